@@ -26,6 +26,7 @@ from workbench.diagnosis.inference.thresholds import Soundness, Thresholds, thre
 from workbench.models.modelica import Library, read_library
 from workbench.system.comparison import RATE
 from workbench.system.installed import system_files
+from workbench.system.reference import reference, tables
 from workbench.system.registry import load_system
 from workbench.system.system import OBSERVER, System
 
@@ -62,7 +63,8 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
-    """Let links that are right in the repository be right in the site; called by MkDocs."""
+    """Put keys where they belong, and let links be right in the site; called by MkDocs."""
+    markdown = with_keys(markdown)
 
     def moved(link: re.Match[str]) -> str:
         target, anchor = link[1], link[2] or ""
@@ -75,6 +77,13 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
         return f"]({name}{anchor})"
 
     return re.sub(r"\]\(((?!https?:|#)[^)#\s]+\.(?:md|py))(#[^)]*)?\)", moved, markdown)
+
+
+def with_keys(markdown: str) -> str:
+    """A page with the keys of tables of a system file in the place of `<!-- keys of CLASS -->`."""
+    known, mark = tables(System), r"<!-- keys of (\w+) -->"
+    apart = [known[name] for name in re.findall(mark, markdown)]
+    return re.sub(mark, lambda place: reference(known[place[1]], apart), markdown)
 
 
 def _tutorials() -> list[Path]:

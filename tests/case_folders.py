@@ -11,8 +11,9 @@ from numpy.testing import assert_allclose
 from workbench.arrays import Vector
 from workbench.errors import InputError
 from workbench.recordings.case import Case, read_case
+from workbench.system.parts import Sampling, Signal
 from workbench.system.registry import load_system
-from workbench.system.system import Sampling, Signal, System
+from workbench.system.system import System
 
 ROUNDING = 1e-14  # some ten roundings of 1.1e-16: text, unit factor, product
 
@@ -110,7 +111,7 @@ def anything_goes(system: System) -> System:
         reference_signals=unknown(system.reference_signals),
         conditions=tuple(replace(condition, agrees=None) for condition in system.conditions),
         redundancies=(),
-        sampling=Sampling(np.inf, np.inf, np.inf),
+        sampling=Sampling(np.inf, (np.inf, np.inf)),
     )
 
 

@@ -17,8 +17,9 @@ import numpy as np
 from workbench.arrays import Matrix, Vector
 from workbench.observers.estimators.block_filter.filter import BlockKalmanFilter
 from workbench.observers.estimators.kalman import ExtendedKalmanFilter
+from workbench.system.parts import EstimatedQuantity
 from workbench.system.registry import load_system, open_model
-from workbench.system.system import OBSERVER, EstimatedQuantity, System
+from workbench.system.system import OBSERVER, System
 
 from .built import build_here
 

@@ -130,6 +130,18 @@ def test_the_reference_has_every_command_name_effect_and_threshold(site: Path) -
     assert Thresholds.__dataclass_fields__["form"].default == 40.0
 
 
+def test_the_page_of_the_system_file_has_every_key_that_is_read(site: Path) -> None:
+    from workbench.system.declaration import key_names
+    from workbench.system.reference import tables
+    from workbench.system.system import System
+
+    page = (site / "system-file.html").read_text()
+    assert "keys of" not in page
+    for table in tables(System).values():
+        for name in key_names(table):
+            assert re.search(rf"<code>([a-zA-Z_]+\.)*{name}</code>", page), (table, name)
+
+
 def test_the_schema_of_case_files_takes_those_that_are_there_and_no_others(site: Path) -> None:
     jsonschema = pytest.importorskip("jsonschema")
     schema = json.loads((site / "schemas" / "wheelset.case.json").read_text())

@@ -21,6 +21,7 @@ from workbench.diagnosis.inference.thresholds import Thresholds
 from workbench.diagnosis.simulation.residual_model import ResidualModel
 from workbench.errors import InputError
 from workbench.studies.power.diagnosing import build_everything, library_effects
+from workbench.system.parts import StateNoise
 from workbench.system.registry import load_system
 from workbench.system.system import System
 
@@ -115,7 +116,7 @@ def test_what_wanders_is_uncertain_by_as_much_as_it_moves_means(tmp_path: Path) 
 def test_a_state_at_the_start_is_no_further_off_than_chance_makes_it(tmp_path: Path) -> None:
     """A casing that is warm already, of which the file says that it is as the room within 1 K."""
     of = block(tmp_path / "block", "")
-    known = replace(of, spreads={"Tc": 1.0})
+    known = replace(of, state_noise=(StateNoise("Tc", walk=None, spread=1.0),))
     warm = recorded(G, 1).iloc[360:].reset_index(drop=True)
     warm["time [s]"] -= warm["time [s]"][0]
     effects, path = library_effects(of), tmp_path / "all.fmu"

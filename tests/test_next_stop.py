@@ -45,6 +45,7 @@ from workbench.system.experiments import (
     STEP,
     Cost,
     Experiments,
+    FurtherSetting,
     Setting,
     VariedInput,
 )
@@ -162,7 +163,7 @@ def test_precision_of_one_unknown_is_its_standard_deviation() -> None:
 
 @pytest.mark.parametrize("kind", [STEP, STAIRCASE, SINE])
 def test_a_demand_stays_in_its_range_and_begins_when_it_says(kind: str) -> None:
-    varied = VariedInput("u", 2.0, 5.0, (kind,), 3.0, 4.0, ())
+    varied = VariedInput("u", (2.0, 5.0), (kind,), 3.0, 4.0, ())
     time = np.arange(0.0, 60.0, 0.1)
     levels = {STEP: (5.0,), STAIRCASE: (2.0, 3.5, 5.0), SINE: (2.0, 5.0)}[kind]
     demand = Profile(varied, kind, levels, 4.0).demand(time)
@@ -174,7 +175,7 @@ def test_a_demand_stays_in_its_range_and_begins_when_it_says(kind: str) -> None:
 
 
 def test_a_lag_is_of_first_order() -> None:
-    varied = VariedInput("u", 0.5, 1.0, (STEP,), 1.0, 4.0, (0.7,))
+    varied = VariedInput("u", (0.5, 1.0), (STEP,), 1.0, 4.0, (0.7,))
     time = np.arange(0.0, 6.0, 0.01)
     expected = np.where(time >= 1.0, 1.0 - np.exp(-(time - 1.0) / 0.7), 0.0)
     # The filter is exact at samples, one of which the demand may come earlier.
@@ -188,13 +189,21 @@ def a_grid(counts: list[int]) -> Experiments:
         f"s{k}": tuple(Setting(float(value), f"{value}") for value in range(count))
         for k, count in enumerate(counts)
     }
-    cost = Cost(Expression("duration", "a test"), "s")
-    return Experiments(60.0, None, settings, {}, {}, (), {}, cost, ())
+    return Experiments(
+        lasts=60.0,
+        ends=None,
+        conditions=settings,
+        further=(),
+        start={},
+        inputs=(),
+        cost=Cost(Expression("duration", "a test"), "s"),
+        sensors=(),
+    )
 
 
 def test_what_is_released_is_so_after_its_time_where_a_machine_allows_it() -> None:
-    varied = VariedInput("u", 2.0, 5.0, (RELEASE,), 3.0, 4.0, ())
-    asked = replace(a_grid([1]), varied=(varied,))
+    varied = VariedInput("u", (2.0, 5.0), (RELEASE,), 3.0, 4.0, ())
+    asked = replace(a_grid([1]), inputs=(varied,))
     (first,) = every_setting(asked)
     (half,), (full,) = (
         other_profile.profiles for other_profile in (first, *other_profiles(asked, first))
@@ -311,9 +320,8 @@ def test_what_is_beside_the_best_of_a_fraction_is_tried_too(
 ) -> None:
     monkeypatch.setattr(candidates, "_GRID", 1)
     assert block.experiments is not None
-    knob = {"knob": (Setting(0.0, "0"), Setting(1.0, "1"))}
-    asked = replace(block.experiments, settings={**block.experiments.settings, **knob})
-    asked = replace(asked, labels={**asked.labels, "knob": "a knob"})
+    knob = FurtherSetting("knob", "a knob", "1", (Setting(0.0, "0"), Setting(1.0, "1")))
+    asked = replace(block.experiments, further=(*block.experiments.further, knob))
     assert len(some_settings(asked)) == 1
     assert undecided.rivals is not None
     found = next_stop(replace(block, experiments=asked), undecided.rivals, ALONE)

@@ -38,8 +38,10 @@ PLANTED = plant(CONSTANT_PADS, ["pressure_exponent=0.04"])
 def one_speed(system: System) -> System:
     """The rig where only the pressure may be varied."""
     assert system.experiments is not None
-    settings = {name: values[:1] for name, values in system.experiments.settings.items()}
-    return replace(system, experiments=replace(system.experiments, settings=settings))
+    asked = system.experiments
+    first = {name: values[:1] for name, values in asked.conditions.items()}
+    further = tuple(replace(setting, values=setting.values[:1]) for setting in asked.further)
+    return replace(system, experiments=replace(asked, conditions=first, further=further))
 
 
 def two_stops(system: System, effects: Effects, folder: Path) -> list[Case]:
@@ -130,8 +132,11 @@ def test_what_no_stop_parts_is_said_and_the_sensor_that_would(
     pytest.importorskip("rumoca", reason="no Modelica compiler")
     asked = one_speed.experiments
     assert asked is not None
-    steps = tuple(replace(one, profiles=("step",)) for one in asked.varied)
-    rig = replace(one_speed, experiments=replace(asked, varied=steps))
+    steps = tuple(
+        replace(given, profiles=("step",)) if given in asked.varied else given
+        for given in asked.inputs
+    )
+    rig = replace(one_speed, experiments=replace(asked, inputs=steps))
     cases = two_stops(rig, plant(CONSTANT_PADS, ["fx_gain=0.02"]), tmp_path / "stops")
     names = ["FxGain", "DriveTorqueGain"]
     found = wb.diagnose(rig, cases, effects=names, out=tmp_path, workers=1, report=lambda _: None)
@@ -222,8 +227,8 @@ def test_what_one_rival_alone_takes_beyond_the_claims_is_proposed_last(
     pytest.importorskip("rumoca", reason="no Modelica compiler")
     asked = system.experiments
     assert asked is not None
-    light = {**asked.settings, "wheel_load": (Setting(60e3, "60 kN"),)}
-    rig = replace(system, experiments=replace(asked, settings=light))
+    light = {**asked.conditions, "wheel_load": (Setting(60e3, "60 kN"),)}
+    rig = replace(system, experiments=replace(asked, conditions=light))
     names = ["CreepStiffness", "WheelLoad"]
     _, rivals, _ = of_two(rig, "creep_stiffness=-0.16", names, tmp_path)
     proposed = next_stop(rig, rivals, ALONE)

@@ -23,8 +23,8 @@ from workbench.observers.observability import (
     prior,
 )
 from workbench.system.expression import Expression
+from workbench.system.parts import OperatingPoint
 from workbench.system.registry import load_system
-from workbench.system.system import OperatingPoint
 
 from .page_rules import check_page
 from .schemas import check

@@ -447,17 +447,17 @@ MISTAKES = {
     ),
     "what is not asked": (
         ('vTrain = "speed"', 'vTrain = "sped"'),
-        r"start vTrain: found 'sped' \(closest: 'speed'\); expected an asked quantity",
+        r"start\] vTrain: found 'sped' \(closest: 'speed'\); expected an asked quantity",
     ),
     "an input without a word": (
         ('mass1 = { is = "mass1" }\n', ""),
-        r"inputs: found no 'mass1'",
+        r"inputs\]: found no 'mass1'",
     ),
     "two spreads": (
         ("share = 0.01  #", "spread = 100.0\nshare = 0.01  #"),
         r"differs\]\] 2: found 'spread' and 'share'; expected one of the two",
     ),
-    "a place": (('at = "end"', 'at = "rest"'), r"at: found 'rest'; expected command or end"),
+    "a place": (('at = "end"', 'at = "rest"'), r"at: found 'rest'; expected one of command, end"),
     "no speed": (
         ("[distance.asked.speed]", "[distance.asked.velocity]"),
         r"expected a table 'speed' in m/s",

@@ -25,7 +25,9 @@ from workbench.observers.simulation import CaseResult, case_figure
 from workbench.pages.figures import LIGHT, CaseFigure, Curve, Panel, save_figure, styled
 from workbench.pages.views import capital, named, per_shown, shown_unit
 from workbench.recordings.case import Case
-from workbench.system.system import Channel, Signal, System
+from workbench.system.comparison import Channel
+from workbench.system.parts import Signal
+from workbench.system.system import System
 from workbench.system.units import BAND, si_factor, with_interval
 
 if TYPE_CHECKING:

@@ -25,8 +25,9 @@ from workbench.observers.replay import replay
 from workbench.observers.run import Ending, Run
 from workbench.observers.score import judged_window
 from workbench.recordings.case import Case
+from workbench.system.parts import OperatingPoint
 from workbench.system.registry import open_model
-from workbench.system.system import OBSERVER, OperatingPoint, System
+from workbench.system.system import OBSERVER, System
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,8 @@ import numpy as np
 from workbench.arrays import Matrix, Vector
 from workbench.models.fmu import FMU
 from workbench.observers.layout import layout
-from workbench.system.system import OperatingPoint, System
+from workbench.system.parts import OperatingPoint
+from workbench.system.system import System
 
 _STEPS = 400  # of implicit Euler, which takes any model to rest
 

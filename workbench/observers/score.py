@@ -9,7 +9,8 @@ from workbench.arrays import Vector
 from workbench.models.native import compiled
 from workbench.observers.run import Ending, Run
 from workbench.recordings.case import Case
-from workbench.system.system import Objective, System
+from workbench.system.parts import Objective
+from workbench.system.system import System
 
 # Two equal poles at a corner are down by 3 dB at this share of it.
 _CORNER = 2 * np.pi / np.sqrt(np.sqrt(2) - 1)

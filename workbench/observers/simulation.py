@@ -33,8 +33,9 @@ from workbench.pages.views import (
 )
 from workbench.recordings.case import Case
 from workbench.runtime.pool import Pool
+from workbench.system.parts import View
 from workbench.system.registry import open_model
-from workbench.system.system import System, View
+from workbench.system.system import System
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -2,7 +2,8 @@
 
 from collections.abc import Sequence
 
-from workbench.system.system import System, Threshold, View
+from workbench.system.parts import Threshold, View
+from workbench.system.system import System
 from workbench.system.units import si_factor
 
 _JUDGED_HEIGHT = 1.8  # the judged signal has room for several curves on top of each other

@@ -20,7 +20,8 @@ from workbench.recordings.channels import (
 from workbench.recordings.csv import read_columns
 from workbench.recordings.formats import is_other_format
 from workbench.recordings.plausibility import Origin, doubts, shown_by
-from workbench.system.system import Condition, System
+from workbench.system.parts import Condition
+from workbench.system.system import System
 from workbench.system.tables import Table, read_table, shown
 from workbench.system.units import quantity, si_factor
 

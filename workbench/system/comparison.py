@@ -1,178 +1,227 @@
 """How recordings of a system are compared with its model: what a diagnosis rests on."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from typing import ClassVar
 
+from workbench.system.declaration import Either, Scope, Unit, declared, key, table_name
 from workbench.system.expression import Expression
-from workbench.system.parts import Threshold
-
-
-@dataclass(frozen=True)
-class Channel:
-    """What the diagnosis compares: a sum of readings, each times a constant.
-
-    Attributes
-    ----------
-    label : what it is, for people.
-    shown : unit in figures of its errors.
-    """
-
-    name: str
-    unit: str
-    label: str
-    shown: str
-    formula: Expression
-
-
-@dataclass(frozen=True)
-class LeadingOutput:
-    """A slow motion that integrates the noise of inputs: a measured output leads it.
-
-    Attributes
-    ----------
-    output : the measured one.
-    together : states that its correction scales alike.
-    ripple : standard deviation of what moves it, over that of the noise of the inputs [1].
-    """
-
-    output: str
-    together: tuple[str, ...]
-    ripple: float
-
-
-@dataclass(frozen=True)
-class Rest:
-    """An input that is measured at rest, before it is applied, against what the model says of it.
-
-    Attributes
-    ----------
-    signal : the input.
-    output : of the model: its reading at rest.
-    zero : standard deviation of a good sensor's zero [unit].
-    """
-
-    signal: str
-    output: str
-    zero: float
-
+from workbench.system.parts import (
+    CONDITION,
+    ENDLESS,
+    FORMULA,
+    OUTPUT,
+    OUTPUT_THAT_IS_A_STATE,
+    PARAMETER,
+    SIGNAL,
+    STATE,
+    VARIABLE,
+    Threshold,
+    unit_of_signal,
+)
 
 RATE = 0.002
 """Sets of a sound machine that may be called something else, unless its system says otherwise: a
 tenth of the 2 % that power allows, since noise of real sensors has heavier tails, and tests on one
 set are several."""
 
+WAYS = ("value", "size", "rate", "integral", "turn")
 
-@dataclass(frozen=True)
+
+def _label(scope: Scope) -> str:
+    """That of the measured signal of this name, else the name."""
+    name: str = scope.own["name"]
+    compared = (*scope.whole["outputs"], *scope.whole["reference_signals"])
+    return next((signal.label for signal in compared if signal.name == name), name)
+
+
+@declared
+class Channel:
+    """What the diagnosis compares: a sum of readings, each times a constant."""
+
+    name: str = table_name()
+    unit: Unit = key("of the formula")
+    label: str = key("what it is, for people", absent=_label, otherwise="the signal's, or the name")
+    shown: Unit = key("unit in figures of its errors", absent="{unit}", like="unit")
+    formula: Expression = key("of measured signals and parameters", name="is", of=FORMULA)
+
+
+def _measured(scope: Scope) -> tuple[Channel, ...]:
+    """What is measured, one by one."""
+    return tuple(
+        Channel(
+            signal.name,
+            signal.unit,
+            signal.label,
+            signal.shown,
+            Expression(signal.name, str(scope.file)),
+        )
+        for signal in (*scope.whole["outputs"], *scope.whole["reference_signals"])
+    )
+
+
+@declared
+class LeadingOutput:
+    """A slow motion that integrates the noise of inputs: a measured output leads it."""
+
+    output: str = key("the measured one", of=OUTPUT)
+    together: tuple[str, ...] = key(
+        "states that its correction scales alike",
+        of=STATE,
+        absent=lambda scope: (scope.own["output"],),
+        otherwise="`output`",
+    )
+    ripple: float = key(
+        "standard deviation of what moves it, over that of the noise of the inputs", absent=1.0
+    )
+
+
+@declared
+class Rest:
+    """An input that is measured at rest, before it is applied, against what the model says."""
+
+    signal: str = key("the input", of=SIGNAL)
+    output: str = key("of the model: its reading at rest", of=VARIABLE)
+    zero: float = key("standard deviation of a good sensor's zero", unit=unit_of_signal)
+
+
+@declared
 class Level:
-    """A parameter that differs by nature from recording to recording, and needs no cause.
+    """A parameter that differs by nature from recording to recording, and needs no cause."""
 
-    Attributes
-    ----------
-    by : condition whose choices have a level each; empty: one for all.
-    spread : relative standard deviation of the common level, infinite: anything.
-    """
-
-    by: str
-    spread: float
+    by: str = key("condition whose choices have a level each", of=CONDITION, absent="")
+    spread: float = key(
+        "relative standard deviation of the common level", absent=ENDLESS, otherwise="any"
+    )
 
 
-@dataclass(frozen=True)
+@declared
 class Wander:
-    """What a parameter differs by along one recording, for each channel by itself.
+    """What a parameter differs by along one recording, for each channel by itself."""
 
-    Attributes
-    ----------
-    share : relative standard deviation.
-    over : [s] correlation time.
-    """
-
-    share: float
-    over: float
+    share: float = key("relative standard deviation")
+    over: float = key("correlation time", "s")
 
 
-@dataclass(frozen=True)
+@declared
 class Exclusion:
-    """When samples do not count.
+    """When samples do not count."""
 
-    Attributes
-    ----------
-    reason : for people.
-    formula : in measured signals and parameters.
-    above, below : a level of its absolute value, infinite for none.
-    from_rest : whether it counts from its median before the input is applied.
-    within : [s] around such samples that do not count either.
-    smoothed : [s] over which the formula is averaged.
-    only_while : and only while a signal is above a level, or None.
-    to_the_end : whether nothing after it counts.
-    restarted : measured outputs, which are states. Such samples do count, if each of their blocks
-        is predicted from these states as measured before it; unless errors last there nevertheless.
-    uncertain : relative standard deviation of parameters of a law that is simplified there.
-    """
+    EITHER: ClassVar = Either(
+        ("above", "below"),
+        expected="one of the two",
+        remedy="say from which level on samples do not count",
+    )
 
-    reason: str
-    formula: Expression
-    above: float
-    below: float
-    from_rest: bool
-    within: float
-    smoothed: float
-    only_while: Threshold | None
-    to_the_end: bool
-    restarted: tuple[str, ...]
-    uncertain: Mapping[str, float]
+    reason: str = key("why, for people")
+    formula: Expression = key("of measured signals and parameters", name="is", of=FORMULA)
+    above: float = key(
+        "level of its absolute value, SI, above which samples do not count",
+        absent=ENDLESS,
+        otherwise="`below` instead",
+    )
+    below: float = key(
+        "level of its absolute value, SI, below which samples do not count",
+        absent=-ENDLESS,
+        otherwise="`above` instead",
+    )
+    from_rest: bool = key("it counts from its median before the input is applied", absent=False)
+    smoothed: float = key("over which it is averaged", "s", 0.0)
+    within: float = key("around such samples that do not count either", "s", 0.0)
+    only_while: Threshold | None = key("it counts", absent=None, otherwise="always")
+    to_the_end: bool = key("nothing after it counts", absent=False)
+    restarted: tuple[str, ...] = key(
+        "measured outputs that are states: each block begins with these as measured, and such "
+        "samples do count, unless errors last there whatever is found",
+        absent=(),
+        of=OUTPUT_THAT_IS_A_STATE,
+    )
+    uncertain: Mapping[str, float] = key(
+        "relative standard deviation of parameters of the law that is simplified there, such as "
+        "`{ mu = 0.04 }`",
+        absent={},
+        keys=PARAMETER,
+    )
 
 
-@dataclass(frozen=True)
+@declared
 class Influence:
-    """What errors may go with.
+    """What errors may go with."""
 
-    Attributes
-    ----------
-    way : of the formula: its "value", "size", "rate", "integral", or "turn", an angle, whose phase
-        belongs to one recording.
-    """
-
-    name: str
-    unit: str
-    formula: Expression
-    way: str
+    name: str = table_name()
+    formula: Expression = key("of measured signals and parameters", name="is", of=FORMULA)
+    unit: Unit = key("of the formula")
+    way: str = key(
+        "what of the formula: an angle, whose phase belongs to one recording, is a `turn`",
+        choices=WAYS,
+        absent="value",
+    )
 
 
-@dataclass(frozen=True)
+_BLOCK, _LASTING = 5, 20  # samples of a block, and blocks of a lasting error, unless said otherwise
+_LEFT = 0.03  # of a detailed model: laws that differ in form agree to some 3 %
+
+
+@declared
 class Comparison:
-    """How the diagnosis compares recordings with the model.
+    """How the diagnosis compares recordings with the model."""
 
-    Attributes
-    ----------
-    block : [s] whose mean errors are the unit of all statistics.
-    lasting : [s] from which on an error is no noise.
-    least : [s] of a recording that must count.
-    settling : [s] at the start, in which the simulation finds its states.
-    left : share of lasting errors that right causes may leave: what the model simplifies [1].
-    false_alarms : share of sets of a sound machine that may be called something else [1].
-    channels : what is compared, in this order.
-    leading : a motion that is led, or None.
-    begins : input that is applied in each recording, and by how much above its rest.
-    rest : readings before that.
-    tolerances : relative standard deviation of parameters from recording to recording.
-    levels : parameters that differ by nature.
-    wander : parameters that differ along a recording.
-    exclusions : samples that do not count.
-    influences : what errors may go with, besides the measured signals.
-    """
-
-    block: float
-    lasting: float
-    least: float
-    settling: float
-    left: float
-    false_alarms: float
-    channels: tuple[Channel, ...]
-    leading: LeadingOutput | None
-    begins: Threshold | None
-    rest: Rest | None
-    tolerances: Mapping[str, float]
-    levels: Mapping[str, Level]
-    wander: Mapping[str, Wander]
-    exclusions: tuple[Exclusion, ...]
-    influences: tuple[Influence, ...]
+    block: float = key(
+        "time whose mean errors are the unit of all statistics; short against all that the machine "
+        "does, of what swings a fifth of a period at most",
+        "s",
+        lambda scope: _BLOCK * scope.whole["sample_time"],
+        otherwise=f"{_BLOCK} samples",
+    )
+    lasting: float = key(
+        "from which on an error is no noise; of what swings, half a period",
+        "s",
+        lambda scope: _LASTING * scope.own["block"],
+        otherwise=f"{_LASTING} blocks",
+    )
+    least: float = key(
+        "of a recording that must count",
+        "s",
+        lambda scope: 2.0 * scope.own["lasting"],
+        otherwise="2 `lasting`",
+    )
+    settling: float = key("at the start, in which the simulation finds its states", "s", 0.0)
+    left: float = key(
+        f"share of lasting errors that right causes may leave: {_LEFT} for a detailed model, more "
+        "for one that simplifies",
+        absent=_LEFT,
+    )
+    false_alarms: float = key(
+        "share of sets of a sound machine that may be called something else; thresholds follow "
+        "from it",
+        absent=RATE,
+        above=0.0,
+        below=1.0,
+        expected="a share between 0 and 1",
+    )
+    begins: Threshold | None = key("input that is applied, by how much above its rest", absent=None)
+    rest: Rest | None = key("readings before that", absent=None)
+    leading: LeadingOutput | None = key(
+        "an output that leads a slow motion, which integrates the noise of inputs",
+        name="leads",
+        absent=None,
+    )
+    channels: tuple[Channel, ...] = key(
+        "what is compared", absent=_measured, otherwise="outputs and reference signals"
+    )
+    tolerances: Mapping[str, float] = key(
+        "relative standard deviation of parameters from recording to recording",
+        absent={},
+        keys=PARAMETER,
+    )
+    levels: Mapping[str, Level] = key(
+        "parameters that differ by nature and are calibrated", absent={}, keys=PARAMETER
+    )
+    wander: Mapping[str, Wander] = key(
+        "parameters that differ along a recording, for each channel by itself",
+        absent={},
+        keys=PARAMETER,
+    )
+    exclusions: tuple[Exclusion, ...] = key("samples that do not count", name="excluded", absent=())
+    influences: tuple[Influence, ...] = key(
+        "what errors may go with, besides the measured signals, for the page", absent=()
+    )

@@ -1,85 +1,211 @@
 """What a system is made of: models, signals, quantities, and what counts."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
+from workbench.errors import InputError
+from workbench.system.declaration import Either, Scope, Unit, declared, key, table_name
 from workbench.system.expression import Expression
+from workbench.system.tables import Table
+
+# What names in a file refer to, as refusals say it; `check.known_names` tells which there are.
+PARAMETER = "a parameter of the model"
+STATE = "a continuous state of the model"
+VARIABLE = "a variable of the model"
+SIGNAL = "a signal of this system"
+FORMULA = "a measured or derived signal, or a parameter of the model"
+OUTPUT = "a measured output of this system"
+OUTPUT_OR_DERIVED = "a measured output, or a derived signal"
+OUTPUT_THAT_IS_A_STATE = "a measured output that is a continuous state of the model"
+SCORED = "a measured output, or a reference signal"
+SHOWN = f"{STATE}, or a measured output"
+CONDITION = "a condition of this system"
+QUANTITY = "an estimated quantity of this system"
+
+ENDLESS = float("inf")
+_ALL = (-ENDLESS, ENDLESS)
+_LIMITS = "the lower limit before the upper one"
+_NOISY = "a standard deviation above 0; only inputs are exactly known"
 
 
-@dataclass(frozen=True)
+def unit_above(scope: Scope, _: str) -> str:
+    """The unit that this table says, or the next one that it is in."""
+    while "unit" not in scope.own:
+        assert scope.above is not None
+        scope = scope.above
+    return scope.own["unit"] or "1"
+
+
+def columns_of(whole: Mapping[str, Any]) -> dict[str, str]:
+    """Columns of an estimate, with units."""
+    estimated = whole["estimated"]
+    return {
+        **{output.name: output.unit for output in whole["outputs"]},
+        **{quantity.correction: quantity.unit for quantity in estimated},
+        **{quantity.name: quantity.unit for quantity in estimated},
+        **whole["reported"],
+    }
+
+
+def units_of(whole: Mapping[str, Any]) -> dict[str, str]:
+    """SI units of all signals: derived ones, columns of estimates, measured ones."""
+    measured = ("inputs", "outputs", "reference_signals", "intermittent")
+    return {
+        **{signal.name: signal.unit for signal in whole["derived"]},
+        **columns_of(whole),
+        **{signal.name: signal.unit for group in measured for signal in whole[group]},
+    }
+
+
+def unit_of_signal(scope: Scope, _: str) -> str | None:
+    """The unit of the signal that the table names, None where there is no such signal."""
+    return units_of(scope.whole).get(scope.own["signal"])
+
+
+def _units(group: str) -> Any:
+    def unit(scope: Scope, name: str) -> str | None:
+        return {part.name: part.unit for part in scope.whole[group]}.get(name)
+
+    return unit
+
+
+def names_of(*groups: str) -> Any:
+    """Names of parts of the system that were read so far."""
+
+    def names(scope: Scope) -> Iterable[str]:
+        return [part.name for group in groups for part in scope.whole[group]]
+
+    return names
+
+
+def _fmu(table: Table, name: str, scope: Scope) -> Path:
+    return (scope.file.parent / table.take(name, str)).resolve()
+
+
+@declared
 class Model:
-    """Modelica class of a role, without its library, and its FMU; None: it is yet to be built."""
+    """Model of a role."""
 
-    name: str
-    path: Path | None
+    name: str = key("Modelica class, without the library's name", name="class")
+    path: Path | None = key(
+        "file beside the system file, FMI 2.0 or 3.0",
+        name="fmu",
+        absent=None,
+        otherwise="compiled from the library",
+        read=_fmu,
+        schema={"type": "string", "minLength": 1},
+    )
 
 
-@dataclass(frozen=True)
+@declared
 class Mode:
-    """A structure between a quantity and the sensor that reads it: one mode of vibration.
+    """A structure between a quantity and the sensor that reads it: one mode of vibration."""
 
-    Attributes
-    ----------
-    frequency : [Hz].
-    damping : ratio [1].
-    late : standard deviation of a delay beyond that of the mode, by filters of an amplifier [s].
-    """
-
-    frequency: float
-    damping: float
-    late: float
+    frequency: float = key("of the mode", "Hz")
+    damping: float = key("ratio")
+    late: float = key(
+        "standard deviation of a delay beyond that of the mode, by filters of an amplifier", "s"
+    )
 
 
-@dataclass(frozen=True)
+@declared
+class RecordedAs:
+    """What recorders have in the place of a signal."""
+
+    formula: Expression = key("of the signal and of parameters", name="is", of=FORMULA)
+    unit: Unit = key("of the formula")
+
+    def check(self, table: Table, scope: Scope) -> None:
+        """Refuse a formula of something else."""
+        assert scope.above is not None
+        name = scope.above.own["name"]
+        if name not in self.formula.names:
+            raise table.wrong("is", f"a formula of {name}")
+
+
+@declared
 class Signal:
-    """A measured signal.
+    """A measured signal, by the name of the model's variable."""
 
-    Attributes
-    ----------
-    name : in recordings and of the model's variable.
-    unit : SI, of the model's variable and of all values.
-    label : what it is, for people.
-    shown : unit in figures.
-    noise, relative_noise : standard deviation of one sample [unit], plus this share of its size;
-        an input without noise is exactly known.
-    relative_error : share of its size by which a filter lets it be wrong, beyond noise [1].
-    scale : typical size [unit].
-    scale_error : share by which its scale may be wrong, which gains must bear [1].
-    reading : output of the model that says what the sensor reads, imperfections included.
-    mode : between the quantity and its sensor, or None.
-    smoothed : [s] windows of a parabola and of a line that take the noise from an input where it
-        allows that, before it drives a model; empty: it is taken as it is.
-    held : whether an input stays as it was sampled until the next sample; else it goes there.
-    resolution : step in which it is read, 0 where that is not known [unit].
-    limits : between which its sensor reads; what reaches them is saturated [unit].
-    plausible, possible : least and largest sample that is likely, and that is possible [unit].
-    called : names that recorders give it, beside its own and its label.
-    recorded_as : what recorders have in its place, a formula of it; None: nothing else.
-    """
-
-    name: str
-    unit: str
-    label: str
-    shown: str
-    noise: float
-    relative_noise: float
-    relative_error: float
-    scale: float
-    scale_error: float
-    reading: str
-    mode: Mode | None
-    smoothed: tuple[float, ...]
-    held: bool
-    resolution: float
-    limits: tuple[float, float]
-    plausible: tuple[float, float]
-    possible: tuple[float, float]
-    called: tuple[str, ...]
-    recorded_as: "DerivedSignal | None"
+    name: str = table_name()
+    unit: Unit = key("of the model's variable")
+    noise: float = key(
+        "standard deviation of one sample; 0 of an input that is exactly known, as a command is",
+        "{unit}",
+        least=0.0,
+        expected=_NOISY,
+    )
+    scale: float = key("typical size", "{unit}", above=0.0, expected="a size above 0")
+    shown: Unit = key("unit in figures", absent="{unit}", like="unit")
+    label: str = key("what it is, for people", absent="{name}")
+    relative_noise: float = key("more noise, as a share of the signal's size", absent=0.0)
+    relative_error: float = key(
+        "share of its size by which filters let it be wrong, beyond noise",
+        absent="{relative_noise}",
+    )
+    scale_error: float = key(
+        "share by which its scale may be wrong, which tuned gains must bear", absent=0.0
+    )
+    reading: str = key(
+        "output of the model that says what the sensor reads, imperfections included",
+        absent="{name}",
+        of=VARIABLE,
+    )
+    mode: Mode | None = key("structure before the sensor", absent=None)
+    smoothed: tuple[float, float] | tuple[()] = key(
+        '`["0.15 s", "2 s"]`: windows of a parabola and of a line that take the noise from an '
+        "input where it allows that, before it drives a simulation",
+        "s",
+        (),
+    )
+    held: bool = key(
+        "an input stays as sampled until the next sample, in simulations and in every estimator; "
+        "else it goes there in a straight line, which takes 4 % from a swing of nine samples a "
+        "period",
+        absent=False,
+    )
+    resolution: float = key(
+        "step in which it is read: it may repeat itself, and rests up to half a step off",
+        "{unit}",
+        0.0,
+        otherwise="unknown",
+    )
+    limits: tuple[float, float] = key(
+        '`["0 V", "10 V"]`: samples at these limits of the sensor do not count',
+        "{unit}",
+        name="saturates",
+        otherwise="never",
+        absent=_ALL,
+        ordered=True,
+        expected=_LIMITS,
+    )
+    plausible: tuple[float, float] = key(
+        '`["-1 bar", "20 bar"]`: recordings with samples beyond it are warned of',
+        "{unit}",
+        otherwise="all",
+        absent=_ALL,
+        ordered=True,
+        expected=_LIMITS,
+    )
+    possible: tuple[float, float] = key(
+        "recordings with samples beyond it are refused",
+        "{unit}",
+        otherwise="all",
+        absent=_ALL,
+        ordered=True,
+        expected=_LIMITS,
+    )
+    called: tuple[str, ...] = key(
+        '`["Bremsdruck", "pC"]`: names that recorders give it, beside its own and its label; see '
+        "[import](import.md)",
+        absent=(),
+    )
+    recorded_as: RecordedAs | None = key(
+        "what recorders have in its place, a formula of it alone and of parameters", absent=None
+    )
 
     def deviation(self, values: Any) -> Any:
         """Standard deviation of samples of these values [unit]."""
@@ -96,313 +222,473 @@ class Signal:
         return self.noise + self.relative_noise * self.scale
 
 
-@dataclass(frozen=True)
+def refuse_without_noise(
+    signals: tuple[Signal, ...], table: Table, name: str, scope: Scope
+) -> None:
+    """Refuse what corrects estimates, or scores them, and is exactly known."""
+    for signal in signals:
+        if signal.noise == 0.0:
+            raise table.table(name).table(signal.name).wrong("noise", _NOISY)
+
+
+@declared
 class DerivedSignal:
-    """A signal made of measured ones and of parameters.
+    """A signal made of measured ones and of parameters."""
 
-    Attributes
-    ----------
-    formula : in SI units.
-    """
-
-    name: str
-    unit: str
-    label: str
-    formula: Expression
+    name: str = table_name()
+    formula: Expression = key("formula, in SI units, of signals before it", name="is")
+    unit: Unit = key("of the formula")
+    label: str = key("what it is, for people", absent="{name}")
 
 
-@dataclass(frozen=True)
+@declared
+class FrictionPower:
+    """A power of friction that wears something [W]."""
+
+    name: str = table_name()
+    formula: Expression = key(
+        "formula of measured signals, parameters and estimated quantities [W]",
+        name="is",
+        of=FORMULA,
+    )
+    label: str = key("what it wears, for people", absent="{name}")
+
+
+def _reach(scope: Scope) -> float:
+    """Standard deviation of what is anywhere in the range."""
+    low, high = scope.own["range"]
+    return float((high - low) / np.sqrt(12.0))
+
+
+@declared
 class EstimatedQuantity:
-    """A quantity that observers estimate: a parameter of the model, which an input corrects.
+    """A parameter of the model that observers estimate."""
 
-    Attributes
-    ----------
-    name : of the parameter.
-    correction : of the input that is added to it.
-    label : what it is, for people.
-    unit : SI.
-    low, high : range that estimates are kept in [unit].
-    prior : range before a measurement, of which any value is as likely [unit].
-    walk : how fast it may move, random walk [unit/sqrt(s)].
-    start : where filters begin, NaN: at its nominal value [unit].
-    spread : standard deviation of what is known of it at the start [unit].
-    relative_error : share of it by which the model lets an estimate be wrong [1].
-    scatter : standard deviation from recording to recording, of a sound machine [unit].
-    memory : time in which a deviation is forgotten [s].
-    useful : standard deviation from which on an estimate serves [unit].
-    acts_on : state whose rate shows its effect, or output that shows it at once; a correction is in
-        proportion to that. Empty: none.
-    claimed : conditions in which it may be claimed, by name; elsewhere it stands in for something
-        that the model has not.
-    watched : whether it is a quantity of the machine, which is followed over its recordings; else
-        of a recording, which tells it only together with what is known before.
-    """
+    name: str = table_name()
+    unit: Unit = key("of the parameter", absent="1")
+    correction: str = key("input of the model that is added to the parameter")
+    range: tuple[float, float] = key("in which estimates are kept", "{unit}", ordered=True)
+    walk: float = key(
+        "how far it may move in a second (random walk, per square root of a second)", "{unit}"
+    )
+    label: str = key("what it is, for people", absent="{name}")
+    prior: tuple[float, float] = key(
+        "between which any value is as likely before a measurement", "{unit}", "{range}"
+    )
+    start: float = key("where filters begin", "{unit}", float("nan"), otherwise="nominal")
+    spread: float = key(
+        "standard deviation of what is known of it at the start",
+        "{unit}",
+        _reach,
+        otherwise="that of the range, uniform",
+    )
+    relative_error: float = key(
+        "share of it by which the model lets an estimate be wrong; part of its band", absent=0.0
+    )
+    scatter: float = key(
+        "standard deviation from one recording to the next, of a sound machine; see "
+        "[monitoring](monitor.md)",
+        "{unit}",
+        0.0,
+    )
+    memory: float = key(
+        "time in which a deviation is forgotten", "s", ENDLESS, otherwise="for ever"
+    )
+    useful: float = key(
+        "standard deviation from which on an estimate serves; where it is claimed by a rule, this "
+        "must be met for `(useful/walk)^2` seconds",
+        "{unit}",
+        lambda scope: 0.1 * _reach(scope),
+        otherwise="a tenth of the range's spread",
+    )
+    acts_on: str = key(
+        "state whose rate shows its effect, or output that shows it at once; a correction is in "
+        "proportion to that",
+        absent="",
+        of=SHOWN,
+    )
+    claimed: Mapping[str, str] = key(
+        'conditions in which it may be claimed, `{ surface = "dry" }`; elsewhere it stands in for '
+        "something that the model has not",
+        absent={},
+        otherwise="always",
+        keys=CONDITION,
+    )
+    watched: bool = key(
+        "false: it is of a recording, which tells it only together with what is known before; "
+        "[monitoring](monitor.md) leaves it out",
+        absent=True,
+    )
 
-    name: str
-    correction: str
-    label: str
-    unit: str
-    low: float
-    high: float
-    prior: tuple[float, float]
-    walk: float
-    start: float
-    spread: float
-    relative_error: float
-    scatter: float
-    memory: float
-    useful: float
-    acts_on: str
-    claimed: Mapping[str, str]
-    watched: bool
+    @property
+    def low(self) -> float:
+        """Least estimate [unit]."""
+        return self.range[0]
+
+    @property
+    def high(self) -> float:
+        """Largest estimate [unit]."""
+        return self.range[1]
 
 
-@dataclass(frozen=True)
+@declared
+class StateNoise:
+    """What is known of a state of the model, in its unit."""
+
+    name: str = table_name()
+    walk: float | None = key(
+        "how far it moves in a second beyond what the model says",
+        unit=lambda scope, _: unit_in_model(scope, scope.own["name"]),
+        absent=None,
+        otherwise="2e-4 of its nominal value",
+    )
+    spread: float | None = key(
+        "standard deviation at the start, where no output shows it",
+        unit=lambda scope, _: unit_in_model(scope, scope.own["name"]),
+        absent=None,
+        otherwise="`walk`",
+    )
+
+
+def unit_in_model(scope: Scope, name: str) -> str:
+    """Unit of a variable of the model; 1 where it has none, or does not say it."""
+    return (scope.units or {}).get(name, "1")
+
+
+@declared
 class Threshold:
-    """Where a signal is above or below a level, in absolute value [its unit]."""
+    """A signal, and the level above which something holds, in absolute value."""
 
-    signal: str
-    level: float
+    signal: str = key("measured or derived", of=SIGNAL)
+    level: float = key("level of its size", name="above", unit=unit_of_signal)
 
 
-@dataclass(frozen=True)
+@declared
+class BelowThreshold(Threshold):
+    """A signal, and the level below which something holds, in absolute value."""
+
+    level: float = key("level of its size", name="below", unit=unit_of_signal)
+
+
+@declared
 class Tolerance:
-    """By how much two values that tell the same may differ.
+    """By how much two values that tell the same may differ."""
 
-    Attributes
-    ----------
-    likely, possible : largest difference that is likely, and that is possible, as a share of the
-        larger of the two [1].
-    slack : difference that means nothing, and size of both below which they are not compared.
-    """
+    within: tuple[float, float] = key(
+        "`[0.05, 0.3]`: largest difference that is likely, and that is possible, as a share of the "
+        "larger one, in the median of all samples; two values differ by 2 at most, which is never "
+        "refused",
+        least=0.0,
+        ordered=True,
+        equal=True,
+        expected="the largest likely share before the largest possible one",
+    )
+    slack: float = key(
+        "difference that means nothing, and size of both below which they are not compared",
+        unit_above,
+        0.0,
+    )
 
-    likely: float
-    possible: float
-    slack: float
+    @property
+    def likely(self) -> float:
+        """Largest share that is likely [1]."""
+        return self.within[0]
+
+    @property
+    def possible(self) -> float:
+        """Largest share that is possible [1]."""
+        return self.within[1]
 
 
-@dataclass(frozen=True)
+@declared
 class RecordingSplit:
-    """Which parts of a long recording are recordings of their own.
+    """Which parts of a long recording are recordings of their own."""
 
-    Attributes
-    ----------
-    begins : where a signal rises above a level, while the other is above its own.
-    ends : where the other falls below its level.
-    released : time for which the first may be below its level before the part is given up [s].
-    before, after : time that is kept around a part [s].
-    """
-
-    begins: Threshold
-    ends: Threshold
-    released: float
-    before: float
-    after: float
+    begins: Threshold = key("a part begins where the size of a signal rises above a level")
+    ends: BelowThreshold = key("and ends where that of another falls below one, which it was above")
+    released: float = key(
+        "for which the first may be below its level within a part; longer, and the part is "
+        "left out",
+        "s",
+        0.0,
+    )
+    before: float = key("time that is kept before a part", "s", 0.0)
+    after: float = key("time that is kept after a part", "s", 0.0)
 
 
-@dataclass(frozen=True)
+@declared
 class Store:
-    """What a flow in and a flow out differ by is stored.
+    """What a flow in and a flow out differ by is stored."""
 
-    Attributes
-    ----------
-    formula : what is stored [unit of the flows times s].
-    over : time over which the flows are averaged [s].
-    """
+    formula: Expression = key(
+        "of a balance: what the difference of both is stored in [`unit` times s], such as "
+        '`"JR*omegaR"`',
+        name="stores",
+        of=FORMULA,
+    )
+    over: float = key("of a balance: time over which both are averaged", "s", above=0.0)
 
-    formula: Expression
-    over: float
 
-
-@dataclass(frozen=True)
+@declared
 class Redundancy:
-    """Two formulas of measured signals that agree while a third signal is small, or is large.
+    """Two formulas of measured signals that agree while a third signal is small, or is large."""
 
-    Attributes
-    ----------
-    reason : why they agree, for people.
-    unit : of both.
-    store : what their difference is stored in; None: they agree in each sample.
-    while_below, while_above : the signal and its level; None: always.
-    """
+    reason: str = key("why they agree, for people")
+    formula: Expression = key(
+        'formula of measured signals, such as `"rW*omegaW"`', name="is", of=FORMULA
+    )
+    other: Expression = key('what it equals, such as `"rR*omegaR"`', name="equals", of=FORMULA)
+    unit: Unit = key("of both")
+    tolerance: Tolerance = key(inline=True)
+    store: Store | None = key(inline=True, absent=None)
+    only_while: BelowThreshold | Threshold | None = key(
+        "they are compared", absent=None, otherwise="always"
+    )
 
-    reason: str
-    formula: Expression
-    other: Expression
-    unit: str
-    tolerance: Tolerance
-    store: Store | None
-    while_below: Threshold | None
-    while_above: Threshold | None
+    @property
+    def while_below(self) -> Threshold | None:
+        """Signal that must be below a level, if one must be."""
+        return self.only_while if isinstance(self.only_while, BelowThreshold) else None
+
+    @property
+    def while_above(self) -> Threshold | None:
+        """Signal that must be above a level, if one must be."""
+        return None if isinstance(self.only_while, BelowThreshold) else self.only_while
 
 
-@dataclass(frozen=True)
+@declared
 class Sampling:
-    """Times between samples [s]; infinite where nothing is known of them.
+    """Times between samples [s]."""
 
-    Attributes
-    ----------
-    slowest : up to which estimates are what they are at usual rates.
-    gap, largest_gap : longest that is likely, and that is possible, in one recording.
-    """
+    slowest: float = key(
+        "time between two samples up to which estimates are what they are at usual rates; a "
+        "recording with longer ones is warned of",
+        "s",
+        ENDLESS,
+        otherwise="any",
+    )
+    gaps: tuple[float, float] = key(
+        '`["0.1 s", "2 s"]`: longest time without a sample that is likely, and that is possible in '
+        "one recording",
+        "s",
+        (ENDLESS, ENDLESS),
+        otherwise="any",
+        ordered=True,
+        equal=True,
+        expected="the longest likely time before the longest possible one",
+    )
 
-    slowest: float
-    gap: float
-    largest_gap: float
+    @property
+    def gap(self) -> float:
+        """Longest time without a sample that is likely [s]."""
+        return self.gaps[0]
+
+    @property
+    def largest_gap(self) -> float:
+        """Longest time without a sample that is possible [s]."""
+        return self.gaps[1]
 
 
-@dataclass(frozen=True)
+@declared
 class FeedbackFading:
-    """Feedback fades out where a signal is small against `half`, at which half is left [unit]."""
+    """Feedback fades out where a signal is small."""
 
-    signal: str
-    half: float
+    signal: str = key("a sum of outputs", of=OUTPUT_OR_DERIVED)
+    half: float = key("its size at which half of the feedback is left", unit=unit_of_signal)
 
 
-@dataclass(frozen=True)
+@declared
 class RollingStates:
-    """Two states in a fixed ratio while an output is zero, which saturates: one follows the other.
+    """Two states in a fixed ratio while an output is zero, which saturates."""
 
-    Attributes
-    ----------
-    follower, leader : states.
-    zero : output of the model that is zero while the follower rolls along.
-    """
-
-    follower: str
-    leader: str
-    zero: str
+    follower: str = key("state that follows the other", of=STATE)
+    leader: str = key("state that it follows", of=STATE)
+    zero: str = key("output of the model that is zero while the follower rolls along", of=VARIABLE)
 
 
-@dataclass(frozen=True)
+@declared
 class OperatingPoint:
-    """Where a model is linearised: inputs given, some states held, all others at rest.
+    """Where a model is linearised: inputs given, some states held, all others at rest."""
 
-    Attributes
-    ----------
-    inputs : by name [SI]; others are zero.
-    held : formulas of states, in parameters of the model.
-    quantities : estimated quantities that are not nominal, by name.
-    """
+    inputs: Mapping[str, float] = key(
+        "of the model; others are zero", unit=_units("inputs"), keys=names_of("inputs"), absent={}
+    )
+    held: Mapping[str, Expression] = key(
+        "formulas of states, in parameters of the model; all others are at rest",
+        keys=STATE,
+        of=PARAMETER,
+        absent={},
+    )
+    quantities: Mapping[str, float] = key(
+        "estimated ones that are not nominal",
+        unit=_units("estimated"),
+        keys=names_of("estimated"),
+        absent={},
+    )
 
-    inputs: Mapping[str, float]
-    held: Mapping[str, Expression]
-    quantities: Mapping[str, float]
+
+AT_REST = OperatingPoint({}, {}, {})
 
 
-@dataclass(frozen=True)
+@declared
 class Objective:
-    """By what estimators are judged and tuned.
+    """By what estimators are scored and tuned."""
 
-    Attributes
-    ----------
-    signal : whose error counts.
-    weights : of the mean absolute deviation by signal [1/unit].
-    bandwidth : below which deviations count [Hz].
-    begins, ends : of the time that is judged: from the first sample above to the last one above.
-    when : what that time is, for people.
-    """
+    signal: str = key(
+        "signal whose error counts",
+        name="judged",
+        aliases=("signal",),
+        of=SCORED,
+        absent=lambda scope: (*scope.whole["reference_signals"], *scope.whole["outputs"])[0].name,
+        otherwise="first reference signal, else the first output",
+    )
+    weights: Mapping[str, float] = key(
+        "of mean absolute deviations, per unit",
+        keys=names_of("outputs", "reference_signals"),
+        absent=lambda scope: {
+            signal.name: 1.0 / signal.scale
+            for signal in (*scope.whole["outputs"], *scope.whole["reference_signals"])
+        },
+        otherwise="1 over `scale` of each",
+    )
+    bandwidth: float = key("below which deviations count", "Hz", ENDLESS, otherwise="all")
+    begins: Threshold | None = key(
+        "of the time that is scored: from the first sample above", absent=None, otherwise="at once"
+    )
+    ends: Threshold | None = key(
+        "of that time: to the last sample above", absent=None, otherwise="at the end"
+    )
+    when: str = key("what that time is, for people", absent="")
 
-    signal: str
-    weights: Mapping[str, float]
-    bandwidth: float
-    begins: Threshold | None
-    ends: Threshold | None
-    when: str
 
-
-@dataclass(frozen=True)
+@declared
 class StepTracking:
     """What tuned gains must do: find a step of a quantity within a time, but for a share."""
 
-    quantity: str
-    within: float
-    left: float
+    quantity: str = key("that steps", of=QUANTITY)
+    within: float = key("time in which it must be found", "s")
+    left: float = key("share of the step that may be left")
 
 
-@dataclass(frozen=True)
+@declared
 class View:
-    """What one panel of a figure shows: measured or estimated signals on one axis.
+    """What one panel of a figure shows: measured or estimated signals on one axis."""
 
-    Attributes
-    ----------
-    title, note : before and after the unit.
-    low, high : of the axis in the shown unit; None: what the signals need.
-    """
-
-    title: str
-    note: str
-    signals: tuple[str, ...]
-    height: float
-    low: float | None
-    high: float | None
+    title: str = key("before the unit")
+    note: str = key("after the unit", absent="")
+    signals: tuple[str, ...] = key("on one axis, measured or estimated", absent=(), of=SIGNAL)
+    height: float = key("relative", absent=1.0)
+    low: float | None = key(
+        "of the axis, in the shown unit", absent=None, otherwise="what the signals need"
+    )
+    high: float | None = key(
+        "of the axis, in the shown unit", absent=None, otherwise="what the signals need"
+    )
 
 
-@dataclass(frozen=True)
+@declared
 class Export:
-    """Estimators that the library has as Modelica classes, for FMUs that run without Python.
+    """Estimators that the library has as Modelica classes, for FMUs that run without Python."""
 
-    Attributes
-    ----------
-    classes : by estimator, without the library's name.
-    start : of the reference model, beside which a package sets them.
-    """
-
-    classes: Mapping[str, str]
-    start: OperatingPoint
+    classes: Mapping[str, str] = key(
+        "by estimator, without the library's name; all others become FMUs by their laws", absent={}
+    )
+    start: OperatingPoint = key(
+        "at which a package starts the reference model", absent=AT_REST, otherwise="at rest"
+    )
 
 
 FIRST, LARGEST = "first", "largest"  # of the values along a recording
 
 
-@dataclass(frozen=True)
+@declared
 class Agreement:
-    """What a recording says of a condition.
+    """What a recording says of a condition."""
 
-    Attributes
-    ----------
-    formula : of measured signals, in the unit of the condition.
-    place : FIRST or LARGEST, which of its values tells the condition.
-    """
+    formula: Expression = key(
+        "of measured signals, in the unit of the condition", name="is", of=FORMULA
+    )
+    place: str = key(
+        "which of its values along the recording shows the condition",
+        name="at",
+        choices=(FIRST, LARGEST),
+        absent=FIRST,
+    )
+    tolerance: Tolerance = key(inline=True)
 
-    formula: Expression
-    place: str
-    tolerance: Tolerance
 
-
-@dataclass(frozen=True)
+@declared
 class Condition:
-    """What was set before a recording, and what it means.
+    """What was set before a recording, and what it means."""
 
-    Attributes
-    ----------
-    unit : SI of a quantity; empty for a word or a whole number.
-    least : smallest quantity; `exclusive`: above it.
-    choices : words or whole numbers that it may be.
-    count : of entries, where it is a list; 0: no list.
-    sets : parameter of the model that a quantity is, and that is as usual where nobody says;
-        empty: none.
-    parameters : of the model by choice, which it sets.
-    told : whether estimators are told what it sets.
-    lasts : mean time until another choice takes its place, under way; infinite: never [s].
-    sign : whether it is the sign of the recording's signals.
-    label : for people.
-    agrees : what the recording says of it, or None.
-    """
+    EITHER: ClassVar = Either(
+        ("unit", "choices"),
+        expected="either the unit of a quantity, or the choices",
+        remedy='write unit = "m/s", or choices = ["new", "worn"]',
+    )
 
-    name: str
-    label: str
-    unit: str
-    least: float
-    exclusive: bool
-    choices: tuple[str | int, ...]
-    count: int
-    sets: str
-    parameters: Mapping[str, Mapping[str, float]]
-    told: bool
-    lasts: float
-    sign: bool
-    agrees: Agreement | None
+    name: str = table_name()
+    label: str = key("what it is, for people", absent="{name}")
+    unit: Unit = key("of a quantity", absent="")
+    smallest: float = key(
+        "smallest quantity, in that unit", name="least", absent=-ENDLESS, otherwise="none"
+    )
+    above: float = key("what it must be above", absent=-ENDLESS, otherwise="none")
+    choices: tuple[str | int, ...] = key("words or whole numbers", absent=())
+    count: int = key("number of entries, where it is a list", absent=0, otherwise="no list")
+    sets: str = key(
+        "parameter of the model that a quantity is, such as a load; nobody needs to say it: it is "
+        "then as in the model",
+        absent="",
+        of=PARAMETER,
+    )
+    parameters: Mapping[str, Mapping[str, float]] = key(
+        "of the model, that a choice means: `wet = { mu = 0.28 }`, SI; `imm` has a filter for each",
+        absent={},
+        keys=PARAMETER,
+    )
+    told: bool = key(
+        "true: estimators whose model has these parameters run with what was said, but for `imm`, "
+        "which finds out; quantities that are estimated start there",
+        absent=False,
+    )
+    lasts: float = key(
+        "mean time until another choice takes its place under way",
+        "s",
+        ENDLESS,
+        otherwise="for ever",
+        above=0.0,
+    )
+    sign: bool = key("whether it is the sign of the recording's signals", absent=False)
+    agrees: Agreement | None = key("what the recording says of it", absent=None)
+
+    def check(self, table: Table, scope: Scope) -> None:
+        """Refuse what does not go together."""
+        if not self.unit and not self.choices:
+            raise table.wrong("choices", "one choice or more")
+        if self.choices and "sets" in table:
+            raise table.wrong("sets", "[conditions.NAME.parameters], where there are choices")
+        for choice in self.parameters:
+            if choice not in map(str, self.choices):
+                expected = f"one of {', '.join(map(str, self.choices))}"
+                raise table.table("parameters").wrong(choice, expected)
+        if self.agrees and (self.count or any(isinstance(c, str) for c in self.choices)):
+            raise InputError(
+                where=table.where,
+                found="'agrees' of words, or of a list",
+                expected="a quantity, or choices that are whole numbers",
+                remedy="remove 'agrees'",
+            )
+
+    @property
+    def exclusive(self) -> bool:
+        """Whether it must be above its least."""
+        return self.above > -ENDLESS
+
+    @property
+    def least(self) -> float:
+        """Smallest quantity, or what it must be above [unit]."""
+        return self.above if self.exclusive else self.smallest
 
     def means(self, said: object) -> Mapping[str, float]:
         """Parameters of the model that it sets where it is this, SI; none where nobody knows."""

@@ -1,138 +1,184 @@
 """How a machine comes to rest: what a stop is asked for, what drives it, what standards say."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from typing import ClassVar
 
 from workbench.system.comparison import Exclusion
+from workbench.system.declaration import Either, Scope, Unit, declared, key, table_name
 from workbench.system.expression import Expression
+from workbench.system.parts import FORMULA, STATE, names_of
+from workbench.system.tables import Table
+from workbench.system.units import quantity
 
 COMMAND, END = "command", "end"  # where a recording tells what was asked of it
 SPEED = "speed"  # the quantity that every stop is asked for: that at the command [m/s]
 
+# What names refer to, see `parts`.
+ASKED = "an asked quantity"
+MOVED = "an input, or a continuous state"
+RISING = "an input that rises"
+OUTSIDE = "a measured output, or a parameter"
 
-@dataclass(frozen=True)
+
+@declared
 class AskedQuantity:
-    """A quantity that a stop is asked for.
+    """A quantity that a stop is asked for."""
 
-    Attributes
-    ----------
-    formula : of measured signals, that tells it of a recorded stop.
-    place : of the recording: COMMAND or END of the rise.
-    usual : unless it is said, SI.
-    """
+    name: str = table_name()
+    label: str = key("what it is, for people", absent="{name}")
+    unit: Unit = key("of the quantity")
+    shown: Unit = key("unit in figures", absent="{unit}", like="unit")
+    formula: Expression = key(
+        "of measured signals, that tells it of a recorded stop", name="is", of=FORMULA
+    )
+    place: str = key(
+        "where a recorded stop tells it: at its `command`, or at its `end`, when all has risen",
+        name="at",
+        choices=(COMMAND, END),
+        absent=COMMAND,
+    )
+    usual: float = key("unless it is said", "{unit}")
 
-    name: str
-    label: str
-    unit: str
-    shown: str
-    formula: Expression
-    place: str
-    usual: float
 
-
-@dataclass(frozen=True)
+@declared
 class DrivenInput:
-    """An input of the model in a stop.
+    """An input of the model in a stop."""
 
-    Attributes
-    ----------
-    formula : of asked quantities: where it goes.
-    delay, lag : [s] after the command, then of first order.
-    along : whether a recorded stop has it by the place, as the way has it.
-    """
+    name: str = table_name()
+    formula: Expression = key("of asked quantities: where it goes", name="is", of=ASKED)
+    delay: float = key("after the command", "s", 0.0)
+    lag: float = key("of first order, then", "s", 0.0)
+    along: bool = key("a recorded stop has it by the place, as the way has it", absent=False)
 
-    name: str
-    formula: Expression
-    delay: float
-    lag: float
-    along: bool
+    @property
+    def rises(self) -> bool:
+        """Whether it takes time to be where it goes."""
+        return self.delay + self.lag > 0.0
 
 
-@dataclass(frozen=True)
+@declared
 class Difference:
-    """What differs from stop to stop, beside the tolerances of the diagnosis.
+    """What differs from stop to stop, beside the tolerances of the diagnosis."""
 
-    Attributes
-    ----------
-    of : states at the command, or inputs, which it moves together.
-    spread : standard deviation, in their unit, or a share of their size.
-    relative : whether it is a share.
-    """
+    EITHER: ClassVar = Either(
+        ("spread", "share"),
+        expected="one of the two",
+        remedy="say how far it moves, in its unit or as a share of its size",
+    )
 
-    of: tuple[str, ...]
-    spread: float
-    relative: bool
+    of: tuple[str, ...] = key("inputs, or states at the command, which it moves together", of=MOVED)
+    unit: Unit = key("of the spread", absent="1")
+    absolute: float | None = key(
+        "standard deviation", "{unit}", None, name="spread", otherwise="`share` instead"
+    )
+    share: float | None = key(
+        "standard deviation, as a share of their size", absent=None, otherwise="`spread` instead"
+    )
+
+    @property
+    def relative(self) -> bool:
+        """Whether its spread is a share."""
+        return self.share is not None
+
+    @property
+    def spread(self) -> float:
+        """Standard deviation, in their unit, or as a share of their size."""
+        spread = self.absolute if self.share is None else self.share
+        assert spread is not None
+        return spread
 
 
-@dataclass(frozen=True)
+@declared
+class Outside(Exclusion):
+    """When a stop is beyond what the model claims."""
+
+    formula: Expression = key("of measured outputs and parameters", name="is", of=OUTSIDE)
+
+
+@declared
 class Nominal:
-    """Formulas of asked quantities that standards correct measured distances by.
+    """Formulas of asked quantities that standards correct measured distances by."""
 
-    Attributes
-    ----------
-    mass : that is weighed [kg].
-    rotating : mass that what turns adds [kg].
-    reference : nominal mass [kg].
-    resistance : along a recording, of gradients and curves, over weight.
-    within : share of the nominal speed by which a measured one may differ.
-    speeds : nominal ones [m/s].
-    """
-
-    mass: Expression
-    rotating: Expression
-    reference: float
-    resistance: Expression
-    within: float
-    speeds: tuple[float, ...]
+    mass: Expression = key("formula of what is asked: mass that is weighed [kg]", of=ASKED)
+    rotating: Expression = key("mass that what turns adds [kg], of parameters", of=FORMULA)
+    reference: float = key("nominal mass", "kg")
+    resistance: Expression = key(
+        "along a recording, of gradients and curves, over weight", of=FORMULA
+    )
+    within: float = key("share of the nominal speed by which a measured one may differ")
+    speeds: tuple[float, ...] = key("nominal ones", "m/s")
 
 
-@dataclass(frozen=True)
+def _constants(table: Table, name: str, scope: Scope) -> dict[float, tuple[float, ...]]:
+    """Two constants by speed [m/s]."""
+    constants = table.table(name)
+    return {
+        quantity(speed, "m/s", constants.place(speed)): constants.numbers(speed, "1", 2)
+        for speed in constants.content
+    }
+
+
+@declared
 class Rating:
-    """A percentage that stands for a distance: C/s - D, with constants by nominal speed.
+    """A percentage that stands for a distance: C/s - D, with constants by nominal speed."""
 
-    Attributes
-    ----------
-    constants : C [m] and D by speed [m/s].
-    """
+    label: str = key("what it is, for people")
+    constants: Mapping[float, tuple[float, float]] = key(
+        '`{ "120 km/h" = [C, D] }`, of a percentage C/s - D, s in m',
+        read=_constants,
+        schema={
+            "type": "object",
+            "additionalProperties": {
+                "type": "array",
+                "items": {"type": "number"},
+                "minItems": 2,
+                "maxItems": 2,
+            },
+        },
+    )
 
-    label: str
-    constants: Mapping[float, tuple[float, float]]
 
-
-@dataclass(frozen=True)
+@declared
 class Stopping:
-    """How a machine stops.
+    """How a machine stops."""
 
-    Attributes
-    ----------
-    speed : formula of measured signals: the speed over ground [m/s].
-    state : of the model, whose integral is the way.
-    rest : [m/s] below which a constant rate leads to rest.
-    longest : [s] that a stop may last.
-    timed_by : input that tells when the command of a recording was given.
-    asked : what a stop is asked for.
-    driven : inputs.
-    start : formulas of states at the command, of asked quantities.
-    differences : beside tolerances.
-    outside : when a stop is beyond what the model claims.
-    nominal, rating : of standards, or None.
-    """
+    speed: Expression = key("formula of measured signals: the speed over ground [m/s]", of=FORMULA)
+    state: str = key("of the model, whose integral is the way [m/s]", of=STATE)
+    rest: float = key("speed below which a constant rate leads to rest", "m/s")
+    longest: float = key("that a stop may last", "s")
+    timed_by: str = key(
+        "input with `delay` or `lag` that tells when the command of a recording was given",
+        of=RISING,
+    )
+    asked: tuple[AskedQuantity, ...] = key(
+        f"what a stop is asked for; `{SPEED}` must be one", schema={"required": [SPEED]}
+    )
+    driven: tuple[DrivenInput, ...] = key(
+        "each input of the model", name="inputs", keys=names_of("inputs"), every=True
+    )
+    start: Mapping[str, Expression] = key(
+        "formulas of states at the command, of what is asked",
+        keys=STATE,
+        of=ASKED,
+        absent={},
+        otherwise="nominal",
+    )
+    differences: tuple[Difference, ...] = key(
+        "what differs from stop to stop beside `tolerances`, one sigma", name="differs", absent=()
+    )
+    outside: tuple[Outside, ...] = key(
+        "when the model claims no stop, as `diagnosis.excluded`", absent=(), otherwise="never"
+    )
+    nominal: Nominal | None = key("how standards correct measured distances", absent=None)
+    rating: Rating | None = key("percentage that stands for a distance", absent=None)
 
-    speed: Expression
-    state: str
-    rest: float
-    longest: float
-    timed_by: str
-    asked: tuple[AskedQuantity, ...]
-    driven: tuple[DrivenInput, ...]
-    start: Mapping[str, Expression]
-    differences: tuple[Difference, ...]
-    outside: tuple[Exclusion, ...]
-    nominal: Nominal | None
-    rating: Rating | None
+    def check(self, table: Table, scope: Scope) -> None:
+        """Refuse stops that are not asked for a speed."""
+        if {quantity.name: quantity.unit for quantity in self.asked}.get(SPEED) != "m/s":
+            raise table.wrong("asked", f"a table '{SPEED}' in m/s among what is asked for")
 
     @property
     def response(self) -> float:
         """Mean time from the command to an equivalent step of what rises [s]."""
-        rising = [one.delay + one.lag for one in self.driven if one.delay + one.lag > 0.0]
+        rising = [driven.delay + driven.lag for driven in self.driven if driven.rises]
         return sum(rising) / len(rising) if rising else 0.0

@@ -3,9 +3,8 @@
 It is read from one file, `system.toml`, beside its Modelica library; see `system_file`.
 """
 
-import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,24 +12,19 @@ import numpy as np
 
 from workbench.arrays import Vector
 from workbench.errors import InputError, closest
-from workbench.system.comparison import (
-    Channel,
-    Comparison,
-    Exclusion,
-    Influence,
-    LeadingOutput,
-    Level,
-    Rest,
-)
+from workbench.system.comparison import Comparison
+from workbench.system.declaration import Scope, declared, key
 from workbench.system.experiments import Experiments
 from workbench.system.expression import Expression
 from workbench.system.parts import (
+    AT_REST,
+    ENDLESS,
     Condition,
     DerivedSignal,
     EstimatedQuantity,
     Export,
     FeedbackFading,
-    Mode,
+    FrictionPower,
     Model,
     Objective,
     OperatingPoint,
@@ -39,132 +33,262 @@ from workbench.system.parts import (
     RollingStates,
     Sampling,
     Signal,
+    StateNoise,
     StepTracking,
-    Threshold,
     View,
+    columns_of,
+    names_of,
+    refuse_without_noise,
+    unit_in_model,
+    units_of,
 )
+from workbench.system.plugins import plugin_of
 from workbench.system.stopping import Stopping
-
-__all__ = [
-    "FULL",
-    "OBSERVER",
-    "REFERENCE",
-    "Channel",
-    "Comparison",
-    "Condition",
-    "DerivedSignal",
-    "EstimatedQuantity",
-    "Exclusion",
-    "Export",
-    "FeedbackFading",
-    "Influence",
-    "LeadingOutput",
-    "Level",
-    "Mode",
-    "Model",
-    "Objective",
-    "OperatingPoint",
-    "RecordingSplit",
-    "Redundancy",
-    "Rest",
-    "RollingStates",
-    "Sampling",
-    "Signal",
-    "StepTracking",
-    "System",
-    "Threshold",
-    "View",
-]
+from workbench.system.tables import Table
 
 OBSERVER = "observer"  # the role of the model that every system has
 FULL = "full"  # of one with more states, where there is one
 REFERENCE = "reference"  # of the most detailed one, which a package connects an observer to
 
 
-@dataclass(frozen=True)
+def _refuse_no_observer(models: Mapping[str, Model], table: Table, name: str, _: Scope) -> None:
+    if OBSERVER not in models:
+        raise InputError(
+            where=table.table(name).where,
+            found=f"roles {', '.join(models) or 'none'}",
+            expected=f"a model in the role '{OBSERVER}', which estimators run on",
+            remedy=f'add {OBSERVER} = {{ class = "NAME" }}',
+        )
+
+
+def _refuse_no_outputs(signals: tuple[Signal, ...], table: Table, name: str, scope: Scope) -> None:
+    if not signals:
+        raise InputError(
+            where=table.where,
+            found=f"no [{name}]",
+            expected="measured outputs, which correct the model",
+            remedy=f"add a table [{name}.NAME] for each",
+        )
+    refuse_without_noise(signals, table, name, scope)
+
+
+def _samples(table: Table, name: str, _: Scope) -> int:
+    return round(table.number(name, "1"))
+
+
+def _reported(table: Table, name: str, scope: Scope) -> dict[str, str]:
+    return {output: unit_in_model(scope, output) for output in table.texts(name)}
+
+
+def _refuse_wrong_loggers(
+    loggers: Mapping[str, tuple[str, ...]], table: Table, name: str, scope: Scope
+) -> None:
+    """Refuse a logger without a name of one word, or with a signal that has another one."""
+    signals = list(names_of("inputs", "outputs", "reference_signals", "intermittent")(scope))
+    owners: dict[str, str] = {}
+    for logger, own in loggers.items():
+        where = table.table(name).place(logger)
+        if not logger.isidentifier() or not own:
+            raise InputError(
+                where=where,
+                found="no signal"
+                if logger.isidentifier()
+                else f"'{logger}', a name of no one word",
+                expected="a name of letters and digits, and the measured signals of this logger",
+                remedy=f'write for instance second = ["{signals[0]}"]',
+            )
+        for signal in own:
+            if signal in signals and signal not in owners:
+                owners[signal] = logger
+                continue
+            raise InputError(
+                where=where,
+                found=f"'{signal}' a second time, after that of {owners[signal]}"
+                if signal in owners
+                else f"'{signal}'{closest(signal, signals)}",
+                expected=f"measured signals, each of one logger: {', '.join(signals)}",
+                remedy="name it once" if signal in owners else "correct the name",
+            )
+
+
+@declared
 class System:
     """A machine: its models, its signals, what is estimated, and what counts.
 
     Attributes
     ----------
-    name : by which it is asked for.
     source : the file it was read from.
     library : `package.mo` of its Modelica library.
-    models : by role; OBSERVER is always there.
     names : the models' own names of variables that we name otherwise.
-    given : parameters of this machine that differ from the models', SI.
     values : all parameters of the observer model as they act, `given` included, SI.
-    walks : random walk of states by name [unit/sqrt(s)]; others move by a small share of their
-        nominal value.
-    spreads : standard deviation of states at the start that no output shows, by name [unit].
-    inputs, outputs : measured; inputs drive the models, outputs correct estimates.
-    reference_signals : measured, but only there to score estimates by.
-    intermittent : measured at times, and missing in others: they correct Kalman filters alone.
-    reported : outputs of the model that estimates hold, with their units.
-    export : estimators as FMUs.
-    plugin : what is of this machine alone, by the name or the place of a `Plugin`; empty: none.
-    shortest : [s] that a recording must last.
-    fewest : samples that a recording must have.
-    settles : [s] in which a model comes to rest at an operating point.
-    sample_time : [s] of usual recordings.
-    sampling : which times between samples are likely.
-    redundancies : what tells the same in a recording.
-    cutting : how a long recording is cut into several, or None.
-    stopping : how the machine comes to rest, or None where nobody said so.
-    cases : folder of recordings that come with the system, or None.
-    experiments : what may be run next, or None where nobody said so.
-    work : powers of friction by what they wear, in measured signals and parameters [W].
-    loggers : measured signals by the logger that records them; others share one more.
-    learns : [s] in which filters learn noise levels from innovations; infinite: they hold them.
-    bands : by estimator and quantity, reach of its 95 % bands over that by its own standard
-        deviations, where recordings whose truth is known say so [1].
     states : of the observer model that the system comes with, None before that is known; observers
         correct these.
     """
 
-    name: str
-    title: str
     source: Path
     library: Path
-    models: Mapping[str, Model]
     names: Mapping[str, str]
-    given: Mapping[str, float]
     values: Mapping[str, float]
-    walks: Mapping[str, float]
-    spreads: Mapping[str, float]
-    inputs: tuple[Signal, ...]
-    outputs: tuple[Signal, ...]
-    reference_signals: tuple[Signal, ...]
-    intermittent: tuple[Signal, ...]
-    derived: tuple[DerivedSignal, ...]
-    estimated: tuple[EstimatedQuantity, ...]
-    reported: Mapping[str, str]
-    conditions: tuple[Condition, ...]
-    design: OperatingPoint
-    tested: OperatingPoint
-    objective: Objective
-    comparison: Comparison
-    fading: FeedbackFading | None = None
-    rolling: RollingStates | None = None
-    following: StepTracking | None = None
-    panels: tuple[View, ...] = ()
-    export: Export = field(default_factory=lambda: Export({}, OperatingPoint({}, {}, {})))
-    plugin: str = ""
-    shortest: float = 0.0
-    fewest: int = 20
-    settles: float = 10.0
-    sample_time: float = 0.005
-    learns: float = math.inf
-    bands: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
-    states: tuple[str, ...] | None = None
-    cases: Path | None = None
-    sampling: Sampling = field(default_factory=lambda: Sampling(math.inf, math.inf, math.inf))
-    redundancies: tuple[Redundancy, ...] = ()
-    experiments: Experiments | None = None
-    cutting: RecordingSplit | None = None
-    stopping: Stopping | None = None
-    work: tuple[DerivedSignal, ...] = ()
-    loggers: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    states: tuple[str, ...] | None
+
+    title: str = key("what the machine is, for people")
+    name: str = key(
+        "by which it is asked for",
+        absent=lambda scope: scope.file.resolve().parent.name,
+        otherwise="the folder's",
+    )
+    sample_time: float = key("between two samples of usual recordings", "s")
+    shortest: float = key("that a recording must last", "s", 0.0)
+    fewest: int = key(
+        "samples that a recording must have: where a machine moves by far more than noise, fewer "
+        "tell enough",
+        absent=20,
+        read=_samples,
+        schema={"type": "number"},
+    )
+    cases: Path | None = key("folder of recordings that come with the system", absent=None)
+    plugin: str = key(
+        "what Python adds for this machine alone, such as a virtual rig, estimators, published "
+        "recordings: the name of an entry point of the group `workbench.machines`, or the place of "
+        'a [`Plugin`](own-machine.md#a-plugin), `"package.module:NAME"`',
+        aliases=("companion",),
+        absent="",
+        read=lambda table, name, scope: plugin_of(table),
+        schema={"type": "string", "minLength": 1},
+    )
+    models: Mapping[str, Model] = key(
+        f"by role. `{OBSERVER}` must be there: estimators run on it. `{FULL}` is a larger one, "
+        f"`{REFERENCE}` the most detailed one, which makes recordings and is connected to exported "
+        "observers",
+        check=_refuse_no_observer,
+    )
+    given: Mapping[str, float] = key(
+        'parameters of this very machine that differ from the model\'s, `A = "0.52 m2"`; they are '
+        "set in the FMU, no compiler is needed",
+        unit_in_model,
+        {},
+        name="parameters",
+        of_model=True,
+    )
+    inputs: tuple[Signal, ...] = key("measured signals that drive the model", absent=())
+    outputs: tuple[Signal, ...] = key(
+        "measured signals that correct estimates", check=_refuse_no_outputs
+    )
+    reference_signals: tuple[Signal, ...] = key(
+        "measured signals that no estimator uses: estimates are scored by them",
+        name="judged",
+        aliases=("reference_signals",),
+        absent=(),
+        check=refuse_without_noise,
+    )
+    intermittent: tuple[Signal, ...] = key(
+        "outputs that are measured at times, and missing in other samples: they correct Kalman "
+        "filters alone",
+        name="aids",
+        aliases=("intermittent",),
+        absent=(),
+        check=refuse_without_noise,
+    )
+    derived: tuple[DerivedSignal, ...] = key(
+        "signals made of measured ones and of parameters", absent=()
+    )
+    estimated: tuple[EstimatedQuantity, ...] = key(
+        "parameters of the model that observers estimate", absent=()
+    )
+    reported: Mapping[str, str] = key(
+        "outputs of the model that estimates hold beside the measured ones",
+        absent={},
+        read=_reported,
+        schema={"type": "array", "items": {"type": "string", "minLength": 1}},
+    )
+    work: tuple[FrictionPower, ...] = key(
+        "powers of friction by what they wear; [monitoring](monitor.md) sums them over recordings",
+        absent=(),
+    )
+    conditions: tuple[Condition, ...] = key(
+        "what was set before a recording; asked for in each `case.toml`", absent=()
+    )
+    sampling: Sampling = key("which times between samples are likely")
+    loggers: Mapping[str, tuple[str, ...]] = key(
+        "measured signals by the logger that records them; others share one more",
+        absent={},
+        check=_refuse_wrong_loggers,
+    )
+    state_noise: tuple[StateNoise, ...] = key(
+        "what is known of states of the model", name="states", absent=(), of_model=True
+    )
+    settles: float = key("time in which the model comes to rest", "s", 10.0, name="points.settles")
+    design: OperatingPoint = key(
+        "where observers are designed",
+        name="points.design",
+        absent=AT_REST,
+        otherwise="at rest without inputs",
+    )
+    tested: OperatingPoint = key(
+        "where observability is tested", name="points.tested", absent="{design}"
+    )
+    objective: Objective = key("by what estimators are scored and tuned")
+    comparison: Comparison = key("how recordings are compared with the model", name="diagnosis")
+    fading: FeedbackFading | None = key(
+        "feedback fades out where a signal is small",
+        name="feedback.fades",
+        absent=None,
+        otherwise="never",
+    )
+    rolling: RollingStates | None = key(
+        "two states in a fixed ratio while an output is zero, which saturates",
+        name="feedback.rolls",
+        absent=None,
+    )
+    learns: float = key(
+        "time in which filters learn noise levels from innovations, see "
+        "[estimators](estimators.md#noise-levels)",
+        "s",
+        ENDLESS,
+        name="feedback.learns",
+        otherwise="never",
+        above=0.0,
+    )
+    bands: Mapping[str, Mapping[str, float]] = key(
+        "by estimator and quantity, reach of its 95 % bands over that by its own standard "
+        "deviations, where recordings whose truth is known say so",
+        absent={},
+        otherwise="1 each",
+        keys=lambda scope: columns_of(scope.whole),
+        above=0.0,
+    )
+    following: StepTracking | None = key(
+        "tuned gains must find a step of a quantity in time", name="tuning.follows", absent=None
+    )
+    panels: tuple[View, ...] = key(
+        "panels of the figures; without any they follow from the signals",
+        name="figures",
+        absent=(),
+        otherwise="by signal",
+    )
+    export: Export = key("estimators as FMUs")
+    redundancies: tuple[Redundancy, ...] = key(
+        "pairs of formulas that tell the same in a recording", absent=()
+    )
+    experiments: Experiments | None = key(
+        "what may be varied in the next recording", name="next", absent=None
+    )
+    cutting: RecordingSplit | None = key(
+        "how `workbench import` splits a long recording; without it, only at a gap that is not "
+        "`possible`",
+        absent=None,
+    )
+    stopping: Stopping | None = key("how the machine comes to rest", name="distance", absent=None)
+
+    @property
+    def walks(self) -> dict[str, float]:
+        """Random walk of states [unit/sqrt(s)]; others move by a small share of their nominal."""
+        return {s.name: s.walk for s in self.state_noise if s.walk is not None}
+
+    @property
+    def spreads(self) -> dict[str, float]:
+        """Standard deviation of states at the start that no output shows [unit]."""
+        return {s.name: s.spread for s in self.state_noise if s.spread is not None}
 
     @property
     def clocks(self) -> dict[str, tuple[str, ...]]:
@@ -215,12 +339,7 @@ class System:
     @property
     def columns(self) -> dict[str, str]:
         """Columns of an estimate, with units."""
-        return {
-            **{output.name: output.unit for output in self.outputs},
-            **{quantity.correction: quantity.unit for quantity in self.estimated},
-            **{quantity.name: quantity.unit for quantity in self.estimated},
-            **self.reported,
-        }
+        return columns_of(vars(self))
 
     @property
     def indirect(self) -> dict[str, tuple[DerivedSignal, str]]:
@@ -235,9 +354,7 @@ class System:
 
     def unit(self, name: str) -> str:
         """SI unit of a measured, derived or estimated signal."""
-        derived = {signal.name: signal.unit for signal in self.derived}
-        measured = {name: signal.unit for name, signal in self.signals.items()}
-        return {**derived, **self.columns, **measured}[name]
+        return units_of(vars(self))[name]
 
     def condition(self, name: str) -> Condition:
         """A condition by name."""
@@ -307,20 +424,3 @@ class System:
     def with_names(self, names: Mapping[str, str]) -> "System":
         """The same system, on models with other names of variables."""
         return replace(self, names={**self.names, **names})
-
-    def refuse_missing(self, name: str, where: str) -> None:
-        """Refuse a name that is no signal of this system.
-
-        Raises
-        ------
-        InputError
-            If it is none.
-        """
-        known = [*self.signals, *(signal.name for signal in self.derived), *self.columns]
-        if name not in known:
-            raise InputError(
-                where=where,
-                found=f"'{name}'{closest(name, known)}",
-                expected=f"a signal of this system: {', '.join(dict.fromkeys(known))}",
-                remedy="correct the name",
-            )

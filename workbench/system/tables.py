@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 from workbench.errors import InputError, closest
 from workbench.runtime.files import read_text
-from workbench.system.units import check_unit, quantity
+from workbench.system.units import quantity
 
 _T = TypeVar("_T")
 LARGEST = 1e300  # of plain numbers; leaves room for sums and products
@@ -28,12 +28,14 @@ class Table:
     Parameters
     ----------
     content : as TOML has it.
-    where : file and name of the table, for the message of an error.
+    file : for the message of an error.
+    header : of the table in the file, such as `[outputs.h]`; empty for the file itself.
     """
 
-    def __init__(self, content: Mapping[str, Any], where: str) -> None:
+    def __init__(self, content: Mapping[str, Any], file: str, header: str = "") -> None:
         self.content = content
-        self.where = where
+        self.where = f"{file}, {header}" if header else file
+        self._file, self._header = file, header
 
     def __contains__(self, key: str) -> bool:
         return key in self.content
@@ -65,18 +67,17 @@ class Table:
         """A text, or the default where there is none."""
         return self.take(key, str) if key in self.content else default
 
-    def unit(self, key: str, default: str | None = None) -> str:
-        """A unit; it must be there unless there is a default."""
-        unit = self.take(key, str) if default is None else self.text(key, default)
-        check_unit(unit, f"{self.where} {key}")
-        return unit
-
     def table(self, key: str) -> "Table":
         """A table within; empty where there is none."""
         content = self.take(key, dict) if key in self.content else {}
-        return Table(
-            content, f"{self.where} {key}" if "[" in self.where else f"{self.where}, [{key}]"
-        )
+        if self._header.endswith("]"):
+            return Table(content, self._file, f"{self._header[:-1]}.{_bare(key)}]")
+        header = f"{self._header} {key}" if self._header else f"[{_bare(key)}]"
+        return Table(content, self._file, header)
+
+    def place(self, key: str) -> str:
+        """Where an entry stands, for the message of an error."""
+        return f"{self.where} {key}"
 
     def date(self, key: str) -> str:
         """A date or time in a form whose order is that of time; empty where there is none."""
@@ -94,7 +95,8 @@ class Table:
         items = self.take(key, list) if key in self.content else []
         if not all(isinstance(item, dict) for item in items):
             raise self.wrong(key, "a list of tables")
-        return [Table(item, f"{self.where}, [[{key}]] {i + 1}") for i, item in enumerate(items)]
+        name = f"{self._header[1:-1]}.{key}" if self._header else key
+        return [Table(item, self._file, f"[[{name}]] {i + 1}") for i, item in enumerate(items)]
 
     def texts(self, key: str) -> tuple[str, ...]:
         """A list of texts; empty where there is none."""
@@ -113,18 +115,19 @@ class Table:
         """
         if key not in self.content and default is not None:
             return default
-        return self._quantity(key, self.content.get(key), unit)
+        return self.quantity(key, self.content.get(key), unit)
 
     def numbers(self, key: str, unit: str, count: int) -> tuple[float, ...]:
         """A list of quantities; see `number`."""
         items = self.take(key, list)
         if len(items) != count:
             raise self.wrong(key, f"{count} numbers")
-        return tuple(self._quantity(key, item, unit) for item in items)
+        return tuple(self.quantity(key, item, unit) for item in items)
 
-    def _quantity(self, key: str, value: object, unit: str) -> float:
+    def quantity(self, key: str, value: object, unit: str) -> float:
+        """A value of an entry, or one of several, in SI `unit`; see `number`."""
         if isinstance(value, str):
-            return quantity(value, unit, f"{self.where} {key}")
+            return quantity(value, unit, self.place(key))
         if value is None:
             raise InputError(
                 where=self.where,
@@ -143,9 +146,7 @@ class Table:
     def wrong(self, key: str, expected: str, remedy: str = "correct the value") -> InputError:
         """The error of an entry that is not as expected."""
         found = shown(self.content.get(key))
-        return InputError(
-            where=f"{self.where} {key}", found=found, expected=expected, remedy=remedy
-        )
+        return InputError(where=self.place(key), found=found, expected=expected, remedy=remedy)
 
     def refuse_unknown(self, keys: str | Iterable[str]) -> None:
         """Refuse what nobody reads, which is a mistake in writing.
@@ -168,6 +169,11 @@ class Table:
                     expected=f"only {', '.join(known)}",
                     remedy="correct or remove the key",
                 )
+
+
+def _bare(key: str) -> str:
+    """A key as a header of TOML has it."""
+    return key if re.fullmatch("[A-Za-z0-9_-]+", key) else f'"{key}"'
 
 
 def shown(value: object) -> str:

@@ -10,7 +10,7 @@ from scipy.signal import savgol_filter
 
 from workbench.arrays import Vector
 from workbench.diagnosis.inference.thresholds import Soundness
-from workbench.system.system import Signal
+from workbench.system.parts import Signal
 
 ALONG = 2.0  # standard deviations, of a line through few samples: noise alone scatters by one
 _ABREAST = 11  # samples of the running median

@@ -11,7 +11,8 @@ from workbench.diagnosis.data.cleaning import Mask, bridge, noise_in, outliers, 
 from workbench.diagnosis.inference.thresholds import Soundness
 from workbench.errors import InputError
 from workbench.recordings.case import Case
-from workbench.system.system import Exclusion, System
+from workbench.system.comparison import Exclusion
+from workbench.system.system import System
 
 # Reasons of every system.
 FAULTY, MISSING, BEYOND = "spike, dropout or saturation", "missing", "at the limit of a sensor"

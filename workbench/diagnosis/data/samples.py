@@ -29,7 +29,9 @@ from workbench.diagnosis.data.whitening import whitening
 from workbench.diagnosis.inference.thresholds import SOUND, Soundness
 from workbench.errors import InputError
 from workbench.recordings.case import Case
-from workbench.system.system import Channel, Comparison, Mode, System
+from workbench.system.comparison import Channel, Comparison
+from workbench.system.parts import Mode
+from workbench.system.system import System
 
 _STARTING = 40  # samples at usual rates, of a first value
 _RELEASED = 0.1  # share of the greatest value

@@ -17,8 +17,9 @@ from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.linearized import LinearizedPoint
 from workbench.diagnosis.simulation.residual_model import ResidualModel
 from workbench.recordings.case import Case, sign
+from workbench.system.comparison import Channel
 from workbench.system.plugins import find_plugin, load
-from workbench.system.system import Channel, System
+from workbench.system.system import System
 
 BEGINNING, DIRECTION = "time since the beginning", "direction"
 _APPLIED = 0.05  # share of its greatest value from which on an input is applied

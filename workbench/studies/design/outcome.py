@@ -10,7 +10,8 @@ import pandas as pd
 
 from workbench.diagnosis.inference.rivals import Rivals
 from workbench.studies.design.prediction import Prediction
-from workbench.system.system import Channel, System
+from workbench.system.comparison import Channel
+from workbench.system.system import System
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

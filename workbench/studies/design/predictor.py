@@ -14,9 +14,10 @@ from workbench.studies.design.candidates import Experiment
 from workbench.studies.design.claims import counts, left_claims
 from workbench.studies.design.prediction import DesignProblem, Prediction, predicted
 from workbench.studies.design.recorded import recorded
+from workbench.system.comparison import Channel
 from workbench.system.expression import Expression
 from workbench.system.parts import Signal
-from workbench.system.system import Channel, System
+from workbench.system.system import System
 
 
 class ExperimentPredictor:

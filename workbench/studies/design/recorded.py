@@ -22,8 +22,8 @@ from workbench.models.native import (
 from workbench.recordings.case import Case, Value, make_case
 from workbench.studies.design.candidates import Experiment
 from workbench.system.experiments import Experiments
-from workbench.system.parts import LARGEST
-from workbench.system.system import Condition, System
+from workbench.system.parts import LARGEST, Condition
+from workbench.system.system import System
 
 
 def recorded(

@@ -14,8 +14,9 @@ from workbench.errors import InputError
 from workbench.recordings.case import Case, Value, read_conditions
 from workbench.studies.distance.simulation import GRID
 from workbench.system.comparison import Exclusion
+from workbench.system.parts import Condition
 from workbench.system.stopping import COMMAND, DrivenInput, Stopping
-from workbench.system.system import Condition, System
+from workbench.system.system import System
 from workbench.system.tables import Table
 
 _RISEN = 6.0  # lags after which what rises is there: a quarter of a percent is left

@@ -10,7 +10,8 @@ from dataclasses import replace
 import numpy as np
 
 from workbench.studies.monitoring.outcome import MonitoringResult
-from workbench.system.system import Level, System
+from workbench.system.comparison import Level
+from workbench.system.system import System
 
 _MOST = 8  # recordings that are diagnosed: scatter from one to the next is small in their mean
 

@@ -17,8 +17,9 @@ from workbench.observers.estimators.kalman import ExtendedKalmanFilter
 from workbench.observers.replay import replay
 from workbench.observers.run import Ending
 from workbench.recordings.case import UNKNOWN, Case
+from workbench.system.parts import EstimatedQuantity
 from workbench.system.registry import open_model
-from workbench.system.system import EstimatedQuantity, System
+from workbench.system.system import System
 
 
 @dataclass(frozen=True, eq=False)

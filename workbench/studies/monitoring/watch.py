@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from workbench.arrays import Matrix, Vector
 from workbench.studies.monitoring.chart import LARGEST, Chart, LevelChange, Scatter, threshold
 from workbench.studies.monitoring.estimate import reach
-from workbench.system.system import EstimatedQuantity
+from workbench.system.parts import EstimatedQuantity
 
 _FEWEST = 3  # of an array: of two, nothing tells which has moved
 _TOLD = 0.5  # of what was not known before, as a variance, that a recording must take away
