@@ -53,15 +53,8 @@ class PlantedTrain:
 
     stops: tuple[AskedStop, ...]
 
-    @property
-    def plantables(self) -> tuple[Plantable, ...]:
-        """What can be planted."""
-        return PLANTABLE
-
-    @property
-    def sheet_errors(self) -> tuple[SheetError, ...]:
-        """What the data sheet may have wrong."""
-        return SHEET_ERRORS
+    plantables = PLANTABLE
+    sheet_errors = SHEET_ERRORS
 
     @property
     def recordings(self) -> tuple[str, ...]:

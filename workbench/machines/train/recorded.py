@@ -5,13 +5,13 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from workbench.errors import InputError
 from workbench.machines.train.planting import PLANTABLE
 from workbench.recordings.datasets import write_cases
 from workbench.runtime.files import read_text
-from workbench.studies.power.planting import Group, Kind, Plantable, Planting, SheetError
+from workbench.studies.power.planting import Group, Kind, Planting, SheetError
 
 _TRUTH = "truth.json"
 _KNOWN = {  # what a truth calls a fault: as it is here, and the size of one of its units
@@ -37,15 +37,8 @@ class RecordedTrain:
 
     folders: tuple[Path, ...]
 
-    @property
-    def plantables(self) -> tuple[Plantable, ...]:
-        """What may be wrong in them."""
-        return PLANTABLE
-
-    @property
-    def sheet_errors(self) -> tuple[SheetError, ...]:
-        """None: what was recorded is as it is."""
-        return ()
+    plantables = PLANTABLE
+    sheet_errors: ClassVar[tuple[SheetError, ...]] = ()  # none: what was recorded is as it is
 
     @property
     def recordings(self) -> tuple[str, ...]:

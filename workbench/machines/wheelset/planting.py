@@ -33,47 +33,47 @@ _FIELDS = {field.name: field.metadata for field in dataclasses.fields(Effects)}
 _FILM = {"E0": 0.45e6}
 
 
-def _one(name: str, effect: str = "", **known: Any) -> Plantable:
+def _plantable(name: str, effect: str = "", **known: Any) -> Plantable:
     unit, least = _FIELDS[name]["unit"], _FIELDS[name]["least"]
     return Plantable(name, unit, effect, least, **known)
 
 
 PLANTABLE = (
-    _one("speed_friction", "SpeedDependentPadFriction"),
-    _one("pressure_exponent", "PressureDependentPadFriction"),
-    _one("fade", "BrakeFade"),
-    _one("water_film", "WaterFilm", signed=False, shapes=_FILM),
-    _one("single_disc_film", "SingleDiscWaterFilm", signed=False, shapes=_FILM),
-    _one("bedding_in", "BeddingIn", shapes={"tau": 2.0}),
-    _one("disc_thickness", "DiscThicknessVariation", signed=False),
-    _one("cylinder_lag", "CylinderLag", signed=False),
-    _one("caliper_hysteresis", "CaliperHysteresis", signed=False),
-    _one("return_spring", "ReturnSpringPressure"),
-    _one("pressure_offset", "PressureSensorOffset", sensed=True),
-    _one("wheel_radius", "WheelRadius"),
-    _one("roller_radius", "RollerRadius"),
-    _one("out_of_round", "OutOfRoundWheel", signed=False),
-    _one("wheel_load", "WheelLoad"),
-    _one("creep_stiffness", "CreepStiffness"),
-    _one("wheel_inertia", "WheelInertia"),
-    _one("roller_inertia", "RollerInertia"),
-    _one("torque_gain", "DriveTorqueGain", sensed=True),
-    _one("adhesion_recovery", "AdhesionRecovery", signed=False, shapes={"Er": 250e3}),
-    _one("falling_friction", "FallingFriction"),
-    _one("wheelset_losses", "WheelsetLosses"),
-    _one("roller_losses", "RollerLosses"),
-    _one("fx_gain", "FxGain", sensed=True),
-    _one("fx_offset", "FxOffset", sensed=True),
-    _one("apex_offset", "ApexOffset", sensed=True),
-    _one("speed_delay", "SpeedSignalDelay", sensed=True),
-    _one("pole_ring", "PoleRingEccentricity", signed=False, sensed=True),
-    _one("time_skew", "LoggerTimeSkew[speeds]", sensed=True),
+    _plantable("speed_friction", "SpeedDependentPadFriction"),
+    _plantable("pressure_exponent", "PressureDependentPadFriction"),
+    _plantable("fade", "BrakeFade"),
+    _plantable("water_film", "WaterFilm", signed=False, shapes=_FILM),
+    _plantable("single_disc_film", "SingleDiscWaterFilm", signed=False, shapes=_FILM),
+    _plantable("bedding_in", "BeddingIn", shapes={"tau": 2.0}),
+    _plantable("disc_thickness", "DiscThicknessVariation", signed=False),
+    _plantable("cylinder_lag", "CylinderLag", signed=False),
+    _plantable("caliper_hysteresis", "CaliperHysteresis", signed=False),
+    _plantable("return_spring", "ReturnSpringPressure"),
+    _plantable("pressure_offset", "PressureSensorOffset", sensed=True),
+    _plantable("wheel_radius", "WheelRadius"),
+    _plantable("roller_radius", "RollerRadius"),
+    _plantable("out_of_round", "OutOfRoundWheel", signed=False),
+    _plantable("wheel_load", "WheelLoad"),
+    _plantable("creep_stiffness", "CreepStiffness"),
+    _plantable("wheel_inertia", "WheelInertia"),
+    _plantable("roller_inertia", "RollerInertia"),
+    _plantable("torque_gain", "DriveTorqueGain", sensed=True),
+    _plantable("adhesion_recovery", "AdhesionRecovery", signed=False, shapes={"Er": 250e3}),
+    _plantable("falling_friction", "FallingFriction"),
+    _plantable("wheelset_losses", "WheelsetLosses"),
+    _plantable("roller_losses", "RollerLosses"),
+    _plantable("fx_gain", "FxGain", sensed=True),
+    _plantable("fx_offset", "FxOffset", sensed=True),
+    _plantable("apex_offset", "ApexOffset", sensed=True),
+    _plantable("speed_delay", "SpeedSignalDelay", sensed=True),
+    _plantable("pole_ring", "PoleRingEccentricity", signed=False, sensed=True),
+    _plantable("time_skew", "LoggerTimeSkew[speeds]", sensed=True),
     # Sizes that disturb the balances about as much as those above.
-    _one("friction_step", unit_size=0.01, slot="padFriction"),
-    _one("friction_ripple", unit_size=0.01, slot="padFriction"),
-    _one("friction_deceleration", unit_size=0.01, slot="padFriction"),
-    _one("drive_beat", sensed=True, unit_size=0.005, slot="driveTorque"),
-    _one("force_drift", sensed=True, unit_size=2.0, slot="forceSensor"),
+    _plantable("friction_step", unit_size=0.01, slot="padFriction"),
+    _plantable("friction_ripple", unit_size=0.01, slot="padFriction"),
+    _plantable("friction_deceleration", unit_size=0.01, slot="padFriction"),
+    _plantable("drive_beat", sensed=True, unit_size=0.005, slot="driveTorque"),
+    _plantable("force_drift", sensed=True, unit_size=2.0, slot="forceSensor"),
 )
 
 # More than a careful sheet has wrong: a mode is measured to 10 %, an inertia computed to 1 %.
@@ -99,15 +99,8 @@ class PlantedStops:
     scenarios: tuple[Scenario, ...]
     reference: Path
 
-    @property
-    def plantables(self) -> tuple[Plantable, ...]:
-        """What can be planted."""
-        return PLANTABLE
-
-    @property
-    def sheet_errors(self) -> tuple[SheetError, ...]:
-        """What the data sheet may have wrong."""
-        return SHEET_ERRORS
+    plantables = PLANTABLE
+    sheet_errors = SHEET_ERRORS
 
     @property
     def recordings(self) -> tuple[str, ...]:
