@@ -17,6 +17,7 @@ from workbench.runtime.resources import CHECKOUT
 
 MODEL_EXCHANGE = "Model Exchange"
 CO_SIMULATION = "Co-Simulation"
+REAL_TYPES = ("Real", "Float64")  # of FMI 2.0 and 3.0
 
 
 @dataclass(frozen=True)
@@ -53,6 +54,7 @@ class Variable:
     minimum: float | None
     maximum: float | None
     text: str
+    array: bool = False
 
 
 @dataclass(frozen=True)
@@ -71,7 +73,7 @@ class Description:
     dependencies : names of what a derivative or an output depends on, by its name; without those of
         which the model structure does not say it.
     event_indicators : their number; 0 for a smooth model.
-    step, stop : of the default experiment [s], None where there is none.
+    start, step, stop : of the default experiment [s], None where there is none.
     """
 
     path: Path
@@ -89,6 +91,7 @@ class Description:
     rates: tuple[str, ...]
     dependencies: Mapping[str, tuple[str, ...]]
     event_indicators: int
+    start: float | None
     step: float | None
     stop: float | None
 
@@ -287,6 +290,7 @@ def _description(
             if unknown.dependencies is not None
         },
         event_indicators=max(found.numberOfEventIndicators, len(found.eventIndicators)),
+        start=_number(experiment.startTime, "the start time") if experiment else None,
         step=_number(experiment.stepSize, "the step size") if experiment else None,
         stop=_number(experiment.stopTime, "the stop time") if experiment else None,
     )
@@ -324,7 +328,7 @@ def _interface(element: ElementTree.Element) -> Interface:
 
 def _variable(variable: "fmpy.model_description.ModelVariable") -> Variable:
     declared = variable.declaredType
-    real = variable.type in ("Real", "Float64") and not variable.dimensions
+    real = variable.type in REAL_TYPES and not variable.dimensions
     name = variable.name
     if not name:
         raise _WrongError("a variable without a name")
@@ -350,6 +354,7 @@ def _variable(variable: "fmpy.model_description.ModelVariable") -> Variable:
         minimum=limit("min"),
         maximum=limit("max"),
         text=variable.description or "",
+        array=bool(variable.dimensions),
     )
 
 

@@ -7,6 +7,7 @@ motions of microseconds beside those of seconds.
 """
 
 import ctypes
+import math
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -27,6 +28,7 @@ from workbench.models.description import (
     CO_SIMULATION,
     MODEL_EXCHANGE,
     Description,
+    Variable,
     read_description,
 )
 from workbench.models.trial import require_trial
@@ -39,6 +41,7 @@ _FUNCTIONS = {
     "derivatives": {"2.0": "fmi2GetDerivatives", "3.0": "fmi3GetContinuousStateDerivatives"},
     "set": {"2.0": "fmi2SetReal", "3.0": "fmi3SetFloat64"},
     "get": {"2.0": "fmi2GetReal", "3.0": "fmi3GetFloat64"},
+    "indicators": {"2.0": "fmi2GetEventIndicators", "3.0": "fmi3GetEventIndicators"},
     "directional": {"2.0": "fmi2GetDirectionalDerivative", "3.0": "fmi3GetDirectionalDerivative"},
     "do_step": {"2.0": "fmi2DoStep", "3.0": "fmi3DoStep"},
     "save": {"2.0": "fmi2GetFMUstate", "3.0": "fmi3GetFMUState"},
@@ -53,6 +56,19 @@ _NEEDED = {
     MODEL_EXCHANGE: ("time", "set_states", "get_states", "derivatives", "set", "get"),
     CO_SIMULATION: ("do_step", "set", "get"),
 }
+
+# FMPy's functions that set parameters which are no Real or Float64, by type.
+_SETTERS = {
+    "Integer": "setInteger",
+    "Enumeration": "setInteger",
+    "Boolean": "setBoolean",
+    **{
+        name: f"set{name}"
+        for name in ("Float32", *(f"{sign}Int{n}" for sign in ("", "U") for n in (8, 16, 32, 64)))
+    },
+}
+
+_MOST_ITERATIONS = 100  # of discrete states at one event; models need some
 
 _CLASSES = {
     (MODEL_EXCHANGE, "2.0"): fmi2.FMU2Model,
@@ -174,17 +190,22 @@ class FMUInstance:
         getattr(self._instance, free)(self._instance.component)
         self._instantiate()
 
-    def start(self, prepare: Callable[[], None]) -> None:
-        """Reset and initialise at time 0; in Model Exchange enter continuous-time mode.
+    def start(self, prepare: Callable[[], None], time: float) -> float:
+        """Reset and initialise; in Model Exchange enter continuous-time mode.
 
         Parameters
         ----------
         prepare : sets what differs from the start values.
+        time : at which the model starts [s].
+
+        Returns
+        -------
+        Time of the next time event [s], infinite where the FMU tells none.
 
         Raises
         ------
         FMUError
-            If the FMU refuses a call.
+            If the FMU refuses a call, or asks to end.
         """
         instance = self._instance
         try:
@@ -192,18 +213,67 @@ class FMUInstance:
                 instance.reset()
             self._used = True
             if self.version == "2.0":
-                instance.setupExperiment()
+                instance.setupExperiment(startTime=time)
             prepare()
-            instance.enterInitializationMode()
+            if self.version == "2.0":
+                instance.enterInitializationMode()
+            else:
+                instance.enterInitializationMode(startTime=time)
             instance.exitInitializationMode()
-            if self._interface == MODEL_EXCHANGE:
-                if self.version == "2.0":
-                    instance.newDiscreteStates()
-                else:
-                    instance.updateDiscreteStates()
-                instance.enterContinuousTimeMode()
+            return self._update_discrete_states() if self._interface == MODEL_EXCHANGE else math.inf
         except FMICallException as error:
             raise self.refusal(error.function, error.status) from None
+
+    def _update_discrete_states(self) -> float:
+        """Iterate until the discrete states are stable, and go on in continuous time.
+
+        Returns the time of the next time event. Source: FMI 2.0.4, section 3.2.2; FMI 3.0, 3.2.1.
+        """
+        instance = self._instance
+        update = (
+            instance.newDiscreteStates if self.version == "2.0" else instance.updateDiscreteStates
+        )
+        name = self._description.path.name
+        for _ in range(_MOST_ITERATIONS):
+            needed, end, _, _, defined, time = update()
+            if end:
+                raise FMUError(f"{name}: it asks to end the simulation: {self._logged()}")
+            if not needed:
+                instance.enterContinuousTimeMode()
+                return float(time) if defined else math.inf
+        raise FMUError(
+            f"{name}: its discrete states are not stable after {_MOST_ITERATIONS} iterations"
+        )
+
+    def set_whole(self, variable: Variable, value: float) -> None:
+        """Set a parameter whose type is not Real or Float64, from a number.
+
+        Raises
+        ------
+        InputError
+            If the type does not hold the number.
+        """
+        type_name = variable.type
+        number = (
+            bool(value)
+            if type_name == "Boolean"
+            else value
+            if type_name == "Float32"
+            else int(value)
+        )
+        if number != value:
+            raise InputError(
+                where=f"{self._description.path}, variable '{variable.name}'",
+                found=f"the value {value:g}",
+                expected="0 or 1, of a Boolean"
+                if type_name == "Boolean"
+                else f"a whole number, of {type_name}",
+                remedy="correct the value",
+            )
+        name = _SETTERS[type_name]
+        if type_name == "Enumeration" and self.version == "3.0":
+            name = "setInt64"
+        getattr(self._instance, name)([variable.reference], [number])
 
     def call(self, use: str, *arguments: object) -> None:
         """Call the function for a use such as "get".
@@ -304,6 +374,10 @@ class FMU:
     units : unit of each variable that has one.
     defaults : start values, those given or of the model description, in the FMU's units.
     sha256 : hash of the file, its identity in results.
+    start_time : of the model's default experiment [s]; 0 where it has none.
+    event_signs : (z,) whether event indicators were above 0 at the last start.
+    time : (1,) that the FMU was set to last [s].
+    next_event : (1,) time of the next time event [s], told at the last start; infinite for none.
 
     Raises
     ------
@@ -340,10 +414,19 @@ class FMU:
             if v.real and v.start is not None
         } | self._given
         self._references = {v.name: v.reference for v in self.description.variables}
+        self._real_names = {v.name for v in self.description.variables if v.real}
+        self._whole_parameters = [
+            v for v in self.description.variables if v.type in _SETTERS and not v.array
+        ]
         self._rates = np.array([self._references[r] for r in self.description.rates], np.uint32)
         self.has_directional_derivatives = offered.directional_derivatives
         self._x = np.zeros(len(self.states))
         self._dx = np.zeros(len(self.states))
+        self._z = np.zeros(self.description.event_indicators)
+        self.start_time = self.description.start or 0.0
+        self.event_signs = np.zeros(self._z.size, np.bool_)
+        self.time = np.full(1, self.start_time)
+        self.next_event = np.full(1, np.inf)
         self._state_variables = self.variables(self.states)
         self._loaded = FMUInstance(self.description, self.interface)
         self._variants: list[FMU] = []
@@ -383,7 +466,7 @@ class FMU:
         Raises
         ------
         InputError
-            If the FMU has no variable of a name.
+            If the FMU has no variable of a name, or not as a real scalar.
         """
         for name in names:
             if name not in self._references:
@@ -392,6 +475,15 @@ class FMU:
                     found=f"no variable '{name}'{closest(name, self._references)}",
                     expected=f"one of {', '.join(self.inputs + self.outputs)}",
                     remedy=f"use an FMU that has it, or map its name: --map {name}=NAME",
+                )
+            if name not in self._real_names:
+                variable = next(v for v in self.description.variables if v.name == name)
+                raise InputError(
+                    where=f"{self.path}, variable '{variable.name}'",
+                    found=f"a variable of type {variable.type}"
+                    + (", an array" if variable.array else ""),
+                    expected="a scalar of type Real (FMI 2.0) or Float64 (FMI 3.0)",
+                    remedy="export the model with a real variable in its place",
                 )
         references = np.array([self._references[n] for n in names], np.uint32)
         return Variables(tuple(names), references, np.zeros(len(names)))
@@ -436,7 +528,7 @@ class FMU:
     def start(
         self, states: Mapping[str, float], parameters: Mapping[str, float] | None = None
     ) -> None:
-        """Reset and initialise at time 0, then enter continuous-time mode.
+        """Reset and initialise at `start_time`, then enter continuous-time mode.
 
         Parameters
         ----------
@@ -444,11 +536,51 @@ class FMU:
         parameters : values of parameters; others keep their defaults.
         """
         given = {**self._given, **(parameters or {}), **states}
+        whole = [(v, given.pop(v.name)) for v in self._whole_parameters if v.name in given]
         variables = self.variables(list(given))
-        self._loaded.start(lambda: self.set(variables, np.array(list(given.values()))))
+        values = np.array(list(given.values()))
+
+        def prepare() -> None:
+            self.set(variables, values)
+            for variable, value in whole:
+                self._loaded.set_whole(variable, value)
+
+        self.time[0] = self.start_time
+        self.next_event[0] = self._loaded.start(prepare, self.start_time)
+        if self.event_signs.size and self.interface == MODEL_EXCHANGE:
+            self.event_signs[:] = self.event_indicators() > 0.0
+
+    def check_event(self) -> None:
+        """Refuse to go on if the FMU has passed an event since its start.
+
+        Raises
+        ------
+        FMUError
+            Where an event indicator has another sign than at the start, or a time event is over.
+        """
+        signs = self.event_signs
+        if self.time[0] > self.next_event[0] or (
+            signs.size and ((self.event_indicators() > 0.0) != signs).any()
+        ):
+            raise self.event_error()
+
+    def event_error(self) -> FMUError:
+        """The error for an event of the model, which estimators do not treat."""
+        return FMUError(
+            f"{self.path.name}: an event of the model by {self.time[0]:.6g} s of its time, or in "
+            "the step after: an event indicator changes its sign, or a time event is due. "
+            "Estimators do not stop at events, so their results would be wrong from there on; "
+            "replace jumps of the model by smooth functions, or cut the recording before the event"
+        )
+
+    def event_indicators(self) -> Vector:
+        """Values whose change of sign is a state event, (z,)."""
+        self._states("indicators", self._z)
+        return self._z.copy()
 
     def set_time(self, t: float) -> None:
         """Set the time [s]."""
+        self.time[0] = t
         self._loaded.call("time", t)
 
     def set_states(self, x: Vector) -> None:
@@ -586,9 +718,12 @@ class CoSimulation(FMU):
     def start(
         self, states: Mapping[str, float], parameters: Mapping[str, float] | None = None
     ) -> None:
-        """Reset and initialise at time 0; see `FMU.start`."""
+        """Reset and initialise at `start_time`; see `FMU.start`."""
         super().start(states, parameters)
-        self._t = 0.0
+        self._t = self.start_time
+
+    def check_event(self) -> None:
+        """Nothing: a Co-Simulation treats its events itself."""
 
     def set_time(self, t: float) -> None:
         """Say where the next step begins [s], after `restore`."""

@@ -16,14 +16,14 @@ from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from workbench.arrays import Matrix, Vector
-from workbench.errors import FMUError
+from workbench.errors import FMUError, InputError
 from workbench.models.fmu import FMU, CoSimulation, References
 from workbench.models.jit import jit
 
 compiled = jit()
 inlined = jit(inline=True)
 
-OK, REFUSED, SINGULAR = 0, 1, 2
+OK, REFUSED, SINGULAR, EVENT = 0, 1, 2, 3
 
 
 @intrinsic
@@ -54,10 +54,15 @@ class Instance(NamedTuple):
     Attributes
     ----------
     address : of the FMU instance.
-    set_states, derivatives, set_real, get_real, directional : addresses of the FMU's functions.
+    set_states, derivatives, set_real, get_real, directional, set_time : addresses of the FMU's
+        functions; get_indicators, too.
         FMI 2.0 takes no length of values in set_real and get_real; the register it would be in is
         not read.
     fmi : 2 or 3 with directional derivatives, 0 for differences.
+    measured : number of the measured inputs, the first of u.
+    time : (1,) that the FMU was set to last [s].
+    indicators, event_signs : (z,) event indicators, and whether they were above 0 at the start.
+    next_event : (1,) time of the next time event [s], infinite for none.
     x, dx : (n,) states and their derivatives.
     u, y : (m,) inputs, (l,) outputs.
     jacobian : (n + q, n + l) derivatives of [dx; y] (columns) by [x; last q inputs] (rows).
@@ -72,7 +77,14 @@ class Instance(NamedTuple):
     set_real: int
     get_real: int
     directional: int
+    set_time: int
+    get_indicators: int
     fmi: int
+    measured: int
+    time: Vector
+    indicators: Vector
+    event_signs: NDArray[np.bool_]
+    next_event: Vector
     x: Vector
     dx: Vector
     u: Vector
@@ -97,6 +109,7 @@ def instance(
     outputs : what estimates are made of, (l,).
     """
     n, m, q, k = len(fmu.states), len(inputs), len(corrections), len(outputs)
+    _refuse_discrete(fmu, [*inputs, *corrections])
     return Instance(
         address=fmu.instance_address,
         set_states=fmu.function_address("set_states"),
@@ -104,7 +117,14 @@ def instance(
         set_real=fmu.function_address("set"),
         get_real=fmu.function_address("get"),
         directional=fmu.function_address("directional"),
+        set_time=fmu.function_address("time"),
+        get_indicators=fmu.function_address("indicators"),
         fmi=int(fmu.version[0]) if fmu.has_directional_derivatives else 0,
+        measured=m,
+        time=fmu.time,
+        indicators=np.zeros(fmu.event_signs.size),
+        event_signs=fmu.event_signs,
+        next_event=fmu.next_event,
         x=np.zeros(n),
         dx=np.zeros(n),
         u=np.zeros(m + q),
@@ -116,6 +136,19 @@ def instance(
         unknowns=np.concatenate([fmu.rate_references, fmu.variables(outputs).references]),
         knowns=fmu.variables([*fmu.states, *corrections]).references,
     )
+
+
+def _refuse_discrete(fmu: FMU, names: Sequence[str]) -> None:
+    """Refuse inputs that FMI allows to be set at events only."""
+    variability = {v.name: v.variability for v in fmu.description.variables}
+    for name in names:
+        if variability.get(name) == "discrete":
+            raise InputError(
+                where=f"{fmu.path}, variable '{fmu.names.get(name, name)}'",
+                found="a discrete input, which may change at events only",
+                expected="a continuous input, since estimators do not stop at events",
+                remedy="export the model with a continuous input in its place",
+            )
 
 
 class CoSimulationInstance(NamedTuple):
@@ -170,6 +203,46 @@ def set_inputs(model, first, count):  # type: ignore[no-untyped-def]
     references, values = model.inputs[first:], model.u[first:]
     status = _call(model.set_real, (model.address, references, count, values, count))
     return REFUSED if status > 1 else OK
+
+
+@inlined
+def set_sample(model, u):  # type: ignore[no-untyped-def]
+    """Set the measured inputs and the time of a sample, (m + 1,); returns a status.
+
+    Without the time, (m,), the FMU stays at the time that it is at. EVENT, if the FMU is at a point
+    beyond a state event, or the time is beyond a time event.
+    """
+    m = model.measured
+    status = check_state_events(model)
+    for j in range(m):
+        model.u[j] = u[j]
+    status = status or set_inputs(model, 0, m)
+    if u.size > m:
+        status = status or set_time(model, u[m])
+    return status
+
+
+@inlined
+def set_time(model, t):  # type: ignore[no-untyped-def]
+    """Set the time to t [s]; returns a status."""
+    if t > model.next_event[0]:
+        return EVENT
+    model.time[0] = t
+    return REFUSED if _call(model.set_time, (model.address, t)) > 1 else OK
+
+
+@inlined
+def check_state_events(model):  # type: ignore[no-untyped-def]
+    """EVENT if an event indicator has another sign than at the start of the FMU; else a status."""
+    n = model.indicators.size
+    if n == 0:
+        return OK
+    if _call(model.get_indicators, (model.address, model.indicators, n)) > 1:
+        return REFUSED
+    for i in range(n):
+        if (model.indicators[i] > 0.0) != model.event_signs[i]:
+            return EVENT
+    return OK
 
 
 @inlined
@@ -350,9 +423,12 @@ def raise_on_failure(status: int, fmu: FMU) -> None:
     Raises
     ------
     FMUError
-        If the FMU refused a call, with what it logged; or an implicit step had no solution.
+        If the FMU refused a call, with what it logged; an implicit step had no solution; or the
+        model has an event, at which estimators do not stop.
     """
     if status == REFUSED:
         raise fmu.refusal("a call of the observer's loop", 3)
     if status == SINGULAR:
         raise FMUError(f"{fmu.path.name}: the implicit step has no solution at this point")
+    if status == EVENT:
+        raise fmu.event_error()

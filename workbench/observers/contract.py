@@ -123,6 +123,7 @@ class Estimator(ABC):
         self._model: Any = instance(fmu, inputs, system.corrections, outputs)
         self._layout = layout(fmu, system)
         self._t = 0.0
+        self._model_time = fmu.start_time
         self._known: dict[str, float] = {}
         self._width = 2 * len(system.columns) + len(self.modes) + 1
         bands = system.bands.get(self.name, {})
@@ -258,7 +259,10 @@ class Estimator(ABC):
             begin[rolling.follower] = rolling_ratio(self.fmu, self.system) * begin[rolling.leader]
         estimated = {quantity.name for quantity in self.system.estimated}
         held = {name: value for name, value in self._known.items() if name not in estimated}
+        if self.fmu.event_signs.size:  # that may depend on inputs: events there are of the start
+            held |= dict(zip((signal.name for signal in self.system.inputs), u, strict=True))
         self.fmu.start(begin, held)
+        self._model_time = self.fmu.start_time
         self._model.u[:] = 0.0
         self._begin(u, y)
 
@@ -312,10 +316,26 @@ class Estimator(ABC):
         """Rows of estimates, as laws write them."""
         rows = np.full((steps.size, self._width), np.nan)
         settings, state = self._arguments()
-        y = read_only(self._measured(y))
-        status = self._loop(self._model, settings, state, steps, read_only(u), y, rows)
+        u, y = self._with_time(steps, u), read_only(self._measured(y))
+        status = self._loop(self._model, settings, state, steps, u, y, rows)
         raise_on_failure(status, self.fmu)
+        for model in self.models:
+            model.check_event()
         return rows
+
+    def _with_time(self, steps: Vector, u: Matrix) -> Matrix:
+        """Inputs and the model's time, (n, m + 1), as `measure` sets them.
+
+        Raises
+        ------
+        ValueError
+            If there are not as many inputs as the system has, or rows as steps.
+        """
+        if u.shape != (steps.size, len(self.system.inputs)):
+            raise ValueError(f"inputs of shape {u.shape}, of {steps.size} samples")
+        time = self._model_time + np.cumsum(steps)
+        self._model_time = float(time[-1]) if time.size else self._model_time
+        return read_only(np.column_stack([u, time]))
 
     def _measured(self, y: Any) -> Any:
         """Outputs that the estimator takes of those given, (l,) or (n, l), NaN for more."""

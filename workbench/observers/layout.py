@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from workbench.arrays import Vector
 from workbench.errors import InputError
 from workbench.models.fmu import FMU
-from workbench.models.native import inlined, read, set_inputs, set_states
+from workbench.models.native import inlined, read, set_inputs, set_sample, set_states
 from workbench.system.system import System
 
 
@@ -29,7 +29,8 @@ class Layout(NamedTuple):
     ratio : of follower over leader while it rolls [1]; lead : coefficient of the leader in `pace`.
     reported : number of the model's outputs that estimates hold.
     columns : of the Jacobian that laws need: rates, and all outputs if one that is fed is no state.
-    held : (m,) 1 of an input that stays as it was sampled until the next sample, else 0.
+    held : (m + 1,) 1 of an input that stays as it was sampled until the next sample, else 0, as of
+        the time.
     """
 
     seen: NDArray[np.intp]
@@ -87,7 +88,7 @@ def layout(fmu: FMU, system: System) -> Layout:
         lead=float(sum(p for p, at in zip(pace, seen, strict=True) if at == leader)),
         reported=len(system.reported),
         columns=len(states) + (len(system.reported) + unseen if unseen else 0),
-        held=np.array([float(signal.held) for signal in system.inputs]),
+        held=np.array([*(float(signal.held) for signal in system.inputs), 0.0]),
     )
 
 
@@ -234,22 +235,20 @@ def assign_rows(target, source):  # type: ignore[no-untyped-def]
 
 @inlined
 def act(layout, before, u, acting):  # type: ignore[no-untyped-def]
-    """Write the inputs that act in a step, (m,): u + held (before - u).
+    """Write the inputs that act in a step, and its time, (m + 1,): u + held (before - u).
 
     Parameters
     ----------
-    before, u : (m,) inputs at the beginning of the step, and at its end.
+    before, u : (m + 1,) inputs and time at the beginning of the step, and at its end.
     """
-    for j in range(u.size):
+    for j in range(acting.size):
         acting[j] = before[j] if layout.held[j] > 0.0 else u[j]
 
 
 @inlined
 def measure(model, u):  # type: ignore[no-untyped-def]
-    """Set the measured inputs; returns a status."""
-    for j in range(u.size):
-        model.u[j] = u[j]
-    return set_inputs(model, 0, u.size)
+    """Set the measured inputs and the time, see `set_sample`; returns a status."""
+    return set_sample(model, u)
 
 
 @inlined

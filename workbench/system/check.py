@@ -60,6 +60,7 @@ def check_model(system: System, model: Description) -> None:
                 expected=f"[{unit}] for {ours}; nothing is converted silently",
                 remedy=f"export the model with this variable in {unit}",
             )
+    _check_corrections(system, model)
     for name in system.given:
         if name not in model.names("parameter"):
             raise InputError(
@@ -68,6 +69,32 @@ def check_model(system: System, model: Description) -> None:
                 expected=f"a parameter of {model.name}{closest(name, model.names('parameter'))}",
                 remedy="correct the name",
             )
+
+
+def _check_corrections(system: System, model: Description) -> None:
+    """Refuse corrections that estimators cannot set, or that are something else as well."""
+    variables = {v.name: v for v in model.variables}
+    taken = {signal.name: "a measured input" for signal in system.inputs}
+    taken |= {
+        signal.name: "a measured output" for signal in (*system.outputs, *system.intermittent)
+    }
+    taken |= {quantity.name: "an estimated quantity" for quantity in system.estimated}
+    for quantity in system.estimated:
+        name = quantity.correction
+        variable = variables[name]
+        settable = variable.causality == "input" or (
+            variable.causality == "parameter" and variable.variability == "tunable"
+        )
+        if name in taken or not settable:
+            own = f"a {variable.variability} variable of causality {variable.causality}"
+            raise InputError(
+                where=f"{system.source}, [estimated.{quantity.name}] correction",
+                found=f"'{name}', which is {taken.get(name, own)}",
+                expected="an input of the model that only this correction sets, 0 by default, and "
+                f"that is added to {quantity.name}; or such a parameter that is tunable",
+                remedy=f"give the model such an input, say 'd{quantity.name}', and name it",
+            )
+        taken[name] = "the correction of another quantity"
 
 
 def check_references(

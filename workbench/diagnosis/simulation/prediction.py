@@ -30,6 +30,7 @@ from workbench.diagnosis.simulation.tangent import (
 from workbench.errors import FMUError
 from workbench.models.fmu import FMU
 from workbench.models.native import (
+    check_state_events,
     compiled,
     inlined,
     instance,
@@ -182,8 +183,9 @@ def _predict(model, state, args):  # type: ignore[no-untyped-def]
                 model.u[j] = u[k, j]
             if holds and set_inputs(model, 0, u.shape[1]):
                 return 1
-        if read(model):
-            return 1
+        status = check_state_events(model) or read(model)
+        if status:
+            return status
         for i in range(y.shape[1]):
             errors[k, i] = y[k, i] - model.y[i]
         if varied:

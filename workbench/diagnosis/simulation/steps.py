@@ -25,6 +25,7 @@ from workbench.models.native import (
     place,
     set_inputs,
     set_states,
+    set_time,
     solve,
 )
 
@@ -48,6 +49,7 @@ class Steps(NamedTuple):
     full : (n, n + 1) the same of all states, and Newton's correction.
     age : (1,) steps that the Jacobian has served.
     from_, to : (m,) inputs at the beginning and at the end of a step.
+    time : (1,) of the model at the beginning of a step [s].
     x, f : (n,) states where a step begins, and their rates.
     moved : (n,) rates where the first stage would lead explicitly; Newton's correction.
     k1, k2 : (n,) slopes of the two stages.
@@ -64,6 +66,7 @@ class Steps(NamedTuple):
     full: Matrix
     from_: Vector
     to: Vector
+    time: Vector
     x: Vector
     f: Vector
     moved: Vector
@@ -95,6 +98,7 @@ def steps(fmu: FMU, stiff: NDArray[np.intp], inputs: int) -> Steps:
         full=np.zeros((n, n + 1)),
         from_=np.zeros(inputs),
         to=np.zeros(inputs),
+        time=np.zeros(1),
         x=np.zeros(n),
         f=np.zeros(n),
         moved=np.zeros(n),
@@ -172,8 +176,9 @@ def _begun(model, work, h, anew):  # type: ignore[no-untyped-def]
         model.x[i] = work.x[i] + h * k1[i]
     for i in work.stiff:
         model.x[i] = work.x[i]
-    if place(model) or evaluate(model):
-        return 1
+    status = set_time(model, work.time[0] + h) or place(model) or evaluate(model)
+    if status:
+        return status
     for i in range(n):
         work.moved[i] = model.dx[i]
         k2[i] = _GAMMA * (model.dx[i] - k1[i])
@@ -214,6 +219,7 @@ def step(model, work, h):  # type: ignore[no-untyped-def]
     Source: J. G. Verwer et al. (1999), SIAM J. Sci. Comput. 20, 1456-1480.
     """
     n, k1, k2 = model.x.size, work.k1, work.k2
+    work.time[0] = model.time[0]
     for j in range(work.from_.size):
         work.from_[j] = model.u[j]
     if evaluate(model):
@@ -230,7 +236,8 @@ def step(model, work, h):  # type: ignore[no-untyped-def]
             model.u[j] = work.from_[j]
         for i in range(n):
             model.x[i] = work.x[i]
-        status = place(model) or _begun(model, work, h, True)
+        status = set_time(model, work.time[0]) or place(model)
+        status = status or _begun(model, work, h, True)
         if status:
             return status
         bent = _bent(model, work, h)
@@ -243,7 +250,7 @@ def step(model, work, h):  # type: ignore[no-untyped-def]
     if not bent or _solved(model, work, h):
         for i in range(n):
             model.x[i] = k2[i]
-    return set_states(model)
+    return set_time(model, work.time[0] + h) or set_states(model)
 
 
 @compiled
@@ -264,7 +271,12 @@ def _solved(model, work, h):  # type: ignore[no-untyped-def]
             share = 0.5 * (part + (_GAMMA if stage == 0 else 1.0))
             for j in range(work.to.size):
                 model.u[j] = work.from_[j] + share * (work.to[j] - work.from_[j])
-            if set_inputs(model, 0, work.to.size) or _implicit(model, work, _GAMMA * half):
+            status = set_time(model, work.time[0] + share * h)
+            if (
+                status
+                or set_inputs(model, 0, work.to.size)
+                or _implicit(model, work, _GAMMA * half)
+            ):
                 return 1
             if stage == 0:
                 for i in range(n):

@@ -232,8 +232,8 @@ class DisturbanceObserver(Estimator):
             system=np.zeros((s + q, s + q + 1)),
             others=np.zeros(len(fmu.states)),
             innovation=np.zeros(outputs),
-            inputs=np.zeros(len(system.inputs)),
-            acting=np.zeros(len(system.inputs)),
+            inputs=np.zeros(len(system.inputs) + 1),
+            acting=np.zeros(len(system.inputs) + 1),
         )
 
     def _arguments(self) -> tuple[Any, Any]:

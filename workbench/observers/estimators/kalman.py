@@ -328,7 +328,7 @@ def drive(model, settings, state, z, u, h):  # type: ignore[no-untyped-def]
     for i in range(n):
         least[i] = 0.0
     status = measure(model, u) or put(model, z)
-    for j in range(u.size):
+    for j in range(settings.driven.size):
         deviation = settings.driven[j] + settings.driven_relative[j] * abs(u[j])
         if deviation == 0.0:
             continue
@@ -688,7 +688,7 @@ def filter_state(n: int, system: System, column: int) -> FilterState:
     ----------
     column : size of a work space.
     """
-    q, m, outputs = len(system.estimated), len(system.inputs), len(system.outputs)
+    q, m, outputs = len(system.estimated), len(system.inputs) + 1, len(system.outputs)
     size = n + q
     return FilterState(
         z=np.zeros(size),

@@ -70,7 +70,7 @@ class OpenLoop(Estimator):
 
     def __init__(self, fmu: FMU, system: System, gains: Gains) -> None:
         super().__init__(fmu, system, gains)
-        n, m = len(fmu.states), len(system.inputs)
+        n, m = len(fmu.states), len(system.inputs) + 1
         self._state = _State(np.zeros((n, n + 1)), np.zeros(m), np.zeros(m))
 
     def _arguments(self) -> tuple[Layout, Any]:

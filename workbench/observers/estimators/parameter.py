@@ -156,8 +156,8 @@ class ParameterEstimator(Estimator):
             z=np.zeros(q),
             system=np.zeros((n, n + 1)),
             innovation=np.zeros(outputs),
-            inputs=np.zeros(len(system.inputs)),
-            acting=np.zeros(len(system.inputs)),
+            inputs=np.zeros(len(system.inputs) + 1),
+            acting=np.zeros(len(system.inputs) + 1),
         )
 
     def _arguments(self) -> tuple[Any, Any]:

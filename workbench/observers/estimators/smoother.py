@@ -287,7 +287,8 @@ class Smoother(MovingHorizonEstimator):
         """Smooth a recording; see Estimator."""
         self.start(u[0], y[0])
         estimates = np.full((time.size, self._width), np.nan)
-        steps, u, y = np.diff(time, prepend=time[0]), read_only(u), read_only(self._measured(y))
+        steps = np.diff(time, prepend=time[0])
+        u, y = self._with_time(steps, u), read_only(self._measured(y))
         horizon, nodes, s = self._state, time.size - 1, self._settings.walk.size
         limits = horizon.window.low, horizon.window.high
         whole = window(nodes, len(self.fmu.states), u.shape[1], y.shape[1], *limits)

@@ -23,7 +23,7 @@ enum { LAW_OK, LAW_REFUSED, LAW_SINGULAR };
 
 /* The model ----------------------------------------------------------------------------------- */
 
-/* Each counterpart of a function of workbench/kernel.py refuses what an FMU refuses there. */
+/* Each counterpart of a function of workbench/models/native.py refuses what an FMU refuses there. */
 
 static inline int plant_set_inputs(LawModelView *model, int first, int count) {
     for (int k = first; k < first + count; k++) {
@@ -35,6 +35,12 @@ static inline int plant_set_inputs(LawModelView *model, int first, int count) {
         model->at_u[plant_input[k]] = model->u[k];
     }
     return LAW_OK;
+}
+
+/* The plant has no explicit time, which an export refuses. */
+static inline int plant_set_sample(LawModelView *model, const double *u) {
+    memcpy(model->u, u, LAW_INPUTS * sizeof *u);
+    return plant_set_inputs(model, 0, LAW_INPUTS);
 }
 
 static inline int plant_set_states(LawModelView *model) {

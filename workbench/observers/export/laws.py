@@ -37,7 +37,7 @@ _HERE = Path(__file__).parent
 _SOURCES = {"integrator.c": _HERE / "law.c", "memory.h": _HERE / "law.h"}
 
 # Functions of the kernel that call the FMU, by the number of their arguments; law.c has them.
-_CALLS = {"set_inputs": 3, "set_states": 1, "place": 1, "evaluate": 1, "read": 1}
+_CALLS = {"set_sample": 2, "set_inputs": 3, "set_states": 1, "place": 1, "evaluate": 1, "read": 1}
 _CALLS |= {"differentiate": 3, "linearise": 2}
 
 
@@ -106,8 +106,9 @@ def _law_code(estimator: Estimator) -> dict[str, str]:
     assert isinstance(of_memory, Record)
     assert isinstance(models, Several)
     sizes = _sizes(estimator)
-    measured = [
-        Array(DOUBLE, (sizes[name],), (1,), constant=True) for name in ("INPUTS", "OUTPUTS")
+    measured = [  # inputs and time, outputs
+        Array(DOUBLE, (size,), (1,), constant=True)
+        for size in (sizes["INPUTS"] + 1, sizes["OUTPUTS"])
     ]
     row = Array(DOUBLE, (sizes["ROW"],), (1,), constant=False)
     program = Program(
@@ -149,7 +150,9 @@ def _law_code(estimator: Estimator) -> dict[str, str]:
         "",
         "static int estimator_step(Law *law, double h, const double *sample, double *row) {",
         "    const double *const y = sample + LAW_INPUTS;",
-        f"    int status = {step}(law->model, &law_settings, &law->memory, h, sample, y, row);",
+        "    double u[LAW_INPUTS + 1] = {0.0};  /* the plant has no explicit time */",
+        "    memcpy(u, sample, LAW_INPUTS * sizeof *u);",
+        f"    int status = {step}(law->model, &law_settings, &law->memory, h, u, y, row);",
         f"    for (int k = 0; k < {estimator.bands.size}; k++) {{",
         f"        row[{estimator.bands.size} + k] *= law_bands[k];",
         "    }",

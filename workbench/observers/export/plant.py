@@ -38,6 +38,13 @@ def plant_of(estimator: Estimator) -> StateSpace:
             expected=f"what {name} has, {', '.join(missing or states)}",
             remedy="build the FMU from the library of the system",
         )
+    if ca.depends_on(ca.vertcat(space.f, space.w), space.t):
+        raise InputError(
+            where=name,
+            found="explicit time in the model",
+            expected="a model of states, inputs and parameters: an exported law has no time",
+            remedy="make what depends on time an input of the model",
+        )
     listed = [output.name for output in space.outputs]
     read = [listed.index(one) for one in _read(estimator) if one not in states]
     return replace(

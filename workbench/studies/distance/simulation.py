@@ -14,12 +14,12 @@ from workbench.diagnosis.simulation.steps import restart, steps
 from workbench.diagnosis.simulation.steps import step as advance
 from workbench.errors import FMUError
 from workbench.models.fmu import FMU
-from workbench.models.native import OK, compiled, instance, place, raise_on_failure, read
+from workbench.models.native import EVENT, OK, compiled, instance, place, raise_on_failure, read
 from workbench.system.stopping import Stopping
 from workbench.system.system import System
 
 GRID = 5.0  # [m] between two values of what drives the model along the way; shorter than a vehicle
-_MOVING = 3  # status: not at rest when the time was over
+_MOVING = EVENT + 1  # status: not at rest when the time was over
 
 
 @dataclass(frozen=True, eq=False)

@@ -309,7 +309,7 @@ class MovingHorizonEstimator(ExtendedKalmanFilter):
         self._state = HorizonState(
             self._state,
             held=np.zeros(outputs),
-            window=window(round(samples), n, len(system.inputs), outputs, low, high),
+            window=window(round(samples), n, len(system.inputs) + 1, outputs, low, high),
         )
 
     @property

@@ -1,0 +1,74 @@
+/* FMI 2.0 Model Exchange of a heated room, C der(T) = P - G (T - Ta). What switches the heating P is
+ * chosen by WHAT: a thermostat with hysteresis (state events), a timetable (time events), or a relay
+ * that switches a relay (two iterations at the start). MODE and FLAG are an Integer and a Boolean
+ * parameter whose value references are those of T and its derivative. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "fmi2FunctionTypes.h"
+enum { THERMOSTAT, TIMETABLE, RELAYS };
+enum { T, DT, TA, G, DG, C, P, SIZE };
+typedef struct { double r[SIZE], time; int mode, flag, relay; } Room;
+static void reset(Room *m) {
+    memset(m, 0, sizeof *m);
+    m->r[T] = 291.0, m->r[TA] = 280.0, m->r[G] = 50.0, m->r[C] = 1e5;
+}
+static void calculate(Room *m) {
+    const double *r = m->r;
+    m->r[DT] = (r[P] * (1 + m->mode) - (r[G] + r[DG]) * (r[T] - r[TA])) / r[C] + m->flag;
+}
+const char *fmi2GetTypesPlatform(void) { return fmi2TypesPlatform; }
+const char *fmi2GetVersion(void) { return "2.0"; }
+fmi2Component fmi2Instantiate(fmi2String a, fmi2Type b, fmi2String c, fmi2String d, const fmi2CallbackFunctions *e, fmi2Boolean f, fmi2Boolean g) {
+    Room *m = malloc(sizeof *m);
+    reset(m);
+    return m;
+}
+void fmi2FreeInstance(fmi2Component c) { free(c); }
+fmi2Status fmi2Reset(fmi2Component c) { reset(c); return fmi2OK; }
+fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean a, fmi2Real b, fmi2Real t, fmi2Boolean d, fmi2Real e) { ((Room *)c)->time = t; return fmi2OK; }
+fmi2Status fmi2EnterInitializationMode(fmi2Component c) { return fmi2OK; }
+fmi2Status fmi2ExitInitializationMode(fmi2Component c) { return fmi2OK; }
+fmi2Status fmi2EnterEventMode(fmi2Component c) { return fmi2OK; }
+fmi2Status fmi2EnterContinuousTimeMode(fmi2Component c) { return fmi2OK; }
+fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *e) {
+    Room *m = c;
+    memset(e, 0, sizeof *e);
+    if (WHAT == THERMOSTAT) m->r[P] = m->r[T] < 293.0 ? 1500.0 : m->r[T] > 295.0 ? 0.0 : m->r[P];
+    if (WHAT == TIMETABLE) {
+        const int part = (int)floor(m->time / 600.0 + 1e-9);
+        m->r[P] = part % 2 == 0 ? 1500.0 : 0.0;
+        e->nextEventTimeDefined = fmi2True, e->nextEventTime = 600.0 * (part + 1);
+    }
+    if (WHAT == RELAYS) {
+        m->r[P] = m->relay ? 1500.0 : 0.0;
+        e->newDiscreteStatesNeeded = !m->relay, m->relay = 1;
+    }
+    return fmi2OK;
+}
+fmi2Status fmi2SetTime(fmi2Component c, fmi2Real t) { ((Room *)c)->time = t; return fmi2OK; }
+fmi2Status fmi2SetContinuousStates(fmi2Component c, const fmi2Real x[], size_t n) { ((Room *)c)->r[T] = x[0]; return fmi2OK; }
+fmi2Status fmi2GetContinuousStates(fmi2Component c, fmi2Real x[], size_t n) { x[0] = ((Room *)c)->r[T]; return fmi2OK; }
+fmi2Status fmi2GetDerivatives(fmi2Component c, fmi2Real x[], size_t n) { calculate(c); x[0] = ((Room *)c)->r[DT]; return fmi2OK; }
+fmi2Status fmi2GetEventIndicators(fmi2Component c, fmi2Real z[], size_t n) {
+    const double *r = ((Room *)c)->r;
+    z[0] = r[P] > 0.0 ? 295.0 - r[T] : r[T] - 293.0;
+    return fmi2OK;
+}
+fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference k[], size_t n, fmi2Real v[]) {
+    calculate(c);
+    for (size_t i = 0; i < n; i++) v[i] = ((Room *)c)->r[k[i]];
+    return fmi2OK;
+}
+fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference k[], size_t n, const fmi2Real v[]) {
+    for (size_t i = 0; i < n; i++) ((Room *)c)->r[k[i]] = v[i];
+    return fmi2OK;
+}
+fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference k[], size_t n, const fmi2Integer v[]) { ((Room *)c)->mode = v[0]; return fmi2OK; }
+fmi2Status fmi2SetBoolean(fmi2Component c, const fmi2ValueReference k[], size_t n, const fmi2Boolean v[]) { ((Room *)c)->flag = v[0]; return fmi2OK; }
+/* FMPy looks for all functions; these are never called. */
+#define NEVER(name) fmi2Status name(void) { return fmi2Error; }
+NEVER(fmi2SetDebugLogging) NEVER(fmi2Terminate) NEVER(fmi2GetInteger) NEVER(fmi2GetBoolean) NEVER(fmi2GetString)
+NEVER(fmi2SetString) NEVER(fmi2GetFMUstate) NEVER(fmi2SetFMUstate) NEVER(fmi2FreeFMUstate)
+NEVER(fmi2SerializedFMUstateSize) NEVER(fmi2SerializeFMUstate) NEVER(fmi2DeSerializeFMUstate)
+NEVER(fmi2GetDirectionalDerivative) NEVER(fmi2CompletedIntegratorStep) NEVER(fmi2GetNominalsOfContinuousStates)
