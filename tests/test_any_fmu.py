@@ -168,3 +168,12 @@ def test_a_correction_is_an_input_of_its_own(correction: str, found: str, build:
     path = build("RELAYS", correction=correction)
     with FMU(path) as fmu, pytest.raises(InputError, match=f"correction: found {found}"):
         estimator(fmu, "ekf")
+
+
+def test_compiled_code_gets_samples_of_the_size_that_it_needs(build: Build) -> None:
+    with FMU(build("RELAYS")) as fmu:
+        filter_ = estimator(fmu, "ekf")
+        time, one, two = np.arange(5.0), np.zeros((5, 1)), np.zeros((5, 2))
+        for u, y in ((two, one), (one[:4], one), (one, one[:4])):
+            with pytest.raises(ValueError, match="samples of shape"):
+                filter_.run(time, u, y)

@@ -216,10 +216,16 @@ def _check(options: argparse.Namespace, output: Output) -> CommandResult:
     )
     unknown = any(finding.unknown for finding in findings)
     fit = None if unknown and is_fit(findings) else is_fit(findings)
-    verdict = {True: "fit for observers", False: "not fit for observers", None: "not measured"}
+    possible = uses(findings)
+    would_do = sum(not failed for failed in possible.values())
+    verdict = {
+        True: "fit for observers",
+        False: f"not fit for observers; it would do for {would_do} of {len(possible)} uses",
+        None: "not measured",
+    }
     output.result(f"{options.fmu.name} ({description.name}): {verdict[fit]}")
     if fit is False:
-        for use, failed in uses(findings).items():
+        for use, failed in possible.items():
             reason = f"no, for {', '.join(failed)}" if failed else "it would do"
             output.result(f"    {use}: {reason}")
     identity = {
@@ -229,7 +235,7 @@ def _check(options: argparse.Namespace, output: Output) -> CommandResult:
         "sha256": description.sha256,
     }
     listed = [asdict(finding) for finding in findings]
-    result = {"fmu": identity, "fit": fit, "uses": uses(findings), "findings": listed}
+    result = {"fmu": identity, "fit": fit, "uses": possible, "findings": listed}
     return CommandResult(result, status={True: 0, False: 1, None: 3}[fit])
 
 

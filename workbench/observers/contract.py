@@ -316,26 +316,29 @@ class Estimator(ABC):
         """Rows of estimates, as laws write them."""
         rows = np.full((steps.size, self._width), np.nan)
         settings, state = self._arguments()
-        u, y = self._with_time(steps, u), read_only(self._measured(y))
+        u, y = self._samples(steps, u, y)
         status = self._loop(self._model, settings, state, steps, u, y, rows)
         raise_on_failure(status, self.fmu)
         for model in self.models:
             model.check_event()
         return rows
 
-    def _with_time(self, steps: Vector, u: Matrix) -> Matrix:
-        """Inputs and the model's time, (n, m + 1), as `measure` sets them.
+    def _samples(self, steps: Vector, u: Matrix, y: Matrix) -> tuple[Matrix, Matrix]:
+        """Inputs with the model's time, (n, m + 1), as `measure` sets them, and outputs, (n, l).
 
         Raises
         ------
         ValueError
-            If there are not as many inputs as the system has, or rows as steps.
+            If there are not as many inputs as the system has, or rows as steps: compiled code
+            would read and write beyond them.
         """
-        if u.shape != (steps.size, len(self.system.inputs)):
-            raise ValueError(f"inputs of shape {u.shape}, of {steps.size} samples")
+        y = self._measured(y)
+        for array, columns in ((u, len(self.system.inputs)), (y, len(self.system.outputs))):
+            if array.shape != (steps.size, columns):
+                raise ValueError(f"samples of shape {array.shape}, not {(steps.size, columns)}")
         time = self._model_time + np.cumsum(steps)
         self._model_time = float(time[-1]) if time.size else self._model_time
-        return read_only(np.column_stack([u, time]))
+        return read_only(np.column_stack([u, time])), read_only(y)
 
     def _measured(self, y: Any) -> Any:
         """Outputs that the estimator takes of those given, (l,) or (n, l), NaN for more."""

@@ -95,6 +95,16 @@ def _check_corrections(system: System, model: Description) -> None:
                 remedy=f"give the model such an input, say 'd{quantity.name}', and name it",
             )
         taken[name] = "the correction of another quantity"
+    columns = {*(output.name for output in system.outputs), *system.corrections}
+    columns |= {quantity.name for quantity in system.estimated}
+    for name in system.reported:
+        if name in columns:
+            raise InputError(
+                where=f"{system.source}, reported",
+                found=f"'{name}', which is {taken[name]} as well",
+                expected="outputs of the model that estimates do not have without it",
+                remedy="leave it out of 'reported'",
+            )
 
 
 def check_references(

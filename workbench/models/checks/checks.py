@@ -153,9 +153,11 @@ def _start(path: Path, instantiations: int) -> Iterator[CheckResult]:
     else:
         reason = ""
     yield replace(START, passed=not reason, value=1, reason=reason)
-    count = fmu.description.event_indicators
-    reason = "observers do not stop at events; replace jumps of the model by smooth functions"
-    yield replace(EVENTS, passed=not count, value=count, reason=reason if count else "")
+    count, timed = fmu.description.event_indicators, float(fmu.next_event[0])
+    smooth = not count and timed == np.inf
+    reason = "" if timed == np.inf else f"a time event at {timed:g} s; "
+    reason += "observers end at the first event; replace jumps of the model by smooth functions"
+    yield replace(EVENTS, passed=smooth, value=count, reason="" if smooth else reason)
 
 
 def _reset(path: Path, instantiations: int) -> Iterator[CheckResult]:

@@ -6,7 +6,7 @@ import numpy as np
 
 from workbench.arrays import Matrix, Vector
 from workbench.errors import InputError
-from workbench.models.native import compiled, raise_on_failure, read_only
+from workbench.models.native import compiled, raise_on_failure
 from workbench.observers.contract import Estimate
 from workbench.observers.estimators.kalman import carry, finish
 from workbench.observers.estimators.moving_horizon.estimator import (
@@ -288,7 +288,7 @@ class Smoother(MovingHorizonEstimator):
         self.start(u[0], y[0])
         estimates = np.full((time.size, self._width), np.nan)
         steps = np.diff(time, prepend=time[0])
-        u, y = self._with_time(steps, u), read_only(self._measured(y))
+        u, y = self._samples(steps, u, y)
         horizon, nodes, s = self._state, time.size - 1, self._settings.walk.size
         limits = horizon.window.low, horizon.window.high
         whole = window(nodes, len(self.fmu.states), u.shape[1], y.shape[1], *limits)
