@@ -207,7 +207,7 @@ def compare_runs(before: RunRecord, after: RunRecord) -> list[Change]:
 
 
 def _verdict(before: Measure | None, after: Measure | None) -> Verdict:
-    first, last = (None if one is None else one.value for one in (before, after))
+    first, last = (None if end is None else end.value for end in (before, after))
     if last is None or after is None:
         return "unchanged" if first is None and before is not None else "gone"
     if first is None or before is None:
@@ -267,7 +267,7 @@ def _leaves(content: Any, path: str = "") -> Iterator[tuple[str, Any]]:
 
 def format_runs(found: list[RunRecord]) -> str:
     """What a folder holds, for people."""
-    return "\n\n".join("\n".join(_told(one)) for one in found)
+    return "\n\n".join("\n".join(_told(run)) for run in found)
 
 
 def _told(ran: RunRecord) -> Iterator[str]:
@@ -291,7 +291,7 @@ def format_changes(before: RunRecord, after: RunRecord, changes: list[Change]) -
     order: tuple[Verdict, ...] = ("worse", "better", "changed", "unclear", "gone", "new")
     shown = [change for change in changes if change.verdict != "unchanged"]
     shown.sort(key=lambda one: (order.index(one.verdict), one.unit))
-    width = max((len(one.name) for one in shown), default=0)
+    width = max((len(change.name) for change in shown), default=0)
     for one in shown:
         ends = " -> ".join(
             "none" if end is None else _value(end) for end in (one.before, one.after)

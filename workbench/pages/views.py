@@ -20,7 +20,7 @@ def views(system: System) -> tuple[View, ...]:
             outputs.setdefault(output.shown, []).append(output.name)
     return (
         *(_view(system, names) for names in outputs.values()),
-        *(_view(system, [one.name], 0.55) for one in system.inputs),
+        *(_view(system, [signal.name], 0.55) for signal in system.inputs),
         _view(system, [judged], _JUDGED_HEIGHT),
         *(_view(system, [quantity.name], 0.8) for quantity in system.estimated),
     )

@@ -54,7 +54,7 @@ class Recording(NamedTuple):
 
     def part(self, samples: slice) -> "Recording":
         """A piece of it."""
-        steps, u, y, judged, shares = (one[samples] for one in self.sampled)
+        steps, u, y, judged, shares = (values[samples] for values in self.sampled)
         return self._replace(steps=steps, u=u, y=y, judged=judged, shares=shares)
 
 
@@ -79,8 +79,8 @@ def recordings(
     for output, error in scale_errors.items():
         signs = (error if i % 2 == 0 else -error for i in range(len(cases)))
         found += [
-            _scaled(one, case, output, sign, system)
-            for one, case, sign in zip(found, cases, signs, strict=False)
+            _scaled(recording, case, output, sign, system)
+            for recording, case, sign in zip(found, cases, signs, strict=False)
         ]
     return tuple(found)
 

@@ -194,13 +194,13 @@ class _Objective:
         candidates = coordinates.T
         limits = np.full(len(candidates), np.inf) if self._limits is None else self._limits
         known = [self._known.get(candidate.tobytes()) for candidate in candidates]
-        new = [i for i, one in enumerate(known) if one is None]
+        new = [i for i, result in enumerate(known) if result is None]
         asked = [
             Candidate(self._space.gains(candidates[i]), float(limits[i]), self._order) for i in new
         ]
         found = evaluate_all(self._pool, asked, len(self._job.recordings))
         self.evaluations += found
-        z = np.array([np.inf if one is None else one[0] for one in known])
+        z = np.array([np.inf if result is None else result[0] for result in known])
         for i, evaluation in zip(new, found, strict=True):
             z[i] = evaluation.z
             # Of equal candidates one may have lost, against a better member.

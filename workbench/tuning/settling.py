@@ -43,7 +43,7 @@ class Settling:
         transition = expm(dynamics * asked.within)
         later = np.linalg.matrix_power(transition, LATER)
         column = quantity - len(self._names)
-        return max(abs(float(error[quantity] @ one[:, column])) for one in (transition, later))
+        return max(abs(float(error[quantity] @ power[:, column])) for power in (transition, later))
 
     def follows(self, gains: Gains) -> bool:
         """Whether a step is found in time, as the system asks."""

@@ -68,7 +68,7 @@ def evaluate_gains(pool: Workers, job: Job, gains: Sequence[Vector]) -> Matrix:
     """z_k of gains in all cases, (g, k); infinite in all where an estimate diverges."""
     order = tuple(range(len(job.recordings)))
     candidates = [Candidate(values, np.inf, order) for values in gains]
-    return np.array([one.z_k for one in evaluate_all(pool, candidates, len(order))])
+    return np.array([evaluation.z_k for evaluation in evaluate_all(pool, candidates, len(order))])
 
 
 def untuned_filters(job: Job) -> dict[str, Vector]:
@@ -98,8 +98,8 @@ def errors(job: Job, cases: Sequence[Case], gains: Sequence[Vector]) -> Matrix:
     """
     with load_model(job) as fmu:
         found = [
-            [score(case, replay(case, one), job.system).nrmse for case in cases]
-            for one in (job_estimator(job, fmu, job.gains.with_values(g)) for g in gains)
+            [score(case, replay(case, estimator), job.system).nrmse for case in cases]
+            for estimator in (job_estimator(job, fmu, job.gains.with_values(g)) for g in gains)
         ]
     return np.array(found, dtype=float)
 

@@ -70,13 +70,15 @@ def next_stop(system: System, rivals: Rivals, engine: Engine) -> NextStop:
             for best in ranked[:_SETTINGS]
             for other_setting in other_settings(experiments, best.candidate)
         ]
-        beside = [one for one in every if one in near and one not in plan]
+        beside = [
+            experiment for experiment in every if experiment in near and experiment not in plan
+        ]
         if beside:
             engine.report(
                 f"{len(beside)} others that differ from the best {_SETTINGS} in one setting"
             )
             ranked = chosen([*ranked, *_predict_all(system, pool, beside)])
-        best = [one.candidate for one in ranked[:_SETTINGS]]
+        best = [prediction.candidate for prediction in ranked[:_SETTINGS]]
         more = [
             other_profile
             for setting in best
@@ -92,7 +94,7 @@ def next_stop(system: System, rivals: Rivals, engine: Engine) -> NextStop:
         first = ranked[0]
         if len(first.groups) < len(rivals.models) and experiments.sensors:
             engine.report("the same with further sensors")
-            best = [one.candidate for one in ranked[:_SENSED]]
+            best = [prediction.candidate for prediction in ranked[:_SENSED]]
             for sensor, found in _sensed(pool, best, experiments.sensors, len(first.groups)):
                 sensed = with_sensor(system, sensor)
                 sensors[sensor.label] = _proposal(sensed, experiments, found)
@@ -100,7 +102,7 @@ def next_stop(system: System, rivals: Rivals, engine: Engine) -> NextStop:
         system=system,
         rivals=rivals,
         channels=channels(system, rivals.signals),
-        tried=tuple(_proposal(system, experiments, one) for one in ranked),
+        tried=tuple(_proposal(system, experiments, prediction) for prediction in ranked),
         sensors=sensors,
     )
 
@@ -117,7 +119,7 @@ def predict_experiments(
     """
     with _open(system, rivals, Engine(workers)) as (experiments, pool):
         ranked = chosen(_predict_all(system, pool, plan, in_full=True))
-        return [_proposal(system, experiments, one) for one in ranked]
+        return [_proposal(system, experiments, prediction) for prediction in ranked]
 
 
 @contextmanager
@@ -134,7 +136,7 @@ def _open(
             remedy="write it, see docs/next-stop.md",
         )
     library = read_library(system.library)
-    effects = {one.name: one for one in choose(rivals.effects, catalogue(system, library))}
+    effects = {effect.name: effect for effect in choose(rivals.effects, catalogue(system, library))}
     with tempfile.TemporaryDirectory() as scratch:
         everything = Path(scratch) / "AllEffects.fmu"
         engine.report(f"compiling {len(effects)} effects")
@@ -186,11 +188,16 @@ def _sensed(
 
     def parting(tasks: Sequence[_Task]) -> list[Prediction]:
         found = [one for task in tasks if (one := task.result()) is not None]
-        return [one for one in found if len(one.groups) > parted]
+        return [prediction for prediction in found if len(prediction.groups) > parted]
 
     once = [(sensor, tried(sensor, plan, False)) for sensor in sensors]
     again = [
-        (sensor, tried(sensor, [one.candidate for one in chosen(parting(tasks))[:1]], True))
+        (
+            sensor,
+            tried(
+                sensor, [prediction.candidate for prediction in chosen(parting(tasks))[:1]], True
+            ),
+        )
         for sensor, tasks in once
     ]
     for sensor, tasks in again:
@@ -216,7 +223,7 @@ def _confirmed(pool: Pool[ExperimentPredictor], ranked: Sequence[Prediction]) ->
         found, tasks = [task.result() for task in tasks[:_TOGETHER]], tasks[_TOGETHER:]
         judged, left = left[: len(found)], left[len(found) :]
         doubtful += [signal for signal, well in zip(judged, found, strict=True) if well is None]
-        sure = [one for one in found if one is not None]
+        sure = [prediction for prediction in found if prediction is not None]
         if not sure:
             continue
         confirmed = chosen([*confirmed, *sure])

@@ -107,7 +107,7 @@ class Experiment:
 
 def every_setting(experiments: Experiments) -> list[Experiment]:
     """Every setting, each with the profiles that sweep most of their ranges."""
-    followed = tuple(_profiles(one)[0] for one in experiments.varied)
+    followed = tuple(_profiles(varied)[0] for varied in experiments.varied)
     names = list(experiments.settings)
     return [
         Experiment(dict(zip(names, settings, strict=True)), followed)
@@ -125,7 +125,9 @@ def some_settings(experiments: Experiments) -> list[Experiment]:
     plan = every_setting(experiments)
     parts = -(-len(plan) // _GRID)
     numbers = product(*(range(len(values)) for values in experiments.settings.values()))
-    return [one for one, at in zip(plan, numbers, strict=True) if sum(at) % parts == 0]
+    return [
+        experiment for experiment, at in zip(plan, numbers, strict=True) if sum(at) % parts == 0
+    ]
 
 
 def other_settings(experiments: Experiments, experiment: Experiment) -> list[Experiment]:
@@ -153,7 +155,7 @@ def drawn(experiments: Experiments, rng: np.random.Generator) -> Experiment:
     settings = {
         name: values[rng.integers(len(values))] for name, values in experiments.settings.items()
     }
-    profiles = [_profiles(one) for one in experiments.varied]
+    profiles = [_profiles(varied) for varied in experiments.varied]
     return Experiment(settings, tuple(some[rng.integers(len(some))] for some in profiles))
 
 

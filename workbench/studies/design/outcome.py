@@ -134,12 +134,16 @@ class NextStop:
         """All that were tried, best first."""
         return pd.DataFrame(
             {
-                "experiment": [one.text for one in self.tried],
-                "separation": [one.prediction.separation for one in self.tried],
-                "chance": [one.prediction.right for one in self.tried],
-                "deviation_before": [one.prediction.precision[0] for one in self.tried],
-                "deviation_after": [one.prediction.precision[1] for one in self.tried],
-                f"cost [{self.tried[0].unit}]": [one.cost for one in self.tried],
+                "experiment": [experiment.text for experiment in self.tried],
+                "separation": [experiment.prediction.separation for experiment in self.tried],
+                "chance": [experiment.prediction.right for experiment in self.tried],
+                "deviation_before": [
+                    experiment.prediction.precision[0] for experiment in self.tried
+                ],
+                "deviation_after": [
+                    experiment.prediction.precision[1] for experiment in self.tried
+                ],
+                f"cost [{self.tried[0].unit}]": [experiment.cost for experiment in self.tried],
             }
         )
 
@@ -149,7 +153,7 @@ class NextStop:
             "sentence": self.sentence,
             "rivals": list(self.names),
             "parts": self.parts,
-            "tried": [one.to_dict() for one in self.tried],
+            "tried": [experiment.to_dict() for experiment in self.tried],
             "sensors": {name: sensor.to_dict() for name, sensor in self.sensors.items()},
         }
 

@@ -54,7 +54,11 @@ def recorded(
     time, rng = time[: len(y)], np.random.default_rng(seed)
     outputs = tuple(output.name for output in system.outputs)
     clean = dict(
-        zip((*(one.name for one in system.inputs), *outputs, *judged), [*u.T, *y.T], strict=True)
+        zip(
+            (*(signal.name for signal in system.inputs), *outputs, *judged),
+            [*u.T, *y.T],
+            strict=True,
+        )
     )
     signals = {
         key: column + system.signals[key].deviation(column) * rng.standard_normal(time.size)
@@ -86,7 +90,10 @@ def _driven(
         start_of(system, experiments, candidate),
         {key: value for key, value in values.items() if key in model.defaults},
     )
-    names, outputs = [one.name for one in system.inputs], [output.name for output in system.outputs]
+    names, outputs = (
+        [signal.name for signal in system.inputs],
+        [output.name for output in system.outputs],
+    )
     readings = [system.signals[key].reading for key in (*outputs, *judged)]
     formulas = [*experiments.driven.values()]
     formulas += [experiments.ends.formula] if experiments.ends else []
@@ -97,7 +104,7 @@ def _driven(
     u, y = np.zeros((time.size, len(names))), np.zeros((time.size, len(readings)))
     for profile in candidate.profiles:
         u[:, names.index(profile.input.name)] = profile.signal(time)
-    held = np.array([one.held for one in system.inputs], np.bool_)
+    held = np.array([signal.held for signal in system.inputs], np.bool_)
     h = float(time[1] - time[0])
     every = max(1, round(system.comparison.block / h))
     model.set(model.variables(names), u[0])

@@ -79,7 +79,7 @@ def precision(new: Matrix, information: Matrix, at: Sequence[int]) -> tuple[floa
         Designs, with SAS, section 10.3.
     """
     before, after = (
-        float(np.exp(0.5 * np.linalg.slogdet(covariance(one)[np.ix_(at, at)])[1] / len(at)))
-        for one in (information, information + new)
+        float(np.exp(0.5 * np.linalg.slogdet(covariance(known)[np.ix_(at, at)])[1] / len(at)))
+        for known in (information, information + new)
     )
     return before, after

@@ -90,7 +90,7 @@ def distance_of_stop(
     stopping = stopping_of(system)
     stop = asked_stop(said, system, stopping)
     made = [recorded(case, system, stopping) for case in cases]
-    if sum(not one.outside for one in made) < 2:
+    if sum(not stop.outside for stop in made) < 2:
         raise InputError(
             where="recordings",
             found=f"{sum(not one.outside for one in made)} within what the model claims",
@@ -119,15 +119,15 @@ class _Forecasts:
         self._made, self._past, self._effort = made, past, effort
         self._pool, self._report = pool, report
         own = []
-        for one, values in zip(made, past.own, strict=True):
-            at = places(past.joint.shared, system, one.stop.conditions)
+        for stop, values in zip(made, past.own, strict=True):
+            at = places(past.joint.shared, system, stop.stop.conditions)
             own.append({**{name: float(past.mean[j]) for name, j in at.items()}, **values})
         tasks = [
-            pool.submit(Forecaster.stop, one.stop, values)
-            for one, values in zip(made, own, strict=True)
+            pool.submit(Forecaster.stop, stop.stop, values)
+            for stop, values in zip(made, own, strict=True)
         ]
         self._model = np.array([task.result().distance for task in tasks])
-        measured = np.array([one.distance for one in made])
+        measured = np.array([stop.distance for stop in made])
         self._left = np.log(measured / self._model)
 
     def told(self, stop: Stop) -> Distance:
@@ -139,9 +139,9 @@ class _Forecasts:
             self._drawn(question, self._effort.checked, k) for k, question in enumerate(questions)
         ]
         drawn.append(self._drawn(asked, self._effort.samples, len(questions)))
-        for one in drawn:
-            one.add_done_callback(counted)
-        *each, ahead = [_forecast(one.result()) for one in drawn]
+        for task in drawn:
+            task.add_done_callback(counted)
+        *each, ahead = [_forecast(task.result()) for task in drawn]
         nominal = self._pool.submit(Forecaster.stop, stop, {}).result().distance
         safety, interrupted = self._safety(asked, nominal)
         plain, short = self._plain(asked, nominal)
@@ -151,8 +151,8 @@ class _Forecasts:
             ahead=ahead,
             nominal=nominal,
             past=tuple(
-                PastStop(one, float(model), forecast)
-                for one, model, forecast in zip(self._made, self._model, each, strict=True)
+                PastStop(stop, float(model), forecast)
+                for stop, model, forecast in zip(self._made, self._model, each, strict=True)
             ),
             safety=safety,
             plain=plain,

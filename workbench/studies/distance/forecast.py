@@ -198,7 +198,7 @@ class Forecaster:
                 along[j] = np.pad(values, (0, length - values.size), "edge")
             else:
                 to[j] = one.formula(stop.asked)
-        delays, lags = np.array([[one.delay, one.lag] for one in driven]).T
+        delays, lags = np.array([[signal.delay, signal.lag] for signal in driven]).T
         return DrivingInputs(to, np.ascontiguousarray(delays), np.ascontiguousarray(lags), along)
 
     def _move(

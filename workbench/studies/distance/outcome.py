@@ -163,7 +163,7 @@ class Safety:
         for decade in range(1, decades + 1):
             found = tail.quantile(decade)
             plain = plain_runs(found.probability, found.variation)
-            value, low, high = (ratio(one) for one in (found.value, found.low, found.high))
+            value, low, high = (ratio(end) for end in (found.value, found.low, found.high))
             hours = plain * spent / 3600.0
             levels.append(SafetyLevel(decade, value, low, high, found.variation, plain, hours))
         return cls(tuple(levels), rate, tail.evaluations, spent)
@@ -195,7 +195,7 @@ class Distance:
     @property
     def claimed(self) -> list[PastStop]:
         """Past stops that the model claims."""
-        return [one for one in self.past if not one.recorded.outside]
+        return [stop for stop in self.past if not stop.recorded.outside]
 
     @property
     def response(self) -> float:
@@ -241,18 +241,18 @@ class Distance:
                 "from tolerances and from the forms of their distributions, which no stop has shown"
             )
         for asked in stopping_of(self.system).asked:
-            seen = [one.recorded.stop.asked[asked.name] for one in self.claimed]
+            seen = [stop.recorded.stop.asked[asked.name] for stop in self.claimed]
             near = _SEEN * (max(seen) - min(seen))
             value = self.stop.asked[asked.name]
             if not min(seen) - near <= value <= max(seen) + near:
                 low, high, here = (_shown(one, asked) for one in (min(seen), max(seen), value))
                 found.append(f"{asked.label} {here} is beyond that of past stops, {low} to {high}")
         for name, said in self.stop.conditions.items():
-            if not any(one.recorded.stop.conditions[name] == said for one in self.claimed):
+            if not any(stop.recorded.stop.conditions[name] == said for stop in self.claimed):
                 label = self.system.condition(name).label
                 found.append(f"no past stop that the model claims was made with {label} {said}")
         if self.ahead.outside > 0.0:
-            reasons = ", ".join(one.reason for one in stopping_of(self.system).outside)
+            reasons = ", ".join(exclusion.reason for exclusion in stopping_of(self.system).outside)
             found.append(
                 f"{self.ahead.outside:.1%} of the stops drawn are beyond what the model claims "
                 f"({reasons}): their distances are no prediction"
@@ -264,7 +264,9 @@ class Distance:
         """The answer in one sentence."""
         low, high = self.ahead.band
         middle = self.ahead.quantile(0.5)
-        speed = next(one for one in stopping_of(self.system).asked if one.name == SPEED)
+        speed = next(
+            quantity for quantity in stopping_of(self.system).asked if quantity.name == SPEED
+        )
         told = [f"{self.system.condition(k).label} {v}" for k, v in self.stop.conditions.items()]
         begins = ", ".join([f"From {_shown(self.stop.asked[SPEED], speed)}", *told])
         return (
@@ -276,13 +278,13 @@ class Distance:
         """The answer, what it rests on, and what it does not carry, for people."""
         lines = [self.sentence]
         said = [
-            f"{one.label} {_shown(self.stop.asked[one.name], one)}"
-            for one in stopping_of(self.system).asked
+            f"{quantity.label} {_shown(self.stop.asked[quantity.name], quantity)}"
+            for quantity in stopping_of(self.system).asked
         ]
         said += [f"{self.system.condition(k).label} {v}" for k, v in self.stop.conditions.items()]
         lines.append(f"asked for: {', '.join(said)}")
-        held = sum(one.held for one in self.claimed)
-        widths = [one.forecast.width for one in self.claimed]
+        held = sum(stop.held for stop in self.claimed)
+        widths = [stop.forecast.width for stop in self.claimed]
         lines.append(
             f"{held} of {len(self.claimed)} past stops are in the 95 % band that the others "
             f"predict, which is {np.median(widths):.2f} times as wide (at most {max(widths):.2f}) "
@@ -290,7 +292,7 @@ class Distance:
         )
         away = len(self.past) - len(self.claimed)
         if away:
-            reasons = sorted({r for one in self.past for r in one.recorded.outside})
+            reasons = sorted({r for stop in self.past for r in stop.recorded.outside})
             lines.append(f"{away} are beyond what the model claims: {', '.join(reasons)}")
         if self.safety is not None:
             lines += ["", *_told(self.safety)]
@@ -303,9 +305,9 @@ class Distance:
         """Past stops: measured, corrected, and as the others predict them."""
         rating = stopping_of(self.system).rating
         rows = []
-        for one in self.past:
-            made, fixed = one.recorded, self.corrected(one.recorded)
-            low, high = one.forecast.band
+        for stop in self.past:
+            made, fixed = stop.recorded, self.corrected(stop.recorded)
+            low, high = stop.forecast.band
             rate = equivalent_rate(made.stop.asked[SPEED], self.response, made.distance)
             rows.append(
                 {
@@ -314,12 +316,12 @@ class Distance:
                     "speed [m/s]": made.stop.asked[SPEED],
                     "distance [m]": made.distance,
                     "deceleration [m/s2]": rate,
-                    "model [m]": one.model,
-                    "predicted [m]": one.forecast.quantile(0.5),
+                    "model [m]": stop.model,
+                    "predicted [m]": stop.forecast.quantile(0.5),
                     "low [m]": low,
                     "high [m]": high,
-                    "width": one.forecast.width,
-                    "held": one.held,
+                    "width": stop.forecast.width,
+                    "held": stop.held,
                     "outside": ", ".join(made.outside),
                     "nominal_speed [m/s]": np.nan if fixed is None else fixed.speed,
                     "nominal_deceleration [m/s2]": np.nan if fixed is None else fixed.rate,
@@ -338,7 +340,7 @@ class Distance:
             {
                 "share": QUANTILES,
                 "distance [m]": found,
-                "deceleration [m/s2]": [self.rate(one) for one in found],
+                "deceleration [m/s2]": [self.rate(distance) for distance in found],
             }
         )
 
@@ -360,7 +362,7 @@ class Distance:
             else [asdict(level) for level in self.safety.levels],
             "plain": None if self.plain is None else asdict(self.plain),
             "stops": frame.astype(object).where(frame.notna(), None).to_dict("records"),
-            "held": {"of": len(self.claimed), "stops": sum(one.held for one in self.claimed)},
+            "held": {"of": len(self.claimed), "stops": sum(stop.held for stop in self.claimed)},
             "warnings": self.warnings,
             "interrupted": self.interrupted,
         }

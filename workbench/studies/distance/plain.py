@@ -53,7 +53,7 @@ class PlainSampling:
         for decade in range(1, decades + 1):
             if (told := quantile(ordered, 10.0**-decade)) is None:
                 break
-            ratios = (equivalent_rate(speed, response, math.exp(-one)) / rate for one in told)
+            ratios = (equivalent_rate(speed, response, math.exp(-value)) / rate for value in told)
             found.append(PlainLevel(decade, *ratios))
         return cls(shortness.size, tuple(found))
 

@@ -68,7 +68,7 @@ def recorded(case: Case, system: System, stopping: Stopping) -> RecordedStop:
         If nothing rises in it, or it does not end at rest.
     """
     time, speed = case.time, system.evaluate(stopping.speed, case.signals)
-    rising = next(one for one in stopping.driven if one.name == stopping.timed_by)
+    rising = next(signal for signal in stopping.driven if signal.name == stopping.timed_by)
     command = _command(case, rising)
     end = _at_rest(case, speed, command, stopping)
     moving = (time > command) & (np.arange(time.size) < end)
@@ -79,14 +79,16 @@ def recorded(case: Case, system: System, stopping: Stopping) -> RecordedStop:
     distance = float(way[-1] + going[-1] ** 2 / (2.0 * rate))
     risen = (at > command + rising.delay + _RISEN * rising.lag) & (way <= way[-1])
     asked = {}
-    for one in stopping.asked:
-        values = np.interp(at, time, system.evaluate(one.formula, case.signals))
-        asked[one.name] = float(values[0] if one.place == COMMAND else np.median(values[risen]))
+    for quantity in stopping.asked:
+        values = np.interp(at, time, system.evaluate(quantity.formula, case.signals))
+        asked[quantity.name] = float(
+            values[0] if quantity.place == COMMAND else np.median(values[risen])
+        )
     grid = np.arange(0.0, way[-1] + GRID, GRID)
     along = {
-        one.name: np.interp(grid, way, np.interp(at, time, case[one.name]))
-        for one in stopping.driven
-        if one.along
+        signal.name: np.interp(grid, way, np.interp(at, time, case[signal.name]))
+        for signal in stopping.driven
+        if signal.along
     }
     return RecordedStop(
         stop=Stop(case.name, asked, case.conditions, along),
@@ -94,9 +96,9 @@ def recorded(case: Case, system: System, stopping: Stopping) -> RecordedStop:
         distance=distance,
         resistance=_resistance(case, system, stopping, at, way),
         outside=tuple(
-            one.reason
-            for one in stopping.outside
-            if _met(one, case.signals, system, time, _step(case))[moving].any()
+            exclusion.reason
+            for exclusion in stopping.outside
+            if _met(exclusion, case.signals, system, time, _step(case))[moving].any()
         ),
     )
 
@@ -114,7 +116,7 @@ def asked_stop(said: Mapping[str, Any], system: System, stopping: Stopping) -> S
         If something is no quantity that is asked for and no condition, or is not as expected.
     """
     where = "what is asked for"
-    kinds = {one.name: one for one in stopping.asked}
+    kinds = {quantity.name: quantity for quantity in stopping.asked}
     table = Table(said, where)
     table.refuse_unknown([*kinds, *(condition.name for condition in system.conditions)])
     asked = {name: table.number(name, kind.unit, kind.usual) for name, kind in kinds.items()}
@@ -134,7 +136,7 @@ def beyond(outputs: Mapping[str, Vector], system: System, stopping: Stopping) ->
     """Whether readings of a model's outputs, (n,) each, are beyond what it claims."""
     h = system.sample_time
     time: Vector = h * np.arange(float(next(iter(outputs.values())).size))
-    return any(_met(one, outputs, system, time, h).any() for one in stopping.outside)
+    return any(_met(exclusion, outputs, system, time, h).any() for exclusion in stopping.outside)
 
 
 def _met(

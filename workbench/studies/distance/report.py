@@ -80,9 +80,9 @@ def distance_answer(summary: Mapping[str, Any]) -> Answer:
         "distance": Measure(middle, "m", "lower", low, high),
         "deceleration": Measure(summary["deceleration"], "m/s2", "higher"),
     }
-    for one in summary["safety"] or []:
-        name = f"deceleration over the nominal one, all but one stop in 1e{one['decade']}"
-        headline[name] = Measure(one["ratio"], "1", "higher", one["low"], one["high"])
+    for level in summary["safety"] or []:
+        name = f"deceleration over the nominal one, all but one stop in 1e{level['decade']}"
+        headline[name] = Measure(level["ratio"], "1", "higher", level["low"], level["high"])
     details = {
         f"{stop['stop']}: measured over predicted distance": Measure(
             stop["distance [m]"] / stop["predicted [m]"], "1"
@@ -120,10 +120,10 @@ def _draw_distribution(axes: "Axes", result: Distance) -> None:
 
 def _draw_past(axes: "Axes", past: tuple[PastStop, ...]) -> None:
     """Each stop and its band, over the middle of what the others predict."""
-    middle = np.array([one.forecast.quantile(0.5) for one in past])
-    low, high = np.array([one.forecast.band for one in past]).T / middle
-    made = np.array([one.recorded.distance for one in past]) / middle
-    inside = np.array([not one.recorded.outside for one in past])
+    middle = np.array([stop.forecast.quantile(0.5) for stop in past])
+    low, high = np.array([stop.forecast.band for stop in past]).T / middle
+    made = np.array([stop.recorded.distance for stop in past]) / middle
+    inside = np.array([not stop.recorded.outside for stop in past])
     place = np.arange(len(past))
     axes.vlines(place, low, high, color=LIGHT["2"], linewidth=4.0, alpha=0.35, label="95 %")
     axes.plot(place[inside], made[inside], "o", color=LIGHT["measured"], markersize=4)
@@ -135,7 +135,7 @@ def _draw_past(axes: "Axes", past: tuple[PastStop, ...]) -> None:
     )
     axes.legend(fontsize=7, frameon=False)
     axes.set(title="past stops, each over what the others predict", ylabel="distance, of predicted")
-    names = [one.recorded.stop.name for one in past] if len(past) <= _MOST else []
+    names = [stop.recorded.stop.name for stop in past] if len(past) <= _MOST else []
     axes.set_xticks(place[: len(names)], names, rotation=90 if len(past) > 8 else 15, fontsize=6)
 
 
@@ -191,15 +191,15 @@ def write_distance_page(result: Distance, summary: Mapping[str, Any], out: Path)
 def _past(past: Sequence[PastStop]) -> Dots:
     """Measured over the middle of what the others predict, on its band."""
     rows, ends = [], []
-    for one in past:
-        middle = one.forecast.quantile(0.5)
-        low, high = (end / middle for end in one.forecast.band)
-        made = one.recorded.distance / middle
-        style = _AWAY if one.recorded.outside else _MADE
-        rows.append((one.recorded.stop.name, (Dot(made, style, low, high),)))
+    for stop in past:
+        middle = stop.forecast.quantile(0.5)
+        low, high = (end / middle for end in stop.forecast.band)
+        made = stop.recorded.distance / middle
+        style = _AWAY if stop.recorded.outside else _MADE
+        rows.append((stop.recorded.stop.name, (Dot(made, style, low, high),)))
         ends += [low, high, made]
-    claimed = [one for one in past if not one.recorded.outside]
-    held = sum(one.held for one in claimed)
+    claimed = [stop for stop in past if not stop.recorded.outside]
+    held = sum(stop.held for stop in claimed)
     finding = (
         f"{held} of {len(claimed)} past stops are where the others predict them with 95 %"
         + "; red ones are beyond what the model claims" * (len(claimed) < len(past))

@@ -118,7 +118,7 @@ class StopSimulation:
 
     def __init__(self, fmu: FMU, system: System, stopping: Stopping) -> None:
         self._fmu, self._stopping = fmu, stopping
-        inputs = [one.name for one in system.inputs]
+        inputs = [signal.name for signal in system.inputs]
         outputs = [output.name for output in system.outputs]
         readings = [system.signals[name].reading for name in outputs]
         self._model = instance(fmu, inputs, system.corrections, readings)

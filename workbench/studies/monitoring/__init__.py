@@ -84,7 +84,7 @@ def monitor(
         new = state.missing(recording_folders(folder))
         interrupted = _estimate(system, new, state, engine.workers, read, step)
         told = state.all()
-        if interrupted and not any(one.estimate for one in told):
+        if interrupted and not any(result.estimate for result in told):
             raise KeyboardInterrupt  # there is nothing to conclude from
         return concluded(system, told, rate, folder, interrupted=interrupted)
 

@@ -258,7 +258,7 @@ class Chart:
         values = sorted(self.values, key=lambda value: abs(value - old))
         about, largest = values[(len(values) - 1) // 2], self.scatter.largest
         reach = largest * np.sqrt(self.variances)
-        return [float(one) for one in np.clip(self.values, about - reach, about + reach)]
+        return [float(value) for value in np.clip(self.values, about - reach, about + reach)]
 
     def _returned(self) -> bool:
         """Whether the level is what it was before the last change, as far as is known."""

@@ -113,7 +113,7 @@ class RecordingEstimator:
                 remedy="leave it out; `workbench simulate` shows where it fails",
             )
         estimated = [quantity.name for quantity in self._constant.estimated]
-        own = [estimated.index(one.name) for one in watched(self._constant)]
+        own = [estimated.index(quantity.name) for quantity in watched(self._constant)]
         values = {name: float(run.signal(name)[-1]) for name in estimated}
         return RecordingEstimate(
             values=np.array([values[estimated[column]] for column in own]),
@@ -135,7 +135,7 @@ class RecordingEstimator:
         """Work of friction along a recording, with what it says of the quantities, (w,) [J]."""
         system = self._constant
         known = {**system.values, **values}
-        powers = [system.evaluate(one.formula, case.signals, known) for one in system.work]
+        powers = [system.evaluate(wear.formula, case.signals, known) for wear in system.work]
         return np.array([np.trapezoid(power, case.time) for power in powers])
 
 

@@ -36,7 +36,7 @@ def recording_folders(folder: Path) -> list[RecordingFolder]:
             key=lambda path: path.name,
         )
         if found:
-            return [RecordingFolder(one.name, _content(one), one) for one in found]
+            return [RecordingFolder(path.name, _content(path), path) for path in found]
         reason = "a folder without folders"
     except OSError as error:
         reason = f"what cannot be read ({error.strerror or error})"

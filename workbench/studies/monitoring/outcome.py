@@ -137,7 +137,7 @@ class MonitoringResult:
 
     def worked(self) -> pd.DataFrame:
         """Work of friction in each recording [J], and seconds that the estimates rest on."""
-        labels = [f"{one.name} [J]" for one in self.system.work]
+        labels = [f"{wear.name} [J]" for wear in self.system.work]
         frame = pd.DataFrame(self.work, columns=labels)
         frame.insert(0, "counted [s]", self.counted)
         frame.insert(0, "date", self.dates)
@@ -181,12 +181,12 @@ class MonitoringResult:
         sums = self.work.sum(axis=0)
         mean = float(sums.mean()) if sums.size else 0.0
         return {
-            one.name: {
-                "label": one.label,
+            wear.name: {
+                "label": wear.label,
                 "work": float(total),
                 "of_the_mean": float(total / mean) if mean else 0.0,
             }
-            for one, total in zip(self.system.work, sums, strict=True)
+            for wear, total in zip(self.system.work, sums, strict=True)
         }
 
     def _size(self, track: Track, size: float, known: float) -> str:
@@ -220,8 +220,8 @@ def concluded(
     InputError
         If none can be used.
     """
-    usable = {one.name: one for one in told if one.estimate is not None}
-    last = {one.name: one for one in told}
+    usable = {result.name: result for result in told if result.estimate is not None}
+    last = {result.name: result for result in told}
     refused = {name: one.refusal for name, one in sorted(last.items()) if one.refusal}
     first: dict[str, str] = {}
     for name in sorted(usable):
@@ -240,17 +240,17 @@ def concluded(
             expected="one or more",
             remedy="repair that one first",
         )
-    dated = all(one.date for one in counted)
+    dated = all(result.date for result in counted)
     if dated:
         counted.sort(key=lambda one: one.date)
-    estimates = [one.estimate for one in counted if one.estimate is not None]
+    estimates = [result.estimate for result in counted if result.estimate is not None]
     values = np.array([estimate.values for estimate in estimates])
     covariances = [estimate.covariance for estimate in estimates]
     tracks, threshold = watch(watched(system), values, covariances, rate)
     return MonitoringResult(
         system=system,
-        names=tuple(one.name for one in counted),
-        dates=tuple(one.date for one in counted),
+        names=tuple(result.name for result in counted),
+        dates=tuple(result.date for result in counted),
         dated=dated,
         tracks=tuple(tracks),
         threshold=threshold,
@@ -277,5 +277,5 @@ def _plain(value: Any) -> Any:
     if isinstance(value, Mapping):
         return {key: _plain(one) for key, one in value.items()}
     if isinstance(value, list):
-        return [_plain(one) for one in value]
+        return [_plain(entry) for entry in value]
     return None if isinstance(value, float) and not np.isfinite(value) else value

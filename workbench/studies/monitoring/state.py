@@ -48,7 +48,9 @@ class State:
         """Those that are not known by name and content."""
         rows = self._connection.execute("SELECT name, content FROM deliveries")
         known = set(rows)
-        return [one for one in found if (one.name, one.content) not in known]
+        return [
+            recording for recording in found if (recording.name, recording.content) not in known
+        ]
 
     def add(self, told: RecordingResult) -> None:
         """Keep what came of a delivery; it is on the disk when this returns."""

@@ -125,8 +125,8 @@ class _Group:
             if self.against:
                 watched[:-1] += away
             off = [
-                chart.surprise(*one) if there else (np.nan, np.nan)
-                for chart, there, *one in zip(self.charts, shown, watched, spread, strict=True)
+                chart.surprise(*column) if there else (np.nan, np.nan)
+                for chart, there, *column in zip(self.charts, shown, watched, spread, strict=True)
             ]
             surprises, squares = np.array(off).T
             left = np.where(away == self.moved, np.abs(surprises[:m]), np.nan)
@@ -139,7 +139,9 @@ class _Group:
 
     def tracks(self) -> list[Track]:
         """What was watched."""
-        values, deviations, surprises = (np.array(one).T for one in zip(*self.rows, strict=True))
+        values, deviations, surprises = (
+            np.array(column).T for column in zip(*self.rows, strict=True)
+        )
         names = [(member.name, member.label, self.against) for member in self.members]
         names += [
             (self.name, f"mean of {self.members[0].label} and the like", False)

@@ -70,7 +70,7 @@ def follow_proposals(
             expected="one with the method 'following'",
             remedy="write it as workbench.studies.power.virtual_rig.FollowingRig says",
         )
-    sets = [one for group in groups for one in group if one.kind == "single"]
+    sets = [planting for group in groups for planting in group if planting.kind == "single"]
     rows: dict[int, dict[str, Any]] = {}
     progress = StepReporter(engine.report, len(sets))
     with (
@@ -95,15 +95,15 @@ def summarise_following(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Shares, see `SHARES`, of groups that hold the planted effect."""
     groups = [row for row in rows if row["proposed"] is not None]
     made = [group["proposed"] for group in groups]
-    drawn_ = [one for row in groups for one in row["drawn"]]
+    drawn_ = [recording for row in groups for recording in row["drawn"]]
     away = [separation for recording in (*made, *drawn_) for separation in recording["separations"]]
     return {
-        "proposed": share(one["parts"] for one in made),
+        "proposed": share(recording["parts"] for recording in made),
         "drawn": share(one["parts"] for one in drawn_),
         "sensed": share(one["parts"] for row in groups if (one := row["sensed"]) is not None),
         "answered": share((row["sensed"] or row["proposed"])["parts"] for row in groups),
-        "foreseen": share(one["parts"] for one in made if one["foreseen"]),
-        "never": share(one["parts"] for one in made if not one["foreseen"]),
+        "foreseen": share(recording["parts"] for recording in made if recording["foreseen"]),
+        "never": share(recording["parts"] for recording in made if not recording["foreseen"]),
         "separations": share(map(_as_predicted, away)),
     }
 
@@ -176,7 +176,10 @@ def _fill(row: dict[str, Any], setup: Setup, planting: Planting) -> None:
                 fitted = replace(setup, system=with_sensor(setup.system, sensor))
                 row["sensed"] = {"sensor": sensor.label, **_made(sensed, fitted, *rest[1:])}
                 break
-    row["drawn"] = [_made(one, *rest) for one in predict_experiments(setup.system, rivals, plan, 1)]
+    row["drawn"] = [
+        _made(experiment, *rest)
+        for experiment in predict_experiments(setup.system, rivals, plan, 1)
+    ]
 
 
 def _made(

@@ -42,9 +42,9 @@ def function_error(
         return None
     law = found.forms[found.laws[0].effect.name].law
     true, proposed = known.diagnosis.best, found.outcome.diagnosis.best
-    every = {one.name: one for one in (*true.active, *proposed.active)}
+    every = {effect.name: effect for effect in (*true.active, *proposed.active)}
     elsewhere = law.place.slot.name not in effect.slots or effect not in true.active
-    if elsewhere or any(one.order_locked for one in every.values()):
+    if elsewhere or any(effect.order_locked for effect in every.values()):
         return None
     with tempfile.TemporaryDirectory() as scratch:
         written = [found.forms[cause.effect.name].written for cause in found.laws]
@@ -58,7 +58,7 @@ def function_error(
         with ResidualModel(both, problem.cases) as simulations:
             fit = Fit(simulations, effects)
             without, right, seen = (
-                _along(simulations, fit, one) for one in (known.diagnosis.base, true, proposed)
+                _along(simulations, fit, model) for model in (known.diagnosis.base, true, proposed)
             )
     return float(np.sqrt(np.mean((seen - right) ** 2)) / np.ptp(right - without))
 

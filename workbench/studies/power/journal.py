@@ -169,7 +169,7 @@ class Journal:
         for number, line in enumerate(lines, start=2):
             try:
                 result = _result(check_checksum(line))
-                if any(one.planting == result.planting for one in self.results):
+                if any(earlier.planting == result.planting for earlier in self.results):
                     raise ValueError("a second verdict on a set")
                 self.results.append(result)
             except (ValueError, KeyError, TypeError, RecursionError):

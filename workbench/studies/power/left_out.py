@@ -80,7 +80,7 @@ def _row(planting: Planting, study: PowerStudy, workers: int) -> dict[str, Any]:
     system, library, rig, effects = study.system, study.library, study.rig, study.effects
     planted = [effect for effect in effects if effect.name in planting.effects]
     others = [effect for effect in effects if effect not in planted]
-    acting = {slot for one in planted for slot in one.slots}
+    acting = {slot for effect in planted for slot in effect.slots}
     acting |= {
         plantable.slot
         for plantable in rig.plantables
@@ -88,7 +88,7 @@ def _row(planting: Planting, study: PowerStudy, workers: int) -> dict[str, Any]:
     }
     row: dict[str, Any] = {
         "rig": planting.options,
-        "left_out": [one.name for one in planted],
+        "left_out": [effect.name for effect in planted],
         "verdict": "failed",
         "named": [],
         "late": [],

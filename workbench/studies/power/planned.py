@@ -61,9 +61,9 @@ def predict_campaign(
     decides = of_system(study.system.comparison, len(study.effects))
     known = {effect.name: effect for effect in study.effects}
     return [
-        _effect_chance(known[one.effect], one, found, sizes, decides)
-        for one in wanted
-        if one.effect in known
+        _effect_chance(known[plantable.effect], plantable, found, sizes, decides)
+        for plantable in wanted
+        if plantable.effect in known
     ]
 
 

@@ -153,7 +153,7 @@ class Repertoire:
     def able(self) -> tuple[Plantable, ...]:
         """What can be planted of the library's, and be shown by recordings."""
         known = (plantable for plantable in self.plantables if plantable.effect)
-        return tuple(one for one in known if one.effect not in self.hidden)
+        return tuple(plantable for plantable in known if plantable.effect not in self.hidden)
 
 
 @dataclass(frozen=True)
@@ -271,8 +271,11 @@ def _pair(repertoire: Repertoire, seed: int, multiple: float) -> Planting:
     rng = np.random.default_rng(seed)
     able = repertoire.able
     both = [able[i] for i in rng.choice(len(able), 2, replace=False)]
-    gains = {one.name: _gain(one, multiple * repertoire.size(one), rng) for one in both}
-    return Planting("pair", seed, multiple, gains, tuple(one.effect for one in both))
+    gains = {
+        plantable.name: _gain(plantable, multiple * repertoire.size(plantable), rng)
+        for plantable in both
+    }
+    return Planting("pair", seed, multiple, gains, tuple(plantable.effect for plantable in both))
 
 
 def _gain(plantable: Plantable, size: float, rng: np.random.Generator) -> float:

@@ -120,7 +120,7 @@ def diagnose_sets(
             )
         known = {result.planting.options for result in journal.results}
         left = [tuple(p for p in group if p.options not in known) for group in groups]
-        interrupted = _run([one for one in left if one], setup, journal, engine)
+        interrupted = _run([group for group in left if group], setup, journal, engine)
         return journal.results, interrupted
 
 
@@ -155,7 +155,9 @@ def _results(task: "Future[list[SetVerdict]]", group: Group) -> list[SetVerdict]
     try:
         return task.result()
     except WorkerError as error:
-        return [SetVerdict(one, "failed", (), None, None, 0.0, repr(error)) for one in group]
+        return [
+            SetVerdict(planting, "failed", (), None, None, 0.0, repr(error)) for planting in group
+        ]
 
 
 def _evaluate(setup: Setup, group: Group) -> list[SetVerdict]:

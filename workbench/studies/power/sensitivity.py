@@ -109,9 +109,9 @@ class Remembering(ResidualModel):
         if new:
             made = super().derivatives(points, [columns[i] for i in new], sizes)
             for j, i in enumerate(new):
-                self._columns[keys[i]] = [one[:, j : j + 1] for one in made]
+                self._columns[keys[i]] = [matrix[:, j : j + 1] for matrix in made]
         found = [self._columns[key] for key in keys]
-        return [np.hstack([one[k] for one in found]) for k in range(len(self.cases))]
+        return [np.hstack([matrix[k] for matrix in found]) for k in range(len(self.cases))]
 
 
 def _key(points: Sequence[Mapping[str, float]]) -> tuple[frozenset[tuple[str, float]], ...]:
@@ -144,7 +144,7 @@ def _said(
 ) -> dict[Thresholds, tuple[str, ...]]:
     """Verdict and causes by each of some thresholds that take the same samples."""
     said: dict[Thresholds, tuple[str, ...]] = {}
-    mine = [one for one in some if one.samples == samples]
+    mine = [thresholds for thresholds in some if thresholds.samples == samples]
     try:
         with Remembering(setup.everything, setup.system, cases, samples) as simulations:
             for one in mine:

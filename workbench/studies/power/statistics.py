@@ -97,17 +97,19 @@ def summarise(results: Sequence[SetVerdict], repertoire: Repertoire) -> dict[str
             for result in results
             if result.verdict == "failed"
         ],
-        "false_alarms": share(one.verdict != "nothing" for one in kinds["clean"]),
+        "false_alarms": share(result.verdict != "nothing" for result in kinds["clean"]),
         "right_first": share(map(named_right, visible)),
         "right_first_above_noise": share(map(named_right, filter(above_noise, visible))),
-        "right_alone": share(named_right(one) and len(one.causes) == 1 for one in visible),
+        "right_alone": share(named_right(result) and len(result.causes) == 1 for result in visible),
         "pairs": _pairs(kinds["pair"], by_name),
-        "unexplained": share(one.verdict == "unexplained" for one in _large(kinds["outside"])),
+        "unexplained": share(
+            result.verdict == "unexplained" for result in _large(kinds["outside"])
+        ),
         "coverage": _coverage(kinds["single"], repertoire),
         "effects": _by_effect(by_name, repertoire),
         "outside": _outside(by_name, repertoire),
         "confusion": {
-            row: dict(Counter(one.first for one in some))
+            row: dict(Counter(result.first for result in some))
             for row, some in _confused(kinds["clean"], by_name, repertoire).items()
         },
         "wrong": [
@@ -174,7 +176,7 @@ def _pairs(pairs: Sequence[SetVerdict], by_name: dict[str, list[SetVerdict]]) ->
     """Shares of pairs; those `seen_alone` have effects that mostly are found alone, as large."""
 
     def seen(name: str, multiple: float) -> bool:
-        alone = [one for one in by_name.get(name, []) if one.planting.multiple == multiple]
+        alone = [result for result in by_name.get(name, []) if result.planting.multiple == multiple]
         return 2 * sum(map(named_right, alone)) > len(alone)
 
     return {
