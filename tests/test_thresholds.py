@@ -29,7 +29,7 @@ from workbench.studies.power.planting import plan_sheet_errors, some
 from workbench.studies.power.report import sheet_check, thresholds_check
 from workbench.studies.power.run import PowerStudy, Setup
 from workbench.studies.power.sensitivity import FACTORS, ThresholdSensitivity, changed, values, vary
-from workbench.studies.power.sheet import named_wrong, summarise_sheet
+from workbench.studies.power.statistics import named_wrong, summarise_sheet
 from workbench.system.comparison import RATE
 from workbench.system.registry import load_system
 

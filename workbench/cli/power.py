@@ -248,7 +248,7 @@ def _usual(
 def _sheet_error(options: argparse.Namespace, output: Output, study: PowerStudy) -> CommandResult:
     from workbench.studies.power.planting import plan_sheet_errors
     from workbench.studies.power.report import sheet_check
-    from workbench.studies.power.sheet import summarise_sheet
+    from workbench.studies.power.statistics import summarise_sheet
 
     out = options.out / "sheet_error"
     groups = plan_sheet_errors(study.rig.sheet_errors, options.repeats, options.seed)

@@ -5,7 +5,18 @@ Equations (11) and (12) of Schwarz, Brembeck, Heckmann (2018), by differential e
 
 from workbench.runtime.pool import NoWorkersError
 from workbench.tuning.checkpoint import Generation
-from workbench.tuning.cost import Candidate, Evaluation, Evaluator, Job, recording, recordings
+from workbench.tuning.cost import (
+    LIMIT,
+    Candidate,
+    Evaluation,
+    Evaluator,
+    Job,
+    Workers,
+    evaluate_all,
+    evaluators,
+    recording,
+    recordings,
+)
 from workbench.tuning.recipe import (
     Lines,
     Problem,
@@ -26,7 +37,6 @@ from workbench.tuning.validation import (
     sensitivities,
     untuned_filters,
 )
-from workbench.tuning.workers import LIMIT, Workers, evaluate_all, evaluators
 
 __all__ = [
     "LIMIT",

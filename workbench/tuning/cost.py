@@ -1,21 +1,23 @@
 """What a candidate costs, equation (12) of Schwarz et al. (2018): no more than decides."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import TracebackType
-from typing import NamedTuple, Self
+from typing import NamedTuple, Protocol, Self
 
 import numpy as np
 
 from workbench.arrays import Matrix, Vector
-from workbench.errors import FMUError, InputError
+from workbench.errors import FMUError, InputError, WorkerError
 from workbench.models.fmu import FMU
 from workbench.observers import Estimator, Gains, estimators_of
 from workbench.observers.score import corner, integrate, samples, weights
 from workbench.recordings.case import Case, Value
+from workbench.runtime.pool import Pool
 from workbench.system.registry import open_file
 from workbench.system.system import System
 from workbench.tuning.settling import Settling
@@ -250,3 +252,52 @@ class Evaluator:
             self._fmu.renew(reload=False)
             return np.nan, end
         return z, end
+
+
+LIMIT = 60.0  # [s] for one candidate, which takes about 0.1 s
+
+
+class Workers(Protocol):
+    """Who evaluates candidates: a `workbench.runtime.pool.Pool`, or one like it."""
+
+    def submit(
+        self, function: Callable[[Evaluator, Candidate], Evaluation], candidate: Candidate, /
+    ) -> "Future[Evaluation]":
+        """Have a worker evaluate a candidate.
+
+        WorkerError if it cannot, NoWorkersError if there is none.
+        """
+
+
+def evaluators(job: Job, workers: int, limit: float = LIMIT) -> Pool[Evaluator]:
+    """Processes of this machine that evaluate candidates of a job.
+
+    Parameters
+    ----------
+    limit : for one candidate [s].
+    """
+    return Pool(workers, Evaluator, job, limit=limit)
+
+
+def evaluate_all(pool: Workers, candidates: Sequence[Candidate], cases: int) -> list[Evaluation]:
+    """Evaluate candidates; one that kills its workers, or takes too long, is infinitely bad.
+
+    Parameters
+    ----------
+    cases : number of cases of the job.
+    """
+    tasks: list[Future[Evaluation]] = []
+    evaluations = []
+    try:
+        tasks.extend(pool.submit(Evaluator.evaluate, candidate) for candidate in candidates)
+        for candidate, task in zip(candidates, tasks, strict=True):
+            try:
+                evaluations.append(task.result())
+            except WorkerError:
+                lost = np.full(cases, np.inf)
+                evaluations.append(Evaluation(np.inf, lost, 0, candidate.order[0], crashed=True))
+    finally:
+        # After Ctrl-C nobody waits for the others.
+        for task in tasks:
+            task.cancel()
+    return evaluations

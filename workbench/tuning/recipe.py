@@ -14,14 +14,15 @@ from workbench.arrays import Matrix, Vector
 from workbench.errors import FMUError, InputError, closest
 from workbench.observers import Estimator, Gains, SearchSpace, estimators_of
 from workbench.observers.gains_file import format_gains
+from workbench.observers.replay import observed
+from workbench.observers.run import Ending
 from workbench.recordings.case import Case
 from workbench.runtime.pool import NoWorkersError
 from workbench.runtime.progress import StepReporter
 from workbench.system.registry import open_model
 from workbench.system.system import System
 from workbench.tuning.checkpoint import Generation
-from workbench.tuning.cost import Job, recordings
-from workbench.tuning.reference import with_reference
+from workbench.tuning.cost import Job, Workers, recordings
 from workbench.tuning.search import Plan, Search, search
 from workbench.tuning.validation import (
     NEGLIGIBLE,
@@ -32,7 +33,6 @@ from workbench.tuning.validation import (
     sensitivities,
     untuned_filters,
 )
-from workbench.tuning.workers import Workers
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -435,3 +435,40 @@ def _as_good(tuned: TuningResult) -> Matrix:
 def _finite(value: float) -> float | None:
     """JSON has no infinity."""
     return value if np.isfinite(value) else None
+
+
+def with_reference(cases: Sequence[Case], system: System, estimator: str) -> list[Case]:
+    """Recordings with the estimate of what is judged in the place of its measurement.
+
+    Machines in service lack sensors that a rig has. Measured outputs of the model stay.
+
+    Parameters
+    ----------
+    estimator : name of one that knows whole recordings; any other would be judged by its like.
+
+    Raises
+    ------
+    InputError
+        If there is no such estimator, or it fails.
+    """
+    known = {name: kind for name, kind in estimators_of(system).items() if kind.offline}
+    if estimator not in known:
+        raise InputError(
+            where=f"estimator '{estimator}' to judge by",
+            found=f"none of this name that knows whole recordings{closest(estimator, known)}",
+            expected=f"one of {', '.join(known)}",
+            remedy="correct the name",
+        )
+    found = []
+    for case in cases:
+        run = observed(case, system, known[estimator])
+        if run.ending is not Ending.OK:
+            raise InputError(
+                where=str(case.source),
+                found=f"{estimator}: {run.ending.value} {run.message}".strip(),
+                expected="an estimate to judge by",
+                remedy="leave this case out of the tuning with --cases",
+            )
+        judged = [name for name in system.objective.weights if name not in case.outputs]
+        found.append(case.with_signals({name: run.signal(name) for name in judged}))
+    return found

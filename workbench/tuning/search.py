@@ -22,8 +22,7 @@ from workbench.errors import InputError
 from workbench.observers import SearchSpace
 from workbench.runtime.pool import NoWorkersError
 from workbench.tuning.checkpoint import Checkpoint, Generation, Population, load, save
-from workbench.tuning.cost import Candidate, Evaluation, Job
-from workbench.tuning.workers import Workers, evaluate_all
+from workbench.tuning.cost import Candidate, Evaluation, Job, Workers, evaluate_all
 
 SPREAD = 0.1  # of the first candidates about the reasoned gains, as a share of the search space
 TOLERANCE = 1e-3  # spread of z in the population below which more generations gain nothing

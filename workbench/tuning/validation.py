@@ -10,9 +10,17 @@ from workbench.observers import SearchSpace, estimators_of
 from workbench.observers.replay import replay
 from workbench.observers.score import score
 from workbench.recordings.case import Case
-from workbench.tuning.cost import DIVERGED, Candidate, Evaluator, Job, job_estimator, load_model
+from workbench.tuning.cost import (
+    DIVERGED,
+    Candidate,
+    Evaluator,
+    Job,
+    Workers,
+    evaluate_all,
+    job_estimator,
+    load_model,
+)
 from workbench.tuning.search import Search
-from workbench.tuning.workers import Workers, evaluate_all
 
 STEP = 0.02  # of a gain's search range: a factor of 1.4 to 1.9 in a gain that matters
 NEGLIGIBLE = 0.01  # relative change of z that does not matter

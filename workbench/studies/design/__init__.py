@@ -191,15 +191,10 @@ def _sensed(
         return [prediction for prediction in found if len(prediction.groups) > parted]
 
     once = [(sensor, tried(sensor, plan, False)) for sensor in sensors]
-    again = [
-        (
-            sensor,
-            tried(
-                sensor, [prediction.candidate for prediction in chosen(parting(tasks))[:1]], True
-            ),
-        )
-        for sensor, tasks in once
-    ]
+    again = []
+    for sensor, tasks in once:
+        best = [prediction.candidate for prediction in chosen(parting(tasks))[:1]]
+        again.append((sensor, tried(sensor, best, True)))
     for sensor, tasks in again:
         if found := parting(tasks):
             yield sensor, chosen(found)[0]

@@ -132,20 +132,12 @@ class NextStop:
 
     def to_frame(self) -> pd.DataFrame:
         """All that were tried, best first."""
-        return pd.DataFrame(
-            {
-                "experiment": [experiment.text for experiment in self.tried],
-                "separation": [experiment.prediction.separation for experiment in self.tried],
-                "chance": [experiment.prediction.right for experiment in self.tried],
-                "deviation_before": [
-                    experiment.prediction.precision[0] for experiment in self.tried
-                ],
-                "deviation_after": [
-                    experiment.prediction.precision[1] for experiment in self.tried
-                ],
-                f"cost [{self.tried[0].unit}]": [experiment.cost for experiment in self.tried],
-            }
-        )
+        columns = ("experiment", "separation", "chance", "deviation_before", "deviation_after")
+        rows = [
+            (e.text, e.prediction.separation, e.prediction.right, *e.prediction.precision, e.cost)
+            for e in self.tried
+        ]
+        return pd.DataFrame(rows, columns=[*columns, f"cost [{self.tried[0].unit}]"])
 
     def to_dict(self) -> dict[str, Any]:
         """All of it as plain numbers and texts; the keys of the first level are a contract."""

@@ -4,14 +4,16 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 
+from workbench.diagnosis.data.counting import CountedSamples, count
 from workbench.diagnosis.data.motion import OpenModel, opened
 from workbench.diagnosis.effects.extension import variables
 from workbench.diagnosis.inference.rivals import Rival
+from workbench.diagnosis.inference.thresholds import SOUND
 from workbench.diagnosis.inference.unknowns import ALL
+from workbench.errors import InputError
 from workbench.models.fmu import CoSimulation
 from workbench.recordings.case import Case
 from workbench.studies.design.candidates import Experiment
-from workbench.studies.design.claims import counts, left_claims
 from workbench.studies.design.prediction import DesignProblem, Prediction, predicted
 from workbench.studies.design.recorded import recorded
 from workbench.system.comparison import Channel
@@ -127,3 +129,26 @@ def with_sensor(system: System, sensor: Signal) -> System:
     return replace(
         system, reference_signals=(*system.reference_signals, sensor), comparison=compared
     )
+
+
+def counts(case: Case, system: System) -> bool:
+    """Whether a recording has enough that counts."""
+    return _counted(case, system, restarting=True) is not None
+
+
+def left_claims(case: Case, system: System) -> set[str] | None:
+    """Reasons why samples do not count, but for its end; None where too few do."""
+    counted = _counted(case, system, restarting=False)
+    if counted is None:
+        return None
+    reasons = [
+        exclusion.reason for exclusion in system.comparison.exclusions if not exclusion.to_the_end
+    ]
+    return {reason for reason in reasons if counted.excluded[reason].any()}
+
+
+def _counted(case: Case, system: System, *, restarting: bool) -> CountedSamples | None:
+    try:
+        return count(case, system, tuple(case.signals), SOUND, restarting=restarting)
+    except InputError:
+        return None

@@ -52,14 +52,8 @@ def recorded(
     time: Vector = h * np.arange(round(experiments.lasts / h) + 1.0)
     u, y = _driven(model, system, experiments, candidate, values, judged, time)
     time, rng = time[: len(y)], np.random.default_rng(seed)
-    outputs = tuple(output.name for output in system.outputs)
-    clean = dict(
-        zip(
-            (*(signal.name for signal in system.inputs), *outputs, *judged),
-            [*u.T, *y.T],
-            strict=True,
-        )
-    )
+    names = [*(signal.name for signal in (*system.inputs, *system.outputs)), *judged]
+    clean = dict(zip(names, (*u.T, *y.T), strict=True))
     signals = {
         key: column + system.signals[key].deviation(column) * rng.standard_normal(time.size)
         for key, column in clean.items()
@@ -90,10 +84,8 @@ def _driven(
         start_of(system, experiments, candidate),
         {key: value for key, value in values.items() if key in model.defaults},
     )
-    names, outputs = (
-        [signal.name for signal in system.inputs],
-        [output.name for output in system.outputs],
-    )
+    names = [signal.name for signal in system.inputs]
+    outputs = [output.name for output in system.outputs]
     readings = [system.signals[key].reading for key in (*outputs, *judged)]
     formulas = [*experiments.driven.values()]
     formulas += [experiments.ends.formula] if experiments.ends else []

@@ -21,9 +21,14 @@ from workbench.studies.monitoring.estimate import (
     open_estimator,
     watched,
 )
-from workbench.studies.monitoring.folder import RecordingFolder, recording_folders
 from workbench.studies.monitoring.outcome import MonitoringResult, concluded
-from workbench.studies.monitoring.state import RecordingResult, State, opened
+from workbench.studies.monitoring.state import (
+    RecordingFolder,
+    RecordingResult,
+    State,
+    opened,
+    recording_folders,
+)
 from workbench.studies.monitoring.watch import Track
 from workbench.system.registry import open_model
 from workbench.system.system import OBSERVER, System

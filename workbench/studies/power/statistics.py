@@ -196,3 +196,26 @@ def _large(results: Sequence[SetVerdict]) -> list[SetVerdict]:
 def _by_size(results: Sequence[SetVerdict]) -> dict[str, list[SetVerdict]]:
     sizes = sorted({result.planting.multiple for result in results})
     return {f"{size:g}": [r for r in results if r.planting.multiple == size] for size in sizes}
+
+
+def named_wrong(result: SetVerdict) -> bool:
+    """Whether a cause was named that is not the error of the sheet, nor its stated twin."""
+    return any(
+        not any(effect and effect in cause.group for effect in result.planting.effects)
+        for cause in result.causes
+    )
+
+
+def summarise_sheet(results: Sequence[SetVerdict]) -> list[dict[str, Any]]:
+    """What was said of each set, as it is written to sheet_error.json."""
+    return [
+        {
+            "rig": result.planting.options,
+            "wrong": dict(result.planting.gains),
+            "verdict": result.verdict,
+            "causes": [[cause.effect, *cause.confusable_with] for cause in result.causes],
+            "wrong_name": named_wrong(result),
+            "error": result.error,
+        }
+        for result in results
+    ]
