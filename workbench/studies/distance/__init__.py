@@ -4,14 +4,14 @@ past stops -> levels and how sure they are -> the model, drawn many times -> dis
     safety level; each past stop beside what the others say of it
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, wait
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
-from workbench.arrays import Matrix, Vector
+from workbench.arrays import Matrix
 from workbench.errors import InputError
 from workbench.recordings.case import Case
 from workbench.runtime.engine import Engine, Reporter
@@ -27,12 +27,15 @@ from workbench.studies.distance.forecast import (
 from workbench.studies.distance.outcome import Distance, Forecast, PastStop, Safety
 from workbench.studies.distance.past import PastFit, fitted, places
 from workbench.studies.distance.plain import PlainSampling
-from workbench.studies.distance.rare_events import Descent, Tail
+from workbench.studies.distance.rare_events import Tail
 from workbench.studies.distance.recorded import RecordedStop, Stop, asked_stop, recorded
+from workbench.studies.distance.standard import NominalRate
 from workbench.system.stopping import SPEED
 from workbench.system.system import System
 
 __all__ = ["Distance", "Effort", "distance_of_stop"]
+
+_T = TypeVar("_T")
 
 _PART, _PLAIN = 2000, 7  # plain samples of a task, and their stream of random numbers
 _RUNS = 8  # of subset simulation: the scatter of fewer says little, and processors share them
@@ -133,7 +136,7 @@ class _Forecasts:
     def told(self, stop: Stop) -> Distance:
         """What is to be said of a stop, and of those that were made."""
         counted = ProgressReporter(self._report, "distributions").part(len(self._made) + 1)
-        questions = [self._question(one.stop, k) for k, one in enumerate(self._made)]
+        questions = [self._question(past.stop, k) for k, past in enumerate(self._made)]
         asked = self._question(stop, None)
         drawn = [
             self._drawn(question, self._effort.checked, k) for k, question in enumerate(questions)
@@ -143,8 +146,9 @@ class _Forecasts:
             task.add_done_callback(counted)
         *each, ahead = [_forecast(task.result()) for task in drawn]
         nominal = self._pool.submit(Forecaster.stop, stop, {}).result().distance
-        safety, interrupted = self._safety(asked, nominal)
-        plain, short = self._plain(asked, nominal)
+        rate = NominalRate(stop.asked[SPEED], self._stopping.response, nominal)
+        safety, interrupted = self._safety(asked, rate)
+        plain, short = self._plain(asked, rate)
         return Distance(
             system=self._system,
             stop=stop,
@@ -161,7 +165,7 @@ class _Forecasts:
 
     def _question(self, stop: Stop, without: int | None) -> Question:
         """What the past stops, or all but one, say of a stop."""
-        whole = [k for k, one in enumerate(self._made) if not one.outside and k != without]
+        whole = [k for k, past in enumerate(self._made) if not past.outside and k != without]
         left = float(np.sqrt(np.square(self._left[whole]).mean()))
         return Question(stop, self._past.known(without), left, len(whole))
 
@@ -173,55 +177,48 @@ class _Forecasts:
         points = rng.standard_normal((samples, count))
         return self._pool.submit(Forecaster.drawn, question, points)
 
-    def _safety(self, question: Question, nominal: float) -> tuple[Safety | None, bool]:
+    def _safety(self, question: Question, nominal: NominalRate) -> tuple[Safety | None, bool]:
         """The safety level; and whether Ctrl-C ended it, which keeps the runs that are done."""
         effort = self._effort
         if not effort.decades:
             return None, False
-        interrupted = False
-        counted = ProgressReporter(self._report, "runs of subset simulation").part(_RUNS)
-        under_way: list[Future[tuple[Descent, float]]] = []
-        try:
-            for number in range(_RUNS):
-                given = question, effort.decades, effort.each, 1000 * effort.seed + number
-                under_way.append(self._pool.submit(Forecaster.descent, *given))
-                under_way[-1].add_done_callback(counted)
-            wait(under_way)
-        except KeyboardInterrupt:
-            interrupted = True
-            for task in under_way:
-                task.cancel()
-        done = [task.result() for task in under_way if task.done() and not task.cancelled()]
+        each = question, effort.decades, effort.each
+        calls = [(*each, 1000 * effort.seed + number) for number in range(_RUNS)]
+        done, interrupted = self._done("runs of subset simulation", Forecaster.descent, calls)
         if len(done) < 2:
             return None, interrupted
         tail = Tail(tuple(run for run, _ in done), question.addend)
-        spent = sum(one for _, one in done) / tail.evaluations
-        speed, response = question.stop.asked[SPEED], self._stopping.response
-        return Safety.of(tail, effort.decades, speed, response, nominal, spent), interrupted
+        spent = sum(seconds for _, seconds in done) / tail.evaluations
+        return Safety.of(tail, effort.decades, nominal, spent), interrupted
 
-    def _plain(self, question: Question, nominal: float) -> tuple[PlainSampling | None, bool]:
+    def _plain(self, question: Question, nominal: NominalRate) -> tuple[PlainSampling | None, bool]:
         """Plain samples; and whether Ctrl-C left some out."""
         effort = self._effort
         sizes = [_PART] * (effort.plain // _PART) + [effort.plain % _PART]
-        parts = [(size, (effort.seed, _PLAIN, k)) for k, size in enumerate(sizes) if size]
-        if not parts:
+        calls = [(question, n, (effort.seed, _PLAIN, k)) for k, n in enumerate(sizes) if n]
+        if not calls:
             return None, False
+        done, interrupted = self._done("parts of the plain samples", Forecaster.plainly, calls)
+        shortness = np.concatenate([np.empty(0), *done])
+        return PlainSampling.of(shortness, effort.decades, nominal), interrupted
+
+    def _done(
+        self, noun: str, function: Callable[..., _T], calls: Sequence[tuple[Any, ...]]
+    ) -> tuple[list[_T], bool]:
+        """Results of calls; and whether Ctrl-C came, which keeps those that are done."""
+        counted = ProgressReporter(self._report, noun).part(len(calls))
+        tasks: list[Future[_T]] = []
         interrupted = False
-        counted = ProgressReporter(self._report, "parts of the plain samples").part(len(parts))
-        under_way: list[Future[Vector]] = []
         try:
-            for size, seed in parts:
-                under_way.append(self._pool.submit(Forecaster.plainly, question, size, seed))
-                under_way[-1].add_done_callback(counted)
-            wait(under_way)
+            for call in calls:
+                tasks.append(self._pool.submit(function, *call))
+                tasks[-1].add_done_callback(counted)
+            wait(tasks)
         except KeyboardInterrupt:
             interrupted = True
-            for task in under_way:
+            for task in tasks:
                 task.cancel()
-        done = [task.result() for task in under_way if task.done() and not task.cancelled()]
-        shortness = np.concatenate([np.empty(0), *done])
-        speed, response = question.stop.asked[SPEED], self._stopping.response
-        return PlainSampling.of(shortness, effort.decades, speed, response, nominal), interrupted
+        return [t.result() for t in tasks if t.done() and not t.cancelled()], interrupted
 
 
 def _forecast(drawn: tuple[Matrix, float]) -> Forecast:

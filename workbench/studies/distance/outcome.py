@@ -14,6 +14,7 @@ from workbench.studies.distance.plain import PlainSampling
 from workbench.studies.distance.rare_events import Tail, plain_runs
 from workbench.studies.distance.recorded import RecordedStop, Stop
 from workbench.studies.distance.standard import (
+    NominalRate,
     StopConditions,
     equivalent_rate,
     nominal_rate,
@@ -138,35 +139,23 @@ class Safety:
     spent: float
 
     @classmethod
-    def of(
-        cls,
-        tail: Tail,
-        decades: int,
-        speed: float,
-        response: float,
-        nominal: float,
-        spent: float,
-    ) -> Self:
-        """From the lower tail of minus the logarithm of the distance.
-
-        Parameters
-        ----------
-        speed : at the command [m/s]; response [s].
-        nominal : distance [m].
-        """
-        rate = equivalent_rate(speed, response, nominal)
-
-        def ratio(shortness: float) -> float:
-            return equivalent_rate(speed, response, math.exp(-shortness)) / rate
-
+    def of(cls, tail: Tail, decades: int, nominal: NominalRate, spent: float) -> Self:
+        """From the lower tail of minus the logarithm of the distance."""
         levels = []
         for decade in range(1, decades + 1):
-            found = tail.quantile(decade)
-            plain = plain_runs(found.probability, found.variation)
-            value, low, high = (ratio(end) for end in (found.value, found.low, found.high))
-            hours = plain * spent / 3600.0
-            levels.append(SafetyLevel(decade, value, low, high, found.variation, plain, hours))
-        return cls(tuple(levels), rate, tail.evaluations, spent)
+            quantile = tail.quantile(decade)
+            plain = plain_runs(quantile.probability, quantile.variation)
+            level = SafetyLevel(
+                decade=decade,
+                ratio=nominal.ratio(quantile.value),
+                low=nominal.ratio(quantile.low),
+                high=nominal.ratio(quantile.high),
+                variation=quantile.variation,
+                plain_stops=plain,
+                plain_hours=plain * spent / 3600.0,
+            )
+            levels.append(level)
+        return cls(tuple(levels), nominal.rate, tail.evaluations, spent)
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,6 +1,5 @@
 """Quantiles by plain sampling, which subset simulation is held against."""
 
-import math
 from dataclasses import dataclass
 from typing import Self
 
@@ -8,7 +7,7 @@ import numpy as np
 from scipy.stats import binom
 
 from workbench.arrays import Vector
-from workbench.studies.distance.standard import equivalent_rate
+from workbench.studies.distance.standard import NominalRate
 
 
 @dataclass(frozen=True)
@@ -41,21 +40,14 @@ class PlainSampling:
     levels: tuple[PlainLevel, ...]
 
     @classmethod
-    def of(cls, shortness: Vector, decades: int, speed: float, response: float, m: float) -> Self:
-        """From minus the logarithm of distances [m], (n,).
-
-        Parameters
-        ----------
-        speed : at the command [m/s]; response [s]; m : nominal distance [m].
-        """
-        ordered, rate = np.sort(shortness), equivalent_rate(speed, response, m)
-        found = []
+    def of(cls, shortness: Vector, decades: int, nominal: NominalRate) -> Self:
+        """From minus the logarithm of distances [m], (n,)."""
+        ordered, levels = np.sort(shortness), []
         for decade in range(1, decades + 1):
-            if (told := quantile(ordered, 10.0**-decade)) is None:
+            if (ends := quantile(ordered, 10.0**-decade)) is None:
                 break
-            ratios = (equivalent_rate(speed, response, math.exp(-value)) / rate for value in told)
-            found.append(PlainLevel(decade, *ratios))
-        return cls(shortness.size, tuple(found))
+            levels.append(PlainLevel(decade, *map(nominal.ratio, ends)))
+        return cls(shortness.size, tuple(levels))
 
     def told(self) -> list[str]:
         """Lines for people."""

@@ -4,6 +4,7 @@ Sources: EN 14531-1:2015, clause 4, and ISO 20138-1 (equivalent rate and respons
 (corrections to nominal conditions, and the percentage).
 """
 
+import math
 from dataclasses import dataclass
 
 G = 9.81  # [m/s2]
@@ -36,6 +37,31 @@ def stopping_distance(speed: float, response: float, rate: float, end: float = 0
 def equivalent_rate(speed: float, response: float, distance: float, end: float = 0.0) -> float:
     """Equivalent deceleration ae [m/s2], the inverse of `stopping_distance`."""
     return (speed**2 - end**2) / (2.0 * (distance - speed * response))
+
+
+@dataclass(frozen=True)
+class NominalRate:
+    """Deceleration of a stop as its sheet says it, which others are compared with.
+
+    Attributes
+    ----------
+    speed : at the command [m/s].
+    response : equivalent [s].
+    distance : nominal [m].
+    """
+
+    speed: float
+    response: float
+    distance: float
+
+    @property
+    def rate(self) -> float:
+        """Equivalent deceleration [m/s2]."""
+        return equivalent_rate(self.speed, self.response, self.distance)
+
+    def ratio(self, shortness: float) -> float:
+        """Deceleration over the nominal one, of minus the logarithm of a distance [m]."""
+        return equivalent_rate(self.speed, self.response, math.exp(-shortness)) / self.rate
 
 
 @dataclass(frozen=True)
