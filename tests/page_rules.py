@@ -19,10 +19,13 @@ def check_page(path: Path, summary: dict[str, Any]) -> Any:
     assert " ".join(answer.text_content().split()).endswith(summary["answer"]["sentence"])
     run = summary["provenance"]["run"]
     assert run["title"] in page.xpath("string(//header/p[@class='kicker'])")
-    levels = [int(heading.tag[1]) for heading in page.xpath("//main//*[self::h2 or self::h3]")]
-    assert levels[0] == 2
-    assert max(np.diff(levels), default=0) <= 1
-    assert len(page.xpath("//h1")) == 1
+    assert page.get("lang") == "en"
+    levels = [int(heading.tag[1]) for heading in page.xpath("//h1|//h2|//h3|//h4|//h5|//h6")]
+    assert levels[:2] == [1, 2]
+    assert levels.count(1) == 1
+    assert max(np.diff(levels)) <= 1
+    first = page.xpath("//body//*[self::a or self::button or @tabindex]")[0]
+    assert page.get_element_by_id(first.get("href")[1:]).tag == "main"
     # What shows the answer is open, the rest is folded.
     assert [one.get("open") is not None for one in page.xpath("//section/details")].count(True) == 1
     assert page.xpath("//section/details")[0].get("open") is not None
@@ -39,8 +42,15 @@ def check_page(path: Path, summary: dict[str, Any]) -> Any:
     for drawing in page.xpath("//svg[not(ancestor::svg)]"):
         assert drawing.get("role") == "img"
         assert drawing.get("aria-label").strip()
+    assert not page.xpath("//svg[ancestor::svg][not(@aria-hidden)]|//img[not(@alt)]")
     for link in map(unquote, page.xpath("//a/@href")):
-        assert link[1:] in ids if link.startswith("#") else (path.parent / link).is_file(), link
+        there = path.parent / link
+        assert link[1:] in ids if link.startswith("#") else there.stat().st_size > 0, link
+    addresses = page.xpath("//@href|//@src|//@srcset|//@action|//@data")
+    assert not [a for a in addresses if ":" in a.split("/")[0] and not a.startswith("data:")]
     text = re.sub(r"data:,", "", path.read_text())
-    assert not re.search(r"(?:src|href)=\"(?:https?:)?//|url\(|@import", text)
+    assert not re.search(r"(?:src|href)=\"(?:\w+:)?//|url\(|@import", text)
+    (policy,) = page.xpath("//meta[@http-equiv='Content-Security-Policy']/@content")
+    assert policy.startswith("default-src 'none'")
+    assert not re.search(r"http|\*|self", policy)
     return page
