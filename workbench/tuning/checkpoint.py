@@ -124,20 +124,20 @@ def load(
         If neither is a sound checkpoint, or it is one of another search.
     """
     try:
-        found = _read(path)
+        checkpoint = _read(path)
     except InputError as damaged:
-        found = _read(previous_path(path))
-        if found is None:
+        checkpoint = _read(previous_path(path))
+        if checkpoint is None:
             raise
         warn(f"going on from the generation before the last: {damaged}")
-    if found is not None and found.identity != identity:
+    if checkpoint is not None and checkpoint.identity != identity:
         raise InputError(
             where=str(path),
             found="the checkpoint of another search",
             expected="the same FMU, cases, seed, population and weights",
             remedy="repeat the command of that search, or run without --resume",
         )
-    return found
+    return checkpoint
 
 
 def _read(path: Path) -> Checkpoint | None:

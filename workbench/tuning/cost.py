@@ -77,14 +77,14 @@ def recordings(
     InputError
         If a case lacks a measured signal to judge by.
     """
-    found = [recording(case, system) for case in cases]
+    prepared = [recording(case, system) for case in cases]
     for output, error in scale_errors.items():
         signs = (error if i % 2 == 0 else -error for i in range(len(cases)))
-        found += [
+        prepared += [
             _scaled(recording, case, output, sign, system)
-            for recording, case, sign in zip(found, cases, signs, strict=False)
+            for recording, case, sign in zip(prepared, cases, signs, strict=False)
         ]
-    return tuple(found)
+    return tuple(prepared)
 
 
 def recording(case: Case, system: System) -> Recording:
@@ -103,10 +103,12 @@ def recording(case: Case, system: System) -> Recording:
     return Recording(case.name, case.name, steps, *signals, shares, case.conditions)
 
 
-def _scaled(one: Recording, case: Case, output: str, error: float, system: System) -> Recording:
+def _scaled(
+    original: Recording, case: Case, output: str, error: float, system: System
+) -> Recording:
     """The recording of a sensor whose scale is wrong by a share."""
     scaled = recording(case.with_signals({output: case[output] * (1.0 + error)}), system)
-    return scaled._replace(name=f"{one.case}, {output} {error:+.2%}")
+    return scaled._replace(name=f"{original.case}, {output} {error:+.2%}")
 
 
 @dataclass(frozen=True, eq=False)

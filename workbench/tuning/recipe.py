@@ -259,12 +259,12 @@ def tune(
             f"{problem.provenance['fmu']['file']}: the FMU fails, hangs or diverges with the "
             "untuned gains, so there is nothing to start from; see 'python -m workbench simulate'"
         )
-    found = run.search(0, range(len(job.recordings)))
-    if found is None:
+    result = run.search(0, range(len(job.recordings)))
+    if result is None:
         return None
-    tuned = TuningResult(problem, plan, found, before, found.interrupted)
+    tuned = TuningResult(problem, plan, result, before, result.interrupted)
     run.progress.found(tuned)
-    return tuned if found.interrupted else run.examine(tuned, folds)
+    return tuned if result.interrupted else run.examine(tuned, folds)
 
 
 @dataclass(frozen=True, eq=False)
@@ -317,18 +317,18 @@ class _Run:
 
 def tuned_gains(tuned: TuningResult) -> str:
     """The text of gains.toml, with what the gains come from."""
-    job, found = tuned.problem.job, tuned.search
-    at_bound = tuned.problem.space.at_bound(found.coordinates)
+    job, search = tuned.problem.job, tuned.search
+    at_bound = tuned.problem.space.at_bound(search.coordinates)
     came_from = {
         **_provenance(tuned),
-        "z": found.z,
-        "z_k": _by_case(tuned, found.z_k),
-        "generations": len(found.history) - 1,
-        "interrupted": found.interrupted,
+        "z": search.z,
+        "z_k": _by_case(tuned, search.z_k),
+        "generations": len(search.history) - 1,
+        "interrupted": search.interrupted,
         "at_bound": [n for n, at in zip(job.gains.names, at_bound, strict=True) if at],
     }
     meaning = estimators_of(job.system)[job.estimator].meaning
-    return format_gains(job.gains.with_values(found.best), meaning, came_from)
+    return format_gains(job.gains.with_values(search.best), meaning, came_from)
 
 
 def summarise_tuning(tuned: TuningResult, folds: int) -> dict[str, Any]:
@@ -338,16 +338,16 @@ def summarise_tuning(tuned: TuningResult, folds: int) -> dict[str, Any]:
     ----------
     folds : asked for; an interruption may have left fewer.
     """
-    found, history, job = tuned.search, tuned.search.history, tuned.problem.job
+    search, history, job = tuned.search, tuned.search.history, tuned.problem.job
     following = job.system.following if job.follows else None
-    before, after = (_by_case(tuned, z_k) for z_k in (tuned.before, found.z_k))
+    before, after = (_by_case(tuned, z_k) for z_k in (tuned.before, search.z_k))
     return {
         "estimator": job.estimator,
         "label": estimators_of(job.system)[job.estimator].label,
         "judged": job.system.objective.signal,
         "bandwidth": _finite(job.system.objective.bandwidth),
         "follows": None if following is None else vars(following),
-        "z": found.z,
+        "z": search.z,
         "z_reasoned": max(before.values()),
         "cases": {
             name: {
@@ -385,10 +385,10 @@ def summarise_tuning(tuned: TuningResult, folds: int) -> dict[str, Any]:
             "seconds": sum(g.seconds for g in history),
             "saved": 1.0 - sum(g.samples for g in history) / sum(g.of for g in history),
             "crashed": sum(g.crashed for g in history),
-            "interrupted": found.interrupted,
-            "converged": found.converged,
+            "interrupted": search.interrupted,
+            "converged": search.converged,
             "as_good": len(_as_good(tuned)),
-            "last": len(found.last.z),
+            "last": len(search.last.z),
             "folds": folds,
         },
         "convergence": [g.z for g in history],
@@ -407,15 +407,15 @@ def _by_case(tuned: TuningResult, z_k: Vector) -> dict[str, float]:
 
 
 def _gains(tuned: TuningResult) -> dict[str, dict[str, Any]]:
-    job, space, found = tuned.problem.job, tuned.problem.space, tuned.search
+    job, space, search = tuned.problem.job, tuned.problem.space, tuned.search
     names, reasoned = job.gains.names, job.gains.values
     lower, upper = space.gains(np.array([np.zeros(len(names)), np.ones(len(names))]))
-    at_bound, as_good = space.at_bound(found.coordinates), _as_good(tuned)
+    at_bound, as_good = space.at_bound(search.coordinates), _as_good(tuned)
     return {
         name: {
             "meaning": tuned.problem.meanings[name][0],
             "unit": tuned.problem.meanings[name][1],
-            "value": float(found.best[i]),
+            "value": float(search.best[i]),
             "reasoned": float(reasoned[i]),
             "lower": float(lower[i]),
             "upper": float(upper[i]),
@@ -459,7 +459,7 @@ def with_reference(cases: Sequence[Case], system: System, estimator: str) -> lis
             expected=f"one of {', '.join(known)}",
             remedy="correct the name",
         )
-    found = []
+    judged_cases = []
     for case in cases:
         run = observed(case, system, known[estimator])
         if run.ending is not Ending.OK:
@@ -470,5 +470,5 @@ def with_reference(cases: Sequence[Case], system: System, estimator: str) -> lis
                 remedy="leave this case out of the tuning with --cases",
             )
         judged = [name for name in system.objective.weights if name not in case.outputs]
-        found.append(case.with_signals({name: run.signal(name) for name in judged}))
-    return found
+        judged_cases.append(case.with_signals({name: run.signal(name) for name in judged}))
+    return judged_cases

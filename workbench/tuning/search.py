@@ -197,10 +197,10 @@ class _Objective:
         asked = [
             Candidate(self._space.gains(candidates[i]), float(limits[i]), self._order) for i in new
         ]
-        found = evaluate_all(self._pool, asked, len(self._job.recordings))
-        self.evaluations += found
+        evaluations = evaluate_all(self._pool, asked, len(self._job.recordings))
+        self.evaluations += evaluations
         z = np.array([np.inf if result is None else result[0] for result in known])
-        for i, evaluation in zip(new, found, strict=True):
+        for i, evaluation in zip(new, evaluations, strict=True):
             z[i] = evaluation.z
             # Of equal candidates one may have lost, against a better member.
             if np.isfinite(evaluation.z):
@@ -225,7 +225,7 @@ def _evolve(
         members[0] = space.start
     else:
         members = objective.before.members
-    found = differential_evolution(
+    result = differential_evolution(
         objective,  # type: ignore[arg-type]  # of all candidates at once
         Bounds(np.zeros(space.start.size), np.ones(space.start.size)),
         init=members,
@@ -237,9 +237,9 @@ def _evolve(
         vectorized=True,
     )
     population = Population(
-        found.population, found.population_energies, objective.z_k(found.population)
+        result.population, result.population_energies, objective.z_k(result.population)
     )
-    return population, bool(found.success)
+    return population, bool(result.success)
 
 
 def _generation(

@@ -35,10 +35,10 @@ class Settling:
         A method that makes its gains as it goes is not judged.
         """
         model, asked = self._model, self._asked
-        found = self._kind.error_dynamics(model.A, model.B, model.C, gains)
-        if found is None or asked is None:
+        error_model = self._kind.error_dynamics(model.A, model.B, model.C, gains)
+        if error_model is None or asked is None:
             return 0.0
-        dynamics, error = found
+        dynamics, error = error_model
         quantity = self._names.index(asked.quantity)
         transition = expm(dynamics * asked.within)
         later = np.linalg.matrix_power(transition, LATER)

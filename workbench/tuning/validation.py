@@ -105,11 +105,11 @@ def errors(job: Job, cases: Sequence[Case], gains: Sequence[Vector]) -> Matrix:
     nan where a run failed or a case cannot be judged.
     """
     with load_model(job) as fmu:
-        found = [
+        rows = [
             [score(case, replay(case, estimator), job.system).nrmse for case in cases]
             for estimator in (job_estimator(job, fmu, job.gains.with_values(g)) for g in gains)
         ]
-    return np.array(found, dtype=float)
+    return np.array(rows, dtype=float)
 
 
 def split(cases: Sequence[str], folds: int) -> list[tuple[int, ...]]:
@@ -145,13 +145,13 @@ def cross_validate(
     for number, held_out in enumerate(
         split([recording.case for recording in job.recordings], folds)
     ):
-        found = tune(number, [k for k in everything if k not in held_out])
-        if found is None or found.interrupted:
+        result = tune(number, [k for k in everything if k not in held_out])
+        if result is None or result.interrupted:
             break
-        tuned, untuned = evaluate_gains(pool, job, [found.best, reasoned])
+        tuned, untuned = evaluate_gains(pool, job, [result.best, reasoned])
         names = tuple(dict.fromkeys(job.recordings[k].case for k in held_out))
         left_out = [case for case in cases if case.name in names]
-        error, error_untuned = errors(job, left_out, [found.best, reasoned]).max(axis=1)
+        error, error_untuned = errors(job, left_out, [result.best, reasoned]).max(axis=1)
         worst = max(held_out, key=lambda k: float(tuned[k]))
         results.append(
             Fold(
@@ -159,7 +159,7 @@ def cross_validate(
                 worst=job.recordings[worst].name,
                 tuned=float(tuned[worst]),
                 reasoned=float(untuned[list(held_out)].max()),
-                z=found.z,
+                z=result.z,
                 error=float(error),
                 error_reasoned=float(error_untuned),
             )
@@ -167,20 +167,20 @@ def cross_validate(
     return results
 
 
-def sensitivities(pool: Workers, job: Job, space: SearchSpace, found: Search) -> list[Sensitivity]:
+def sensitivities(pool: Workers, job: Job, space: SearchSpace, result: Search) -> list[Sensitivity]:
     """Change one gain after the other."""
     names = job.gains.names
     changed: list[Vector] = []
     for i in range(len(names)):
         for step in (-STEP, STEP):
-            coordinates = found.coordinates.copy()
+            coordinates = result.coordinates.copy()
             coordinates[i] = np.clip(coordinates[i] + step, 0.0, 1.0)
             changed.append(space.gains(coordinates))
-        without = found.best.copy()
+        without = result.best.copy()
         without[i] = 0.0
         changed.append(without)
-    z = evaluate_gains(pool, job, changed)[:, list(found.cases)].max(axis=1)
-    change = np.where(z < DIVERGED, z / found.z - 1.0, np.inf).reshape(-1, 3)
+    z = evaluate_gains(pool, job, changed)[:, list(result.cases)].max(axis=1)
+    change = np.where(z < DIVERGED, z / result.z - 1.0, np.inf).reshape(-1, 3)
     return [
         Sensitivity(name, float(less), float(more), float(without))
         for name, (less, more, without) in zip(names, change, strict=True)

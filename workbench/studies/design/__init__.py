@@ -155,18 +155,18 @@ def _predict_all(
 ) -> list[Prediction]:
     """What experiments would tell, those that would count."""
     tasks = [
-        pool.submit(ExperimentPredictor.predict_experiment, one, number, None, in_full)
-        for number, one in enumerate(plan, 1)
+        pool.submit(ExperimentPredictor.predict_experiment, experiment, number, None, in_full)
+        for number, experiment in enumerate(plan, 1)
     ]
-    found = [one for task in tasks if (one := task.result()) is not None]
-    if not found:
+    predictions = [prediction for task in tasks if (prediction := task.result()) is not None]
+    if not predictions:
         raise InputError(
             where=f"{system.source}, [next]",
             found="no experiment with enough samples that count",
             expected="one that a diagnosis can use",
             remedy="let recordings last longer, or widen the ranges",
         )
-    return found
+    return predictions
 
 
 def _sensed(
@@ -187,8 +187,8 @@ def _sensed(
         ]
 
     def parting(tasks: Sequence[_Task]) -> list[Prediction]:
-        found = [one for task in tasks if (one := task.result()) is not None]
-        return [prediction for prediction in found if len(prediction.groups) > parted]
+        predictions = [one for task in tasks if (one := task.result()) is not None]
+        return [prediction for prediction in predictions if len(prediction.groups) > parted]
 
     once = [(sensor, tried(sensor, plan, False)) for sensor in sensors]
     again = []
@@ -196,8 +196,8 @@ def _sensed(
         best = [prediction.candidate for prediction in chosen(parting(tasks))[:1]]
         again.append((sensor, tried(sensor, best, True)))
     for sensor, tasks in again:
-        if found := parting(tasks):
-            yield sensor, chosen(found)[0]
+        if better := parting(tasks):
+            yield sensor, chosen(better)[0]
 
 
 def _confirmed(pool: Pool[ExperimentPredictor], ranked: Sequence[Prediction]) -> list[Prediction]:
@@ -215,10 +215,10 @@ def _confirmed(pool: Pool[ExperimentPredictor], ranked: Sequence[Prediction]) ->
         wanted = min(_TOGETHER + pool.workers - 1, _CONFIRMED - len(confirmed))
         some = enumerate(left[len(tasks) : wanted], len(tasks) + 1)
         tasks += [pool.submit(ExperimentPredictor.confirm, one, number) for number, one in some]
-        found, tasks = [task.result() for task in tasks[:_TOGETHER]], tasks[_TOGETHER:]
-        judged, left = left[: len(found)], left[len(found) :]
-        doubtful += [signal for signal, well in zip(judged, found, strict=True) if well is None]
-        sure = [prediction for prediction in found if prediction is not None]
+        results, tasks = [task.result() for task in tasks[:_TOGETHER]], tasks[_TOGETHER:]
+        judged, left = left[: len(results)], left[len(results) :]
+        doubtful += [signal for signal, well in zip(judged, results, strict=True) if well is None]
+        sure = [prediction for prediction in results if prediction is not None]
         if not sure:
             continue
         confirmed = chosen([*confirmed, *sure])

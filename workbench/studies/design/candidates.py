@@ -167,26 +167,26 @@ def _profiles(varied_input: VariedInput) -> list[Profile]:
     low, high = varied_input.low, varied_input.high
     rising = np.linspace(low, high, _STAIRS + 1).tolist()
     stairs = (*rising, *rising[-2:0:-1])
-    found = []
+    profiles = []
     if STAIRCASE in varied_input.profiles:
         falling = (*stairs[_STAIRS:], *stairs[:_STAIRS])
-        found += [
+        profiles += [
             Profile(varied_input, STAIRCASE, levels, varied_input.every)
             for levels in (stairs, falling)
         ]
     if SINE in varied_input.profiles:
-        found += [
+        profiles += [
             Profile(varied_input, SINE, (low, high), times * varied_input.every)
             for times in (1.0, 2.0)
         ]
     if STEP in varied_input.profiles:
-        found += [
+        profiles += [
             Profile(varied_input, STEP, (to,), varied_input.every)
             for to in (low, 0.5 * (low + high), high)
         ]
     if RELEASE in varied_input.profiles:
-        found += [
+        profiles += [
             Profile(varied_input, RELEASE, (to,), varied_input.every)
             for to in (0.5 * (low + high), high)
         ]
-    return found
+    return profiles

@@ -36,32 +36,32 @@ class RankedExperiment:
 
     def to_dict(self) -> dict[str, Any]:
         """All of it as plain numbers and texts."""
-        found = self.prediction
+        prediction = self.prediction
         return {
             "experiment": self.text,
-            "groups": [list(group) for group in found.groups],
-            "separation": found.separation,
-            "chance": found.right,
-            "separations": np.sqrt(np.maximum(0.0, found.pairwise)).tolist(),
-            "deviation": {"before": found.precision[0], "after": found.precision[1]},
+            "groups": [list(group) for group in prediction.groups],
+            "separation": prediction.separation,
+            "chance": prediction.right,
+            "separations": np.sqrt(np.maximum(0.0, prediction.pairwise)).tolist(),
+            "deviation": {"before": prediction.precision[0], "after": prediction.precision[1]},
             "cost": {"value": self.cost, "unit": self.unit},
-            "duration": float(found.case.time[-1] - found.case.time[0]),
+            "duration": float(prediction.case.time[-1] - prediction.case.time[0]),
             "inputs": {
                 profile.input.name: {
                     "profile": profile.kind,
                     "levels": profile.levels,
                     "every": profile.every,
                 }
-                for profile in found.candidate.profiles
+                for profile in prediction.candidate.profiles
             },
             "conditions": {
                 name: list(value) if isinstance(value, tuple) else value
-                for name, value in found.case.conditions.items()
+                for name, value in prediction.case.conditions.items()
             },
             "settings": {
                 name: setting.value
-                for name, setting in found.candidate.settings.items()
-                if name not in found.case.conditions
+                for name, setting in prediction.candidate.settings.items()
+                if name not in prediction.case.conditions
             },
         }
 
@@ -104,23 +104,26 @@ class NextStop:
     def sentence(self) -> str:
         """The answer in one or two sentences."""
         best = self.tried[0]
-        found = best.prediction
+        prediction = best.prediction
         if len(self.names) == 1:
-            return f"Next: {best.text}. It makes {self.names[0]} {_ratio(found):.2g} times as sure."
+            sure = f"{_ratio(prediction):.2g} times as sure"
+            return f"Next: {best.text}. It makes {self.names[0]} {sure}."
         said = []
         if self.parts:
-            groups = " from ".join(_or(self.names[i] for i in group) for group in found.groups)
+            groups = " from ".join(_or(self.names[i] for i in group) for group in prediction.groups)
             said.append(
-                f"Next: {best.text}. It parts {groups} by {found.separation:.1f} standard "
+                f"Next: {best.text}. It parts {groups} by {prediction.separation:.1f} standard "
                 "deviations."
             )
-        for group in found.groups:
+        for group in prediction.groups:
             if len(group) > 1:
                 names = " and ".join(self.names[i] for i in group)
                 said.append(f"No experiment here likely parts {names}, whichever is true.")
-        for sensor, one in self.sensors.items():
-            groups = " from ".join(_or(self.names[i] for i in g) for g in one.prediction.groups)
-            said.append(f"A sensor of {sensor} would part {groups}: {one.text}.")
+        for sensor, experiment in self.sensors.items():
+            groups = " from ".join(
+                _or(self.names[i] for i in g) for g in experiment.prediction.groups
+            )
+            said.append(f"A sensor of {sensor} would part {groups}: {experiment.text}.")
         return " ".join(said)
 
     def summary(self) -> str:
@@ -164,19 +167,20 @@ def _or(names: Iterable[str]) -> str:
     return " or ".join(names)
 
 
-def _ratio(found: Prediction) -> float:
-    return found.precision[0] / found.precision[1]
+def _ratio(prediction: Prediction) -> float:
+    return prediction.precision[0] / prediction.precision[1]
 
 
 def _told(experiment: RankedExperiment) -> str:
-    found = experiment.prediction
+    prediction = experiment.prediction
     cost = f"cost {experiment.cost:.3g} {experiment.unit}"
-    if len(found.pairwise) == 1:
-        return f"{_ratio(found):.2g} times as sure, {cost}"
-    group = " or its group" if 1 < len(found.groups) < len(found.pairwise) else ""
+    if len(prediction.pairwise) == 1:
+        return f"{_ratio(prediction):.2g} times as sure, {cost}"
+    several = 1 < len(prediction.groups) < len(prediction.pairwise)
+    group = " or its group" if several else ""
     return (
-        f"separation {found.separation:.1f} standard deviations, chance {found.right:.0%} that the "
-        f"right one{group} is then named, {cost}"
+        f"separation {prediction.separation:.1f} standard deviations, chance "
+        f"{prediction.right:.0%} that the right one{group} is then named, {cost}"
     )
 
 

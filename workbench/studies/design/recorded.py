@@ -136,19 +136,19 @@ def _conditions(
     system: System, candidate: Experiment, clean: Mapping[str, Vector]
 ) -> dict[str, Value]:
     """Conditions as they are set; others as the recording says, or the usual ones."""
-    found: dict[str, Value] = {}
+    conditions: dict[str, Value] = {}
     for condition in system.conditions:
         if condition.name in candidate.settings:
-            found[condition.name] = candidate.settings[condition.name].value
+            conditions[condition.name] = candidate.settings[condition.name].value
         elif condition.choices:
-            found[condition.name] = (
+            conditions[condition.name] = (
                 (condition.choices[0],) * condition.count
                 if condition.count
                 else condition.choices[0]
             )
         elif not condition.sets:
-            found[condition.name] = _told(system, condition, clean)
-    return found
+            conditions[condition.name] = _told(system, condition, clean)
+    return conditions
 
 
 def _told(system: System, condition: Condition, clean: Mapping[str, Vector]) -> float:

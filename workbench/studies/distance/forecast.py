@@ -47,8 +47,8 @@ class Question:
 
     def addend(self, x: Vector) -> Vector:
         """Cumulative distribution of what the model leaves of a logarithm, (n,) of (n,)."""
-        found: Vector = stdtr(self.freedom, x / self.left)
-        return found
+        share: Vector = stdtr(self.freedom, x / self.left)
+        return share
 
     def certain(self) -> "Question":
         """The same if the machine and its model were known, so that it only differs by nature."""

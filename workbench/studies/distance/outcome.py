@@ -223,9 +223,9 @@ class Distance:
     def warnings(self) -> list[str]:
         """What the data do not carry."""
         count = len(self.claimed)
-        found = []
+        warnings = []
         if self.safety is not None:
-            found.append(
+            warnings.append(
                 f"{count} stops show what happens once in {count + 1}; levels beyond that follow "
                 "from tolerances and from the forms of their distributions, which no stop has shown"
             )
@@ -235,18 +235,20 @@ class Distance:
             value = self.stop.asked[asked.name]
             if not min(seen) - near <= value <= max(seen) + near:
                 low, high, here = (_shown(one, asked) for one in (min(seen), max(seen), value))
-                found.append(f"{asked.label} {here} is beyond that of past stops, {low} to {high}")
+                warnings.append(
+                    f"{asked.label} {here} is beyond that of past stops, {low} to {high}"
+                )
         for name, said in self.stop.conditions.items():
             if not any(stop.recorded.stop.conditions[name] == said for stop in self.claimed):
                 label = self.system.condition(name).label
-                found.append(f"no past stop that the model claims was made with {label} {said}")
+                warnings.append(f"no past stop that the model claims was made with {label} {said}")
         if self.ahead.outside > 0.0:
             reasons = ", ".join(exclusion.reason for exclusion in stopping_of(self.system).outside)
-            found.append(
+            warnings.append(
                 f"{self.ahead.outside:.1%} of the stops drawn are beyond what the model claims "
                 f"({reasons}): their distances are no prediction"
             )
-        return found
+        return warnings
 
     @property
     def sentence(self) -> str:
@@ -324,12 +326,12 @@ class Distance:
 
     def quantiles(self) -> pd.DataFrame:
         """Of the distance and of the deceleration of the stop that is asked for."""
-        found = [self.ahead.quantile(share) for share in QUANTILES]
+        distances = [self.ahead.quantile(share) for share in QUANTILES]
         return pd.DataFrame(
             {
                 "share": QUANTILES,
-                "distance [m]": found,
-                "deceleration [m/s2]": [self.rate(distance) for distance in found],
+                "distance [m]": distances,
+                "deceleration [m/s2]": [self.rate(distance) for distance in distances],
             }
         )
 

@@ -104,7 +104,7 @@ def places(keys: Sequence[Key], system: System, conditions: Mapping[str, Value])
     InputError
         If no past stop was made under them.
     """
-    found = {}
+    columns = {}
     for name, level in system.comparison.levels.items():
         key = name, choice_of(system, name, conditions)
         if key not in keys:
@@ -114,5 +114,5 @@ def places(keys: Sequence[Key], system: System, conditions: Mapping[str, Value])
                 expected=f"one, by which '{name}' is known",
                 remedy="give recordings under this condition too",
             )
-        found[name] = list(keys).index(key)
-    return found
+        columns[name] = list(keys).index(key)
+    return columns

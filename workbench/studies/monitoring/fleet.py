@@ -57,22 +57,22 @@ class Fleet:
         try:
             if (remote := self._remote) is None:
                 entries = [path for path in Path(self.location).iterdir() if path.is_dir()]
-                found = sorted(entry.name for entry in entries if not entry.name.startswith("."))
+                names = sorted(entry.name for entry in entries if not entry.name.startswith("."))
             else:
                 system, path = remote
                 listed = system.ls(path, detail=True)
-                found = sorted(Path(o["name"]).name for o in listed if o["type"] == "directory")
+                names = sorted(Path(o["name"]).name for o in listed if o["type"] == "directory")
             reason = "a folder without folders"
         except (OSError, ValueError, ImportError) as error:
-            found, reason = [], f"what cannot be read ({error})"
-        if not found:
+            names, reason = [], f"what cannot be read ({error})"
+        if not names:
             raise InputError(
                 where=self.location,
                 found=reason,
                 expected="a folder for each machine, which holds one for each recording",
                 remedy="correct it; other kinds of URLs need the packages that fsspec names",
             )
-        return found
+        return names
 
     def fetched(self, machine: str, to: Path) -> Path:
         """Folder of a machine's recordings, copied where they are not on this machine."""
@@ -135,14 +135,14 @@ def watch_machine(fleet: Fleet, machine: str, state: bytes) -> MachineResult:
         try:
             folder = fleet.fetched(machine, Path(scratch) / "recordings")
             engine = Engine(out=out)
-            found = monitor(fleet.system, folder, engine, rate=fleet.rate, read=fleet.read)
-            fleet.write(found, out)
+            result = monitor(fleet.system, folder, engine, rate=fleet.rate, read=fleet.read)
+            fleet.write(result, out)
         except InputError as error:
             return MachineResult(machine, refusal=str(error))
         except Exception as error:  # one machine must not cost the others; it is listed
             return MachineResult(machine, refusal=f"{machine}: {error!r}")
         files = {path.name: path.read_bytes() for path in sorted(out.iterdir())}
-        return MachineResult(machine, len(found.names), len(found.changes), "", files)
+        return MachineResult(machine, len(result.names), len(result.changes), "", files)
 
 
 def watch_fleet(
@@ -165,7 +165,7 @@ def watch_fleet(
     InputError
         If there are no machines.
     """
-    names, found, interrupted = fleet.machines(), list[MachineResult](), False
+    names, results, interrupted = fleet.machines(), list[MachineResult](), False
     tasks: list[Future[MachineResult]] = []
     try:
         for name in names:
@@ -173,14 +173,14 @@ def watch_fleet(
             state = before.read_bytes() if before.is_file() else b""
             tasks.append(pool.submit(watch_machine, name, state))
         for task in as_completed(tasks):
-            one = task.result()
-            for file, content in one.files.items():
-                write_whole(out / one.machine / file, content)
-            found.append(one)
-            step(len(found), len(names), one.machine)
+            machine = task.result()
+            for file, content in machine.files.items():
+                write_whole(out / machine.machine / file, content)
+            results.append(machine)
+            step(len(results), len(names), machine.machine)
     except KeyboardInterrupt:
         interrupted = True
     finally:
         for task in tasks:
             task.cancel()
-    return sorted(found, key=lambda one: one.machine), interrupted
+    return sorted(results, key=lambda machine: machine.machine), interrupted

@@ -55,8 +55,8 @@ class MonitoringResult:
     @property
     def changes(self) -> list[tuple[Track, LevelChange]]:
         """All that were told, in their order."""
-        found = [(track, change) for track in self.tracks for change in track.changes]
-        return sorted(found, key=lambda one: one[1].raised)
+        changes = [(track, change) for track in self.tracks for change in track.changes]
+        return sorted(changes, key=lambda one: one[1].raised)
 
     @property
     def sentences(self) -> list[str]:

@@ -43,12 +43,12 @@ def recording_folders(folder: Path) -> list[RecordingFolder]:
         If there is no such folder, or no recording in it.
     """
     try:
-        found = sorted(
+        paths = sorted(
             (path for path in folder.iterdir() if path.is_dir() and not path.name.startswith(".")),
             key=lambda path: path.name,
         )
-        if found:
-            return [RecordingFolder(path.name, _content(path), path) for path in found]
+        if paths:
+            return [RecordingFolder(path.name, _content(path), path) for path in paths]
         reason = "a folder without folders"
     except OSError as error:
         reason = f"what cannot be read ({error.strerror or error})"
@@ -95,12 +95,12 @@ class State:
     def __init__(self, connection: sqlite3.Connection) -> None:
         self._connection = connection
 
-    def missing(self, found: list[RecordingFolder]) -> list[RecordingFolder]:
+    def missing(self, folders: list[RecordingFolder]) -> list[RecordingFolder]:
         """Those that are not known by name and content."""
         rows = self._connection.execute("SELECT name, content FROM deliveries")
         known = set(rows)
         return [
-            recording for recording in found if (recording.name, recording.content) not in known
+            recording for recording in folders if (recording.name, recording.content) not in known
         ]
 
     def add(self, told: RecordingResult) -> None:
@@ -137,16 +137,16 @@ def opened(path: Path, identity: Mapping[str, Any]) -> Iterator[State]:
     InputError
         If it cannot be read or written, or holds estimates of another identity.
     """
-    said = json.dumps(identity, sort_keys=True)
+    asked = json.dumps(identity, sort_keys=True)
     try:
         with closing(sqlite3.connect(path)) as connection:
             with connection:
                 connection.executescript(_TABLES)
             with connection:
-                found = [text for (text,) in connection.execute("SELECT said FROM identity")]
-                if not found:
-                    connection.execute("INSERT INTO identity VALUES (?)", (said,))
-            if found not in ([], [said]):
+                known = [text for (text,) in connection.execute("SELECT said FROM identity")]
+                if not known:
+                    connection.execute("INSERT INTO identity VALUES (?)", (asked,))
+            if known not in ([], [asked]):
                 raise InputError(
                     where=str(path),
                     found="estimates by another model, system file or version",

@@ -55,9 +55,9 @@ def rivals_of_set(
 ) -> tuple[Diagnosis, Rivals | None]:
     """Diagnose one set, and keep what it leaves undecided; None where no cause is found."""
     with _fit(system, effects, everything, cases) as (simulations, fit):
-        found = conclude(fit, effects, silent)
-        left = gathered(simulations, fit, found.base, found.rivals) if found.rivals else None
-        return found, left
+        result = conclude(fit, effects, silent)
+        left = gathered(simulations, fit, result.base, result.rivals) if result.rivals else None
+        return result, left
 
 
 def distances_in_set(
@@ -80,23 +80,25 @@ def distances_in_set(
         that could be fitted.
     """
     with _fit(system, effects, everything, cases) as (_, fit):
-        found = conclude(fit, effects, silent)
-        base, trial = examine(fit, found.base, effects, silent)
+        result = conclude(fit, effects, silent)
+        base, trial = examine(fit, result.base, effects, silent)
         fits: dict[str, FittedModel | None] = {}
         for score in trial.scores():
             name = score.effect.name
             if name in (true, *others) and name not in fits:
                 fits[name] = extended(fit, base, score)
         if (right := fits.get(true)) is None:
-            return found, {}
+            return result, {}
         _, settled = fit.least(right.linearised, right.active, right.linearised.variance_factors)
         units = fit.at(settled.point).variance_factors
         least = {
-            name: fit.least(one.linearised, one.active, units)[0]
-            for name, one in fits.items()
-            if one is not None
+            name: fit.least(fitted.linearised, fitted.active, units)[0]
+            for name, fitted in fits.items()
+            if fitted is not None
         }
-        return found, {name: distance(c - least[true]) for name, c in least.items() if name != true}
+        return result, {
+            name: distance(c - least[true]) for name, c in least.items() if name != true
+        }
 
 
 def distance(chi_squared: float) -> float:

@@ -154,8 +154,8 @@ def _row(setup: Setup, planting: Planting) -> dict[str, Any]:
 def _fill(row: dict[str, Any], setup: Setup, planting: Planting) -> None:
     (planted,) = planting.effects
     cases = setup.recorded(planting, setup.rig.simulate(planting.seed, planting.gains))
-    found, rivals = rivals_of_set(setup.system, setup.effects, setup.everything, cases)
-    row["verdict"], row["group"] = found.verdict, _named(found)
+    diagnosis, rivals = rivals_of_set(setup.system, setup.effects, setup.everything, cases)
+    row["verdict"], row["group"] = diagnosis.verdict, _named(diagnosis)
     if rivals is None or len(rivals.models) == 1:
         return
     experiments = setup.system.experiments
@@ -198,14 +198,14 @@ def _made(
     more = replace(setup, rig=rig).recorded(planting, rig.simulate(planting.seed, planting.gains))
     others = [name for name in names if name != planted]
     recordings = [*cases, *more]
-    found, shown = distances_in_set(
+    diagnosis, shown = distances_in_set(
         setup.system, setup.effects, setup.everything, recordings, planted, others
     )
-    named = _named(found)
+    named = _named(diagnosis)
     return {
         "experiment": experiment.text,
         "foreseen": (at,) in experiment.prediction.groups,
-        "verdict": found.verdict,
+        "verdict": diagnosis.verdict,
         "named": named,
         "parts": named == [planted],
         "separations": [
@@ -220,6 +220,8 @@ def _made(
     }
 
 
-def _named(found: Diagnosis) -> list[str]:
+def _named(diagnosis: Diagnosis) -> list[str]:
     """Causes, with those that are as good."""
-    return [name for cause in found.causes for name in (cause.effect.name, *cause.confusable_with)]
+    return [
+        name for cause in diagnosis.causes for name in (cause.effect.name, *cause.confusable_with)
+    ]

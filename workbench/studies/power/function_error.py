@@ -20,7 +20,7 @@ from workbench.diagnosis.simulation.residual_model import ResidualModel
 
 
 def function_error(
-    problem: Problem, known: Outcome, found: Proposal, effect: Effect
+    problem: Problem, known: Outcome, proposal: Proposal, effect: Effect
 ) -> float | None:
     """Error of the first law that is proposed, over the range of what the true cause does.
 
@@ -38,16 +38,16 @@ def function_error(
     error : root mean square over range; None where the law acts elsewhere, the true cause was not
         found, or phases are free in each recording.
     """
-    if not found.laws or found.outcome is None:
+    if not proposal.laws or proposal.outcome is None:
         return None
-    law = found.forms[found.laws[0].effect.name].law
-    true, proposed = known.diagnosis.best, found.outcome.diagnosis.best
+    law = proposal.forms[proposal.laws[0].effect.name].law
+    true, proposed = known.diagnosis.best, proposal.outcome.diagnosis.best
     every = {effect.name: effect for effect in (*true.active, *proposed.active)}
     elsewhere = law.place.slot.name not in effect.slots or effect not in true.active
     if elsewhere or any(effect.order_locked for effect in every.values()):
         return None
     with tempfile.TemporaryDirectory() as scratch:
-        written = [found.forms[cause.effect.name].written for cause in found.laws]
+        written = [proposal.forms[cause.effect.name].written for cause in proposal.laws]
         extended = extended_library(problem.library, written, Path(scratch))
         effects, path = list(every.values()), Path(scratch) / "Both.fmu"
         about = "With the law and the true cause"

@@ -149,7 +149,7 @@ class Journal:
         # What follows the last line feed was being written when the run was killed.
         head, *lines = text.split("\n")[:-1] or [""]
         try:
-            found = check_checksum(head)
+            written = check_checksum(head)
         except (ValueError, RecursionError) as error:
             raise InputError(
                 where=f"{self._path}, line 1",
@@ -158,8 +158,8 @@ class Journal:
                 remedy=f"put {previous_path(self._path).name} in its place, if it is there, or run "
                 "without --resume",
             ) from None
-        if found != identity:
-            other = next((key for key in identity if found.get(key) != identity[key]), "more")
+        if written != identity:
+            other = next((key for key in identity if written.get(key) != identity[key]), "more")
             raise InputError(
                 where=str(self._path),
                 found=f"verdicts of another run (other: {other})",

@@ -117,16 +117,16 @@ def _row(planting: Planting, study: PowerStudy, workers: int) -> dict[str, Any]:
             row["late"] = [] if late is None else list(late.signals)
             row["asked"] = needs_law(before)
             if row["asked"]:
-                found = propose(before, problem, engine)
-                row |= _told(found)
-                if planted and found.laws:
+                proposal = propose(before, problem, engine)
+                row |= _told(proposal)
+                if planted and proposal.laws:
                     known = diagnose(replace(problem, effects=effects), engine)
                     gain = known.diagnosis.gain
                     row["after_with_it"] = None if gain is None else gain.after
                     rig.write(rig.simulate(planting.seed + 1, planting.gains), planting.gains, new)
                     fresh = read_cases([new], system)
                     row["function_error"] = function_error(
-                        replace(problem, cases=fresh), known, found, planted[0]
+                        replace(problem, cases=fresh), known, proposal, planted[0]
                     )
     except Exception as error:  # one set must not end a run of hours; it is counted
         row["error"] = repr(error)
@@ -135,12 +135,12 @@ def _row(planting: Planting, study: PowerStudy, workers: int) -> dict[str, Any]:
     return row
 
 
-def _told(found: Proposal) -> dict[str, Any]:
+def _told(proposal: Proposal) -> dict[str, Any]:
     """What is proposed; its slots are also those of laws that are as good."""
-    laws = [form.law for form in found.forms.values()] if found.laws else []
-    gain = found.outcome.diagnosis.gain if laws and found.outcome is not None else None
+    laws = [form.law for form in proposal.forms.values()] if proposal.laws else []
+    gain = proposal.outcome.diagnosis.gain if laws and proposal.outcome is not None else None
     return {
-        "laws": [found.said(law) for law in found.laws],
+        "laws": [proposal.said(law) for law in proposal.laws],
         "slots": list(dict.fromkeys(law.place.slot.name for law in laws)),
         "before": None if gain is None else gain.before,
         "after": None if gain is None else gain.after,

@@ -57,11 +57,11 @@ def predict_campaign(
     with study.setup() as setup:
         clean = Planting("clean", seed, 0.0, {}, ())
         cases = setup.recorded(clean, study.rig.simulate(seed, {}))
-        found = diagnose_set(setup.system, setup.effects, setup.everything, cases)
+        diagnosis = diagnose_set(setup.system, setup.effects, setup.everything, cases)
     decides = of_system(study.system.comparison, len(study.effects))
     known = {effect.name: effect for effect in study.effects}
     return [
-        _effect_chance(known[plantable.effect], plantable, found, sizes, decides)
+        _effect_chance(known[plantable.effect], plantable, diagnosis, sizes, decides)
         for plantable in wanted
         if plantable.effect in known
     ]
@@ -70,12 +70,12 @@ def predict_campaign(
 def _effect_chance(
     effect: Effect,
     planted: Plantable,
-    found: Diagnosis,
+    diagnosis: Diagnosis,
     sizes: Sequence[float],
     decides: Thresholds,
 ) -> EffectChance:
     asked = [factor * effect.matters for factor in sizes]
-    for score in found.scores:
+    for score in diagnosis.scores:
         if score.effect.name == effect.name and dict(score.shape) == dict(planted.shapes):
             unknowns = 1 + len(score.phases) * effect.order_locked
             return EffectChance(

@@ -170,13 +170,13 @@ def _evaluate(setup: Setup, group: Group) -> list[SetVerdict]:
             if simulated is None:
                 simulated = setup.rig.simulate(planting.seed, planting.gains)
             cases = setup.recorded(planting, simulated)
-            found = diagnose_set(setup.system, setup.effects, setup.everything, cases)
+            result = diagnose_set(setup.system, setup.effects, setup.everything, cases)
         except Exception as error:  # one set must not end a run of hours; it is counted
             seconds = time.perf_counter() - begin
             results.append(SetVerdict(planting, "failed", (), None, None, seconds, repr(error)))
         else:
             seconds = time.perf_counter() - begin
-            results.append(diagnosed(planting, found, setup.repertoire, seconds))
+            results.append(diagnosed(planting, result, setup.repertoire, seconds))
     return results
 
 

@@ -64,9 +64,9 @@ class ThresholdSensitivity:
 
 def values(thresholds: Thresholds) -> dict[str, float]:
     """Each threshold by its name."""
-    found = dataclasses.asdict(thresholds)
-    samples = found.pop(_SAMPLES)
-    return {**found, **samples}
+    by_name = dataclasses.asdict(thresholds)
+    samples = by_name.pop(_SAMPLES)
+    return {**by_name, **samples}
 
 
 def changed(thresholds: Thresholds, name: str, factor: float) -> Thresholds:
@@ -110,8 +110,8 @@ class Remembering(ResidualModel):
             made = super().derivatives(points, [columns[i] for i in new], sizes)
             for j, i in enumerate(new):
                 self._columns[keys[i]] = [matrix[:, j : j + 1] for matrix in made]
-        found = [self._columns[key] for key in keys]
-        return [np.hstack([matrix[k] for matrix in found]) for k in range(len(self.cases))]
+        matrices = [self._columns[key] for key in keys]
+        return [np.hstack([matrix[k] for matrix in matrices]) for k in range(len(self.cases))]
 
 
 def _key(points: Sequence[Mapping[str, float]]) -> tuple[frozenset[tuple[str, float]], ...]:
@@ -147,10 +147,13 @@ def _said(
     mine = [thresholds for thresholds in some if thresholds.samples == samples]
     try:
         with Remembering(setup.everything, setup.system, cases, samples) as simulations:
-            for one in mine:
-                fit = Fit(simulations, setup.effects, one)
-                found = conclude(fit, setup.effects, silent)
-                said[one] = (found.verdict, *(cause.effect.name for cause in found.causes))
+            for variant in mine:
+                fit = Fit(simulations, setup.effects, variant)
+                diagnosis = conclude(fit, setup.effects, silent)
+                said[variant] = (
+                    diagnosis.verdict,
+                    *(cause.effect.name for cause in diagnosis.causes),
+                )
     except InputError:  # too few samples are left
         return dict.fromkeys(mine, ("refused",))
     return said
