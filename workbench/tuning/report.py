@@ -104,12 +104,7 @@ def bad_news(summary: Mapping[str, Any]) -> list[str]:
 
 
 def write_tuning_page(summary: Mapping[str, Any], folder: Path) -> Path:
-    """Write the page into the folder, beside gains.toml and the figures; returns its path.
-
-    Parameters
-    ----------
-    summary : as written to summary.json.
-    """
+    """Write the page into the folder, beside gains.toml and the figures; returns its path."""
     parts = [
         Part("cases", "Cases, worst first", [_cases(summary), _dots(summary)]),
         Part("gains", "Gains", _gains(summary, folder), printed=True),

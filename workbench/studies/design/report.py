@@ -37,12 +37,7 @@ _TERMS = {
 
 
 def write_next_stop(proposal: NextStop, provenance: Mapping[str, Any], out: Path) -> Path:
-    """Write next.json, experiments.csv, the figure of the best ones and the page; returns this.
-
-    Parameters
-    ----------
-    provenance : what was run.
-    """
+    """Write next.json, experiments.csv, the figure of the best ones and the page; returns this."""
     content = {**proposal.to_dict(), "provenance": provenance}
     summary = with_answer(design_answer(content), content)
     write_json(out / "next.json", summary)
@@ -107,12 +102,7 @@ def responses_figure(proposal: NextStop) -> "Figure":
 
 
 def write_next_stop_page(proposal: NextStop, summary: Mapping[str, Any], out: Path) -> Path:
-    """Write the page into the folder; returns its path.
-
-    Parameters
-    ----------
-    summary : as written to next.json.
-    """
+    """Write the page into the folder; returns its path."""
     figures = [_figure(proposal, best, k) for k, best in enumerate(proposal.proposals, 1)]
     first, *others = zoomable(figures, summary, out)
     shown = (

@@ -52,12 +52,7 @@ _TERMS = {
 
 
 def write_distance(result: Distance, provenance: Mapping[str, Any], out: Path) -> Path:
-    """Write distance.json, tables as CSV, the figure and the page; returns this.
-
-    Parameters
-    ----------
-    provenance : what was run.
-    """
+    """Write distance.json, tables as CSV, the figure and the page; returns this."""
     content = {**result.to_dict(), "provenance": provenance}
     summary = with_answer(distance_answer(content), content)
     write_json(out / "distance.json", summary)
@@ -161,12 +156,7 @@ def _draw_levels(axes: "Axes", safety: Safety) -> None:
 
 
 def write_distance_page(result: Distance, summary: Mapping[str, Any], out: Path) -> Path:
-    """Write the page into the folder; returns its path.
-
-    Parameters
-    ----------
-    summary : as written to distance.json.
-    """
+    """Write the page into the folder; returns its path."""
     (distribution,) = zoomable([_distribution(result)], summary, out)
     parts = [
         Part(

@@ -48,12 +48,7 @@ _TERMS = {
 
 
 def write_monitoring_page(result: MonitoringResult, summary: Mapping[str, Any], out: Path) -> Path:
-    """Write the page into the folder; returns its path.
-
-    Parameters
-    ----------
-    summary : as written to summary.json.
-    """
+    """Write the page into the folder; returns its path."""
     tracks = [track for track in result.tracks if np.isfinite(track.values).any()]
     tracks.sort(key=_first_told)
     figures = [_figure(track, result) for track in tracks] if len(result.names) > 1 else []
@@ -228,12 +223,7 @@ def _work(work: Mapping[str, Any]) -> Table:
 
 
 def write_monitoring(result: MonitoringResult, provenance: Mapping[str, Any], out: Path) -> Path:
-    """Write all files; returns the page.
-
-    Parameters
-    ----------
-    provenance : what was run.
-    """
+    """Write all files; returns the page."""
     content = {**result.to_dict(), "provenance": provenance}
     summary = with_answer(monitoring_answer(content), content)
     write_json(out / "summary.json", summary)

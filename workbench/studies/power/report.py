@@ -237,12 +237,7 @@ _INTERVAL = (
 
 
 def write_power_page(summary: Mapping[str, Any], out: Path) -> Path:
-    """Write the page into the folder; returns its path.
-
-    Parameters
-    ----------
-    summary : as written to power.json.
-    """
+    """Write the page into the folder; returns its path."""
     provenance = summary["provenance"]
     warnings = []
     if provenance["interrupted"]:
