@@ -11,19 +11,19 @@ def percentage(share: float | None, better: Better = "lower") -> Measure:
     return Measure(None if share is None else 100.0 * share, "%", better)
 
 
-def share_measure(one: Mapping[str, Any], better: Better) -> Measure:
+def share_measure(share: Mapping[str, Any], better: Better) -> Measure:
     """A share of sets; without any there is nothing to compare."""
-    if not one["of"]:
+    if not share["of"]:
         return Measure(None, "%", better)
-    value, low, high = (100.0 * one[key] for key in ("share", "low", "high"))
+    value, low, high = (100.0 * share[key] for key in ("share", "low", "high"))
     return Measure(value, "%", better, low, high)
 
 
-def share_with_interval(one: Mapping[str, Any], of: str = "sets") -> str:
+def share_with_interval(counts: Mapping[str, Any], of: str = "sets") -> str:
     """A share of sets in words, with its 95 % interval."""
-    low, high = 100.0 * one["low"], 100.0 * one["high"]
-    share = whole_percent(one["share"])
-    return f"{one['hits']} of {one['of']} {of}, {share} (95 %: {low:.0f} to {high:.0f})"
+    low, high = 100.0 * counts["low"], 100.0 * counts["high"]
+    share = whole_percent(counts["share"])
+    return f"{counts['hits']} of {counts['of']} {of}, {share} (95 %: {low:.0f} to {high:.0f})"
 
 
 def unit_suffix(unit: str) -> str:

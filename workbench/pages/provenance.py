@@ -54,9 +54,9 @@ def software(packages: Sequence[str]) -> dict[str, Any]:
 
 def models(system: System, roles: Sequence[str]) -> dict[str, dict[str, str]]:
     """File, model and hash of the FMU of each role."""
-    found = {}
+    by_role = {}
     with ExitStack() as stack:
         for role in roles:
             fmu = stack.enter_context(open_model(system, role))
-            found[role] = {"file": fmu.path.name, "model": fmu.name, "sha256": fmu.sha256}
-    return found
+            by_role[role] = {"file": fmu.path.name, "model": fmu.name, "sha256": fmu.sha256}
+    return by_role

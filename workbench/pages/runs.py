@@ -80,8 +80,8 @@ class Change:
     def to_dict(self) -> dict[str, Any]:
         """As plain numbers and texts."""
         ends = {"before": self.before, "after": self.after}
-        told = {key: None if end is None else vars(end) for key, end in ends.items()}
-        return {"name": self.name, "unit": self.unit, "verdict": self.verdict, **told}
+        values = {key: None if end is None else vars(end) for key, end in ends.items()}
+        return {"name": self.name, "unit": self.unit, "verdict": self.verdict, **values}
 
 
 def read_runs(folder: Path, warn: Callable[[InputError], None] | None = None) -> list[RunRecord]:
@@ -104,25 +104,25 @@ def read_runs(folder: Path, warn: Callable[[InputError], None] | None = None) ->
             remedy="correct the path",
         )
     paths = sorted(path for name in SUMMARIES for path in folder.rglob(name))
-    found, wrong = [], []
+    runs, wrong = [], []
     for path in paths:
         try:
-            found.append(_read(path, folder))
+            runs.append(_read(path, folder))
         except InputError as problem:
             wrong.append(problem)
-    if wrong and (warn is None or not found):
+    if wrong and (warn is None or not runs):
         raise wrong[0]
     if warn is not None:
-        for one in wrong:
-            warn(one)
-    if not found:
+        for refusal in wrong:
+            warn(refusal)
+    if not runs:
         raise InputError(
             where=str(folder),
             found=f"none of {', '.join(SUMMARIES)}",
             expected="what a command wrote with --out",
             remedy="name a folder of results",
         )
-    return found
+    return runs
 
 
 def _read(path: Path, folder: Path) -> RunRecord:
@@ -130,7 +130,7 @@ def _read(path: Path, folder: Path) -> RunRecord:
         content = json.loads(read_text(path, _ANEW))
         run, answer = content["provenance"]["run"], content["answer"]
         headline, details = (
-            {name: Measure(**one) for name, one in answer[key].items()}
+            {name: Measure(**measure) for name, measure in answer[key].items()}
             for key in ("headline", "details")
         )
         _check(run, [*headline.values(), *details.values()])
@@ -174,8 +174,8 @@ def _files(folder: Path) -> dict[str, int]:
     counts: dict[str, int] = {}
     for path in sorted(folder.iterdir()):
         if path.is_file():
-            kind = path.suffix.removeprefix(".") or path.name
-            counts[kind] = counts.get(kind, 0) + 1
+            suffix = path.suffix.removeprefix(".") or path.name
+            counts[suffix] = counts.get(suffix, 0) + 1
     return counts
 
 
@@ -229,10 +229,10 @@ def _overlap(measure: Measure, other: Measure) -> bool:
 
 def differences(before: RunRecord, after: RunRecord) -> list[str]:
     """What else is not the same, so that a change may come from it."""
-    found = []
+    lines = []
     for key, text in (("system", "system"), ("workbench", "version"), ("commit", "commit")):
         if before.run[key] != after.run[key]:
-            found.append(f"{text}: {before.run[key]} and {after.run[key]}")
+            lines.append(f"{text}: {before.run[key]} and {after.run[key]}")
     old, new = dict(before.run["data"]), dict(after.run["data"])
     for text, names in (
         ("recordings only in the first", [name for name in old if name not in new]),
@@ -243,7 +243,7 @@ def differences(before: RunRecord, after: RunRecord) -> list[str]:
         ),
     ):
         if names:
-            found.append(f"{text}: {listed(names)}")
+            lines.append(f"{text}: {listed(names)}")
     settings = dict(_leaves(before.provenance)), dict(_leaves(after.provenance))
     names = [
         name
@@ -251,8 +251,8 @@ def differences(before: RunRecord, after: RunRecord) -> list[str]:
         if settings[0].get(name) != settings[1].get(name)
     ]
     if names:
-        found.append(f"settings: {listed(names)}")
-    return found
+        lines.append(f"settings: {listed(names)}")
+    return lines
 
 
 def _leaves(content: Any, path: str = "") -> Iterator[tuple[str, Any]]:
@@ -290,18 +290,18 @@ def format_changes(before: RunRecord, after: RunRecord, changes: list[Change]) -
     lines += [f"not the same, {difference}" for difference in differences(before, after)]
     order: tuple[Verdict, ...] = ("worse", "better", "changed", "unclear", "gone", "new")
     shown = [change for change in changes if change.verdict != "unchanged"]
-    shown.sort(key=lambda one: (order.index(one.verdict), one.unit))
+    shown.sort(key=lambda row: (order.index(row.verdict), row.unit))
     width = max((len(change.name) for change in shown), default=0)
-    for one in shown:
+    for row in shown:
         ends = " -> ".join(
-            "none" if end is None else _value(end) for end in (one.before, one.after)
+            "none" if end is None else _value(end) for end in (row.before, row.after)
         )
-        lines.append(f"{one.verdict:<8} {one.name:<{width}}  {ends}{_relative(one)}")
+        lines.append(f"{row.verdict:<8} {row.name:<{width}}  {ends}{_relative(row)}")
     counts = {verdict: sum(change.verdict == verdict for change in changes) for verdict in order}
-    told = ", ".join(f"{count} {verdict}" for verdict, count in counts.items() if count)
+    summary = ", ".join(f"{count} {verdict}" for verdict, count in counts.items() if count)
     same = sum(change.verdict == "unchanged" for change in changes)
     lines.append(
-        f"of {len(changes)} numbers: " + ", ".join(filter(None, (told, f"{same} unchanged")))
+        f"of {len(changes)} numbers: " + ", ".join(filter(None, (summary, f"{same} unchanged")))
     )
     if counts["unclear"]:
         lines.append("unclear: the 95 % intervals of both overlap")

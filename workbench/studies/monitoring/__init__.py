@@ -88,10 +88,10 @@ def monitor(
     with opened(engine.out / STATE, _identity(system)) as state:
         new = state.missing(recording_folders(folder))
         interrupted = _estimate(system, new, state, engine.workers, read, step)
-        told = state.all()
-        if interrupted and not any(result.estimate for result in told):
+        results = state.all()
+        if interrupted and not any(result.estimate for result in results):
             raise KeyboardInterrupt  # there is nothing to conclude from
-        return concluded(system, told, rate, folder, interrupted=interrupted)
+        return concluded(system, results, rate, folder, interrupted=interrupted)
 
 
 def _identity(system: System) -> dict[str, Any]:
@@ -117,9 +117,9 @@ def _estimate(
         return False
     with Pool(min(workers, len(new)), open_estimator, system) as pool:
         try:
-            told = pool.completed(partial(_told, read), new)
-            for done, (number, one) in enumerate(told, 1):
-                state.add(one)
+            results = pool.completed(partial(_told, read), new)
+            for done, (number, result) in enumerate(results, 1):
+                state.add(result)
                 step(done, len(new), new[number].name)
         except KeyboardInterrupt:
             return True

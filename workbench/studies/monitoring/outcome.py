@@ -208,7 +208,12 @@ class MonitoringResult:
 
 
 def concluded(
-    system: System, told: Sequence[RecordingResult], rate: float, folder: Path, *, interrupted: bool
+    system: System,
+    results: Sequence[RecordingResult],
+    rate: float,
+    folder: Path,
+    *,
+    interrupted: bool,
 ) -> MonitoringResult:
     """Watch all recordings that are known, in the order of their dates.
 
@@ -220,8 +225,8 @@ def concluded(
     InputError
         If none can be used.
     """
-    usable = {result.name: result for result in told if result.estimate is not None}
-    last = {result.name: result for result in told}
+    usable = {result.name: result for result in results if result.estimate is not None}
+    last = {result.name: result for result in results}
     refused = {name: one.refusal for name, one in sorted(last.items()) if one.refusal}
     first: dict[str, str] = {}
     for name in sorted(usable):

@@ -103,14 +103,14 @@ class State:
             recording for recording in folders if (recording.name, recording.content) not in known
         ]
 
-    def add(self, told: RecordingResult) -> None:
+    def add(self, result: RecordingResult) -> None:
         """Keep what came of a delivery; it is on the disk when this returns."""
-        estimate = None if told.estimate is None else json.dumps(_plain(told.estimate))
+        estimate = None if result.estimate is None else json.dumps(_plain(result.estimate))
         with self._connection:
             self._connection.execute(
                 "INSERT OR IGNORE INTO deliveries (name, content, date, estimate, refusal) "
                 "VALUES (?, ?, ?, ?, ?)",
-                (told.name, told.content, told.date, estimate, told.refusal),
+                (result.name, result.content, result.date, estimate, result.refusal),
             )
 
     def all(self) -> list[RecordingResult]:

@@ -303,11 +303,11 @@ def _effects(summary: Mapping[str, Any]) -> Table:
     return Table("effect-table", caption, columns, rows)
 
 
-def _share(one: Mapping[str, Any] | None) -> Cell:
-    if one is None or not one["of"]:
+def _share(share: Mapping[str, Any] | None) -> Cell:
+    if share is None or not share["of"]:
         return Cell("n/a")
-    percent = 100.0 * one["share"]
-    return Cell(f"{percent:.0f} ({one['hits']}/{one['of']})", percent, one["share"])
+    percent = 100.0 * share["share"]
+    return Cell(f"{percent:.0f} ({share['hits']}/{share['of']})", percent, share["share"])
 
 
 def _confusion_rows(summary: Mapping[str, Any]) -> Table:
@@ -459,24 +459,25 @@ def format_power(summary: Mapping[str, Any]) -> str:
         row = f"{name:<30}{with_unit(effect['size'], effect['unit']):>18}"
         row += "".join(f"{_count(effect['right_first'].get(f'{size:g}')):>8}" for size in sizes)
         lines.append(row + f"{_count(effect['coverage']):>11}" + "  hidden" * effect["hidden"])
-    for name, one in outside.items():
+    for name, unknown in outside.items():
         said = (
             f"x {size}: " + ", ".join(f"{n} {verdict}" for verdict, n in verdicts.items())
-            for size, verdicts in one["verdicts"].items()
+            for size, verdicts in unknown["verdicts"].items()
         )
-        lines.append(f"{name:<30}{with_unit(one['size'], one['unit']):>18}  {'; '.join(said)}")
+        size = with_unit(unknown["size"], unknown["unit"])
+        lines.append(f"{name:<30}{size:>18}  {'; '.join(said)}")
     return "\n".join(lines)
 
 
-def _count(one: Mapping[str, Any] | None) -> str:
-    return f"{one['hits']}/{one['of']}" if one and one["of"] else "-"
+def _count(share: Mapping[str, Any] | None) -> str:
+    return f"{share['hits']}/{share['of']}" if share and share["of"] else "-"
 
 
-def _text(one: Mapping[str, Any]) -> str:
-    if not one["of"]:
+def _text(share: Mapping[str, Any]) -> str:
+    if not share["of"]:
         return f"{'-':>8}"
-    low, high = 100.0 * one["low"], 100.0 * one["high"]
-    return f"{100.0 * one['share']:6.1f} % ({low:.1f} to {high:.1f} %, {_count(one)})"
+    low, high = 100.0 * share["low"], 100.0 * share["high"]
+    return f"{100.0 * share['share']:6.1f} % ({low:.1f} to {high:.1f} %, {_count(share)})"
 
 
 def power_answer(summary: Mapping[str, Any]) -> Answer:
@@ -492,9 +493,9 @@ def power_answer(summary: Mapping[str, Any]) -> Answer:
     headline = {"false alarms on clean sets": share_measure(summary["false_alarms"], "lower")}
     headline |= {name: share_measure(share, "higher") for name, share in shares.items()}
     details = {
-        f"{effect} x {size}: named right": share_measure(one, "higher")
+        f"{effect} x {size}: named right": share_measure(named, "higher")
         for effect, values in summary["effects"].items()
-        for size, one in values["right_first"].items()
+        for size, named in values["right_first"].items()
     }
     words = []
     if (right := summary["right_first"])["of"]:
