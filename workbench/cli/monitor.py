@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import time
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -98,14 +96,12 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
     if options.diagnose:
         require_compiler()
     with locked_folder(options.out):
-        begin = time.perf_counter()
         watched = monitor(
             system,
             history,
-            Engine(options.workers, out=options.out),
+            Engine(options.workers, output.progress, options.out),
             rate=options.false_alarms,
             read=read_recorded,
-            step=partial(output.step, begin=begin),
         )
         provenance = provenance_of(system, history)
         page = write_monitoring(watched, provenance, options.out)

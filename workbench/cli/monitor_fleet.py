@@ -15,6 +15,7 @@ from workbench.errors import InputError
 from workbench.pages.answer import Answer, Measure, with_answer
 from workbench.pages.provenance import models, run_of, software
 from workbench.recordings.datasets import read_recorded
+from workbench.runtime.engine import Engine
 from workbench.runtime.files import locked_folder, write_json, write_whole
 from workbench.runtime.pool import Pool
 from workbench.studies.monitoring import MonitoringResult
@@ -59,8 +60,8 @@ def run_fleet(options: argparse.Namespace, output: Output) -> CommandResult:
         begin = time.perf_counter()
         pool = _pool(options, fleet, count)
         try:
-            step = partial(output.step, begin=begin)
-            machines, interrupted = watch_fleet(fleet, options.out, pool, step)
+            engine = Engine(options.workers, output.progress, options.out)
+            machines, interrupted = watch_fleet(fleet, engine, pool)
         finally:
             pool.close()
         summary = _summary(machines, provenance, time.perf_counter() - begin, interrupted)

@@ -14,6 +14,7 @@ from workbench.errors import InputError
 from workbench.recordings.case import Case, read_case
 from workbench.runtime.engine import Engine
 from workbench.runtime.pool import Pool
+from workbench.runtime.progress import StepReporter
 from workbench.studies.monitoring.chart import LevelChange
 from workbench.studies.monitoring.estimate import (
     RecordingEstimate,
@@ -48,7 +49,6 @@ RATE = 0.01
 STATE = "state.sqlite"
 
 Reader = Callable[[Path, System], Case]
-Steps = Callable[[int, int, str], None]
 
 
 def monitor(
@@ -58,7 +58,6 @@ def monitor(
     *,
     rate: float = RATE,
     read: Reader = read_case,
-    step: Steps = lambda done, total, name: None,
 ) -> MonitoringResult:
     """Estimate what is new in a folder of recordings, and say what has changed in all of them.
 
@@ -71,7 +70,6 @@ def monitor(
     engine : whose folder takes the state, from which a run goes on.
     rate : alarms per recording that a sound machine may raise.
     read : makes a case of a folder; a function of a module.
-    step : takes how many of the new recordings are done, of how many, and the last one's name.
 
     Raises
     ------
@@ -87,7 +85,7 @@ def monitor(
         )
     with opened(engine.out / STATE, _identity(system)) as state:
         new = state.missing(recording_folders(folder))
-        interrupted = _estimate(system, new, state, engine.workers, read, step)
+        interrupted = _estimate(system, new, state, engine, read)
         results = state.all()
         if interrupted and not any(result.estimate for result in results):
             raise KeyboardInterrupt  # there is nothing to conclude from
@@ -105,22 +103,18 @@ def _identity(system: System) -> dict[str, Any]:
 
 
 def _estimate(
-    system: System,
-    new: list[RecordingFolder],
-    state: State,
-    workers: int,
-    read: Reader,
-    step: Steps,
+    system: System, new: list[RecordingFolder], state: State, engine: Engine, read: Reader
 ) -> bool:
     """Estimate what is new; returns whether Ctrl-C ended it. What is done by then is kept."""
     if not new:
         return False
-    with Pool(min(workers, len(new)), open_estimator, system) as pool:
+    progress = StepReporter(engine.report, len(new))
+    with Pool(min(engine.workers, len(new)), open_estimator, system) as pool:
         try:
             results = pool.completed(partial(_told, read), new)
-            for done, (number, result) in enumerate(results, 1):
+            for number, result in results:
                 state.add(result)
-                step(done, len(new), new[number].name)
+                progress.step(new[number].name)
         except KeyboardInterrupt:
             return True
     return False

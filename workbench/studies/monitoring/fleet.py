@@ -15,6 +15,7 @@ from typing import Any, Protocol
 from workbench.errors import InputError
 from workbench.runtime.engine import Engine
 from workbench.runtime.files import write_whole
+from workbench.runtime.progress import StepReporter
 from workbench.studies.monitoring import STATE, MonitoringResult, Reader, monitor
 from workbench.system.system import System
 
@@ -146,14 +147,13 @@ def watch_machine(fleet: Fleet, machine: str, state: bytes) -> MachineResult:
 
 
 def watch_fleet(
-    fleet: Fleet, out: Path, pool: FleetWorkers, step: Callable[[int, int, str], None]
+    fleet: Fleet, engine: Engine, pool: FleetWorkers
 ) -> tuple[list[MachineResult], bool]:
     """Watch all machines, each into a folder of its own.
 
     Parameters
     ----------
-    out : of the folders, from whose states a run goes on.
-    step : takes how many are done, of how many, and the last one's name.
+    engine : whose folder holds those of the machines, from whose states a run goes on.
 
     Returns
     -------
@@ -167,17 +167,18 @@ def watch_fleet(
     """
     names, results, interrupted = fleet.machines(), list[MachineResult](), False
     tasks: list[Future[MachineResult]] = []
+    progress = StepReporter(engine.report, len(names))
     try:
         for name in names:
-            before = out / name / STATE
+            before = engine.out / name / STATE
             state = before.read_bytes() if before.is_file() else b""
             tasks.append(pool.submit(watch_machine, name, state))
         for task in as_completed(tasks):
             machine = task.result()
             for file, content in machine.files.items():
-                write_whole(out / machine.machine / file, content)
+                write_whole(engine.out / machine.machine / file, content)
             results.append(machine)
-            step(len(results), len(names), machine.machine)
+            progress.step(machine.machine)
     except KeyboardInterrupt:
         interrupted = True
     finally:
