@@ -157,6 +157,7 @@ def _find(
     found = [place for place in places if place.channel.name == name]
     found = found or [place for place in places if name in (place.label, place.full)]
     found = found or [p for p in places if p.channel.name.casefold() == name.casefold()]
+    found = found or [place for place in places if place.channel.about == name]  # its number
     if signal == TIME and found:
         return found[0]
     if len(found) != 1:

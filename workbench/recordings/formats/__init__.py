@@ -7,6 +7,7 @@ channel means for a machine is not known here.
 import gzip
 import hashlib
 import io
+import struct
 import warnings
 import zlib
 from collections.abc import Callable
@@ -38,6 +39,7 @@ _PACKAGES = {
 }
 # Their libraries hand what a file says to compiled code, which may end the process or never return.
 _NATIVE = frozenset({"hdf5", "matlab5", "mdf", "parquet"})
+_MAT_4 = struct.Struct("<5i")  # type, rows, columns, imaginary, length of the name
 _START, _RATE = 60.0, 1e6  # [s] and [byte/s], a twentieth of what they read on a busy machine
 _BEGINS = {  # how files begin, whatever their ending
     b"PAR1": "parquet",
@@ -113,6 +115,7 @@ def _unpacked(path: Path, raw: bytes) -> bytes:
 def _reader(path: Path, raw: bytes) -> _Reader:
     """The reader of a format, by how the file begins."""
     module = next((name for start, name in _BEGINS.items() if raw.startswith(start)), "")
+    module = module or "matlab5" * _is_mat_4(raw)
     if raw.startswith(b"\xd0\xcf\x11\xe0"):
         raise InputError(
             where=str(path),
@@ -134,6 +137,17 @@ def _reader(path: Path, raw: bytes) -> _Reader:
         ) from None
     reader = partial(_apart if module in _NATIVE else _here, module)
     return partial(_undamaged, reader, called)
+
+
+def _is_mat_4(raw: bytes) -> bool:
+    """Whether a file begins as MAT files of version 4 do: with what its first matrix is."""
+    if len(raw) <= _MAT_4.size:
+        return False
+    kind, rows, columns, imaginary, length = _MAT_4.unpack_from(raw)
+    name = raw[_MAT_4.size : _MAT_4.size + length] if 1 < length < 64 else b""
+    known = 0 <= kind < 100 and kind // 10 in range(6) and kind % 10 in range(3)
+    named = name[:1].isalpha() and name[-1:] == b"\0" and name.isascii()
+    return known and rows >= 0 and columns >= 0 and imaginary in (0, 1) and named
 
 
 def _here(module: str, path: Path, raw: bytes) -> Contents:

@@ -45,14 +45,16 @@ def _collect(
         name, unit = named(key)
         unit = unit or units.get(key, "")
         if isinstance(value, Mapping):
-            one = _timed(name, value)
-            if one is not None:
-                groups.append(replace(one, within=within))
+            timed = _simulink(name, value) or _timed(name, value)
+            if timed is not None:
+                groups.append(replace(timed, within=within))
             elif (found := _single(name, value)) is not None:
                 by_size.setdefault(found.values.size, []).append(found)
             else:
                 _collect((*within, key), value, groups, notes)
         elif isinstance(value, np.ndarray):
+            if value.dtype.kind not in "fiub" and value.size > 1:
+                notes.append(f"'{key}' holds no real numbers")
             for channel in _columns(name, unit, value, content):
                 by_size.setdefault(channel.values.size, []).append(channel)
             if value.ndim > 2:
@@ -113,11 +115,37 @@ def _timed(name: str, content: Mapping[str, Any]) -> Group | None:
     return Group(name, (clock, channel))
 
 
+def _simulink(name: str, content: Mapping[str, Any]) -> Group | None:
+    """What Simulink logs as a structure with time: times, and a list of signals with values."""
+    times, signals = content.get("time"), content.get("signals")
+    if not isinstance(times, np.ndarray) or not isinstance(signals, Mapping):
+        return None
+    held = {"(1)": signals} if "values" in signals else signals
+    channels: list[FileChannel] = []
+    for key, signal in held.items():
+        values = signal.get("values") if isinstance(signal, Mapping) else None
+        if not isinstance(values, np.ndarray):
+            return None
+        label = str(signal.get("label") or "").strip() or key
+        own, unit = named(label)
+        unit = unit or (spelled(entry) if isinstance(entry := signal.get("unit"), str) else "")
+        channels += [replace(channel, about=key) for channel in _columns(own, unit, values, {})]
+    if not channels or len({channel.values.size for channel in channels}) > 1:
+        return None
+    if times.size != channels[0].values.size:  # without time, where Simulink leaves it empty
+        return Group(name, tuple(channels))
+    return Group(name, (FileChannel("time", "s", _flat(times)), *channels))
+
+
 def _single(name: str, content: Mapping[str, Any]) -> FileChannel | None:
     """A structure with values of one channel, and its unit."""
     key, values = _entry(content, _VALUES)
     if not isinstance(values, np.ndarray) or values.size != max(values.shape, default=0):
         return None
+    clock, _ = _entry(content, _TIMES)
+    others = [held for other, held in content.items() if other not in (key, clock)]
+    if any(isinstance(held, np.ndarray) and held.size == values.size > 1 for held in others):
+        return None  # one of several channels
     _, unit = _entry(content, ("unit", "units", "einheit"))
     _, about = _entry(content, _TEXTS)
     return FileChannel(
