@@ -19,6 +19,7 @@ from workbench.recordings.channels import (
 )
 from workbench.recordings.csv import read_columns
 from workbench.recordings.formats import is_other_format
+from workbench.recordings.formats.numbers import markers
 from workbench.recordings.plausibility import Origin, doubts, shown_by
 from workbench.system.parts import Condition
 from workbench.system.system import System
@@ -518,10 +519,26 @@ def _read_signals(
         if column in recorded:
             where = f"{source}, line 1, column '{column}'"
             factor = si_factor(recorded[column].unit, units[signal], where)
-            signals[signal] = recorded[column].values * factor
+            values = recorded[column].values
+            _refuse_markers(values, source, column)
+            signals[signal] = values * factor
     time = signals.pop("time")
     check_recording(time, system, f"{source}, column '{columns['time']}'")
     return time, signals
+
+
+def _refuse_markers(values: Vector, source: Path, column: str) -> None:
+    """Refuse values that recorders write in place of a sample."""
+    known, _ = markers(values)
+    for value, count in known.items():
+        first = int(np.flatnonzero(values == value)[0])
+        raise InputError(
+            where=f"{source}, line {first + 2}, column '{column}'",
+            found=f"{value:g} in {count} samples, far outside of all others, as recorders write "
+            "where they have none",
+            expected="samples",
+            remedy=f"run 'workbench import {source}', which leaves them out, or remove the lines",
+        )
 
 
 def read_only(array: Matrix) -> Matrix:

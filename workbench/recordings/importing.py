@@ -403,6 +403,7 @@ def _described_channels(one: Import, system: System) -> dict[str, dict[str, Any]
                 "zero": found.zero,
                 "recorded_as": found.formula or None,
             },
+            "missing": list(found.missing),
             "reason": found.reason,
         }
         for name, found in one.recording.proposal.assigned.items()

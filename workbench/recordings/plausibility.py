@@ -18,6 +18,7 @@ from workbench.system.system import System
 from workbench.system.units import si_factor
 
 _FEW = 5  # samples that tell a value, whatever one or two of them read
+_CONTRADICTS = 300.0  # times the usual step: the unit of the time is another one
 _ROUNDED = 1.0 + 1e-6  # times are written with some digits
 
 
@@ -164,7 +165,16 @@ def _sampling(time: Vector, system: System, origin: Origin) -> Iterator[_Finding
             f"samples of one recording, no more than {limits.gap:g} s apart",
             "write a case folder for each recording, if several stand in one file",
         )
-    if usual > limits.slowest * _ROUNDED:
+    ratio = usual / system.sample_time
+    if ratio > _CONTRADICTS or any(abs(ratio * 1e3**k - 1.0) < 0.2 for k in (1, 2, 3)):
+        yield _Finding(
+            True,
+            origin.at(1, "time"),
+            f"a sample every {usual:.6g} s, {ratio:.4g} times as far apart as in usual recordings",
+            f"times in seconds, about {system.sample_time:g} s apart",
+            f"correct the unit of the time; if it is right, correct sample_time in {system.source}",
+        )
+    elif usual > limits.slowest * _ROUNDED:
         yield _Finding(
             False,
             origin.at(1, "time"),

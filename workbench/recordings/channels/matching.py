@@ -1,5 +1,6 @@
 """Channels that may be signals: by name, by unit, and by what values are plausible."""
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -8,6 +9,7 @@ import numpy as np
 from workbench.arrays import Vector
 from workbench.recordings.channels.names import EXACT, WITHIN, WORDS, NamedChannel, alike, is_asked
 from workbench.recordings.formats import FileChannel, Group
+from workbench.recordings.formats.numbers import markers
 from workbench.recordings.formats.spelling import Conversion, conversion, is_unit, spelled
 from workbench.system.parts import Signal
 from workbench.system.system import System
@@ -29,6 +31,8 @@ class Assignment:
     certain : whether name and unit are the system's own, so that nobody need be asked.
     concluded : whether the file does not say the unit.
     doubt : what somebody must confirm before it is taken, in words; empty: nothing.
+    missing : values of the channel that stand for no sample.
+    declared : those of them that the user declares; None: nothing is said of them.
     """
 
     file: int
@@ -43,18 +47,20 @@ class Assignment:
     certain: bool
     concluded: bool = False
     doubt: str = ""
+    missing: tuple[float, ...] = ()
+    declared: tuple[float, ...] | None = None
 
     @property
     def values(self) -> Vector:
         """(n,) SI, not finite in gaps."""
         with np.errstate(over="ignore", invalid="ignore"):  # what no machine reads
-            return self.factor * self.channel.values + self.zero
+            return self.factor * samples_of(self.channel, self.missing) + self.zero
 
     @property
     def named(self) -> NamedChannel:
         """As it is stored; what the file says of the unit is left to it."""
         unit = self.unit if self.concluded or self.unit != self.channel.unit else ""
-        return NamedChannel(self.label, unit, self.factor < 0.0)
+        return NamedChannel(self.label, unit, self.factor < 0.0, self.declared)
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +77,81 @@ class PlacedChannel:
     def full(self) -> str:
         """Name with that of its group, whether or not others have the same."""
         return f"{self.holder.name}/{self.channel.name}"
+
+
+def samples_of(channel: FileChannel, missing: Sequence[float]) -> Vector:
+    """(n,) values of a channel, NaN where one of some stands for no sample."""
+    if not missing:
+        return channel.values
+    return np.where(np.isin(channel.values, missing), np.nan, channel.values)
+
+
+def missing_of(
+    channel: FileChannel, declared: tuple[float, ...] | None, column: str
+) -> tuple[tuple[float, ...], str, str]:
+    """Values that stand for no sample, what is said of them, and what somebody must confirm.
+
+    Parameters
+    ----------
+    declared : by the user; None: known markers are taken, and others asked about.
+    column : how the user names the channel, SIGNAL=CHANNEL.
+    """
+    if declared is not None:
+        return declared, "", ""
+    known, others = markers(channel.values)
+    said = "".join(f"; {value:g}, {count} times, is no sample" for value, count in known.items())
+    doubt = ""
+    if others:
+        value, count = next(iter(others.items()))
+        doubt = (
+            f"'{channel.name}' is {value:g} in {count} samples, far outside of all others; "
+            f"--column '{column} missing {value:g}' leaves them out, 'missing none' keeps them"
+        )
+    return tuple(known), said, doubt
+
+
+def is_difference(signal: Signal) -> bool:
+    """Whether a temperature is a difference of two: it may be below zero, or is called one."""
+    below = np.isfinite(signal.possible[0]) and signal.possible[0] < 0.0
+    names = (signal.name, signal.label, *signal.called)
+    called = any(_DIFFERENCE.search(name) for name in names)
+    return signal.unit == "K" and bool(below or called)
+
+
+def size_doubt(values: Vector, unit: str, signal: Signal, column: str) -> str:
+    """That values are a thousand times what is usual, or have another zero; empty: they are not.
+
+    Parameters
+    ----------
+    values : (n,) SI.
+    column : how the user names the channel, SIGNAL=CHANNEL.
+    """
+    held = np.abs(values[np.isfinite(values)])
+    if not held.size or not signal.scale > 0.0:
+        return ""
+    largest, middle = float(held.max()), float(np.median(held))
+    ratio = largest / signal.scale
+    confirms = f"--column '{column} [{unit}]' confirms [{unit}]"
+    # A sensor at rest scatters by its noise, and no less.
+    moves = largest > 5.0 * signal.noise or 0.0 < float(held.std()) < 0.2 * signal.noise
+    if ratio > _THOUSANDFOLD or (1e-7 < ratio < 1.0 / _THOUSANDFOLD and moves):
+        return (
+            f"its largest value, {largest:.4g} {signal.unit}, is {ratio:.3g} times the typical "
+            f"{signal.scale:g} {signal.unit}; {confirms}"
+        )
+    if signal.unit != "K" or is_difference(signal):
+        return ""
+    if signal.scale < _COLD and unit in ("degC", "degF"):
+        return (
+            f"in [{unit}] it may be a temperature, or a difference of two; {confirms} for a "
+            f"temperature, [K] takes 6 degC for 6 K"
+        )
+    if signal.scale >= _COLD:
+        shift = ZERO_CELSIUS if middle < _COLD else -ZERO_CELSIUS
+        if abs(middle + shift - signal.scale) < 0.5 * abs(middle - signal.scale):
+            other = "degC" if shift > 0.0 else "K"
+            return f"its median is {middle:.4g} K, as if it were in [{other}]; {confirms}"
+    return ""
 
 
 def unconfirmed(signal: str, channel: str, unit: str) -> str:
@@ -103,10 +184,12 @@ def _candidate(
     place: PlacedChannel, signal: Signal, system: System, likeness: int
 ) -> tuple[Assignment | None, str]:
     """A channel as a signal, or None and why it cannot be."""
-    channel = place.channel
+    channel, column = place.channel, f"{signal.name}={place.label}"
+    missing, said, marked = missing_of(channel, None, column)
+    samples = samples_of(channel, missing)
     unit = stated = channel.unit or unit_in_name(channel.name, signal, system)
     if not stated:
-        fitting = fitting_units(channel, signal, system)
+        fitting = fitting_units(samples, signal, system)
         if len(fitting) != 1:
             fits = f"as {' or '.join(fitting)}" if fitting else "in no usual unit"
             return None, f"'{channel.name}' has no unit and is plausible {fits}"
@@ -117,7 +200,7 @@ def _candidate(
         known = "" if is_unit(unit) else ", a unit that is not known"
         return None, f"'{channel.name}' is in [{unit}]{known}"
     scale, formula = way
-    values = scale.factor * channel.values + scale.zero
+    values = scale.factor * samples + scale.zero
     low, high = signal.possible
     if not np.isfinite(values).any():
         return None, f"'{channel.name}' holds no numbers"
@@ -130,6 +213,8 @@ def _candidate(
     elif not likeness:
         confirms = f"--column '{signal.name}={place.label}' confirms it"
         doubt = f"nothing but its unit speaks for it, {confirms}"
+    own_doubts = marked, size_doubt(values, unit, signal, column)
+    doubt = "; ".join(filter(None, (doubt, *own_doubts)))
     return Assignment(
         place.file,
         place.group,
@@ -139,10 +224,14 @@ def _candidate(
         scale.factor,
         scale.zero,
         formula,
-        unit_reason(reason, unit, concluded),
-        certain=likeness == EXACT and channel.name == signal.name and bool(channel.unit),
+        unit_reason(reason, unit, concluded) + said,
+        certain=likeness == EXACT
+        and channel.name == signal.name
+        and bool(channel.unit)
+        and not any(own_doubts),
         concluded=concluded,
         doubt=doubt,
+        missing=missing,
     ), ""
 
 
@@ -220,6 +309,13 @@ _USUAL = {
     "A": ("A", "mA"),
     "K": ("K", "degC"),
 }
+ZERO_CELSIUS = 273.15  # K
+_DIFFERENCE = re.compile(
+    r"differen[cz]|delta|\u0394|\bd[ _]?T\b|spreizung|spread|superheat|subcool|\b(rise|lift)\b",
+    re.IGNORECASE,
+)
+_COLD = 100.0  # K, below which no machine's temperature is
+_THOUSANDFOLD = 300.0  # times the typical size of a signal: a unit is another one
 _TYPICAL = 10.0  # times the typical size of a signal, or a tenth, is what its largest sample may be
 
 
@@ -227,7 +323,8 @@ def conversion_to(unit: str, signal: Signal, system: System) -> tuple[Conversion
     """How values in a unit become a signal, and by which formula; None: in no way."""
     direct = conversion(unit, signal.unit)
     if direct is not None:
-        return direct, ""
+        turned = Conversion(direct.factor) if is_difference(signal) else direct
+        return turned, ""
     other = signal.recorded_as
     found = conversion(unit, other.unit) if other is not None else None
     if other is None or found is None:
@@ -236,7 +333,7 @@ def conversion_to(unit: str, signal: Signal, system: System) -> tuple[Conversion
     return Conversion(found.factor / slope, found.zero / slope), other.formula.text
 
 
-def fitting_units(channel: FileChannel, signal: Signal, system: System) -> list[str]:
+def fitting_units(samples: Vector, signal: Signal, system: System) -> list[str]:
     """Usual units in which values without a unit have the signal's typical size."""
     others = _USUAL.get(signal.recorded_as.unit, ()) if signal.recorded_as else ()
     fitting: list[str] = []
@@ -244,7 +341,7 @@ def fitting_units(channel: FileChannel, signal: Signal, system: System) -> list[
         way = conversion_to(unit, signal, system)
         if way is None:
             continue
-        values = way[0].factor * channel.values + way[0].zero
+        values = way[0].factor * samples + way[0].zero
         size = float(np.nanmax(np.abs(values), initial=0.0))
         low, high = signal.plausible
         typical = signal.scale / _TYPICAL <= size <= signal.scale * _TYPICAL

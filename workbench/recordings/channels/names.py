@@ -25,6 +25,8 @@ _ASKED_WITHIN = re.compile(
 )
 _UMLAUTS = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss"})
 _LEAST = 4  # letters of a word that tells within another one: "druck" in "Bremsdruck"
+_VALUE = r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?"
+_MISSING = re.compile(rf"(?P<channel>.*\S)\s+missing\s+(?P<values>none|{_VALUE}([,\s]+{_VALUE})*)")
 EXACT, WORDS, WITHIN = 4, 3, 2  # how alike names are
 
 
@@ -37,18 +39,21 @@ class NamedChannel:
     channel : its name, or "GROUP/NAME" where several groups have it.
     unit : what its values are in, whatever the file says; empty: as the file says.
     reversed : whether its sign is the other one.
+    missing : values that stand for no sample; None: as is usual, and asked where one may be.
     """
 
     channel: str
     unit: str = ""
     reversed: bool = False
+    missing: tuple[float, ...] | None = None
 
-    def to_dict(self) -> dict[str, str | bool]:
+    def to_dict(self) -> dict[str, str | bool | list[float]]:
         """Entries of a TOML table."""
         return {
             "channel": self.channel,
             **({"unit": self.unit} if self.unit else {}),
             **({"reversed": True} if self.reversed else {}),
+            **({"missing": list(self.missing)} if self.missing is not None else {}),
         }
 
 
@@ -68,15 +73,25 @@ def read_named(table: Table, system: System) -> dict[str, NamedChannel]:
             continue
         table.take(signal, dict)
         own = table.table(signal)
-        own.refuse_unknown("channel unit reversed")
+        own.refuse_unknown("channel unit reversed missing")
         unit = spelled(own.text("unit", ""))
         other = "reversed" in own and own.take("reversed", bool)
-        found[signal] = NamedChannel(own.take("channel", str), unit, other)
+        missing = _missing(own) if "missing" in own else None
+        found[signal] = NamedChannel(own.take("channel", str), unit, other, missing)
     return found
+
+
+def _missing(table: Table) -> tuple[float, ...]:
+    values = table.take("missing", list)
+    if not all(isinstance(value, int | float) and not isinstance(value, bool) for value in values):
+        raise table.wrong("missing", "a list of numbers, as the file has them, such as [-9999]")
+    return tuple(map(float, values))
 
 
 def parse_named(text: str, where: str, system: System) -> tuple[str, NamedChannel]:
     """One entry as people type it: `SIGNAL=CHANNEL`, `SIGNAL=-CHANNEL [unit]`.
+
+    Values that stand for no sample follow it: `SIGNAL=CHANNEL [unit] missing -9999, 7999`, or none.
 
     Raises
     ------
@@ -92,8 +107,12 @@ def parse_named(text: str, where: str, system: System) -> tuple[str, NamedChanne
             f"{', '.join(system.signals)}",
             remedy="write for instance 'time=Zeit [ms]'; a minus before the channel reverses it",
         )
-    name, unit = named(channel.removeprefix("-").strip())
-    return signal, NamedChannel(name, unit, channel.startswith("-"))
+    own, missing = channel, None
+    if match := _MISSING.fullmatch(channel):
+        own, values = match["channel"], re.split(r"[,\s]+", match["values"].strip())
+        missing = () if values == ["none"] else tuple(map(float, values))
+    name, unit = named(own.removeprefix("-").strip())
+    return signal, NamedChannel(name, unit, channel.startswith("-"), missing)
 
 
 def words(name: str) -> tuple[str, ...]:

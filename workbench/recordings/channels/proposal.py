@@ -12,6 +12,9 @@ from workbench.recordings.channels.matching import (
     conversion_to,
     fitting_units,
     match,
+    missing_of,
+    samples_of,
+    size_doubt,
     unconfirmed,
     unit_reason,
 )
@@ -181,9 +184,12 @@ def _as_named(
 ) -> Assignment:
     """The channel that a user names for a signal."""
     place = _find(channel, signal.name, places, where)
+    column = f"{signal.name}={place.label}"
+    missing, said, marked = missing_of(place.channel, channel.missing, column)
+    samples = samples_of(place.channel, missing)
     unit = stated = channel.unit or place.channel.unit
     if not stated:
-        fitting = fitting_units(place.channel, signal, system)
+        fitting = fitting_units(samples, signal, system)
         unit = fitting[0] if len(fitting) == 1 else ""
     concluded = not stated and unit != "1"
     way = conversion_to(unit, signal, system) if unit else None
@@ -191,6 +197,12 @@ def _as_named(
         raise _no_unit_of(signal, place, unit, stated_by_user=bool(channel.unit), where=where)
     turn = -1.0 if channel.reversed else 1.0
     scale, formula = way
+    large = (
+        ""
+        if channel.unit
+        else size_doubt(scale.factor * samples + scale.zero, unit, signal, column)
+    )
+    doubt = unconfirmed(signal.name, place.label, unit) if concluded else ""
     return Assignment(
         place.file,
         place.group,
@@ -200,10 +212,12 @@ def _as_named(
         turn * scale.factor,
         turn * scale.zero,
         formula,
-        unit_reason("named", unit, concluded),
-        certain=not concluded,
+        unit_reason("named", unit, concluded) + said,
+        certain=not (concluded or marked or large),
         concluded=concluded or bool(channel.unit),
-        doubt=unconfirmed(signal.name, place.label, unit) if concluded else "",
+        doubt="; ".join(filter(None, (doubt, marked, large))),
+        missing=missing,
+        declared=channel.missing,
     )
 
 

@@ -43,7 +43,43 @@ _READINGS: dict[str, tuple[re.Pattern[str], Callable[[str], str]]] = {
         lambda text: text.replace(",", ""),
     ),
 }
+# What recorders write in place of a sample, whatever its sign; and how far outside of others, in
+# widths of these, a marker stands, and a value that may be one.
+_MARKERS = frozenset(
+    (6999.0, 7999.0, 9999.0, 9999.9, 9999.99, 99999.0, 999999.0, 9999999.0, 32767.0, 32768.0)
+) | frozenset(
+    (65535.0, 3276.7, 3276.8, 6553.5, 2147483647.0, 2147483648.0, 4294967295.0, 9.9e37, 9.91e37)
+)
+_LARGE = 1e30  # beyond which nothing is a sample: largest numbers of single precision, and others
+_MAYBE = frozenset((99.0, 99.9, 99.99, 888.0, 888.8, 8888.0, 999.0, 999.9, 999.99, 327.67, 1e10))
+_FEWEST, _RARE, _FAR, _FARTHER = 5, 0.02, 3.0, 100.0
 _LARGEST = 1e100  # no measurement comes near
+
+
+def markers(values: Vector) -> tuple[dict[float, int], dict[float, int]]:
+    """Values that stand alone far outside of all others, and how often: known markers, and others.
+
+    Known are those that recorders write where they have no sample; others come more than once.
+    """
+    known: dict[float, int] = {}
+    others: dict[float, int] = {}
+    left = values[np.isfinite(values)]
+    while left.size > _FEWEST:
+        for extreme in (float(left.max()), float(left.min())):
+            rest = left[left != extreme]
+            if np.unique(rest[: 100 * _FEWEST]).size < _FEWEST:
+                continue  # steps between a few values
+            apart = float(np.abs(rest - extreme).min()) / float(np.ptp(rest) or 1.0)
+            count = left.size - rest.size
+            marker = abs(extreme) in _MARKERS or abs(extreme) >= _LARGE
+            rare = count > 1 and count <= _RARE * left.size and apart > _FARTHER
+            if apart > _FAR and (rare or marker or abs(extreme) in _MAYBE):
+                (known if marker else others)[extreme] = count
+                left = rest
+                break
+        else:
+            break
+    return known, others
 
 
 def is_number(cell: str) -> bool:

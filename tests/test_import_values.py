@@ -1,0 +1,142 @@
+"""Values of recorders that are no samples, or in another unit than they say."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import workbench as wb
+from workbench.errors import InputError
+from workbench.recordings.channels import ProposedMapping, merge, parse_named, propose
+from workbench.recordings.formats import read_recorded_file
+from workbench.recordings.formats.numbers import markers
+from workbench.system.registry import load_system
+from workbench.system.system import System
+from workbench.system.template import write_system
+
+TIME = 0.5 * np.arange(200)  # s
+LEVEL = 900.0 + 50.0 * np.sin(0.1 * TIME)  # mm
+
+
+@pytest.fixture(scope="module")
+def tank(tmp_path_factory: pytest.TempPathFactory) -> System:
+    """A tank with an inflow and a level of about 1 m, sampled each 0.5 s."""
+    folder = tmp_path_factory.mktemp("systems") / "tank"
+    write_system(folder)
+    return load_system(folder)
+
+
+def system_with_temperature(folder: Path, scale: str, label: str) -> System:
+    write_system(folder)
+    path = folder / "system.toml"
+    text = path.read_text()
+    judged = f'\n[judged.T]\nunit = "K"\nlabel = "{label}"\nnoise = "0.1 K"\nscale = "{scale}"\n'
+    path.write_text(text + judged)
+    return load_system(folder)
+
+
+def write(
+    path: Path, levels: np.ndarray, unit: str = "mm", extra: str = "", more: str = ""
+) -> Path:
+    rows = [
+        f"{t};{4 + k % 7 / 10};{h:.3f}{more}"
+        for k, (t, h) in enumerate(zip(TIME, levels, strict=True))
+    ]
+    path.write_text("\n".join([f"time [s];inflow [l/s];h [{unit}]{extra}", *rows]))
+    return path
+
+
+def proposed(path: Path, system: System, *columns: str) -> ProposedMapping:
+    named = dict(parse_named(column, "", system) for column in columns)
+    return propose([read_recorded_file(path)], system, named)
+
+
+@pytest.mark.parametrize("marker", [-9999.0, -7999.0, 9.9e37, 32767.0, 3276.7])
+def test_a_marker_of_a_recorder_is_no_sample(tmp_path: Path, tank: System, marker: float) -> None:
+    levels = np.where(np.arange(200) % 50 == 20, marker, LEVEL)
+    path = write(tmp_path / "a.csv", levels)
+    proposal = proposed(path, tank)
+    assert proposal.assigned["h"].missing == (marker,)
+    assert f"{marker:g}, 4 times, is no sample" in proposal.assigned["h"].reason
+    measured = merge([read_recorded_file(path)], proposal, tank)
+    assert measured.signals["h"].max() < 1.0
+
+
+def test_a_value_that_may_be_a_marker_is_asked_about_and_declared(
+    tmp_path: Path, tank: System
+) -> None:
+    path = write(tmp_path / "a.csv", np.where(np.arange(200) % 80 == 20, 12345.0, LEVEL))
+    (doubt,) = proposed(path, tank).doubts
+    assert "'h' is 12345 in 3 samples, far outside" in doubt
+    assert "--column 'h=h missing 12345'" in doubt
+    declared = proposed(path, tank, "h=h missing 12345, -9999")
+    assert not declared.doubts
+    assert declared.assigned["h"].missing == (12345.0, -9999.0)
+    assert np.isnan(declared.assigned["h"].values).sum() == 3
+    assert declared.named["h"].to_dict()["missing"] == [12345.0, -9999.0]
+    kept = proposed(path, tank, "h=h missing none")
+    assert not kept.doubts
+    assert np.nanmax(kept.assigned["h"].values) == pytest.approx(12.345)
+
+
+def test_steps_between_a_few_values_are_samples() -> None:
+    valve = np.where(np.arange(200) % 20 == 0, 9999.0, 0.0)
+    noisy = 0.5 + 0.3 * np.sin(np.arange(200.0))
+    assert markers(valve) == ({}, {})
+    assert markers(noisy) == ({}, {})
+
+
+def test_a_marker_in_a_recording_of_the_workbench_is_refused(tmp_path: Path, tank: System) -> None:
+    (tmp_path / "case.toml").write_text('title = "a"\n[measurement]\nfile = "measured.csv"\n')
+    levels = np.where(np.arange(200) == 20, -9999.0, LEVEL)
+    path = write(tmp_path / "measured.csv", levels)
+    path.write_text(path.read_text().replace(";", ","))
+    with pytest.raises(InputError, match=r"line 22, column 'h': found -9999 in 1 samples"):
+        wb.read_cases(tmp_path, tank)
+
+
+def test_a_unit_that_is_wrong_by_a_thousand_is_asked_about(tmp_path: Path, tank: System) -> None:
+    path = write(tmp_path / "a.csv", LEVEL, "um")
+    (doubt,) = proposed(path, tank).doubts
+    assert "its largest value, 0.00095 m, is 0.00095 times the typical 1 m" in doubt
+    assert "--column 'h=h [um]' confirms" in doubt
+    assert not proposed(path, tank, "h=h [um]").doubts
+    (problem,) = proposed(write(tmp_path / "b.csv", LEVEL, "m"), tank).problems
+    assert "goes beyond what is possible" in problem
+
+
+@pytest.mark.parametrize(
+    ("scale", "label", "values", "unit", "first"),
+    [
+        ("10 K", "temperature difference", 6.0, "degC", 6.0),
+        ("300 K", "water", 20.0, "degC", 293.15),
+        ("10 K", "water", 20.0, "degC", "a temperature, or a difference of two"),
+        ("300 K", "water", 20.0, "K", r"as if it were in [degC]"),
+        ("300 K", "water", 293.0, "degC", r"as if it were in [K]"),
+    ],
+)
+def test_a_temperature_has_the_zero_of_its_signal(
+    tmp_path: Path, scale: str, label: str, values: float, unit: str, first: float | str
+) -> None:
+    system = system_with_temperature(tmp_path / "system", scale, label)
+    path = write(tmp_path / "a.csv", LEVEL, extra=f";T [{unit}]", more=f";{values}")
+    proposal = proposed(path, system)
+    if isinstance(first, str):
+        assert any(first in doubt for doubt in proposal.doubts)
+    else:
+        assert not proposal.doubts
+        assert_allclose(proposal.assigned["T"].values[0], first)
+
+
+def test_milliseconds_declared_as_seconds_are_refused(tmp_path: Path, tank: System) -> None:
+    (tmp_path / "case.toml").write_text('title = "a"\n[measurement]\nfile = "measured.csv"\n')
+    rows = [
+        f"{1000 * t},{4 + k % 7 / 10},{h:.3f}"
+        for k, (t, h) in enumerate(zip(TIME, LEVEL, strict=True))
+    ]
+    names = "time [s],inflow [l/s],h [mm]"
+    (tmp_path / "measured.csv").write_text("\n".join([names, *rows]))
+    match = r"a sample every 500 s, 1000 times as far apart.*the unit of the time"
+    with pytest.raises(InputError, match=match):
+        wb.read_cases(tmp_path, tank)
