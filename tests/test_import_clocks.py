@@ -10,10 +10,18 @@ import pytest
 from numpy.testing import assert_allclose
 
 from workbench.errors import InputError
-from workbench.recordings.channels import NamedChannel, merge, parse_named, propose
+from workbench.recordings.case import read_cases
+from workbench.recordings.channels import (
+    NamedChannel,
+    ProposedRecording,
+    merge,
+    parse_named,
+    propose,
+)
 from workbench.recordings.channels.clock import Clock
 from workbench.recordings.formats import read_recorded_file
 from workbench.recordings.formats.stamps import iso
+from workbench.recordings.importing import import_recording, write
 from workbench.system.registry import load_system
 from workbench.system.system import System
 from workbench.system.template import write_system
@@ -215,3 +223,25 @@ def test_nothing_goes_across_a_censored_sample(tmp_path: Path, tank: System) -> 
     measured = merge([recorded], propose([recorded], tank, {}), tank)
     assert measured.time.size == 59
     assert 27000.0 not in measured.time
+
+
+@pytest.mark.parametrize(
+    ("form", "date"),
+    [
+        ("%Y-%m-%d %H:%M", "2024-06-01T00:00:00.000000"),
+        ("%Y-%m-%d %H:%M%z", "2024-05-31T22:00:00.000000Z"),
+        ("%H:%M", ""),
+    ],
+)
+def test_a_recording_has_the_date_of_its_first_sample(
+    tmp_path: Path, tank: System, form: str, date: str
+) -> None:
+    path = table(tmp_path / "a.csv", local(datetime(2024, 6, 1, tzinfo=BERLIN), 60, form))
+    recorded = read_recorded_file(path)
+    proposal = propose([recorded], tank, {})
+    assert merge([recorded], proposal, tank).date(0) == date
+    found = import_recording("a", ProposedRecording("", (recorded,), proposal), tank, {})
+    write(found, tmp_path / "cases", tank)
+    (case,) = read_cases([tmp_path / "cases"], tank)
+    assert case.date.startswith(date[:19] if not date.endswith("T00:00:00.000000") else date[:10])
+    assert bool(case.date) == bool(date)

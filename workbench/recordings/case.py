@@ -318,7 +318,7 @@ def read_file(path: Path, system: System, options: RecordingOptions = _NOTHING) 
     check_recording(measured.time, system, f"{path}, time", None)
     origin = Origin(str(path), None, {}, where, measured.doubts)
     case = make_case(_name(path), (measured.time, measured.signals), conditions, system, origin)
-    return replace(case, title=path.name, source=path)
+    return replace(case, title=path.name, source=path, date=measured.date(0))
 
 
 def read_case(folder: Path, system: System) -> Case:

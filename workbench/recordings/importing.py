@@ -26,7 +26,6 @@ from workbench.recordings.channels import (
     merge,
 )
 from workbench.recordings.csv import cell
-from workbench.recordings.formats.stamps import iso
 from workbench.recordings.plausibility import Origin, doubts
 from workbench.runtime.files import write_json, write_whole
 from workbench.runtime.resources import commit
@@ -315,7 +314,9 @@ def write(one: Import, out: Path, system: System) -> None:
     for piece in one.pieces:
         names = ", ".join(file.path.name for file in one.recording.files)
         names += f", '{one.recording.name}'" if one.recording.name else ""
-        case = {"title": f"{piece.name}, imported from {names}"}
+        date = one.measured.date(piece.samples[0])
+        dated = {"date": date} if date else {}
+        case = {"title": f"{piece.name}, imported from {names}", **dated}
         conditions = {"conditions": dict(piece.conditions)} if piece.conditions else {}
         measurement = {"measurement": {"file": "measured.csv"}}
         written[f"{piece.name}/case.toml"] = tomli_w.dumps({**case, **conditions, **measurement})
@@ -344,7 +345,7 @@ def describe(one: Import, system: System) -> dict[str, Any]:
             for file in one.recording.files
         ],
         "recording": one.recording.name or None,
-        "began": iso(measured.start + float(time[0])) or None,
+        "began": measured.date(0) or None,
         "time": _described_clocks(one),
         "channels": _described_channels(one, system),
         "dropped": list(one.recording.proposal.left),

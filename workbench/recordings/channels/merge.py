@@ -12,6 +12,7 @@ from workbench.errors import InputError
 from workbench.recordings.channels.matching import Assignment
 from workbench.recordings.channels.proposal import ProposedMapping
 from workbench.recordings.formats import RecordedFile
+from workbench.recordings.formats.stamps import iso
 from workbench.system.parts import Signal
 from workbench.system.system import System
 
@@ -27,6 +28,7 @@ class MergedRecording:
     time : (n,) s, as the recorder counts them.
     signals : (n,) each, by name.
     start : of time zero [s since 1970], NaN where that is not known.
+    zoned : whether that is in UTC; else in some local time.
     notes : what was interpolated and left out, in words.
     doubts : why its files may be damaged, or units wrong, in words.
     """
@@ -36,6 +38,12 @@ class MergedRecording:
     start: float
     notes: tuple[str, ...]
     doubts: tuple[str, ...]
+    zoned: bool = False
+
+    def date(self, sample: int) -> str:
+        """When a sample was taken, ISO 8601; empty where that is not known."""
+        known = iso(self.start + float(self.time[sample]))
+        return f"{known}Z" if known and self.zoned else known
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +127,8 @@ def merge(
         for text in clock.corrections
     ]
     doubts = *damaged, *proposal.contradictions, *mended, *_mixed(files, proposal)
-    return MergedRecording(time[known], signals, zero, tuple(notes), doubts)
+    zoned = all(c.zoned for c in proposal.clocks.values() if math.isfinite(c.start))
+    return MergedRecording(time[known], signals, zero, tuple(notes), doubts, zoned)
 
 
 def _mixed(files: Sequence[RecordedFile], proposal: ProposedMapping) -> Iterator[str]:
