@@ -135,6 +135,14 @@ def test_dates_of_any_order_are_read_as_times_go_on(
     assert iso(found.start).startswith(start)
 
 
+def test_days_that_follow_are_not_those_of_several_years(tmp_path: Path, tank: System) -> None:
+    """Eight hours a day: no order is even."""
+    stamps = local(datetime(2024, 3, 1, tzinfo=UTC), 300, "%y/%m/%d %H:%M")
+    worked = [stamp for stamp in stamps if "08:00" <= stamp[-5:] < "16:00"]
+    times = clock(table(tmp_path / "a.csv", worked), tank).times
+    assert times[-1] < 4 * 86400.0
+
+
 def test_dates_that_go_on_in_two_ways_are_asked_for(tmp_path: Path, tank: System) -> None:
     """Twelve firsts of a month, or twelve days in January."""
     path = table(tmp_path / "a.csv", [f"{k:02d}/01/2024" for k in range(1, 13)])

@@ -282,7 +282,10 @@ def _chosen(
     going = {order: channel for order, channel in readings.items() if _goes_on(channel.values)}
     left = going or readings
     even = {order: channel for order, channel in left.items() if _is_even(channel.values)}
-    left = even or left
+    # Nobody records on one day of each year, where another reading has days that follow.
+    near = {k: c for k, c in left.items() if _longest(c.values) <= 31 * 24 * _HOUR}
+    far = {k: c for k, c in left.items() if _longest(c.values) > 300 * 24 * _HOUR}
+    left = even or (near if near and len(near) + len(far) == len(left) else left)
     if not left:
         return None
     order, channel = next(iter(left.items()))
@@ -312,6 +315,11 @@ def _moment(seconds: float) -> datetime:
 def _goes_on(times: Vector) -> bool:
     steps = np.diff(times[np.isfinite(times)])
     return bool((steps >= 0.0).all())
+
+
+def _longest(times: Vector) -> float:
+    steps = np.diff(times[np.isfinite(times)])
+    return float(steps.max()) if steps.size else 0.0
 
 
 def _is_even(times: Vector) -> bool:
