@@ -50,7 +50,7 @@ _MARKERS = frozenset(
 ) | frozenset(
     (65535.0, 3276.7, 3276.8, 6553.5, 2147483647.0, 2147483648.0, 4294967295.0, 9.9e37, 9.91e37)
 )
-_LARGE = 1e30  # beyond which nothing is a sample: largest numbers of single precision, and others
+_LARGE = 1e30, 3.5e38  # from which on single precision holds no samples, to its largest number
 _MAYBE = frozenset((99.0, 99.9, 99.99, 888.0, 888.8, 8888.0, 999.0, 999.9, 999.99, 327.67, 1e10))
 _FEWEST, _RARE, _FAR, _FARTHER = 5, 0.02, 3.0, 100.0
 _LARGEST = 1e100  # no measurement comes near
@@ -71,7 +71,7 @@ def markers(values: Vector) -> tuple[dict[float, int], dict[float, int]]:
                 continue  # steps between a few values
             apart = float(np.abs(rest - extreme).min()) / float(np.ptp(rest) or 1.0)
             count = left.size - rest.size
-            marker = abs(extreme) in _MARKERS or abs(extreme) >= _LARGE
+            marker = abs(extreme) in _MARKERS or _LARGE[0] <= abs(extreme) <= _LARGE[1]
             rare = count > 1 and count <= _RARE * left.size and apart > _FARTHER
             if apart > _FAR and (rare or marker or abs(extreme) in _MAYBE):
                 (known if marker else others)[extreme] = count
