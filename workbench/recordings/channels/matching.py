@@ -132,8 +132,9 @@ def size_doubt(values: Vector, unit: str, signal: Signal, column: str) -> str:
     largest, middle = float(held.max()), float(np.median(held))
     ratio = largest / signal.scale
     confirms = f"--column '{column} [{unit}]' confirms [{unit}]"
-    # A sensor at rest scatters by its noise, and no less.
-    moves = largest > 5.0 * signal.noise or 0.0 < float(held.std()) < 0.2 * signal.noise
+    # A sensor at rest scatters by its noise, and no less; the system's own unit is no mistake.
+    other = unit not in (signal.unit, signal.shown)
+    moves = other and (largest > 5.0 * signal.noise or 0.0 < float(held.std()) < 0.2 * signal.noise)
     if ratio > _THOUSANDFOLD or (1e-7 < ratio < 1.0 / _THOUSANDFOLD and moves):
         return (
             f"its largest value, {largest:.4g} {signal.unit}, is {ratio:.3g} times the typical "
@@ -149,8 +150,8 @@ def size_doubt(values: Vector, unit: str, signal: Signal, column: str) -> str:
     if signal.scale >= _COLD:
         shift = ZERO_CELSIUS if middle < _COLD else -ZERO_CELSIUS
         if abs(middle + shift - signal.scale) < 0.5 * abs(middle - signal.scale):
-            other = "degC" if shift > 0.0 else "K"
-            return f"its median is {middle:.4g} K, as if it were in [{other}]; {confirms}"
+            zero = "degC" if shift > 0.0 else "K"
+            return f"its median is {middle:.4g} K, as if it were in [{zero}]; {confirms}"
     return ""
 
 
