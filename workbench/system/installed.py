@@ -27,11 +27,12 @@ def usual_system() -> str:
     Commands without any arguments work on it.
     """
     # Of the workbench's own: looking for plugins would take each command 10 ms.
-    return next(
+    names = (
         content.get("name", path.parent.name)
         for path, content in _own().items()
         if "cases" in content
     )
+    return str(next(names))
 
 
 def installed_plugins() -> list[Plugin]:
