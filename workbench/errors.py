@@ -52,6 +52,35 @@ class WorkerError(RuntimeError):
     """A task ended the process that worked on it, twice, or took longer than it may."""
 
 
+def unknown_name(
+    name: str,
+    known: Iterable[str],
+    *,
+    where: str,
+    expected: str,
+    found: str = "",
+    remedy: str = "correct the name",
+) -> InputError:
+    """The error of a name that is none of those that are known; it says the nearest one.
+
+    Parameters
+    ----------
+    found : in place of the name.
+
+    Examples
+    --------
+    >>> error = unknown_name("leve", ["level"], where="system.toml", expected="a signal")
+    >>> str(error)
+    "system.toml: found 'leve' (closest: 'level'); expected a signal. To do: correct the name."
+    """
+    return InputError(
+        where=where,
+        found=(found or f"'{name}'") + closest(name, known),
+        expected=expected,
+        remedy=remedy,
+    )
+
+
 def closest(name: str, names: Iterable[str]) -> str:
     """Say which of `names` was probably meant, or nothing.
 

@@ -20,7 +20,7 @@ from workbench.cli.arguments import (
 )
 from workbench.cli.extras import require_compiler
 from workbench.cli.output import CommandResult, Output, read_result
-from workbench.errors import InputError, closest
+from workbench.errors import unknown_name
 from workbench.runtime.engine import Engine
 from workbench.runtime.files import locked_folder
 
@@ -88,11 +88,12 @@ def _parted(cases: Sequence[Case], patterns: Sequence[str]) -> tuple[list[Case],
     names = [case.name for case in cases]
     for pattern in patterns:
         if not any(fnmatchcase(name, pattern) for name in names):
-            raise InputError(
+            raise unknown_name(
+                pattern,
+                names,
                 where=f"--held-out {pattern}",
-                found=f"no recording of this name{closest(pattern, names)}",
+                found="no recording of this name",
                 expected=f"some of {', '.join(names)}",
-                remedy="correct the name",
             )
     held_out = [
         case for case in cases if any(fnmatchcase(case.name, pattern) for pattern in patterns)

@@ -7,7 +7,7 @@ from typing import Any
 
 from workbench.cli.arguments import nearby
 from workbench.cli.output import warn
-from workbench.errors import InputError, closest
+from workbench.errors import InputError, unknown_name
 from workbench.recordings.case import UNKNOWN, Case, check_names, read_cases
 from workbench.recordings.channels import RecordingOptions, parse_named
 from workbench.system.reader import with_model
@@ -51,15 +51,15 @@ def read_condition(text: str, system: System) -> tuple[str, Any]:
     name, equals, value = (part.strip() for part in text.partition("="))
     known = next((condition for condition in system.conditions if condition.name == name), None)
     if not equals or known is None:
-        raise InputError(
+        raise unknown_name(
+            name,
+            [condition.name for condition in system.conditions],
             where=f"condition {text}",
-            found=f"'{name}'{closest(name, [condition.name for condition in system.conditions])}",
             expected="NAME=VALUE of a condition: "
             + (
                 ", ".join(condition.name for condition in system.conditions)
                 or "this system has none"
             ),
-            remedy="correct the name",
         )
     words = {str(choice): choice for choice in known.choices}
     entries = [words.get(part.strip(), part.strip()) for part in value.split(",")]

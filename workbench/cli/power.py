@@ -24,7 +24,7 @@ from workbench.cli.arguments import (
 )
 from workbench.cli.extras import require_compiler
 from workbench.cli.output import CommandResult, Output, read_result
-from workbench.errors import InputError, closest
+from workbench.errors import InputError, unknown_name
 from workbench.runtime.engine import Engine
 from workbench.runtime.files import locked_folder
 
@@ -191,9 +191,11 @@ def _chosen(names: Sequence[str], rig: VirtualRig) -> tuple[Plantable, ...]:
     known = {plantable.effect or plantable.name: plantable for plantable in rig.plantables}
     for name in names:
         if name not in known:
-            raise InputError(
+            raise unknown_name(
+                name,
+                known,
                 where=f"--effects {name}",
-                found=f"no effect that the virtual rig can plant{closest(name, known)}",
+                found="no effect that the virtual rig can plant",
                 expected=f"some of {', '.join(known)}",
                 remedy="choose others, or leave --effects out for all",
             )

@@ -20,7 +20,7 @@ from workbench.diagnosis.inference.score_test import CandidateScore
 from workbench.diagnosis.inference.search import Step
 from workbench.diagnosis.inference.timing import LateSignals
 from workbench.diagnosis.inference.verdict import Cause, Diagnosis, Gain
-from workbench.errors import InputError, closest
+from workbench.errors import unknown_name
 from workbench.observers.simulation import CaseResult, case_figure
 from workbench.pages.figures import LIGHT, CaseFigure, Curve, Panel, save_figure, styled
 from workbench.pages.views import capital, named, per_shown, shown_unit
@@ -257,11 +257,12 @@ class Outcome:
             If there is no such recording.
         """
         if recording not in self.starts:
-            raise InputError(
+            raise unknown_name(
+                recording,
+                self.starts,
                 where=f"recording '{recording}'",
-                found=f"no recording of this name{closest(recording, self.starts)}",
+                found="no recording of this name",
                 expected=f"one of {', '.join(self.starts)}",
-                remedy="correct the name",
             )
         return dict(self.starts[recording])
 
@@ -498,11 +499,12 @@ def shown_first(figures: Sequence[CaseFigure], recording: str) -> CaseFigure:
     if not recording:
         return figures[0]
     if recording not in known:
-        raise InputError(
+        raise unknown_name(
+            recording,
+            known,
             where=f"recording '{recording}'",
-            found=f"no recording of this name{closest(recording, known)}",
+            found="no recording of this name",
             expected=f"one of {', '.join(known)}",
-            remedy="correct the name",
         )
     return known[recording]
 

@@ -11,7 +11,7 @@ from xml.parsers import expat
 
 import fmpy
 
-from workbench.errors import InputError, closest
+from workbench.errors import InputError, unknown_name
 from workbench.models.archive import DESCRIPTION, damaged, opened
 from workbench.runtime.resources import CHECKOUT
 
@@ -116,9 +116,11 @@ class Description:
         own = {variable.name for variable in self.variables}
         for ours, theirs in names.items():
             if theirs not in own:
-                raise InputError(
+                raise unknown_name(
+                    theirs,
+                    own,
                     where=str(self.path),
-                    found=f"no variable '{theirs}'{closest(theirs, own)}",
+                    found=f"no variable '{theirs}'",
                     expected=f"the variable that is to be '{ours}'",
                     remedy=f"correct '{ours}' in the mapping of names; 'workbench fmu info' lists "
                     "the FMU's variables",

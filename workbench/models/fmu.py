@@ -22,7 +22,7 @@ from fmpy.fmi1 import FMICallException
 from numpy.typing import NDArray
 
 from workbench.arrays import Matrix, Vector
-from workbench.errors import FMUError, InputError, closest
+from workbench.errors import FMUError, InputError, unknown_name
 from workbench.models.archive import unpack
 from workbench.models.description import (
     CO_SIMULATION,
@@ -470,9 +470,11 @@ class FMU:
         """
         for name in names:
             if name not in self._references:
-                raise InputError(
+                raise unknown_name(
+                    name,
+                    self._references,
                     where=str(self.path),
-                    found=f"no variable '{name}'{closest(name, self._references)}",
+                    found=f"no variable '{name}'",
                     expected=f"one of {', '.join(self.inputs + self.outputs)}",
                     remedy=f"use an FMU that has it, or map its name: --map {name}=NAME",
                 )

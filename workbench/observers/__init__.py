@@ -9,7 +9,7 @@ from functools import cache
 from importlib import import_module
 from types import ModuleType
 
-from workbench.errors import InputError, closest
+from workbench.errors import unknown_name
 from workbench.observers.contract import Estimate, Estimator
 from workbench.observers.gains import Gains, SearchSpace
 from workbench.system.plugins import find_plugin
@@ -58,11 +58,12 @@ def label(name: str, system: System) -> str:
 
 def _refuse_unknown(name: str, known: Mapping[str, type[Estimator]], where: str) -> None:
     if name not in known:
-        raise InputError(
+        raise unknown_name(
+            name,
+            known,
             where=where,
-            found=f"no estimator of this name{closest(name, known)}",
+            found="no estimator of this name",
             expected=f"one of {', '.join(known)}",
-            remedy="correct the name",
         )
 
 

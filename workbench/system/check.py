@@ -2,7 +2,7 @@
 
 from collections.abc import Collection, Iterable, Iterator
 
-from workbench.errors import InputError, closest
+from workbench.errors import InputError, closest, unknown_name
 from workbench.models.description import Description
 from workbench.system.experiments import SET_OR_DURATION, SET_OR_PARAMETER, SET_OR_VARIABLE
 from workbench.system.parts import (
@@ -38,9 +38,11 @@ def check_model(system: System, model: Description) -> None:
         theirs = system.names.get(ours, ours)
         where = f"{model.path}, variable '{theirs}'"
         if ours not in variables:
-            raise InputError(
+            raise unknown_name(
+                ours,
+                variables,
                 where=str(model.path),
-                found=f"no variable '{ours}'{closest(ours, variables)}",
+                found=f"no variable '{ours}'",
                 expected=f"one for '{ours}' of {system.source}",
                 remedy=f"use an FMU that has it, or map its name: --map {ours}=NAME",
             )
@@ -137,12 +139,7 @@ def check_references(
 
 def _refuse_unknown(name: str, known: Collection[str], where: str, expected: str) -> None:
     if name not in known:
-        raise InputError(
-            where=where,
-            found=f"'{name}'{closest(name, known)}",
-            expected=expected,
-            remedy="correct the name",
-        )
+        raise unknown_name(name, known, where=where, expected=expected)
 
 
 def _derived(system: System) -> Iterator[tuple[DerivedSignal, Collection[str]]]:

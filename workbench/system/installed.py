@@ -6,7 +6,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from workbench.errors import InputError, closest
+from workbench.errors import unknown_name
 from workbench.runtime import resources
 from workbench.system.plugins import Plugin, distributed_plugins, find_plugin
 
@@ -67,9 +67,11 @@ def system_path(which: str | Path) -> Path:
         path = path / FILE if path.is_dir() else path
         if path.is_file():
             return path
-    raise InputError(
+    raise unknown_name(
+        str(which),
+        known,
         where=f"system '{which}'",
-        found=f"no such file, and no system of this name{closest(str(which), known)}",
+        found="no such file, and no system of this name",
         expected=f"a system file, or one of {', '.join(known)}",
         remedy="correct the name or path; 'workbench systems' lists what is installed",
     )

@@ -18,7 +18,7 @@ from pathlib import Path
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any
 
-from workbench.errors import InputError, closest
+from workbench.errors import InputError, unknown_name
 
 if TYPE_CHECKING:
     from workbench.system.tables import Table
@@ -104,9 +104,11 @@ def find_plugin(plugin: str) -> Plugin:
     try:
         found = resolve_name(place)
     except (ImportError, AttributeError, ValueError) as error:
-        raise InputError(
+        raise unknown_name(
+            plugin,
+            _places(),
             where=f"plugin '{plugin}'",
-            found=f"{type(error).__name__}: {error}{closest(plugin, _places())}",
+            found=f"{type(error).__name__}: {error}",
             expected=f"an entry point of the group '{GROUP}', or 'package.module:NAME' of a Plugin",
             remedy="install the distribution that has it, or correct the name",
         ) from None

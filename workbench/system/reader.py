@@ -191,9 +191,9 @@ def _says(hint: Any, content: Any) -> bool:
     """Whether an entry says anything: not a table of things by name without any, or no texts."""
     origin, inside = typing.get_origin(hint), typing.get_args(hint)
     if origin is tuple and inside[0] is str:
-        return content != []
-    by_name = origin is tuple and inside and table_name_of(kinds_of(inside[0])[0])
-    return content != {} or not (by_name or origin is collections.abc.Mapping)
+        return bool(content != [])
+    by_name = bool(origin is tuple and inside and table_name_of(kinds_of(inside[0])[0]))
+    return bool(content != {}) or not (by_name or origin is collections.abc.Mapping)
 
 
 def _absent(absent: Any, scope: Scope) -> Any:

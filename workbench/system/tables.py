@@ -7,7 +7,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, TypeVar
 
-from workbench.errors import InputError, closest
+from workbench.errors import InputError, unknown_name
 from workbench.runtime.files import read_text
 from workbench.system.units import quantity
 
@@ -49,9 +49,11 @@ class Table:
             If it is missing, or another type.
         """
         if key not in self.content:
-            raise InputError(
+            raise unknown_name(
+                key,
+                self.content,
                 where=self.where,
-                found=f"no '{key}'{closest(key, self.content)}",
+                found=f"no '{key}'",
                 expected=f"{_KINDS[kind]} '{key}'",
                 remedy=f"add '{key}'",
             )
@@ -129,9 +131,11 @@ class Table:
         if isinstance(value, str):
             return quantity(value, unit, self.place(key))
         if value is None:
-            raise InputError(
+            raise unknown_name(
+                key,
+                self.content,
                 where=self.where,
-                found=f"no '{key}'{closest(key, self.content)}",
+                found=f"no '{key}'",
                 expected=f"a number '{key}' in [{unit}]",
                 remedy=f"add '{key}'",
             )
@@ -163,9 +167,11 @@ class Table:
         known = tuple(keys.split()) if isinstance(keys, str) else tuple(keys)
         for key in self.content:
             if key not in known:
-                raise InputError(
+                raise unknown_name(
+                    key,
+                    known,
                     where=self.where,
-                    found=f"unknown key '{key}'{closest(key, known)}",
+                    found=f"unknown key '{key}'",
                     expected=f"only {', '.join(known)}",
                     remedy="correct or remove the key",
                 )

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from workbench.arrays import Matrix, Vector
-from workbench.errors import FMUError, InputError, closest
+from workbench.errors import FMUError, InputError, unknown_name
 from workbench.observers import Estimator, Gains, SearchSpace, estimators_of
 from workbench.observers.gains_file import format_gains
 from workbench.observers.replay import observed
@@ -212,11 +212,12 @@ def tunable(system: System, estimator: str) -> type[Estimator]:
     """
     known = {name: kind for name, kind in estimators_of(system).items() if kind.tunable}
     if estimator not in known:
-        raise InputError(
+        raise unknown_name(
+            estimator,
+            known,
             where=f"estimator '{estimator}'",
-            found=f"none with gains of this name{closest(estimator, known)}",
+            found="none with gains of this name",
             expected=f"one of {', '.join(known)}",
-            remedy="correct the name",
         )
     return known[estimator]
 
@@ -453,11 +454,12 @@ def with_reference(cases: Sequence[Case], system: System, estimator: str) -> lis
     """
     known = {name: kind for name, kind in estimators_of(system).items() if kind.offline}
     if estimator not in known:
-        raise InputError(
+        raise unknown_name(
+            estimator,
+            known,
             where=f"estimator '{estimator}' to judge by",
-            found=f"none of this name that knows whole recordings{closest(estimator, known)}",
+            found="none of this name that knows whole recordings",
             expected=f"one of {', '.join(known)}",
-            remedy="correct the name",
         )
     judged_cases = []
     for case in cases:

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from workbench.errors import InputError, closest
+from workbench.errors import InputError, unknown_name
 
 
 @dataclass(frozen=True)
@@ -24,9 +24,10 @@ class AnnotationReader:
         """Refuse other keys."""
         for key in self.content:
             if key not in known:
-                raise InputError(
+                raise unknown_name(
+                    key,
+                    known,
                     where=self.where,
-                    found=f"'{key}'{closest(key, known)}",
                     expected=f"some of {', '.join(known)}",
                     remedy="correct or remove it",
                 )

@@ -15,7 +15,7 @@ import numpy as np
 from workbench.arrays import Matrix
 from workbench.diagnosis.effects.annotation import AnnotationReader
 from workbench.diagnosis.effects.slots import Slot, read_slots
-from workbench.errors import InputError, closest
+from workbench.errors import InputError, unknown_name
 from workbench.models.modelica import Class, Library
 
 _TURNING = ("cosine", "sine")
@@ -186,11 +186,12 @@ def choose(names: Sequence[str], effects: Sequence[Effect]) -> tuple[Effect, ...
     known = dict.fromkeys(name for effect in effects for name in (effect.kind, effect.name))
     for name in names:
         if name not in known:
-            raise InputError(
+            raise unknown_name(
+                name,
+                known,
                 where=f"--effects {name}",
-                found=f"no effect of this name{closest(name, known)}",
+                found="no effect of this name",
                 expected=f"some of {', '.join(known)}",
-                remedy="correct the name",
             )
     return tuple(
         effect for effect in effects if not names or {effect.name, effect.kind} & set(names)
@@ -274,11 +275,12 @@ def _slots(
     chosen = said.texts("slots") if "slots" in said.content else fitting
     for name in chosen:
         if name not in fitting:
-            raise InputError(
+            raise unknown_name(
+                name,
+                fitting,
                 where=said.where,
-                found=f"slot '{name}'{closest(name, fitting)}",
+                found=f"slot '{name}'",
                 expected=f"some of {', '.join(fitting)}, which it fits by the class it extends",
-                remedy="correct the name",
             )
     return tuple(name for name in fitting if name in chosen)
 
@@ -336,9 +338,11 @@ def _check_parameters(library: Library, one: Class, effect: Effect) -> None:
     shared = (effect.where.share,) if effect.where and effect.where.share else ()
     for name in (*effect.sizes, *(name for name, _ in effect.shapes), *shared):
         if name not in parameters:
-            raise InputError(
+            raise unknown_name(
+                name,
+                parameters,
                 where=one.where,
-                found=f"effect {one.name} without a parameter '{name}'{closest(name, parameters)}",
+                found=f"effect {one.name} without a parameter '{name}'",
                 expected=f"one of {', '.join(parameters) or 'its parameters, but it has none'}",
                 remedy="correct the annotation, or declare the parameter",
             )
@@ -359,11 +363,12 @@ def _ordered(library: Library, names: list[str], after: Mapping[str, str]) -> li
     while waiting:
         ready = [name for name in waiting if after[name] in ordered]
         if not ready:
-            raise InputError(
+            raise unknown_name(
+                after[waiting[0]],
+                ordered,
                 where=f"{library.file}, effect {waiting[0]}",
-                found=f'after="{after[waiting[0]]}"{closest(after[waiting[0]], ordered)}',
+                found=f'after="{after[waiting[0]]}"',
                 expected="another effect, which does not stand after this one",
-                remedy="correct the name",
             )
         ordered.insert(ordered.index(after[ready[0]]) + 1, ready[0])
         waiting.remove(ready[0])

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from workbench.errors import InputError, closest
+from workbench.errors import InputError, unknown_name
 from workbench.machines.train.rig import AXLES, BOGIES, VEHICLES, AskedStop
 from workbench.machines.train.stops import USUAL, Faults, Made, draw_train, make, write_stop
 from workbench.recordings.datasets import write_cases
@@ -97,11 +97,12 @@ def virtual_rig(names: Sequence[str], model: Path | None) -> PlantedTrain:
     known = {stop.name: stop for stop in USUAL}
     for name in names:
         if name not in known:
-            raise InputError(
+            raise unknown_name(
+                name,
+                known,
                 where=f"--case {name}",
-                found=f"no stop of this name{closest(name, known)}",
+                found="no stop of this name",
                 expected=f"one of {', '.join(known)}",
-                remedy="correct the name",
             )
     if model is not None:
         raise InputError(

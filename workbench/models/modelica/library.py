@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from workbench.errors import InputError, closest
+from workbench.errors import InputError, unknown_name
 from workbench.models.modelica.classes import Class, Component, Modifier
 from workbench.models.modelica.files import packages, read
 from workbench.models.modelica.source import Reader
@@ -53,9 +53,11 @@ class Library:
         for dotted in (name, f"{self.name}.{name}"):
             if dotted in self.classes:
                 return self.classes[dotted]
-        raise InputError(
+        raise unknown_name(
+            f"{self.name}.{name}",
+            self.classes,
             where=str(self.file),
-            found=f"no class '{name}'{closest(f'{self.name}.{name}', self.classes)}",
+            found=f"no class '{name}'",
             expected=f"a class of {self.name}",
             remedy="correct the name, or give another library",
         )

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from workbench.errors import InputError, closest
+from workbench.errors import InputError, unknown_name
 from workbench.models.compiler import PLATFORMS, BuiltFMU, SteppingLaw, assemble
 from workbench.models.compiler.explicit import StateSpace, make_explicit
 from workbench.models.compiler.flat import flatten
@@ -104,9 +104,11 @@ def _with_gains(space: StateSpace, observer: ObserverModel) -> StateSpace:
     values = parameter_values(observer.gains, observer.system)
     names = {variable.name for variable in space.parameters}
     if missing := sorted(values.keys() - names):
-        raise InputError(
+        raise unknown_name(
+            missing[0],
+            names,
             where=observer.model,
-            found=f"no parameter '{missing[0]}'{closest(missing[0], names)}",
+            found=f"no parameter '{missing[0]}'",
             expected=f"parameters {', '.join(values)}, as gains are named",
             remedy="rename the parameter of the class, or correct [export.classes]",
         )

@@ -8,7 +8,7 @@ from typing import Literal, Protocol
 
 import numpy as np
 
-from workbench.errors import InputError, closest
+from workbench.errors import InputError, unknown_name
 
 Kind = Literal["clean", "single", "pair", "outside", "sheet"]
 
@@ -74,11 +74,12 @@ def assigned(assignments: Sequence[str], known: Mapping[str, Plantable]) -> dict
         name, _, text = assignment.partition("=")
         where = f"--effect {assignment}"
         if name not in known:
-            raise InputError(
+            raise unknown_name(
+                name,
+                known,
                 where=where,
-                found=f"unknown effect '{name}'{closest(name, known)}",
+                found=f"unknown effect '{name}'",
                 expected=f"one of {', '.join(known)}",
-                remedy="correct the name",
             )
         if name in gains:
             raise InputError(

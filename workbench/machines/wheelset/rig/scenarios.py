@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
-from workbench.errors import InputError, closest
+from workbench.errors import unknown_name
 from workbench.machines.wheelset.rig.drive import TRAIN_INERTIA
 
 Surface: TypeAlias = Literal["dry", "wet"]
@@ -198,11 +198,12 @@ def select(names: Sequence[str]) -> list[Scenario]:
     for name in names:
         matches = [full for full in SCENARIOS if name in (full, full[3:])]
         if not matches:
-            raise InputError(
+            raise unknown_name(
+                name,
+                SCENARIOS,
                 where=f"--case {name}",
-                found=f"no scenario of this name{closest(name, SCENARIOS)}",
+                found="no scenario of this name",
                 expected=f"one of {', '.join(SCENARIOS)}",
-                remedy="correct the name",
             )
         chosen.update(matches)
     return [scenario for name, scenario in SCENARIOS.items() if name in chosen]
