@@ -133,6 +133,11 @@ def remaining(scaled: Matrix) -> Matrix:
 WINDOW = 0.5  # [s] the time within which a control has to react
 
 
+_POINTS = 200  # of a recording at which it is linearised to tell quantities apart
+_PART = 0.1  # share of a direction that counts as part of it
+_LEFT = 0.5  # share of what was unknown of a direction, of which nothing to speak of was learnt
+
+
 STRIDE = 0.1  # [s] from one window to the next
 
 
@@ -330,6 +335,58 @@ def window_test(fmu: FMU, system: System, case: Case, run: Run, scale: Vector) -
         bound=bounds(model, starts, length, before)[:, count:],
         serving=np.array([quantity.useful for quantity in system.estimated]),
     )
+
+
+def inseparable(fmu: FMU, system: System, case: Case) -> dict[tuple[str, ...], float]:
+    """Estimated quantities that a recording cannot tell apart, and their correlation.
+
+    By the Fisher information of the whole recording on starts and constant quantities, at nominal
+    quantities: a filter that linearises where its estimate is gains information that is none. Of
+    a direction of several quantities half of what was unknown before is left.
+    Source: S. Huang, G. Dissanayake (2007), IEEE Trans. Robotics 23, 1036-1049 (estimates of
+    filters that are too sure as they linearise at changing points).
+    """
+    q = len(system.estimated)
+    if q < 2 or case.time.size < 3:
+        return {}
+    kept = np.unique(np.linspace(0, case.time.size - 1, _POINTS).astype(int))
+    held = [output.name for output in system.outputs if output.name in fmu.states]
+    values = np.column_stack([case[name][kept] for name in held]) if held else None
+    if values is not None and not np.isfinite(values).all():
+        return {}
+    places = [fmu.states.index(name) for name in held]
+    fmu.start({} if values is None else dict(zip(held, values[0], strict=True)))
+    u = np.column_stack([case.u[kept], np.zeros((kept.size, q))])
+    inputs = fmu.variables(_inputs(system))
+    x = np.tile(fmu.get_states(), (kept.size, 1))
+    if values is not None:
+        x[:, places] = values
+    if len(fmu.states) > len(held):
+        for k, h in enumerate(np.diff(case.time[kept])):
+            fmu.set_states(x[k])
+            fmu.set(inputs, u[k])
+            free = fmu.step(h)
+            if values is not None:
+                free[places] = values[k + 1]
+            x[k + 1] = free
+    model = linearise_along(fmu, system, case.time[kept], x, u)
+    n = len(fmu.states)
+    sizes = {v.name: abs(v.nominal or 1.0) for v in fmu.description.variables}
+    states = [max(system.spreads.get(name, 0.0), sizes[name]) for name in fmu.states]
+    before = np.array([*states, *prior(system)])
+    share = case.time.size / kept.size  # each point stands for so many samples
+    gramian = share * gramians(model, np.zeros(1, int), kept.size)[0]
+    left = np.linalg.inv(np.eye(n + q) + gramian * np.outer(before, before))[n:, n:]
+    if not np.isfinite(left).all():
+        return {}
+    found = {}
+    variances, directions = np.linalg.eigh(left)
+    for variance, direction in zip(variances, directions.T, strict=True):
+        of = np.flatnonzero(direction**2 > _PART)
+        if variance > _LEFT**2 and of.size > 1:
+            known = left[of[0], of[1]] / np.sqrt(left[of[0], of[0]] * left[of[1], of[1]])
+            found[tuple(system.estimated[i].name for i in of)] = float(known)
+    return found
 
 
 def follow(fmu: FMU, system: System, case: Case, run: Run) -> tuple[Matrix, Matrix]:

@@ -68,6 +68,7 @@ def format_table(system: System, results: Sequence[CaseResult]) -> str:
     when = f" {objective.when}" if objective.when else ""
     limits = ", ".join(filter(None, (below(system), window(system))))
     lines = [f"Error of {objective.signal}, rms / mean{when} ({limits})"]
+    lines += [f"{result.case.name}: {guess}." for result in results for guess in result.guesses()]
     lines += narrow_bands({result.case.name: result.contradicted for result in results})
     lines += [header, "-" * len(header)]
     for result in results:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import cycle
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,11 +12,12 @@ import pandas as pd
 from scipy.stats import chi2
 
 from workbench.arrays import Vector
-from workbench.errors import InputError
+from workbench.errors import FMUError, InputError
 from workbench.models.fmu import FMU
 from workbench.observers import Estimator, Gains, label
 from workbench.observers.estimators.smoother import Smoother
 from workbench.observers.gains_file import read_gains, usual_gains
+from workbench.observers.observability import inseparable
 from workbench.observers.replay import observed, replay
 from workbench.observers.run import Ending, Run, _band, _claimed, _probabilities, _range
 from workbench.observers.score import Score, judged_window, low_pass, score
@@ -58,6 +59,7 @@ class CaseResult:
     Attributes
     ----------
     reference : the smoother's estimate, where no sensor is only there to judge by; else None.
+    inseparable : estimated quantities that the recording cannot tell apart, and their correlation.
     """
 
     system: System
@@ -65,6 +67,7 @@ class CaseResult:
     runs: Mapping[str, Run]
     scores: Mapping[str, Score]
     reference: Run | None
+    inseparable: Mapping[tuple[str, ...], float] = field(default_factory=dict)
 
     def measured(self) -> Vector | None:
         """The judged signal as it judges, below the bandwidth, (n,); None if not measured."""
@@ -103,6 +106,15 @@ class CaseResult:
             for name, (ratio, chance) in tested.items()
             if ratio > OVERCONFIDENT and chance < _CHANCE
         }
+
+    def guesses(self) -> list[str]:
+        """What is said of quantities that the recording cannot tell apart."""
+        return [
+            f"{' and '.join(names)} cannot be told apart by this recording (correlation "
+            f"{correlation:.4f}): their estimates are guesses, and others fit as well. Estimate "
+            "one of them, or record what moves one of them alone"
+            for names, correlation in self.inseparable.items()
+        ]
 
     def _tested(self, name: str) -> tuple[float, float]:
         """Mean of the NIS over that of chi-squared, and how likely chance makes it as large."""
@@ -151,7 +163,7 @@ class CaseResult:
         unit = self.system.unit(judged)
         return {
             "title": self.case.title,
-            "doubts": list(self.case.doubts),
+            "doubts": [*self.case.doubts, *self.guesses()],
             "contradicted": {name: round(ratio, 3) for name, ratio in self.contradicted.items()},
             "reference": None if self.reference is None else self.reference.estimator,
             "estimators": {
@@ -171,7 +183,7 @@ class CaseResult:
         """Scores by estimator, for people."""
         table = pd.DataFrame(self.to_dict()["estimators"]).T
         title = f"{self.case.name}: {self.case.title}"
-        lines = narrow_bands({self.case.name: self.contradicted})
+        lines = [*self.guesses(), *narrow_bands({self.case.name: self.contradicted})]
         return "\n".join([title, *lines, table.to_string(na_rep="n/a")])
 
     def plot(self) -> "Figure":
@@ -223,7 +235,22 @@ class Simulation:
         with self.estimators() as estimators:
             runs = {name: replay(case, estimator) for name, estimator in estimators.items()}
         scores = {name: score(case, run, self.system) for name, run in runs.items()}
-        return CaseResult(self.system, case, runs, scores, self._reference(case, runs))
+        apart, best = self._inseparable(case), self._reference(case, runs)
+        guessed = {name: np.zeros(case.time.size, bool) for names in apart for name in names}
+        marked = {
+            name: replace(run, claimed={**run.claimed, **guessed}) for name, run in runs.items()
+        }
+        if best is not None:
+            best = replace(best, claimed={**best.claimed, **guessed})
+        return CaseResult(self.system, case, marked, scores, best, apart)
+
+    def _inseparable(self, case: Case) -> dict[tuple[str, ...], float]:
+        """See `inseparable`; nothing where the model does not run along the recording."""
+        try:
+            with open_model(self.system) as fmu:
+                return inseparable(fmu, self.system, case)
+        except (InputError, FMUError, np.linalg.LinAlgError):
+            return {}
 
     def _reference(self, case: Case, runs: Mapping[str, Run]) -> Run | None:
         """The smoother's estimate, where a recording has nothing that is only there to judge by."""
