@@ -126,8 +126,7 @@ class Outcome:
         for cause in found.causes:
             label, one = next(iter(cause.parameters.items()))
             twins = f" (or {', '.join(cause.confusable_with)})" if cause.confusable_with else ""
-            size = with_interval(one.value, one.low, one.high, one.unit)
-            names.append(f"{cause.effect.text}: {cause.effect.name}{twins}, {label} {size}")
+            names.append(f"{cause.effect.text}: {cause.effect.name}{twins}, {label} {one.text}")
         assert found.gain is not None
         more = " The search was interrupted: more may be missing." if found.interrupted else ""
         return (
@@ -341,9 +340,8 @@ def _told(cause: Cause) -> list[str]:
     """Lines on a cause."""
     lines = [f"{cause.effect.name}: {cause.effect.text}"]
     lines += [
-        f"  {name} = "
-        f"{with_interval(parameter.value, parameter.low, parameter.high, parameter.unit)}"
-        for name, parameter in cause.parameters.items()
+        f"  {name}: {p.text}" if p.limit else f"  {name} = {p.text}"
+        for name, p in cause.parameters.items()
     ]
     lines.append(f"  explains {cause.explained:.1%} of what can be, on held-out recordings")
     if cause.confusable_with:

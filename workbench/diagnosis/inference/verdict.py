@@ -17,7 +17,7 @@ from workbench.diagnosis.inference.selection import Selection, search, select
 from workbench.diagnosis.inference.timing import LateSignals, by_themselves
 from workbench.errors import InputError
 from workbench.runtime.engine import Reporter
-from workbench.system.units import BAND
+from workbench.system.units import BAND, with_interval, with_unit
 
 Verdict = Literal["nothing", "found", "unexplained"]
 
@@ -27,12 +27,28 @@ _DRAWS = 2000  # of the bootstrap over stops
 
 @dataclass(frozen=True)
 class Interval:
-    """An estimate with its 95 % interval, in `unit`."""
+    """An estimate with its 95 % interval, in `unit`.
+
+    Attributes
+    ----------
+    limit : the bound at which a fit stopped, "least" or "greatest": then it is no estimate, and
+        what is beyond may fit better.
+    """
 
     value: float
     low: float
     high: float
     unit: str
+    limit: str = ""
+
+    @property
+    def text(self) -> str:
+        """For people."""
+        if not self.limit:
+            return with_interval(self.value, self.low, self.high, self.unit)
+        beyond = "smaller" if self.limit == "least" else "larger"
+        value = with_unit(self.value, self.unit)
+        return f"at its limit of {value}, which is no estimate: {beyond} may fit better"
 
 
 @dataclass(frozen=True, eq=False)
@@ -244,7 +260,8 @@ def _cause(fit: Fit, chosen: Selection, effect: Effect) -> Cause:
         form = np.hypot(_FORM * value, _COMPANY * effect.matters * (key[1] == effect.label))
         reach = float(BAND * np.hypot(sigma[trial.joint.known.index(key)], form))
         ends = max(value - reach, low), min(value + reach, high)
-        parameters[key[1]] = Interval(value, *ends, unknowns.unit(effect, parameter))
+        limit = "least" if value <= low else "greatest" if value >= high else ""
+        parameters[key[1]] = Interval(value, *ends, unknowns.unit(effect, parameter), limit)
     fast = effect.order_locked
     return Cause(
         effect=effect,

@@ -126,7 +126,9 @@ class Proposal:
         for cause in self.laws:
             lines += ["", f"{cause.effect.name}, {MARK}: {self.forms[cause.effect.name].text}"]
             lines += [
-                f"  {name} = {parameter.value:.4g} {parameter.unit}, "
+                f"  {name}: {parameter.text}"
+                if parameter.limit
+                else f"  {name} = {parameter.value:.4g} {parameter.unit}, "
                 f"95 %: {parameter.low:.4g} to {parameter.high:.4g}"
                 for name, parameter in cause.parameters.items()
             ]
