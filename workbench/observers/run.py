@@ -125,14 +125,14 @@ def run_figure(run: Run) -> CaseFigure:
     panels = []
     for name, unit in run.columns.items():
         if not np.isnan(run.signal(name)).all():
-            curve = Curve("2", run.signal(name), _band(run, name, 1.0))
-            panels.append(_panel(name, unit, _claimed(curve, run, name)))
-    panels += [panel for panel in [_probabilities([run])] if panel.curves]
+            curve = Curve("2", run.signal(name), half_band(run, name, 1.0))
+            panels.append(_panel(name, unit, claimed_parts(curve, run, name)))
+    panels += [panel for panel in [probability_panel([run])] if panel.curves]
     legend = (("2", run.estimator),)
     return CaseFigure(run.case, run.summary(), "", run.time, None, legend, tuple(panels))
 
 
-def _probabilities(runs: Iterable[Run]) -> Panel:
+def probability_panel(runs: Iterable[Run]) -> Panel:
     """Probability of each mode of the estimators that weigh models, one line style each."""
     modes = [one for run in runs for one in run.probability.items()]
     title = "Probability of " + ", ".join(name.replace("_", " ") for name, _ in modes) + " [1]"
@@ -140,7 +140,7 @@ def _probabilities(runs: Iterable[Run]) -> Panel:
     return Panel(title, "1", -0.05, 1.05, 0.6, tuple(curves))
 
 
-def _claimed(curve: Curve, run: Run, signal: str) -> list[Curve]:
+def claimed_parts(curve: Curve, run: Run, signal: str) -> list[Curve]:
     """A curve in up to two parts: what is claimed, and dashed what is not."""
     if signal not in run.claimed:
         return [curve]
@@ -152,18 +152,18 @@ def _claimed(curve: Curve, run: Run, signal: str) -> list[Curve]:
     return [part for part in parts if np.isfinite(part.values).any()]
 
 
-def _band(run: Run, signal: str, factor: float) -> Vector | None:
+def half_band(run: Run, signal: str, factor: float) -> Vector | None:
     """Half of the 95 % band of an estimated signal, in its panel's unit; None without."""
     sigma = run.deviation(signal)
     return None if np.isnan(sigma).all() else BAND * sigma / factor
 
 
 def _panel(name: str, unit: str, curves: Sequence[Curve]) -> Panel:
-    ends = _range([curve.values for curve in curves])
+    ends = value_range([curve.values for curve in curves])
     return Panel(f"{name} [{unit}]", unit, *ends, 1.0, tuple(curves))
 
 
-def _range(signals: Sequence[Vector], margin: float = 0.08) -> tuple[float, float]:
+def value_range(signals: Sequence[Vector], margin: float = 0.08) -> tuple[float, float]:
     """Lowest and highest value with a margin on both sides; 0 to 1 where there is none."""
     values = np.concatenate([*signals, []])  # none, where nothing was estimated
     values = values[np.isfinite(values)]

@@ -19,7 +19,14 @@ from workbench.observers.estimators.smoother import Smoother
 from workbench.observers.gains_file import read_gains, usual_gains
 from workbench.observers.observability import inseparable
 from workbench.observers.replay import observed, replay
-from workbench.observers.run import Ending, Run, _band, _claimed, _probabilities, _range
+from workbench.observers.run import (
+    Ending,
+    Run,
+    claimed_parts,
+    half_band,
+    probability_panel,
+    value_range,
+)
 from workbench.observers.score import Score, judged_window, low_pass, score
 from workbench.pages.figures import ESTIMATORS, CaseFigure, Curve, Panel
 from workbench.pages.views import (
@@ -410,7 +417,7 @@ def case_figure(result: CaseResult, styles: Sequence[str] = ESTIMATORS) -> CaseF
         panels.append(_seen(result, chosen, view))
         if system.objective.signal in view.signals:
             panels.append(_residual(result, chosen, window))
-    panels.append(_probabilities(result.runs.values()))
+    panels.append(probability_panel(result.runs.values()))
     return CaseFigure(
         name=case.name,
         title=case.title,
@@ -449,7 +456,7 @@ def _seen(result: CaseResult, styles: dict[str, str], view: View) -> Panel:
             values = here.signal(name, case.signals) / factor
             curves.append(Curve("measured", values, dashed=number > 0))
     signals = [curve.values for curve in curves]
-    low, high = _range(signals) if measured is None else _range([measured], margin=0.25)
+    low, high = value_range(signals) if measured is None else value_range([measured], margin=0.25)
     return Panel(
         titled(view, unit),
         unit,
@@ -488,8 +495,8 @@ def _estimated(run: Run, style: str, signal: str, factor: float) -> list[Curve]:
     """Curves of an estimator that knows the signal, with its band."""
     if signal not in run.columns or not np.isfinite(run.signal(signal)).any():
         return []
-    curve = Curve(style, run.signal(signal) / factor, _band(run, signal, factor))
-    return _claimed(curve, run, signal)
+    curve = Curve(style, run.signal(signal) / factor, half_band(run, signal, factor))
+    return claimed_parts(curve, run, signal)
 
 
 def _reach(errors: Sequence[Vector]) -> float:
