@@ -242,9 +242,11 @@ def _counting(channel: FileChannel, unit: str, factor: float, reason: str) -> Cl
     first = next((float(value) for value in values if math.isfinite(value)), math.nan)
     if _UNIX[0] <= first * factor <= _UNIX[1] and is_time(channel.name):
         values, start = values - first, first * factor
+    with np.errstate(over="ignore"):  # what no clock counts
+        times = factor * values
     return Clock(
         channel=channel.name,
-        times=factor * values,
+        times=times,
         start=start,
         unit=unit,
         reason="; ".join((reason, *words)),

@@ -126,7 +126,7 @@ def size_doubt(values: Vector, unit: str, signal: Signal, column: str) -> str:
     values : (n,) SI.
     column : how the user names the channel, SIGNAL=CHANNEL.
     """
-    held = np.abs(values[np.isfinite(values)])
+    held = np.abs(values[np.abs(values) < _HUGE])
     if not held.size or not signal.scale > 0.0:
         return ""
     largest, middle = float(held.max()), float(np.median(held))
@@ -201,7 +201,8 @@ def _candidate(
         known = "" if is_unit(unit) else ", a unit that is not known"
         return None, f"'{channel.name}' is in [{unit}]{known}"
     scale, formula = way
-    values = scale.factor * samples + scale.zero
+    with np.errstate(over="ignore", invalid="ignore"):  # what no machine reads
+        values = scale.factor * samples + scale.zero
     low, high = signal.possible
     if not np.isfinite(values).any():
         return None, f"'{channel.name}' holds no numbers"
@@ -315,6 +316,7 @@ _DIFFERENCE = re.compile(
     r"differen[cz]|delta|\u0394|\bd[ _]?T\b|spreizung|spread|superheat|subcool|\b(rise|lift)\b",
     re.IGNORECASE,
 )
+_HUGE = 1e100  # no sample, and its square would be no number
 _COLD = 100.0  # K, below which no machine's temperature is
 _THOUSANDFOLD = 300.0  # times the typical size of a signal: a unit is another one
 _TYPICAL = 10.0  # times the typical size of a signal, or a tenth, is what its largest sample may be
@@ -342,7 +344,8 @@ def fitting_units(samples: Vector, signal: Signal, system: System) -> list[str]:
         way = conversion_to(unit, signal, system)
         if way is None:
             continue
-        values = way[0].factor * samples + way[0].zero
+        with np.errstate(over="ignore", invalid="ignore"):
+            values = way[0].factor * samples + way[0].zero
         size = float(np.nanmax(np.abs(values), initial=0.0))
         low, high = signal.plausible
         typical = signal.scale / _TYPICAL <= size <= signal.scale * _TYPICAL

@@ -4,6 +4,8 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from workbench.errors import InputError, closest
 from workbench.recordings.channels.clock import Clock, read_clock
 from workbench.recordings.channels.matching import (
@@ -197,11 +199,9 @@ def _as_named(
         raise _no_unit_of(signal, place, unit, stated_by_user=bool(channel.unit), where=where)
     turn = -1.0 if channel.reversed else 1.0
     scale, formula = way
-    large = (
-        ""
-        if channel.unit
-        else size_doubt(scale.factor * samples + scale.zero, unit, signal, column)
-    )
+    with np.errstate(over="ignore", invalid="ignore"):  # what no machine reads
+        values = scale.factor * samples + scale.zero
+    large = "" if channel.unit else size_doubt(values, unit, signal, column)
     doubt = unconfirmed(signal.name, place.label, unit) if concluded else ""
     return Assignment(
         place.file,
