@@ -1,0 +1,1 @@
+"""What commands write and what tests are refused, kept so that two states can be compared."""
