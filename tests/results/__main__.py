@@ -1,7 +1,7 @@
 """`python -m tests.results`: shows that a change of the code changes no result.
 
     python -m tests.results write DIR [--only NAME ...] [--recordings FOLDER]
-    python -m tests.results compare A B
+    python -m tests.results compare A B [--only NAME ...] [--no-pages]
 
 `write` runs small calls of every command, and keeps what they say and write. `compare` lists what
 differs between two such folders, or between two files of refusals; see `tests/results/refusals.py`.
@@ -27,7 +27,6 @@ def main(arguments: list[str] | None = None) -> int:
     jobs = parser.add_subparsers(required=True, metavar="JOB", dest="job")
     writing = jobs.add_parser("write", help="run commands, and keep their results")
     writing.add_argument("folder", type=Path, metavar="DIR", help="where to keep them")
-    writing.add_argument("--only", nargs="+", choices=PARTS, metavar="NAME", help=", ".join(PARTS))
     writing.add_argument(
         "--recordings", type=Path, metavar="FOLDER", help="that are not part of the repository"
     )
@@ -36,12 +35,16 @@ def main(arguments: list[str] | None = None) -> int:
     comparing.add_argument("before", type=Path, metavar="A")
     comparing.add_argument("after", type=Path, metavar="B")
     comparing.add_argument("--no-pages", action="store_true", help="leave pages out")
+    for job in (writing, comparing):
+        job.add_argument(
+            "--only", nargs="+", choices=PARTS, default=[], metavar="NAME", help=", ".join(PARTS)
+        )
     options = parser.parse_args(arguments)
     if options.job == "write":
         recordings = options.recordings and options.recordings.resolve()
-        write(options.folder, options.only or tuple(PARTS), recordings, options.jobs)
+        write(options.folder, options.only or list(PARTS), recordings, options.jobs)
         return 0
-    differences = compare(options.before, options.after)
+    differences = compare(options.before, options.after, options.only)
     if options.no_pages:
         differences = [each for each in differences if each.group != "pages"]
     print(listed(differences) or "the same")

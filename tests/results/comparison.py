@@ -1,7 +1,7 @@
 """Compares what was kept of two states."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import groupby, takewhile, zip_longest
 from pathlib import Path
@@ -35,10 +35,11 @@ class Difference:
         return "\n".join(lines)
 
 
-def compare(before: Path, after: Path) -> list[Difference]:
-    """Compare two folders of results, or two files of refusals."""
-    differences = _folders if before.is_dir() and after.is_dir() else _refusals
-    return list(differences(before, after))
+def compare(before: Path, after: Path, only: Sequence[str] = ()) -> list[Difference]:
+    """Compare two folders of results, or some parts of them, or two files of refusals."""
+    if before.is_dir() and after.is_dir():
+        return list(_folders(before, after, only))
+    return list(_refusals(before, after))
 
 
 def listed(differences: list[Difference]) -> str:
@@ -51,21 +52,21 @@ def listed(differences: list[Difference]) -> str:
     return "\n".join(lines)
 
 
-def _folders(before: Path, after: Path) -> Iterator[Difference]:
-    """Compare files by their lines; what pages say is a group of its own, as its words may change.
+def _folders(before: Path, after: Path, only: Sequence[str]) -> Iterator[Difference]:
+    """Compare files by their lines; pages are a group of their own, as their words may change.
 
-    A part that only one of them has was not asked for in the other, and is one difference.
+    A part that one of the folders lacks is a difference by itself.
     """
-    parts, names = ({path.name for path in folder.iterdir()} for folder in (before, after))
-    for part in sorted(parts ^ names):
-        yield Difference("parts", f"{part}: {'only before' if part in parts else 'only after'}")
-    for part in sorted(parts & names):
+    parts, others = ({path.name for path in folder.iterdir()} for folder in (before, after))
+    for part in only or sorted(parts | others):
+        if part not in parts or part not in others:
+            yield Difference("parts", f"{part}: not kept {'after' if part in parts else 'before'}")
+            continue
         first, last = _files(before / part), _files(after / part)
         for name in sorted(first.keys() | last.keys()):
             group = "pages" if name.endswith(_PAGES) else part
             if name not in first or name not in last:
-                lost = "gone" if name in first else "new"
-                yield Difference(group, f"{part}/{name}: {lost}")
+                yield Difference(group, f"{part}/{name}: {'gone' if name in first else 'new'}")
             elif first[name].read_bytes() != last[name].read_bytes():
                 yield _first_line(group, f"{part}/{name}", first[name], last[name])
 

@@ -38,8 +38,11 @@ PLACES = (
         "<tmp>",
         "folders of a test are numbered, by the worker that it runs in",
     ),
-    Rule("*", r"/tmp/(?:tmp|workbench-)\w{8}", "<tmp>", "temporary folders are named by chance"),
-    Rule("*", r"0x[0-9a-f]{9,16}", "<address>", "objects lie anywhere in memory"),
+    Rule("*", r"/tmp/(?:[a-z]+-|tmp)\w{8}\b", "<tmp>", "temporary folders are named by chance"),
+    Rule("*", r"/fmus/[0-9a-f]{64}", "/fmus/<hash>", "kept by the text of the compiler's sources"),
+    Rule("*", r"\b[0-9a-f]{16}\b", "<hash>", "of the code that workers of a cluster have"),
+    Rule("*", r"tcp://[\d.]+:\d+", "tcp://<address>", "ports are given by the system"),
+    Rule("*", r"\S*\.\.\. \(\d+ characters\)", "<cut>", "longer folders leave less of a text"),
 )
 
 RESULTS = (
@@ -57,7 +60,7 @@ RESULTS = (
     ),
     Rule(
         "*.json*",
-        r'("(?:identity|rig|source_sha256)": )"[0-9a-f]{64}"',
+        r'("(?:identity|rig|code|source_sha256)": )"[0-9a-f]{64}"',
         r"\1<hash>",
         "of all that a search depends on, with the folder of its system, and of Python files",
     ),
