@@ -80,7 +80,7 @@ RESULTS = (
     ),
     Rule(
         "stderr",
-        r"<time> s  \d+ (?:simulations|runs of subset simulation.*)\n",
+        r"<time> s  \d+ (?:simulations|distributions|runs of|parts of).*\n",
         "",
         "every few seconds progress counts what is done by then",
     ),
