@@ -4,6 +4,7 @@
 
 Only what the process of the test makes counts, and only while its function runs: fixtures that
 tests share are made by whichever comes first. Workers of xdist hand theirs over with their reports.
+Of property tests none count: Hypothesis takes examples from constants in all code that is loaded.
 """
 
 import json
@@ -54,7 +55,9 @@ class _Watch:
         try:
             return (yield)
         finally:
-            item.user_properties.append((_PROPERTY, [_name(item), sorted(self._texts)]))
+            drawn = getattr(getattr(item, "obj", None), "is_hypothesis_test", False)
+            texts = [] if drawn else sorted(self._texts)
+            item.user_properties.append((_PROPERTY, [_name(item), texts]))
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         """Gather; tests of one name in several files count together, as files may be renamed."""

@@ -40,9 +40,14 @@ PLACES = (
     ),
     Rule("*", r"/tmp/(?:[a-z]+-|tmp)\w{8}\b", "<tmp>", "temporary folders are named by chance"),
     Rule("*", r"/fmus/[0-9a-f]{64}", "/fmus/<hash>", "kept by the text of the compiler's sources"),
-    Rule("*", r"\b[0-9a-f]{16}\b", "<hash>", "of the code that workers of a cluster have"),
+    Rule("*", r"(workbench|here) [0-9a-f]{16}\b", r"\1 <hash>", "code of workers of a cluster"),
     Rule("*", r"tcp://[\d.]+:\d+", "tcp://<address>", "ports are given by the system"),
-    Rule("*", r"\S*\.\.\. \(\d+ characters\)", "<cut>", "longer folders leave less of a text"),
+    Rule(
+        "*",
+        r"\S*\.\.\. \(\d+ characters\)|\S{100,}\.\.\.",
+        "<cut>",
+        "of a text that is cut a longer folder leaves less",
+    ),
 )
 
 RESULTS = (
