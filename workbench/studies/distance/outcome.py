@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from workbench.arrays import Vector
+from workbench.pages.figures import LIGHT, styled
 from workbench.studies.distance.forecast import stopping_of
 from workbench.studies.distance.plain import PlainSampling
 from workbench.studies.distance.rare_events import Tail, plain_runs
@@ -26,10 +27,12 @@ from workbench.system.system import System
 from workbench.system.units import si_factor
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 QUANTILES = (0.025, 0.05, 0.25, 0.5, 0.75, 0.95, 0.975)
 _BAND = 0.95
+MOST_NAMED = 60  # past stops that have names below the figure
 _SEEN = 0.1  # share of the range of past stops by which one may be beyond it, and is near
 
 
@@ -360,8 +363,6 @@ class Distance:
 
     def plot(self) -> "Figure":
         """Figure of the distribution, of past stops beside predictions, and of the safety level."""
-        from workbench.studies.distance.report import distance_figure
-
         return distance_figure(self)
 
     def _repr_html_(self) -> str:
@@ -388,3 +389,71 @@ def _told(safety: Safety) -> list[str]:
             f"   {level.variation:8.3f}    {level.plain_stops:.1e} stops, {level.plain_hours:.1e} h"
         )
     return lines
+
+
+def distance_figure(result: Distance) -> "Figure":
+    """Draw the distribution with its quantiles, past stops with their bands, the safety level."""
+    rows = 2 if result.safety is None else 3
+    with styled(9.0, 0.5 + 2.9 * rows) as sheet:
+        panels = sheet.subplots(rows)
+        _draw_distribution(panels[0], result)
+        _draw_past(panels[1], result.past)
+        if result.safety is not None:
+            _draw_levels(panels[2], result.safety)
+    return sheet
+
+
+def _draw_distribution(axes: "Axes", result: Distance) -> None:
+    distances = result.ahead.distances
+    axes.hist(distances, bins=60, density=True, color=LIGHT["raw"], alpha=0.5)
+    top = axes.get_ylim()[1]
+    for share in QUANTILES:
+        at = result.ahead.quantile(share)
+        axes.axvline(at, color=LIGHT["2"], linewidth=1.5 if share == 0.5 else 0.8)
+        axes.text(at, top, f" {100 * share:g} %", fontsize=7, rotation=90, va="top", ha="right")
+    axes.axvline(result.nominal, color=LIGHT["1"], linestyle="--", label="model as its sheet says")
+    axes.legend(fontsize=7, frameon=False)
+    axes.set(title=result.sentence, xlabel="distance [m]", ylabel="density [1/m]")
+    axes.title.set_fontsize(9)
+
+
+def _draw_past(axes: "Axes", past: tuple[PastStop, ...]) -> None:
+    """Each stop and its band, over the middle of what the others predict."""
+    middle = np.array([stop.forecast.quantile(0.5) for stop in past])
+    low, high = np.array([stop.forecast.band for stop in past]).T / middle
+    made = np.array([stop.recorded.distance for stop in past]) / middle
+    inside = np.array([not stop.recorded.outside for stop in past])
+    place = np.arange(len(past))
+    axes.vlines(place, low, high, color=LIGHT["2"], linewidth=4.0, alpha=0.35, label="95 %")
+    axes.plot(place[inside], made[inside], "o", color=LIGHT["measured"], markersize=4)
+    axes.plot(
+        *(place[~inside], made[~inside], "x"),
+        color=LIGHT["1"],
+        markersize=5,
+        label="beyond what the model claims",
+    )
+    axes.legend(fontsize=7, frameon=False)
+    axes.set(title="past stops, each over what the others predict", ylabel="distance, of predicted")
+    names = [stop.recorded.stop.name for stop in past] if len(past) <= MOST_NAMED else []
+    axes.set_xticks(place[: len(names)], names, rotation=90 if len(past) > 8 else 15, fontsize=6)
+
+
+def _draw_levels(axes: "Axes", safety: Safety) -> None:
+    decades = np.array([level.decade for level in safety.levels])
+    ratio, low, high = np.array([(level.ratio, level.low, level.high) for level in safety.levels]).T
+    axes.errorbar(
+        *(decades, ratio),
+        yerr=np.maximum(0.0, [ratio - low, high - ratio]),
+        color=LIGHT["2"],
+        marker="o",
+        markersize=4,
+        capsize=3,
+    )
+    axes.set(
+        title=f"deceleration over the nominal one, {safety.nominal:.3f} m/s2, that all but one "
+        "stop in so many reach",
+        xlabel="one stop in",
+        ylabel="ratio",
+    )
+    axes.title.set_fontsize(9)
+    axes.set_xticks(decades, [f"1e{k}" for k in decades])

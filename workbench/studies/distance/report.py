@@ -3,13 +3,13 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from workbench.pages.answer import Answer, Measure, with_answer
-from workbench.pages.figures import LIGHT, CaseFigure, Curve, Panel, save_figure, styled
+from workbench.pages.figures import CaseFigure, Curve, Panel, save_figure
 from workbench.pages.parts import (
     Definitions,
     Dot,
@@ -23,13 +23,8 @@ from workbench.pages.parts import (
 )
 from workbench.runtime.files import write_json, write_whole
 from workbench.studies.distance import Distance
-from workbench.studies.distance.outcome import QUANTILES, PastStop, Safety
+from workbench.studies.distance.outcome import PastStop, distance_figure
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-_MOST = 60  # past stops that have names below the figure
 _POINTS = 200  # of the drawn distribution
 _MADE, _AWAY = "2", "7"
 _LESS = "stop shorter"
@@ -85,74 +80,6 @@ def distance_answer(summary: Mapping[str, Any]) -> Answer:
         for stop in summary["stops"]
     }
     return Answer(summary["sentence"], headline, details)
-
-
-def distance_figure(result: Distance) -> "Figure":
-    """Draw the distribution with its quantiles, past stops with their bands, the safety level."""
-    rows = 2 if result.safety is None else 3
-    with styled(9.0, 0.5 + 2.9 * rows) as sheet:
-        panels = sheet.subplots(rows)
-        _draw_distribution(panels[0], result)
-        _draw_past(panels[1], result.past)
-        if result.safety is not None:
-            _draw_levels(panels[2], result.safety)
-    return sheet
-
-
-def _draw_distribution(axes: "Axes", result: Distance) -> None:
-    distances = result.ahead.distances
-    axes.hist(distances, bins=60, density=True, color=LIGHT["raw"], alpha=0.5)
-    top = axes.get_ylim()[1]
-    for share in QUANTILES:
-        at = result.ahead.quantile(share)
-        axes.axvline(at, color=LIGHT["2"], linewidth=1.5 if share == 0.5 else 0.8)
-        axes.text(at, top, f" {100 * share:g} %", fontsize=7, rotation=90, va="top", ha="right")
-    axes.axvline(result.nominal, color=LIGHT["1"], linestyle="--", label="model as its sheet says")
-    axes.legend(fontsize=7, frameon=False)
-    axes.set(title=result.sentence, xlabel="distance [m]", ylabel="density [1/m]")
-    axes.title.set_fontsize(9)
-
-
-def _draw_past(axes: "Axes", past: tuple[PastStop, ...]) -> None:
-    """Each stop and its band, over the middle of what the others predict."""
-    middle = np.array([stop.forecast.quantile(0.5) for stop in past])
-    low, high = np.array([stop.forecast.band for stop in past]).T / middle
-    made = np.array([stop.recorded.distance for stop in past]) / middle
-    inside = np.array([not stop.recorded.outside for stop in past])
-    place = np.arange(len(past))
-    axes.vlines(place, low, high, color=LIGHT["2"], linewidth=4.0, alpha=0.35, label="95 %")
-    axes.plot(place[inside], made[inside], "o", color=LIGHT["measured"], markersize=4)
-    axes.plot(
-        *(place[~inside], made[~inside], "x"),
-        color=LIGHT["1"],
-        markersize=5,
-        label="beyond what the model claims",
-    )
-    axes.legend(fontsize=7, frameon=False)
-    axes.set(title="past stops, each over what the others predict", ylabel="distance, of predicted")
-    names = [stop.recorded.stop.name for stop in past] if len(past) <= _MOST else []
-    axes.set_xticks(place[: len(names)], names, rotation=90 if len(past) > 8 else 15, fontsize=6)
-
-
-def _draw_levels(axes: "Axes", safety: Safety) -> None:
-    decades = np.array([level.decade for level in safety.levels])
-    ratio, low, high = np.array([(level.ratio, level.low, level.high) for level in safety.levels]).T
-    axes.errorbar(
-        *(decades, ratio),
-        yerr=np.maximum(0.0, [ratio - low, high - ratio]),
-        color=LIGHT["2"],
-        marker="o",
-        markersize=4,
-        capsize=3,
-    )
-    axes.set(
-        title=f"deceleration over the nominal one, {safety.nominal:.3f} m/s2, that all but one "
-        "stop in so many reach",
-        xlabel="one stop in",
-        ylabel="ratio",
-    )
-    axes.title.set_fontsize(9)
-    axes.set_xticks(decades, [f"1e{k}" for k in decades])
 
 
 def write_distance_page(result: Distance, summary: Mapping[str, Any], out: Path) -> Path:
