@@ -40,7 +40,18 @@ PLACES = (
     ),
     Rule("*", r"/tmp/(?:[a-z]+-|tmp)\w{8}\b", "<tmp>", "temporary folders are named by chance"),
     Rule("*", r"/fmus/[0-9a-f]{64}", "/fmus/<hash>", "kept by the text of the compiler's sources"),
-    Rule("*", r"(workbench|here) [0-9a-f]{16}\b", r"\1 <hash>", "code of workers of a cluster"),
+    Rule(
+        "*",
+        r"(workbench|here) (?:none|[0-9a-f]{16})\b",
+        r"\1 <hash>",
+        "of the code of a cluster's workers, which are listed by their ports",
+    ),
+    Rule(
+        "*",
+        r"(checkpoint\.json: .*)column \d+ \(char \d+\)",
+        r"\1<place>",
+        "durations before it have more digits or less",
+    ),
     Rule("*", r"tcp://[\d.]+:\d+", "tcp://<address>", "ports are given by the system"),
     Rule(
         "*",
