@@ -48,7 +48,7 @@ PLACES = (
     ),
     Rule(
         "*",
-        r"(checkpoint\.json: .*)column \d+ \(char \d+\)",
+        r"(<tmp>/checkpoint\.json: .*)column \d+ \(char \d+\)",
         r"\1<place>",
         "durations before it have more digits or less",
     ),
