@@ -275,3 +275,53 @@ def test_the_archive_holds_sources_and_no_paths_of_the_building_machine(minimal_
         folders = (tempfile.gettempdir(), str(Path.home()), "site-packages", "/home/", "/Users/")
         for name, folder in itertools.product(names, folders):
             assert folder.encode() not in archive.read(name), f"{folder} in {name}"
+
+
+TWO_OF_ONE_NAME = """
+  package Old
+    model Pump "the old pump"
+      output Real x(start=0, fixed=true);
+    equation
+      der(x) = -x;
+      annotation(experiment(StopTime=1, Tolerance=1e-2));
+    end Pump;
+  end Old;
+  package New
+    model Pump "the new pump"
+      output Real x(start=0, fixed=true);
+    equation
+      der(x) = -100*x;
+      annotation(experiment(StartTime=50, StopTime=500, Tolerance=1e-9));
+    end Pump;
+    model Plain
+      output Real x(start=0, fixed=true);
+    equation
+      der(x) = -x;
+    end Plain;
+  end New;
+"""
+
+
+def test_a_model_has_its_own_experiment_not_that_of_a_namesake(tmp_path: Path) -> None:
+    package = library(tmp_path, TWO_OF_ONE_NAME)
+    new, old, plain = (
+        flatten(package, f"Lib.{name}") for name in ("New.Pump", "Old.Pump", "New.Plain")
+    )
+    assert new.description == "the new pump"
+    assert new.experiment == {"StartTime": 50.0, "StopTime": 500.0, "Tolerance": 1e-9}
+    assert old.description == "the old pump"
+    assert old.experiment == {"StopTime": 1.0, "Tolerance": 1e-2}
+    assert plain.experiment == {}
+
+
+def test_a_panic_of_the_front_end_is_an_error_with_file_and_line(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """The front end panics where the derivative of an input is asked for."""
+    package = library(
+        tmp_path,
+        "  model M\n    input Real u; output Real y;\n  equation\n    y = der(u);\n  end M;\n",
+    )
+    with pytest.raises(InputError, match=r"package\.mo:5: der\(u\): .*continuous state"):
+        flatten(package, "Lib.M")
+    assert "panicked" not in capfd.readouterr().err

@@ -159,7 +159,7 @@ def test_a_vendor_annotation_is_numbers_texts_arrays_and_parts(tmp_path: Path) -
       __Workbench(a(size="b" + "c", step=-1.5e-3, on=true, values={0.1e6, 1}, in_={"x", "y"}),
         empty="a \\"b\\""), Documentation(info="<html>)</html>"));
   end A;
-  model B extends A annotation (__Workbench(a=1)); end B;
+  model B extends A; end B;
 end P;
 """,
     )
@@ -187,6 +187,14 @@ end P;
         ("package P\nend P;\npackage Q\nend Q;", 3, "one class in a file"),
         ("within Q;\npackage P\nend P;", 1, "no 'within'"),
         ("package P\n  model A end A;\n  model A end A;\nend P;", 3, "a second class P.A"),
+        *(
+            (
+                f"package P\n  model A\n    {part} annotation (__Workbench(a=1));\n  end A;\nend P;",
+                3,
+                "found 'annotation'; expected ';' before",
+            )
+            for part in ("extends B", "Real x", "equation x = 1.0", "import P.Q")
+        ),
         ("package P\n annotation (__Workbench(a=b));\nend P;", 2, "found 'b'; expected a number"),
         ("package P\n annotation (__Workbench(a=1/3));\nend P;", 2, "found '/'"),
         ("package P\n annotation (__Workbench(a=1, a=2));\nend P;", 2, "expected one 'a'"),

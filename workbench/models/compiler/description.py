@@ -73,7 +73,7 @@ def describe(
     ET.SubElement(
         root,
         "DefaultExperiment",
-        startTime="0",
+        startTime=f"{model.experiment.get('StartTime', 0.0):g}",
         stopTime=repr(model.experiment.get("StopTime", 1.0)),
         tolerance=repr(model.experiment.get("Tolerance", 1e-6)),
     )

@@ -7,7 +7,10 @@ here, with file and line.
 
 import contextlib
 import io
+import os
 import re
+import sys
+import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,7 +23,8 @@ import rumoca
 from workbench.errors import InputError
 from workbench.models.compiler.dropped import refuse_dropped
 from workbench.models.compiler.expressions import BINARY, Arena, Value, each, lift
-from workbench.models.modelica import check, packages, read_library
+from workbench.models.modelica import check, files, packages, read_library
+from workbench.models.modelica.classes import Class
 
 SCHEMA = 43
 
@@ -98,13 +102,23 @@ def flatten(package: Path, model: str) -> FlatModel:
     refuse_dropped(library, check(library, model))
     used = [str(one.parent) for one in packages(package)[1:]]
     try:
-        dae = rumoca.Session(roots=used).load(str(package), model=model).to_dict("dae")
+        with _quiet_panic():
+            dae = rumoca.Session(roots=used).load(str(package), model=model).to_dict("dae")
     except rumoca.RumocaError as error:
         raise InputError(
             where=f"{package.parent}, model {model}",
             found=_diagnostics(package, model, str(error)),
             expected="a balanced Modelica model without errors",
             remedy="correct the source and build again",
+        ) from None
+    except BaseException as panic:  # a panic of the front end is no Exception
+        if type(panic).__name__ != "PanicException":
+            raise
+        raise InputError(
+            where=f"{package.parent}, model {model}",
+            found=_panic(package, str(panic)),
+            expected="Modelica that the front end treats",
+            remedy="write what stands there in another way, and build again",
         ) from None
     if dae["schema_version"] != SCHEMA:
         raise InputError(
@@ -113,7 +127,46 @@ def flatten(package: Path, model: str) -> FlatModel:
             expected=f"schema {SCHEMA}",
             remedy="install the rumoca release that the extra [compiler] pins",
         )
-    return _Reader(dae, model).flat_model()
+    return _Reader(dae, library.find(model), model).flat_model()
+
+
+@contextlib.contextmanager
+def _quiet_panic() -> Iterator[None]:
+    """Keep the report that a panic writes to the process's standard error from the user's."""
+    sys.stderr.flush()
+    shown = os.dup(2)
+    with tempfile.TemporaryFile() as report:
+        os.dup2(report.fileno(), 2)
+        try:
+            yield
+        finally:
+            os.dup2(shown, 2)
+            os.close(shown)
+
+
+def _panic(package: Path, text: str) -> str:
+    """What a panic of the front end says, with file and line where its span tells them.
+
+    >>> _panic(Path("package.mo"), 'Unsupported { detail: "der(...) of an input" }')
+    'der(...) of an input'
+    """
+    detail = re.search(r'detail: "((?:[^"\\]|\\.)*)"', text)
+    message = detail.group(1) if detail else text.splitlines()[0]
+    span = re.search(r"start: BytePos\((\d+)\), end: BytePos\((\d+)\)", text)
+    if span is None or not message.startswith("der("):
+        return message
+    # The span names no file: of those of the library it is in the one that has a der() there.
+    start, end = int(span.group(1)), int(span.group(2))
+    texts = {path: path.read_bytes() for path in files(package) if path.suffix == ".mo"}
+    places = [
+        (path, content[:start].count(b"\n") + 1, content[start:end].decode())
+        for path, content in texts.items()
+        if content[start:end].startswith(b"der(")
+    ]
+    if len(places) != 1:
+        return message
+    path, line, derivative = places[0]
+    return f"{path}:{line}: {derivative}: {message}"
 
 
 def _diagnostics(package: Path, model: str, fallback: str) -> str:
@@ -137,7 +190,8 @@ def _diagnostics(package: Path, model: str, fallback: str) -> str:
 class _Reader:
     """Reads variables and equations around the arena of expressions."""
 
-    def __init__(self, dae: Mapping[str, Any], model: str) -> None:
+    def __init__(self, dae: Mapping[str, Any], source: Class, model: str) -> None:
+        self.source = source
         self.model = model
         self.storage = dae["storage"]
         self.arena = Arena(dae, model)
@@ -184,7 +238,7 @@ class _Reader:
         substitute = _substitution(bound)
         return FlatModel(
             name=self.model,
-            description=self._model_description(),
+            description=self.source.description or self.model,
             experiment=self._experiment(),
             time=self.arena.time,
             states=groups["state"],
@@ -350,24 +404,17 @@ class _Reader:
         literal = self.arena.nodes[number].get("literal", {})
         return str(literal.get("string", "assertion failed"))
 
-    def _source_text(self) -> str:
-        """Text of the model's own class, from its opening to its end (the flat DAE drops it)."""
-        short = self.model.rsplit(".", 1)[-1]
-        pattern = rf"\bmodel {short}\b.*?\bend {short}\s*;"
-        own = [t for p, t in self.arena.sources.values() if Path(p).stem == short]
-        for text in [*own, *(t for _, t in self.arena.sources.values())]:
-            if found := re.search(pattern, text, re.DOTALL):
-                return found[0]
-        return ""
-
-    def _model_description(self) -> str:
-        found = re.match(r'model \w+\s+"((?:[^"\\]|\\.)*)"', self._source_text())
-        return found[1] if found else self.model
-
     def _experiment(self) -> dict[str, float]:
-        """StopTime and Tolerance of the experiment annotation, where given."""
-        found = re.search(r"\bexperiment\s*\(([^)]*)\)", self._source_text())
-        pairs = re.findall(r"(\w+)\s*=\s*([-+.\deE]+)", found[1]) if found else []
+        """Read the experiment annotation of the model's own class, which the flat DAE drops.
+
+        It ends with its class: a class of the same short name elsewhere in the file is another.
+        """
+        file, _, line = self.source.where.rpartition(":")
+        short = self.source.name.rpartition(".")[2]
+        lines = Path(file).read_text(encoding="utf-8").splitlines()[int(line) - 1 :]
+        own = re.split(rf"\bend\s+{short}\s*;", "\n".join(lines), maxsplit=1)[0]
+        experiment = re.search(r"\bexperiment\s*\(([^)]*)\)", own)
+        pairs = re.findall(r"(\w+)\s*=\s*([-+.\deE]+)", experiment[1]) if experiment else []
         return {name: float(value) for name, value in pairs}
 
 

@@ -153,6 +153,8 @@ class Reader(Cursor):
                 raise self.refusal("';'")
             if self.took("connect"):
                 body.connections.append(self._connection(where))
+            elif self.sees("annotation"):
+                self._inner_annotation()
             else:
                 self.step()
         self.expect(";")
@@ -177,10 +179,10 @@ class Reader(Cursor):
     def _element(self, name: str, body: _Body, access: frozenset[str]) -> None:
         if self.took("import"):
             body.imports += self._import()
-            self._comment()
+            self._inner_comment()
         elif self.took("extends"):
             body.extends.append(self._extends())
-            self._comment()
+            self._inner_comment()
         else:
             prefixes = self.words(PREFIXES) | access
             if self.token.text in KINDS | CLASS_PREFIXES:
@@ -230,7 +232,7 @@ class Reader(Cursor):
         modifier = self._modification(where)
         if self.took("if"):
             self._expression()
-        description, _ = self._comment()
+        description = self._inner_comment()
         nothing = Modifier()
         return Component(
             name, self._owner, declared, prefixes, modifier, "", nothing, description, where
@@ -242,7 +244,7 @@ class Reader(Cursor):
             return "", Modifier(), ""
         where, name = self.where, self.name()
         modifier = Modifier(inner=self._modifiers(), where=where)
-        return name, modifier, self._comment()[0]
+        return name, modifier, self._inner_comment()
 
     # --- modifiers and values ---
 
@@ -283,7 +285,7 @@ class Reader(Cursor):
             where, name = self.where, self.identifier()
             self.expect("=")
             (base,) = self._alias() or [Extends("", Modifier(), where)]
-            description, _ = self._comment()
+            description = self._inner_comment()
             nothing = Modifier()
             one = Component(
                 *(name, self._owner, base.name, prefixes | kind, base.modifier),
@@ -319,6 +321,22 @@ class Reader(Cursor):
     def _comment(self) -> tuple[str, Mapping[str, Any]]:
         description = self.string()
         return description, self._annotation() if self.sees("annotation") else {}
+
+    def _inner_comment(self) -> str:
+        """Read the comment of what is inside a class; returns its description."""
+        description = self.string()
+        if self.sees("annotation"):
+            self._inner_annotation()
+        return description
+
+    def _inner_annotation(self) -> None:
+        """Pass over an annotation inside a class.
+
+        One of the workbench is the class's: the ';' before it is missing, which would drop it.
+        """
+        misplaced = self.refusal("';' before the annotation of the class")
+        if self._annotation():
+            raise misplaced
 
     def _annotation(self) -> Mapping[str, Any]:
         """Content of the workbench's annotation; others are passed over."""
