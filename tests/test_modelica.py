@@ -189,7 +189,8 @@ end P;
         ("package P\n  model A end A;\n  model A end A;\nend P;", 3, "a second class P.A"),
         *(
             (
-                f"package P\n  model A\n    {part} annotation (__Workbench(a=1));\n  end A;\nend P;",
+                f"package P\n  model A\n    {part} annotation (__Workbench(a=1));\n  end A;\n"
+                "end P;",
                 3,
                 "found 'annotation'; expected ';' before",
             )

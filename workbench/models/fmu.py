@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from workbench.arrays import Matrix, Vector
 from workbench.errors import FMUError, InputError, unknown_name
+from workbench.models import fmu_cache
 from workbench.models.archive import unpack
 from workbench.models.description import (
     CO_SIMULATION,
@@ -431,6 +432,12 @@ class FMU:
         self._loaded = FMUInstance(self.description, self.interface)
         self._variants: list[FMU] = []
 
+    @property
+    def place(self) -> str:
+        """Where a refusal says it is: its file, or its model where it was built to be kept."""
+        kept = self.path.is_relative_to(fmu_cache.folder())
+        return f"model {self.name}" if kept else str(self.path)
+
     def __enter__(self) -> Self:
         return self
 
@@ -473,7 +480,7 @@ class FMU:
                 raise unknown_name(
                     name,
                     self._references,
-                    where=str(self.path),
+                    where=self.place,
                     found=f"no variable '{name}'",
                     expected=f"one of {', '.join(self.inputs + self.outputs)}",
                     remedy=f"use an FMU that has it, or map its name: --map {name}=NAME",
@@ -481,7 +488,7 @@ class FMU:
             if name not in self._real_names:
                 variable = next(v for v in self.description.variables if v.name == name)
                 raise InputError(
-                    where=f"{self.path}, variable '{variable.name}'",
+                    where=f"{self.place}, variable '{variable.name}'",
                     found=f"a variable of type {variable.type}"
                     + (", an array" if variable.array else ""),
                     expected="a scalar of type Real (FMI 2.0) or Float64 (FMI 3.0)",

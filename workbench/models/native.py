@@ -144,7 +144,7 @@ def _refuse_discrete(fmu: FMU, names: Sequence[str]) -> None:
     for name in names:
         if variability.get(name) == "discrete":
             raise InputError(
-                where=f"{fmu.path}, variable '{fmu.names.get(name, name)}'",
+                where=f"{fmu.place}, variable '{fmu.names.get(name, name)}'",
                 found="a discrete input, which may change at events only",
                 expected="a continuous input, since estimators do not stop at events",
                 remedy="export the model with a continuous input in its place",

@@ -100,7 +100,7 @@ def _column(fmu: FMU, name: str, shown: Mapping[str, int]) -> int:
 def _state_index(fmu: FMU, name: str) -> int:
     if name not in fmu.states:
         raise InputError(
-            where=f"{fmu.path}, variable '{fmu.names.get(name, name)}'",
+            where=f"{fmu.place}, variable '{fmu.names.get(name, name)}'",
             found="a variable that is no state",
             expected=f"a continuous state for {name}, because estimators set it",
             remedy=f"choose it as state in the model, or map another: --map {name}=NAME",

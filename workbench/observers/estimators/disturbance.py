@@ -324,7 +324,7 @@ class DisturbanceObserver(Estimator):
             covariance = solve_continuous_are(A.T, C.T, np.eye(s + q), np.eye(len(C)))
         except LinAlgError:
             raise InputError(
-                where=f"{fmu.path}, {cls.name}",
+                where=f"{fmu.place}, {cls.name}",
                 found="a state or quantity that the outputs do not show at the design point",
                 expected="a model whose outputs show all that is estimated",
                 remedy="choose another [points.design], or run 'workbench observability'",

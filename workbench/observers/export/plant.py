@@ -33,7 +33,7 @@ def plant_of(estimator: Estimator) -> StateSpace:
     missing = [one.name for one in (*space.parameters, *space.inputs) if one.name not in known]
     if states != ours or missing:
         raise InputError(
-            where=str(fmu.path),
+            where=fmu.place,
             found=f"no {missing[0]}" if missing else f"states {', '.join(ours)}",
             expected=f"what {name} has, {', '.join(missing or states)}",
             remedy="build the FMU from the library of the system",

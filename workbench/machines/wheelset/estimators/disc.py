@@ -140,7 +140,7 @@ class DiscObserver(DisturbanceObserver):
         super().__init__(fmu, system, gains)
         if "JW" not in fmu.defaults:
             raise InputError(
-                where=f"{fmu.path}, {self.name}",
+                where=f"{fmu.place}, {self.name}",
                 found="no parameter 'JW' with a value",
                 expected="the inertia of the wheelset, which tells the heat of the discs",
                 remedy="add JW to the model, or leave this estimator out",

@@ -77,7 +77,7 @@ class DirectInversion(Estimator):
         super().__init__(fmu, system, gains)
         if missing := [name for name in ("JR", "rR") if name not in fmu.defaults]:
             raise InputError(
-                where=f"{fmu.path}, {self.name}",
+                where=f"{fmu.place}, {self.name}",
                 found=f"no parameter '{missing[0]}' with a value",
                 expected="inertia and radius of the roller",
                 remedy="add it to the model, or leave this estimator out",
