@@ -112,6 +112,7 @@ def anything_goes(system: System) -> System:
         conditions=tuple(replace(condition, agrees=None) for condition in system.conditions),
         redundancies=(),
         sampling=Sampling(np.inf, (np.inf, np.inf)),
+        sample_time=np.inf,
     )
 
 

@@ -63,7 +63,7 @@ def test_a_script_needs_no_guard_from_file_to_diagnosis(root: Path, folder: Path
         check=False,
     )
     assert run.returncode == 0, run.stderr
-    assert run.stdout.count("[  1/1] z ") == 1
+    assert run.stdout.count("[1/2] z ") == 1
     said = "The model lacks a wall that seeps in proportion to the level: Seepage, k 0.0004"
     assert run.stdout.count(said) == 1
     assert "no law: the diagnosis: found the verdict 'found'" in run.stdout

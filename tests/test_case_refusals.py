@@ -194,11 +194,11 @@ def test_a_wrong_entry_of_the_conditions_is_refused(tmp_path, old, new, match):
 @pytest.mark.parametrize(
     ("columns", "match"),
     [
-        ('pb = "p"', r"columns: found unknown key 'pb' \(closest: 'pB'\)"),
-        ("pB = 2", "columns pB: found 2; expected a text"),
+        ('pb = "p"', r"columns\]: found unknown key 'pb' \(closest: 'pB'\)"),
+        ("pB = 2", r"columns\] pB: found 2; expected a text"),
         ('pB = "p_cyl"', "column 'p_cyl': found no such column among time, pB, "),
         ('Fx = "force"', "column 'force': found no such column"),
-        ('omegaR = "omegaW"', "columns omegaR: found column 'omegaW', .* already omegaW"),
+        ('omegaR = "omegaW"', r"columns\] omegaR: found column 'omegaW', .* already omegaW"),
     ],
 )
 def test_a_wrong_name_of_a_column_is_refused(tmp_path, columns, match):

@@ -369,7 +369,7 @@ def test_the_command_writes_what_it_says(
     assert main([*words, "--out", str(tmp_path / "out")]) == 0
     said = capsys.readouterr()
     assert usual.sentences[0] in said.out
-    assert "[ 16/16]" in said.err
+    assert "[16/16]" in said.err
     alarms = pd.read_csv(tmp_path / "out" / "alarms.csv")
     assert set(alarms["quantity"]) == {"muDC[3] against the others"}
     estimates = pd.read_csv(tmp_path / "out" / "estimates.csv")

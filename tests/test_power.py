@@ -378,7 +378,7 @@ def test_killed_run_leaves_no_process_and_goes_on_where_it_was(tmp_path: Path) -
     results, interrupted = run(tmp_path, lines.append)
     assert not interrupted
     assert len(lines) == 2
-    assert lines[0].startswith("[   1/2] fx_gain=0.016")
+    assert lines[0].startswith("[1/2] fx_gain=0.016")
     assert [result.verdict for result in results] == ["nothing", "found", "nothing"]
     assert named_right(results[1])
     assert summarise(results, REPERTOIRE)["false_alarms"]["hits"] == 0

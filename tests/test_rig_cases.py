@@ -68,8 +68,6 @@ def test_nothing_but_accuracy_reads_the_truth_of_the_rig() -> None:
         if re.search(r"truth\.(csv|json)", path.read_text())
     }
     files = {"rig/files.py", "commands/rig.py", "truth.py", "commands/accuracy.py"}
-    files |= {"commands/options/rig.py", "commands/options/accuracy.py"}  # their help names it
-    made = {"commands/planted.py"}  # which writes one of another machine
     # Recorded sets that say what is wrong in them are scored, with what was found.
-    scored = {"published/train/recorded.py", "commands/options/power.py"}
-    assert readers <= {f"wheelset/{name}" for name in files} | scored | made
+    scored = {"machines/train/recorded.py", "cli/power.py"}
+    assert readers <= {f"machines/wheelset/{name}" for name in files} | scored

@@ -123,7 +123,7 @@ def test_a_cluster_finds_the_same_gains(
 LATE = """
 import pickle, time
 from types import SimpleNamespace
-from workbench.tuning import cluster
+from workbench.runtime import cluster
 
 
 def refuse(given):

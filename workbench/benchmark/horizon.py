@@ -139,7 +139,7 @@ def _solve(window: Window, fmu: FMU, system: System) -> tuple[list[float], float
     root = np.linalg.cholesky(np.linalg.inv(spread))
     terms = [root.T @ (nodes[:, 0] - window.mean)]
     for k in range(N):
-        end, seen = step(nodes[:, k], window.inputs[k], window.steps[k])
+        end, seen = step(nodes[:, k], window.inputs[k, : len(system.inputs)], window.steps[k])
         terms.append((window.samples[k] - seen) / np.sqrt(window.levels[k]))
         if k + 1 < N:
             noise = np.sqrt(window.noise[k + 1] * window.wider[k + 1])

@@ -308,7 +308,7 @@ class EstimatedQuantity:
         of=SHOWN,
     )
     claimed: Mapping[str, str] = key(
-        'conditions in which it may be claimed, `{ surface = "dry" }`; elsewhere it stands in for '
+        'conditions in which it may be claimed, `{ phase = "charge" }`; elsewhere it stands in for '
         "something that the model has not",
         absent={},
         otherwise="always",
@@ -421,8 +421,7 @@ class Store:
     """What a flow in and a flow out differ by is stored."""
 
     formula: Expression = key(
-        "of a balance: what the difference of both is stored in [`unit` times s], such as "
-        '`"JR*omegaR"`',
+        'of a balance: what the difference of both is stored in [`unit` times s], such as `"J*w"`',
         name="stores",
         of=FORMULA,
     )
@@ -435,9 +434,9 @@ class Redundancy:
 
     reason: str = key("why they agree, for people")
     formula: Expression = key(
-        'formula of measured signals, such as `"rW*omegaW"`', name="is", of=FORMULA
+        'formula of measured signals, such as `"r1*w1"`', name="is", of=FORMULA
     )
-    other: Expression = key('what it equals, such as `"rR*omegaR"`', name="equals", of=FORMULA)
+    other: Expression = key('what it equals, such as `"r2*w2"`', name="equals", of=FORMULA)
     unit: Unit = key("of both")
     tolerance: Tolerance = key(inline=True)
     store: Store | None = key(inline=True, absent=None)
@@ -643,7 +642,7 @@ class Condition:
         of=PARAMETER,
     )
     parameters: Mapping[str, Mapping[str, float]] = key(
-        "of the model, that a choice means: `wet = { mu = 0.28 }`, SI; `imm` has a filter for each",
+        "of the model, that a choice means: `hot = { k = 0.28 }`, SI; `imm` has a filter for each",
         absent={},
         keys=PARAMETER,
     )

@@ -51,11 +51,11 @@ _HOUR = 3600
 ORDERS = {"ymd": "year, month, day", "dmy": "day, month, year", "mdy": "month, day, year"}
 # Hours that zones are ahead of UTC, by the letters that recorders write.
 _AHEAD = {
-    **{"": 0, "z": 0, "utc": 0, "gmt": 0, "wet": 0, "west": 1, "bst": 1, "cet": 1, "mez": 1},
-    **{"cest": 2, "mesz": 2, "eet": 2, "eest": 3, "msk": 3, "jst": 9, "kst": 9, "awst": 8},
-    **{"aest": 10, "aedt": 11, "acst": 9.5, "acdt": 10.5, "nzst": 12, "nzdt": 13, "hst": -10},
-    **{"est": -5, "edt": -4, "cst": -6, "cdt": -5, "mst": -7, "mdt": -6, "pst": -8, "pdt": -7},
-    **{"akst": -9, "akdt": -8},
+    **{"": 0, "Z": 0, "UTC": 0, "GMT": 0, "WET": 0, "WEST": 1, "BST": 1, "CET": 1, "MEZ": 1},
+    **{"CEST": 2, "MESZ": 2, "EET": 2, "EEST": 3, "MSK": 3, "JST": 9, "KST": 9, "AWST": 8},
+    **{"AEST": 10, "AEDT": 11, "ACST": 9.5, "ACDT": 10.5, "NZST": 12, "NZDT": 13, "HST": -10},
+    **{"EST": -5, "EDT": -4, "CST": -6, "CDT": -5, "MST": -7, "MDT": -6, "PST": -8, "PDT": -7},
+    **{"AKST": -9, "AKDT": -8},
 }
 # Zones that change their clocks at local times of their own; others change as one of these.
 _CHANGING = (
@@ -77,7 +77,7 @@ def _match(text: str) -> re.Match[str] | None:
 
 
 def _zone_known(zone: str | None) -> bool:
-    if not zone or zone[-1].isdigit() or zone.casefold() in _AHEAD:
+    if not zone or zone[-1].isdigit() or zone.upper() in _AHEAD:
         return True
     return "/" in zone and _zone(zone) is not None
 
@@ -438,7 +438,7 @@ def _offset(match: re.Match[str] | None) -> float:
     if not zone or "/" in zone:
         return 0.0
     if not zone[-1].isdigit():
-        return _AHEAD[zone.casefold()] * _HOUR if zone.casefold() in _AHEAD else math.nan
+        return _AHEAD[zone.upper()] * _HOUR if zone.upper() in _AHEAD else math.nan
     sign, digits = re.sub(r"^(UTC|GMT)", "", zone, flags=re.IGNORECASE)[0], re.sub(r"\D", "", zone)
     hours, minutes = (digits[:-2], digits[-2:]) if len(digits) > 2 else (digits, "0")
     return int(f"{sign}1") * (int(hours) * _HOUR + int(minutes) * 60.0)
