@@ -435,7 +435,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 from workbench.recordings.case import read_case
 from workbench.observers import choose
-from workbench.observers.report import LiveWindow
+from workbench.observers.live import LiveWindow
 from workbench.observers.simulation import prepare
 from workbench.system.registry import load_system
 
