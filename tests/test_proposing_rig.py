@@ -6,6 +6,7 @@ import pytest
 
 import workbench as wb
 from workbench.diagnosis import choose, read_effects
+from workbench.diagnosis.problem import Problem
 from workbench.machines.wheelset.rig import CONSTANT_PADS, SCENARIOS, plant
 from workbench.models.modelica import read_library
 from workbench.recordings.case import Case, read_case
@@ -54,7 +55,8 @@ def test_pads_that_bed_in_are_told_by_the_time_since_they_touch(
     effects = read_effects(library, system.models[OBSERVER].name)
     (bedding,) = choose(["BeddingIn"], effects)
     fresh = stops(system, 2, tmp_path / "fresh")
-    error = function_error(system, library, fresh, known, found, bedding)
+    problem = Problem(system, fresh, library, effects)
+    error = function_error(problem, known, found, bedding)
     if form.law.place.slot.name == "padFriction":
         assert error is not None
         assert error < 0.15
