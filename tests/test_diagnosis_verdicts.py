@@ -53,7 +53,7 @@ def test_an_interrupted_search_keeps_what_it_found(root: Path, stops: Path, tmp_
     assert Path(summary["model"]["fmu"]).is_file()
     page = lxml.html.fromstring((tmp_path / "index.html").read_bytes())
     assert "interrupted" in text(page.find_class("warning")[0])
-    assert "more may be missing" in text(page.get_element_by_id("verdict"))
+    assert "more may be missing" in text(page.get_element_by_id("answer"))
 
 
 def test_without_force_the_verdict_says_what_that_costs(forceless: Any) -> None:
