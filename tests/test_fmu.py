@@ -1,6 +1,8 @@
 """The extended-FMI pattern on the built FMU, against independent evaluations."""
 
 import itertools
+import re
+import shutil
 from pathlib import Path
 
 import fmpy
@@ -12,6 +14,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import solve_ivp
 
 from workbench.errors import FMUError, InputError
+from workbench.models import fmu_cache
 from workbench.models.fmu import FMU, CoSimulation
 from workbench.models.native import (
     OK,
@@ -238,3 +241,14 @@ def test_a_file_that_is_no_fmu_is_refused(tmp_path: Path) -> None:
         FMU(wrong)
     with pytest.raises(InputError, match="no such file"):
         FMU(tmp_path / "absent.fmu")
+
+
+def test_a_refusal_names_the_model_of_an_fmu_that_is_kept_not_its_file(
+    minimal_path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    kept = Path(shutil.copy(minimal_path, tmp_path / "0123.fmu"))
+    with FMU(kept) as fmu, pytest.raises(InputError, match=re.escape(str(kept))):
+        fmu.variables(["nothing"])
+    monkeypatch.setattr(fmu_cache, "folder", lambda: tmp_path)
+    with FMU(kept) as fmu, pytest.raises(InputError, match=f"^model {fmu.name}: found no"):
+        fmu.variables(["nothing"])

@@ -27,7 +27,7 @@ _CODE = (".py", ".c", ".h")
 _TOOLS = ("wheelset-workbench", "rumoca", "casadi", "ziglang", "fmpy")
 _MOST_KNOWN = 4096  # empty files; a diagnosis builds some, a user has some
 # Files, of 0.1 MB: more than a run of all tests asks for, which is some hundreds. As the least used
-# are dropped, of a round that is longer than the shelf nothing would ever be found again.
+# are dropped, of a round that is longer than the cache nothing would ever be found again.
 _MOST = 1024
 
 
