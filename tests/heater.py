@@ -11,8 +11,9 @@ from workbench.diagnosis.problem import Problem
 from workbench.models.modelica import read_library
 from workbench.recordings.case import Case
 from workbench.runtime.engine import Engine
-from workbench.system.registry import load_system
 from workbench.system.system import System
+
+from .built import declare
 
 LIBRARY = """within ;
 package Heater "A heated block in a casing"
@@ -95,12 +96,8 @@ NOISE = 0.05  # [K]
 
 def system(folder: Path, sensor: str = "", effect: str = "") -> System:
     """The heater, with more keys of its sensor, or with one more effect in Modelica."""
-    folder.mkdir()
-    (folder / "package.mo").write_text(
-        LIBRARY.replace("  model Draught", effect + "  model Draught")
-    )
-    (folder / "system.toml").write_text(SYSTEM.format(sensor=sensor))
-    return load_system(folder)
+    library = LIBRARY.replace("  model Draught", effect + "  model Draught")
+    return declare(folder, library, SYSTEM.format(sensor=sensor))
 
 
 def cases(of: System, frames: Sequence[pd.DataFrame]) -> list[Case]:

@@ -26,7 +26,7 @@ from workbench.system.system import System
 pytest.importorskip("casadi")
 pytest.importorskip("rumoca")
 
-from .built import build_here
+from .built import declare
 
 STILL = """
 package Still
@@ -69,11 +69,7 @@ TRAIN = load_system("train")
 
 @pytest.fixture(scope="module")
 def still(tmp_path_factory: pytest.TempPathFactory) -> System:
-    folder = tmp_path_factory.mktemp("still")
-    (folder / "package.mo").write_text(STILL)
-    build_here(folder / "package.mo", "Still.Level", folder / "Level.fmu")
-    (folder / "system.toml").write_text(STILL_SYSTEM)
-    return load_system(folder)
+    return declare(tmp_path_factory.mktemp("still"), STILL, STILL_SYSTEM, Level="Still.Level")
 
 
 @pytest.fixture(scope="module")

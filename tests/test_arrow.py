@@ -27,7 +27,7 @@ pytest.importorskip("casadi")
 pytest.importorskip("rumoca")
 
 from . import growth
-from .built import build_here
+from .built import declare
 
 COUNT = 5
 LIBRARY = """
@@ -106,9 +106,6 @@ def library() -> str:
 
 @pytest.fixture(scope="module")
 def vessels(tmp_path_factory: pytest.TempPathFactory) -> System:
-    folder = tmp_path_factory.mktemp("vessels")
-    (folder / "package.mo").write_text(library())
-    build_here(folder / "package.mo", "Water.Vessels", folder / "Vessels.fmu")
     outputs = "\n".join(
         f'[outputs.reading{i}]\nunit = "V"\nnoise = "0.02 V"\nscale = "2 V"\n' for i in EVERY
     )
@@ -117,8 +114,8 @@ def vessels(tmp_path_factory: pytest.TempPathFactory) -> System:
         'range = ["-1e-2 m3/s", "1e-2 m3/s"]\nwalk = "3e-6 m3/s"\nspread = "5e-5 m3/s"\n'
         for i in EVERY
     )
-    (folder / "system.toml").write_text(SYSTEM.format(outputs=outputs, estimated=estimated))
-    return load_system(folder)
+    system = SYSTEM.format(outputs=outputs, estimated=estimated)
+    return declare(tmp_path_factory.mktemp("vessels"), library(), system, Vessels="Water.Vessels")
 
 
 @pytest.fixture(scope="module")

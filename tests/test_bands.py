@@ -8,9 +8,9 @@ from workbench import case_from_frame
 from workbench.observers import choose
 from workbench.observers.report import format_table, summarise_runs
 from workbench.observers.simulation import CaseResult, prepare
-from workbench.system.registry import load_system
 from workbench.system.system import System
 
+from .built import declare
 from .test_held_inputs import SYSTEM, VESSEL
 
 pytest.importorskip("rumoca", reason="needs the extra [compiler]")
@@ -22,9 +22,7 @@ NAMES = ["open_loop", "ekf", "mhe"]
 @pytest.fixture(scope="module")
 def vessel(tmp_path_factory: pytest.TempPathFactory) -> System:
     folder = tmp_path_factory.mktemp("vessel")
-    (folder / "package.mo").write_text(VESSEL)
-    (folder / "system.toml").write_text(SYSTEM)
-    return load_system(folder)
+    return declare(folder, VESSEL, SYSTEM)
 
 
 def result_of(system: System, noise: float, seed: int) -> CaseResult:

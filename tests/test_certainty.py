@@ -26,7 +26,8 @@ from workbench.diagnosis.inference.search import FittedModel
 from workbench.diagnosis.inference.selection import anew
 from workbench.diagnosis.simulation.residual_model import ResidualModel
 from workbench.models.modelica import read_library
-from workbench.system.registry import load_system
+
+from .built import declare
 
 LIBRARY = """within ;
 package Gauge "A gauge: reading by what is measured"
@@ -104,9 +105,7 @@ SCALE, BEND, TEETH, NOISE = 2.1, 0.3, 3.0, 0.1
 def fits(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Fit]]:
     """Two pulls of a gauge with each of the effects."""
     folder = tmp_path_factory.mktemp("gauge")
-    (folder / "package.mo").write_text(LIBRARY)
-    (folder / "system.toml").write_text(SYSTEM)
-    system, rng = load_system(folder), np.random.default_rng(1)
+    system, rng = declare(folder, LIBRARY, SYSTEM), np.random.default_rng(1)
     library = read_library(system.library)
     effects = read_effects(library, "Observer")
     path = folder / "AllEffects.fmu"

@@ -25,13 +25,13 @@ from workbench.observers.replay import replay
 from workbench.observers.run import Ending, Run
 from workbench.observers.score import score
 from workbench.recordings.case import Case, read_case
-from workbench.system.registry import load_system, open_model
+from workbench.system.registry import open_model
 from workbench.system.system import System
 
 pytest.importorskip("casadi")
 pytest.importorskip("rumoca")
 
-from .built import build_here
+from .built import declare
 
 LIBRARY = """
 package Water
@@ -124,9 +124,6 @@ def simulated(seed: int) -> pd.DataFrame:
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """All that a user writes: library, system file and recordings; and the compiled model."""
     folder = tmp_path_factory.mktemp("tanks")
-    (folder / "package.mo").write_text(LIBRARY)
-    build_here(folder / "package.mo", "Water.Tanks", folder / "Tanks.fmu")
-    (folder / "system.toml").write_text(SYSTEM)
     for seed, name in enumerate(("01_first", "02_second")):
         (folder / "cases" / name).mkdir(parents=True)
         (folder / "cases" / name / "case.toml").write_text(CASE)
@@ -136,7 +133,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def tanks(folder: Path) -> System:
-    return load_system(folder)
+    return declare(folder, LIBRARY, SYSTEM, Tanks="Water.Tanks")
 
 
 @pytest.fixture(scope="module")

@@ -16,8 +16,10 @@ from workbench.observers import estimators_of
 from workbench.observers.export import ObserverModel, build_observer
 from workbench.observers.replay import replay
 from workbench.recordings.case import Case
-from workbench.system.registry import load_system, open_model
+from workbench.system.registry import open_model
 from workbench.system.system import System
+
+from .built import declare
 
 pytest.importorskip("rumoca", reason="needs the extra [compiler]")
 pytest.importorskip("ziglang", reason="needs the extra [compiler]")
@@ -82,9 +84,7 @@ ESTIMATORS = [
 @pytest.fixture(scope="module")
 def vessel(tmp_path_factory: pytest.TempPathFactory) -> System:
     folder = tmp_path_factory.mktemp("vessel")
-    (folder / "package.mo").write_text(VESSEL)
-    (folder / "system.toml").write_text(SYSTEM)
-    return load_system(folder)
+    return declare(folder, VESSEL, SYSTEM)
 
 
 @pytest.fixture(scope="module")

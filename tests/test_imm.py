@@ -22,6 +22,8 @@ from workbench.recordings.case import Case, read_case, read_cases
 from workbench.system.registry import load_system, open_model
 from workbench.system.system import System
 
+from .built import declare
+
 ROOT = Path(__file__).parent.parent
 WHEELSET = load_system("wheelset")
 
@@ -73,12 +75,7 @@ RATES, STEP, NOISE, WALK = (0.02, 0.05), 1.0, 0.2, np.array([0.01, 0.002])
 def vessel(tmp_path_factory: pytest.TempPathFactory) -> System:
     pytest.importorskip("casadi")
     pytest.importorskip("rumoca")
-    from .built import build_here  # needs the extra
-
     folder = tmp_path_factory.mktemp("vessel")
-    (folder / "package.mo").write_text(LIBRARY)
-    build_here(folder / "package.mo", "Heat.Vessel", folder / "Vessel.fmu")
-    (folder / "system.toml").write_text(SYSTEM)
     rng, warm, rows = np.random.default_rng(3), 10.0, []
     for k in range(300):
         heater = 0.4 if k % 60 < 30 else 0.1
@@ -90,7 +87,7 @@ def vessel(tmp_path_factory: pytest.TempPathFactory) -> System:
     (case / "case.toml").write_text(title)
     table = pd.DataFrame(rows, columns=["time [s]", "heater [K/s]", "warm [K]"])
     table.to_csv(case / "measured.csv", index=False)
-    return load_system(folder)
+    return declare(folder, LIBRARY, SYSTEM, Vessel="Heat.Vessel")
 
 
 @pytest.fixture(scope="module")

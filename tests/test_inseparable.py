@@ -10,7 +10,8 @@ from workbench import case_from_frame
 from workbench.observers import choose
 from workbench.observers.report import format_table
 from workbench.observers.simulation import CaseResult, prepare
-from workbench.system.registry import load_system
+
+from .built import declare
 
 pytest.importorskip("rumoca", reason="needs the extra [compiler]")
 pytest.importorskip("ziglang", reason="needs the extra [compiler]")
@@ -60,10 +61,8 @@ QUANTITIES = {
 def ran(folder: Path, *estimated: str) -> CaseResult:
     """The filter on a tram that accelerates and rolls in turns."""
     folder.mkdir()
-    (folder / "package.mo").write_text(TRAM)
     tables = "".join(f'[estimated.{n}]\n{QUANTITIES[n]}acts_on = "v"\n' for n in estimated)
-    (folder / "system.toml").write_text(SYSTEM + tables)
-    system = load_system(folder)
+    system = declare(folder, TRAM, SYSTEM + tables)
     time, rng = np.arange(600.0), np.random.default_rng(3)
     power = np.where((time // 60.0) % 3.0 < 2.0, 1.6e5, 2e4)
     speed = [5.0]

@@ -22,9 +22,9 @@ from workbench.diagnosis.simulation.residual_model import ResidualModel
 from workbench.errors import InputError
 from workbench.studies.power.diagnosing import build_everything, library_effects
 from workbench.system.parts import StateNoise
-from workbench.system.registry import load_system
 from workbench.system.system import System
 
+from .built import declare
 from .heater import LIBRARY, NOISE, SYSTEM, cases, diagnosed
 
 pytest.importorskip("casadi")
@@ -40,9 +40,7 @@ def block(folder: Path, more: str) -> System:
     own = f'  parameter Real Ga(unit="W/K") = {G / 2}, Gb(unit="W/K") = {G / 2};\n'
     library = LIBRARY.replace("  input Real P(", own + "  input Real P(")
     library = library.replace("- loss.Q;", "- (Ga + Gb)*T - loss.Q;")
-    (folder / "package.mo").write_text(library)
-    (folder / "system.toml").write_text(SYSTEM.format(sensor="") + more)
-    return load_system(folder)
+    return declare(folder, library, SYSTEM.format(sensor="") + more)
 
 
 def recorded(conductance: float, seed: int, share: float = 1.0) -> pd.DataFrame:

@@ -30,8 +30,9 @@ from workbench.pages.provenance import run_of
 from workbench.recordings.case import Case, read_cases
 from workbench.runtime.engine import Engine
 from workbench.system.reader import with_model
-from workbench.system.registry import load_system
 from workbench.system.system import System
+
+from .built import declare
 
 LIBRARY = """within ;
 package Fan "A fan on an electric motor"
@@ -229,9 +230,7 @@ def simulated(
 @pytest.fixture(scope="module")
 def fan(tmp_path_factory: pytest.TempPathFactory) -> System:
     folder = tmp_path_factory.mktemp("fan")
-    (folder / "package.mo").write_text(LIBRARY)
-    (folder / "system.toml").write_text(SYSTEM)
-    return load_system(folder)
+    return declare(folder, LIBRARY, SYSTEM)
 
 
 @pytest.fixture(scope="module")
@@ -287,14 +286,13 @@ def test_wind_that_the_library_lacks_is_unexplained(diagnosed: Diagnosed) -> Non
 
 def test_a_logger_of_the_system_file_that_is_late_is_named(fan: System, tmp_path: Path) -> None:
     """Without a line of Python or Modelica, and neither recording nor model has that clock."""
-    (tmp_path / "package.mo").write_text(LIBRARY)
-    (tmp_path / "system.toml").write_text(f'{SYSTEM}\n[loggers]\nsupply = ["u"]\n')
+    system = declare(tmp_path, LIBRARY, f'{SYSTEM}\n[loggers]\nsupply = ["u"]\n')
     late = 3  # samples
     cases = [
         one.with_signals({"u": np.concatenate([np.full(late, one["u"][0]), one["u"][:-late]])})
         for one in recorded(tmp_path / "recordings", fan, nothing)
     ]
-    outcome = diagnosis(load_system(tmp_path), cases, tmp_path / "results")
+    outcome = diagnosis(system, cases, tmp_path / "results")
     (cause,) = outcome.diagnosis.causes
     assert (cause.effect.name, cause.effect.text) == (
         "LoggerTimeSkew[supply]",

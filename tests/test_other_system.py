@@ -23,13 +23,13 @@ from workbench.observers.simulation import CaseResult, case_figure, prepare, sim
 from workbench.pages.provenance import run_of
 from workbench.pages.views import views
 from workbench.recordings.case import Case, read_case
-from workbench.system.registry import load_system, open_model
+from workbench.system.registry import open_model
 from workbench.system.system import System
 
 pytest.importorskip("casadi")
 pytest.importorskip("rumoca")
 
-from .built import build_here
+from .built import declare
 
 MODEL = """
 within ;
@@ -100,12 +100,7 @@ TRUE_LOSS = 14.0  # [W/K], nominal is 10
 
 @pytest.fixture(scope="module")
 def boiler(tmp_path_factory: pytest.TempPathFactory) -> System:
-    folder = tmp_path_factory.mktemp("boiler")
-    package = folder / "package.mo"
-    package.write_text(MODEL)
-    build_here(package, "Boiler.Vessel", folder / "Vessel.fmu")
-    (folder / "system.toml").write_text(SYSTEM)
-    return load_system(folder)
+    return declare(tmp_path_factory.mktemp("boiler"), MODEL, SYSTEM, Vessel="Boiler.Vessel")
 
 
 @pytest.fixture(scope="module")

@@ -25,13 +25,12 @@ from workbench.observers.estimators.disturbance import DisturbanceObserver
 from workbench.observers.score import corner
 from workbench.recordings.case import Case
 from workbench.runtime.pool import Pool
-from workbench.system.registry import load_system
 from workbench.tuning import Evaluator, Job, Plan, Search, evaluate_gains, recording, search
 
 pytest.importorskip("casadi")
 pytest.importorskip("rumoca")
 
-from .built import build_here
+from .built import declare
 
 MODEL = """
 package Lib
@@ -278,18 +277,13 @@ def gain(found: Search, name: str) -> float:
 def prepare_rolling(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Job]:
     """Prepares jobs on the linear model."""
     folder = tmp_path_factory.mktemp("rolling")
-    package, path = folder / "Lib" / "package.mo", folder / "RollingWheelset.fmu"
-    package.parent.mkdir()
-    package.write_text(MODEL)
-    build_here(package, "Lib.RollingWheelset", path)
-    (folder / "system.toml").write_text(SYSTEM)
-    rolling = load_system(folder)
+    rolling = declare(folder, MODEL, SYSTEM, RollingWheelset="Lib.RollingWheelset")
     assert corner(rolling.objective) == pytest.approx(CORNER)
 
     def prepared(gains: Gains, weights: Mapping[str, float], *cases: Case) -> Job:
         judged = replace(rolling, objective=replace(rolling.objective, weights=weights))
         recordings = tuple(recording(case, judged) for case in cases)
-        model = path.read_bytes()
+        model = (folder / "RollingWheelset.fmu").read_bytes()
         return Job(gains.estimator, judged, model, gains, recordings, follows=False)
 
     return prepared
