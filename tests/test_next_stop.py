@@ -30,11 +30,11 @@ from workbench.studies.design import (
 )
 from workbench.studies.design.candidates import (
     Profile,
-    drawn,
-    every_setting,
+    all_settings,
+    draw_experiment,
     other_profiles,
     other_settings,
-    some_settings,
+    settings_fraction,
 )
 from workbench.studies.design.separation import discrimination_chance, precision, refitted
 from workbench.studies.power.diagnosing import distance
@@ -204,7 +204,7 @@ def a_grid(counts: list[int]) -> Experiments:
 def test_what_is_released_is_so_after_its_time_where_a_machine_allows_it() -> None:
     varied = VariedInput("u", (2.0, 5.0), (RELEASE,), 3.0, 4.0, ())
     asked = replace(a_grid([1]), inputs=(varied,))
-    (first,) = every_setting(asked)
+    (first,) = all_settings(asked)
     (half,), (full,) = (
         other_profile.profiles for other_profile in (first, *other_profiles(asked, first))
     )
@@ -220,7 +220,7 @@ def test_of_a_large_grid_a_fraction_is_tried_with_every_value(
     counts: list[int], parts: int
 ) -> None:
     asked = a_grid(counts)
-    every, some = every_setting(asked), some_settings(asked)
+    every, some = all_settings(asked), settings_fraction(asked)
     assert len(some) <= 48
     assert len(some) == pytest.approx(len(every) / parts, abs=1.0)
     for name, values in asked.settings.items():
@@ -322,7 +322,7 @@ def test_what_is_beside_the_best_of_a_fraction_is_tried_too(
     assert block.experiments is not None
     knob = FurtherSetting("knob", "a knob", "1", (Setting(0.0, "0"), Setting(1.0, "1")))
     asked = replace(block.experiments, further=(*block.experiments.further, knob))
-    assert len(some_settings(asked)) == 1
+    assert len(settings_fraction(asked)) == 1
     assert undecided.rivals is not None
     found = next_stop(replace(block, experiments=asked), undecided.rivals, ALONE)
     turned = {one.prediction.candidate.settings["knob"].value for one in found.tried}
@@ -384,9 +384,9 @@ def test_each_experiment_is_drawn_as_often(block: System) -> None:
     """Seven profiles in 7000 draws: chi-squared of six degrees of freedom, one in a thousand."""
     assert block.experiments is not None
     rng = np.random.default_rng(8)
-    (first,) = every_setting(block.experiments)
+    (first,) = all_settings(block.experiments)
     every = [first, *other_profiles(block.experiments, first)]
-    found = [every.index(drawn(block.experiments, rng)) for _ in range(7000)]
+    found = [every.index(draw_experiment(block.experiments, rng)) for _ in range(7000)]
     counts = np.bincount(found, minlength=len(every))
     assert len(every) == 7
     assert np.sum((counts - 1000.0) ** 2 / 1000.0) < chi2.isf(1e-3, 6)

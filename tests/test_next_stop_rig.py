@@ -23,7 +23,7 @@ from workbench.machines.wheelset.rig import (
 from workbench.recordings.case import Case, read_case
 from workbench.runtime.engine import ALONE
 from workbench.studies.design import NextStop, RankedExperiment, next_stop, predict_experiments
-from workbench.studies.design.candidates import Experiment, every_setting
+from workbench.studies.design.candidates import Experiment, all_settings
 from workbench.system.experiments import Setting
 from workbench.system.system import System
 
@@ -160,7 +160,7 @@ def other_surface(system: System, rail: str, imitated: float) -> Experiment:
     fixed |= {"disc_temperature": 333.15}
     (one,) = (
         experiment
-        for experiment in every_setting(system.experiments)
+        for experiment in all_settings(system.experiments)
         if all(experiment.settings[name].value == value for name, value in fixed.items())
     )
     return one

@@ -15,8 +15,8 @@ from workbench.machines.wheelset.rig import CONSTANT_PADS, SCENARIOS, plant, sim
 from workbench.models.fmu import FMU, CoSimulation
 from workbench.models.modelica import read_library
 from workbench.recordings.case import read_case
-from workbench.studies.design.candidates import Experiment, every_setting, other_profiles
-from workbench.studies.design.recorded import recorded
+from workbench.studies.design.candidates import Experiment, all_settings, other_profiles
+from workbench.studies.design.simulation import predict_recording
 from workbench.system.experiments import RELEASE
 from workbench.system.registry import load_system, model_path
 
@@ -74,7 +74,7 @@ def coasting() -> Experiment:
     fixed = {"initial_speed": 120.0 / 3.6, "direction": 1, "wheel_rail": "dry", "imitated": 0.0}
     one = next(
         one
-        for one in every_setting(SYSTEM.experiments)
+        for one in all_settings(SYSTEM.experiments)
         if all(one.settings[name].value == value for name, value in fixed.items())
     )
     profiles = other_profiles(SYSTEM.experiments, one)
@@ -111,7 +111,7 @@ def test_the_rig_coasts_down_by_its_losses_alone(coasting: Experiment) -> None:
 def test_a_coast_down_counts_from_its_brake_on(coasting: Experiment) -> None:
     assert SYSTEM.experiments is not None
     with CoSimulation(model_path(SYSTEM, "observer")) as model:
-        case = recorded(model, SYSTEM, SYSTEM.experiments, coasting, {}, "coast", ("Fx",), 1)
+        case = predict_recording(model, SYSTEM, coasting, {}, ("Fx",), 1)
     assert case.time[-1] == pytest.approx(SYSTEM.experiments.lasts)
     found = count(case, SYSTEM, tuple(case.signals), SOUND, restarting=False)
     assert len(found.blocks) * SYSTEM.comparison.block > 80.0

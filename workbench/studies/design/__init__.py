@@ -19,26 +19,31 @@ from workbench.runtime.engine import Engine
 from workbench.runtime.pool import Pool
 from workbench.studies.design.candidates import (
     Experiment,
-    every_setting,
+    all_settings,
     other_profiles,
     other_settings,
-    some_settings,
+    settings_fraction,
 )
-from workbench.studies.design.outcome import PROPOSED, NextStop, RankedExperiment, chosen
-from workbench.studies.design.prediction import DesignProblem, Prediction
-from workbench.studies.design.predictor import ExperimentPredictor, open_predictor, with_sensor
+from workbench.studies.design.outcome import PROPOSED, NextStop, RankedExperiment, rank
+from workbench.studies.design.prediction import (
+    DesignProblem,
+    ExperimentPredictor,
+    Prediction,
+    open_predictor,
+    with_sensor,
+)
 from workbench.system.experiments import Experiments
 from workbench.system.parts import Signal
 from workbench.system.system import System
 
-__all__ = ["NextStop", "RankedExperiment", "foreseen", "next_stop", "with_sensor"]
+__all__ = ["NextStop", "RankedExperiment", "next_stop", "predict_experiments", "with_sensor"]
 
 _Task = Future[Prediction | None]
 
-_SETTINGS = 3  # of which all profiles are tried
+_SETTINGS = 3  # of which all profiles are predicted
 _TOGETHER = 6  # experiments of which models are fitted again at a time
-_CONFIRMED = 24  # at most: a quarter of what is tried
-_SENSED = 3  # experiments that are tried with further sensors
+_CONFIRMED = 24  # at most: a quarter of those that are predicted
+_SENSED = 3  # experiments that are predicted with further sensors
 
 
 def next_stop(system: System, rivals: Rivals, engine: Engine) -> NextStop:
@@ -61,48 +66,38 @@ def next_stop(system: System, rivals: Rivals, engine: Engine) -> NextStop:
         If the system does not say what may be varied, or no recording of it would count.
     """
     with _open(system, rivals, engine) as (experiments, pool):
-        every, plan = every_setting(experiments), some_settings(experiments)
+        grid, plan = all_settings(experiments), settings_fraction(experiments)
         named = " with ".join(rivals.models[0].effects)
-        engine.report(f"{len(plan)} of {len(every)} settings, as {named} predicts")
-        ranked = chosen(_predict_all(system, pool, plan))
-        near = [
-            other_setting
-            for best in ranked[:_SETTINGS]
-            for other_setting in other_settings(experiments, best.candidate)
-        ]
-        beside = [
-            experiment for experiment in every if experiment in near and experiment not in plan
-        ]
+        engine.report(f"{len(plan)} of {len(grid)} settings, as {named} predicts")
+        ranked = rank(_predict_all(system, pool, plan))
+        best = [prediction.candidate for prediction in ranked[:_SETTINGS]]
+        near = [other for setting in best for other in other_settings(experiments, setting)]
+        beside = [setting for setting in grid if setting in near and setting not in plan]
         if beside:
             engine.report(
                 f"{len(beside)} others that differ from the best {_SETTINGS} in one setting"
             )
-            ranked = chosen([*ranked, *_predict_all(system, pool, beside)])
+            ranked = rank([*ranked, *_predict_all(system, pool, beside)])
         best = [prediction.candidate for prediction in ranked[:_SETTINGS]]
-        more = [
-            other_profile
-            for setting in best
-            for other_profile in other_profiles(experiments, setting)
-        ]
+        more = [other for setting in best for other in other_profiles(experiments, setting)]
         if more:
             engine.report(f"{len(more)} profiles with the best {len(best)}")
-            ranked = chosen([*ranked, *_predict_all(system, pool, more)])
+            ranked = rank([*ranked, *_predict_all(system, pool, more)])
         if len(rivals.models) > 1:
             engine.report("the best, with the models fitted again in full")
-            ranked = _confirmed(pool, ranked)
+            ranked = _rank_by_full_fits(pool, ranked)
         sensors = {}
-        first = ranked[0]
-        if len(first.groups) < len(rivals.models) and experiments.sensors:
+        groups = len(ranked[0].groups)
+        if groups < len(rivals.models) and experiments.sensors:
             engine.report("the same with further sensors")
             best = [prediction.candidate for prediction in ranked[:_SENSED]]
-            for sensor, found in _sensed(pool, best, experiments.sensors, len(first.groups)):
-                sensed = with_sensor(system, sensor)
-                sensors[sensor.label] = _proposal(sensed, experiments, found)
+            for sensor, prediction in _best_with_sensors(pool, best, experiments.sensors, groups):
+                sensors[sensor.label] = _proposal(with_sensor(system, sensor), prediction)
     return NextStop(
         system=system,
         rivals=rivals,
         channels=channels(system, rivals.signals),
-        tried=tuple(_proposal(system, experiments, prediction) for prediction in ranked),
+        tried=tuple(_proposal(system, prediction) for prediction in ranked),
         sensors=sensors,
     )
 
@@ -117,9 +112,9 @@ def predict_experiments(
     InputError
         As `next_stop`.
     """
-    with _open(system, rivals, Engine(workers)) as (experiments, pool):
-        ranked = chosen(_predict_all(system, pool, plan, in_full=True))
-        return [_proposal(system, experiments, prediction) for prediction in ranked]
+    with _open(system, rivals, Engine(workers)) as (_, pool):
+        ranked = rank(_predict_all(system, pool, plan, in_full=True))
+        return [_proposal(system, prediction) for prediction in ranked]
 
 
 @contextmanager
@@ -137,12 +132,12 @@ def _open(
         )
     library = read_library(system.library)
     effects = {effect.name: effect for effect in choose(rivals.effects, catalogue(system, library))}
-    with tempfile.TemporaryDirectory() as scratch:
-        everything = Path(scratch) / "AllEffects.fmu"
+    with tempfile.TemporaryDirectory() as folder:
+        everything = Path(folder) / "AllEffects.fmu"
         engine.report(f"compiling {len(effects)} effects")
         build_everything(system, library, list(effects.values()), everything)
-        outlook = DesignProblem(everything, system, experiments, rivals, effects)
-        with Pool(engine.workers, open_predictor, outlook) as pool:
+        problem = DesignProblem(everything, system, rivals, effects)
+        with Pool(engine.workers, open_predictor, problem) as pool:
             yield experiments, pool
 
 
@@ -169,42 +164,44 @@ def _predict_all(
     return predictions
 
 
-def _sensed(
+def _best_with_sensors(
     pool: Pool[ExperimentPredictor],
     plan: Sequence[Experiment],
     sensors: Sequence[Signal],
-    parted: int,
+    groups: int,
 ) -> Iterator[tuple[Signal, Prediction]]:
-    """The best of some experiments with each sensor more that parts more groups by it.
+    """Each further sensor by which an experiment of the plan leaves more groups, with the best.
 
-    Models are fitted again in full in the best of those where they part as linearised.
+    Models are fitted again in full in the best of those that discriminate as linearised.
     """
 
-    def tried(sensor: Signal, some: Sequence[Experiment], in_full: bool) -> list[_Task]:
+    def submit(sensor: Signal, experiments: Sequence[Experiment], in_full: bool) -> list[_Task]:
         return [
-            pool.submit(ExperimentPredictor.predict_experiment, one, number, sensor, in_full)
-            for number, one in enumerate(some, 1)
+            pool.submit(ExperimentPredictor.predict_experiment, experiment, number, sensor, in_full)
+            for number, experiment in enumerate(experiments, 1)
         ]
 
-    def parting(tasks: Sequence[_Task]) -> list[Prediction]:
-        predictions = [one for task in tasks if (one := task.result()) is not None]
-        return [prediction for prediction in predictions if len(prediction.groups) > parted]
+    def discriminating(tasks: Sequence[_Task]) -> list[Prediction]:
+        predictions = (task.result() for task in tasks)
+        return rank([p for p in predictions if p is not None and len(p.groups) > groups])
 
-    once = [(sensor, tried(sensor, plan, False)) for sensor in sensors]
-    again = []
-    for sensor, tasks in once:
-        best = [prediction.candidate for prediction in chosen(parting(tasks))[:1]]
-        again.append((sensor, tried(sensor, best, True)))
-    for sensor, tasks in again:
-        if better := parting(tasks):
-            yield sensor, chosen(better)[0]
+    linear = [(sensor, submit(sensor, plan, False)) for sensor in sensors]
+    full = []
+    for sensor, tasks in linear:
+        best = [prediction.candidate for prediction in discriminating(tasks)[:1]]
+        full.append((sensor, submit(sensor, best, True)))
+    for sensor, tasks in full:
+        if better := discriminating(tasks):
+            yield sensor, better[0]
 
 
-def _confirmed(pool: Pool[ExperimentPredictor], ranked: Sequence[Prediction]) -> list[Prediction]:
-    """The best first: rivals that bend far are known by full fits alone, which cost more.
+def _rank_by_full_fits(
+    pool: Pool[ExperimentPredictor], ranked: Sequence[Prediction]
+) -> list[Prediction]:
+    """Rank again: of rivals that bend far only full fits are right, which cost more.
 
     They are made of the best as linearised, until what is proposed is better than all others
-    promise. What not all rivals claim comes last.
+    promise. Experiments outside the validity range of a rival come last.
     """
     confirmed: list[Prediction] = []
     doubtful: list[Prediction] = []
@@ -213,26 +210,28 @@ def _confirmed(pool: Pool[ExperimentPredictor], ranked: Sequence[Prediction]) ->
     while left and len(confirmed) < _CONFIRMED:
         # A few ahead: no processor waits for the last one of a part.
         wanted = min(_TOGETHER + pool.workers - 1, _CONFIRMED - len(confirmed))
-        some = enumerate(left[len(tasks) : wanted], len(tasks) + 1)
-        tasks += [pool.submit(ExperimentPredictor.confirm, one, number) for number, one in some]
-        results, tasks = [task.result() for task in tasks[:_TOGETHER]], tasks[_TOGETHER:]
-        judged, left = left[: len(results)], left[len(results) :]
-        doubtful += [signal for signal, well in zip(judged, results, strict=True) if well is None]
-        sure = [prediction for prediction in results if prediction is not None]
+        tasks += [
+            pool.submit(ExperimentPredictor.confirm, prediction, number)
+            for number, prediction in enumerate(left[len(tasks) : wanted], len(tasks) + 1)
+        ]
+        refits, tasks = [task.result() for task in tasks[:_TOGETHER]], tasks[_TOGETHER:]
+        linear, left = left[: len(refits)], left[len(refits) :]
+        doubtful += [p for p, refit in zip(linear, refits, strict=True) if refit is None]
+        sure = [refit for refit in refits if refit is not None]
         if not sure:
             continue
-        confirmed = chosen([*confirmed, *sure])
+        confirmed = rank([*confirmed, *sure])
         last = confirmed[min(PROPOSED, len(confirmed)) - 1]
-        if left and chosen([last, left[0]])[0] is last:
+        if left and rank([last, left[0]])[0] is last:
             break
     for task in tasks:
         task.cancel()
     return [*confirmed, *left, *doubtful]
 
 
-def _proposal(system: System, experiments: Experiments, prediction: Prediction) -> RankedExperiment:
+def _proposal(system: System, prediction: Prediction) -> RankedExperiment:
+    assert system.experiments is not None
+    cost, candidate = system.experiments.cost, prediction.candidate
     duration = float(prediction.case.time[-1] - prediction.case.time[0])
-    cost = float(experiments.cost.formula({**prediction.candidate.numbers, "duration": duration}))
-    return RankedExperiment(
-        prediction.candidate.text(system), cost, experiments.cost.unit, prediction
-    )
+    value = float(cost.formula({**candidate.numbers, "duration": duration}))
+    return RankedExperiment(candidate.text(system), value, cost.unit, prediction)

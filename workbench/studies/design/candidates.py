@@ -1,4 +1,4 @@
-"""What may be run next, one by one: conditions, and profiles of the inputs."""
+"""Experiments that may be run next: conditions, and profiles of the inputs."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -41,7 +41,7 @@ class Profile:
     every: float
 
     def demand(self, time: Vector) -> Vector:
-        """What is asked for, (n,) [unit]."""
+        """Demand at each time, (n,) [unit]."""
         begun = time - self.input.begins
         if self.kind == SINE:
             low, high = self.levels
@@ -53,7 +53,7 @@ class Profile:
         return np.where(begun >= 0.0, np.array(self.levels)[stair], 0.0)
 
     def signal(self, time: Vector) -> Vector:
-        """What the input then is, (n,) [unit]: behind its lags."""
+        """Input at each time, (n,) [unit]: the demand behind its lags."""
         values, h = self.demand(time), float(time[1] - time[0])
         for lag in self.input.lags:
             pole = np.exp(-h / lag)
@@ -98,14 +98,14 @@ class Experiment:
         """For people."""
         assert system.experiments is not None
         besides = system.experiments.labels
-        said = [
+        settings = [
             f"{besides[name] if name in besides else system.condition(name).label} {setting.text}"
             for name, setting in self.settings.items()
         ]
-        return "; ".join([*said, *(profile.text(system) for profile in self.profiles)])
+        return "; ".join([*settings, *(profile.text(system) for profile in self.profiles)])
 
 
-def every_setting(experiments: Experiments) -> list[Experiment]:
+def all_settings(experiments: Experiments) -> list[Experiment]:
     """Every setting, each with the profiles that sweep most of their ranges."""
     followed = tuple(_profiles(varied)[0] for varied in experiments.varied)
     names = list(experiments.settings)
@@ -115,14 +115,14 @@ def every_setting(experiments: Experiments) -> list[Experiment]:
     ]
 
 
-def some_settings(experiments: Experiments) -> list[Experiment]:
+def settings_fraction(experiments: Experiments) -> list[Experiment]:
     """Every setting, or a fraction of a grid that is large.
 
     The fraction is regular, each value being in it as often as any other: of settings whose values
     are numbered, those whose numbers add up to a multiple (G. E. P. Box, J. S. Hunter, 1961,
     Technometrics 3, 311-351). `other_settings` has what is next to them.
     """
-    plan = every_setting(experiments)
+    plan = all_settings(experiments)
     parts = -(-len(plan) // _GRID)
     numbers = product(*(range(len(values)) for values in experiments.settings.values()))
     return [
@@ -142,21 +142,20 @@ def other_settings(experiments: Experiments, experiment: Experiment) -> list[Exp
 
 def other_profiles(experiments: Experiments, experiment: Experiment) -> list[Experiment]:
     """All other profiles, with the settings of an experiment."""
-    every = product(*(_profiles(varied) for varied in experiments.varied))
     return [
-        replace(experiment, profiles=followed)
-        for followed in every
-        if followed != experiment.profiles
+        replace(experiment, profiles=profiles)
+        for profiles in product(*map(_profiles, experiments.varied))
+        if profiles != experiment.profiles
     ]
 
 
-def drawn(experiments: Experiments, rng: np.random.Generator) -> Experiment:
+def draw_experiment(experiments: Experiments, rng: np.random.Generator) -> Experiment:
     """An experiment drawn at random: each of all that may be run is as likely."""
     settings = {
         name: values[rng.integers(len(values))] for name, values in experiments.settings.items()
     }
-    profiles = [_profiles(varied) for varied in experiments.varied]
-    return Experiment(settings, tuple(some[rng.integers(len(some))] for some in profiles))
+    choices = [_profiles(varied) for varied in experiments.varied]
+    return Experiment(settings, tuple(each[rng.integers(len(each))] for each in choices))
 
 
 def _profiles(varied_input: VariedInput) -> list[Profile]:
@@ -167,26 +166,16 @@ def _profiles(varied_input: VariedInput) -> list[Profile]:
     low, high = varied_input.low, varied_input.high
     rising = np.linspace(low, high, _STAIRS + 1).tolist()
     stairs = (*rising, *rising[-2:0:-1])
-    profiles = []
-    if STAIRCASE in varied_input.profiles:
-        falling = (*stairs[_STAIRS:], *stairs[:_STAIRS])
-        profiles += [
-            Profile(varied_input, STAIRCASE, levels, varied_input.every)
-            for levels in (stairs, falling)
-        ]
-    if SINE in varied_input.profiles:
-        profiles += [
-            Profile(varied_input, SINE, (low, high), times * varied_input.every)
-            for times in (1.0, 2.0)
-        ]
-    if STEP in varied_input.profiles:
-        profiles += [
-            Profile(varied_input, STEP, (to,), varied_input.every)
-            for to in (low, 0.5 * (low + high), high)
-        ]
-    if RELEASE in varied_input.profiles:
-        profiles += [
-            Profile(varied_input, RELEASE, (to,), varied_input.every)
-            for to in (0.5 * (low + high), high)
-        ]
-    return profiles
+    falling = (*stairs[_STAIRS:], *stairs[:_STAIRS])
+    middle, period = 0.5 * (low + high), varied_input.every
+    profiles = [
+        *((STAIRCASE, levels, period) for levels in (stairs, falling)),
+        *((SINE, (low, high), times * period) for times in (1.0, 2.0)),
+        *((STEP, (to,), period) for to in (low, middle, high)),
+        *((RELEASE, (to,), period) for to in (middle, high)),
+    ]
+    return [
+        Profile(varied_input, shape, levels, duration)
+        for shape, levels, duration in profiles
+        if shape in varied_input.profiles
+    ]

@@ -1,6 +1,6 @@
 """Which experiment to make next, as a value: a sentence, numbers, a table, a figure."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 from typing import TYPE_CHECKING, Any
@@ -21,7 +21,7 @@ PROPOSED = 3
 
 @dataclass(frozen=True, eq=False)
 class RankedExperiment:
-    """One experiment.
+    """An experiment, and what it would tell.
 
     Attributes
     ----------
@@ -33,6 +33,19 @@ class RankedExperiment:
     cost: float
     unit: str
     prediction: Prediction
+
+    @property
+    def measures(self) -> str:
+        """What it would tell and cost, for people."""
+        prediction, cost = self.prediction, f"cost {self.cost:.3g} {self.unit}"
+        if len(prediction.pairwise) == 1:
+            return f"{_ratio(prediction):.2g} times as sure, {cost}"
+        several = 1 < len(prediction.groups) < len(prediction.pairwise)
+        group = " or its group" if several else ""
+        return (
+            f"separation {prediction.separation:.1f} standard deviations, chance "
+            f"{prediction.right:.0%} that the right one{group} is then named, {cost}"
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """All of it as plain numbers and texts."""
@@ -108,29 +121,30 @@ class NextStop:
         if len(self.names) == 1:
             sure = f"{_ratio(prediction):.2g} times as sure"
             return f"Next: {best.text}. It makes {self.names[0]} {sure}."
-        said = []
+        sentences = []
         if self.parts:
-            groups = " from ".join(_or(self.names[i] for i in group) for group in prediction.groups)
-            said.append(
-                f"Next: {best.text}. It parts {groups} by {prediction.separation:.1f} standard "
-                "deviations."
+            sentences.append(
+                f"Next: {best.text}. It parts {self._groups(prediction)} by "
+                f"{prediction.separation:.1f} standard deviations."
             )
         for group in prediction.groups:
             if len(group) > 1:
                 names = " and ".join(self.names[i] for i in group)
-                said.append(f"No experiment here likely parts {names}, whichever is true.")
+                sentences.append(f"No experiment here likely parts {names}, whichever is true.")
         for sensor, experiment in self.sensors.items():
-            groups = " from ".join(
-                _or(self.names[i] for i in g) for g in experiment.prediction.groups
-            )
-            said.append(f"A sensor of {sensor} would part {groups}: {experiment.text}.")
-        return " ".join(said)
+            groups = self._groups(experiment.prediction)
+            sentences.append(f"A sensor of {sensor} would part {groups}: {experiment.text}.")
+        return " ".join(sentences)
+
+    def _groups(self, prediction: Prediction) -> str:
+        groups = (" or ".join(self.names[i] for i in group) for group in prediction.groups)
+        return " from ".join(groups)
 
     def summary(self) -> str:
         """The answer and the best experiments, for people."""
         lines = [self.sentence]
         for number, proposal in enumerate(self.proposals, 1):
-            lines += [f"{number}. {proposal.text}", f"   {_told(proposal)}"]
+            lines += [f"{number}. {proposal.text}", f"   {proposal.measures}"]
         return "\n".join(lines)
 
     def to_frame(self) -> pd.DataFrame:
@@ -163,29 +177,12 @@ class NextStop:
         return f"<p>{escape(self.sentence)}</p>{self.to_frame().to_html(index=False)}"
 
 
-def _or(names: Iterable[str]) -> str:
-    return " or ".join(names)
-
-
 def _ratio(prediction: Prediction) -> float:
     return prediction.precision[0] / prediction.precision[1]
 
 
-def _told(experiment: RankedExperiment) -> str:
-    prediction = experiment.prediction
-    cost = f"cost {experiment.cost:.3g} {experiment.unit}"
-    if len(prediction.pairwise) == 1:
-        return f"{_ratio(prediction):.2g} times as sure, {cost}"
-    several = 1 < len(prediction.groups) < len(prediction.pairwise)
-    group = " or its group" if several else ""
-    return (
-        f"separation {prediction.separation:.1f} standard deviations, chance "
-        f"{prediction.right:.0%} that the right one{group} is then named, {cost}"
-    )
-
-
-def chosen(ranked: Sequence[Prediction]) -> list[Prediction]:
-    """Best first: pairs that are told apart, then the least distance, then precision."""
+def rank(ranked: Sequence[Prediction]) -> list[Prediction]:
+    """Best first: by pairs that are told apart, then by separation, then by precision."""
 
     def worth(prediction: Prediction) -> tuple[float, float, float]:
         return (

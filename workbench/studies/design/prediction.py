@@ -1,6 +1,11 @@
-"""What every rival predicts of every experiment, and what that would tell them apart by."""
+"""What rivals predict of an experiment, and what that would tell them apart by.
 
-from collections.abc import Callable, Mapping, Sequence
+A worker opens the model with all effects once (`open_predictor`), and predicts every experiment
+with it.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -10,19 +15,33 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
 from workbench.arrays import Matrix, Vector
-from workbench.diagnosis.data.motion import ModelSource, OpenModel
+from workbench.diagnosis.data.counting import CountedSamples, count
+from workbench.diagnosis.data.motion import ModelSource, OpenModel, opened
 from workbench.diagnosis.effects.catalogue import Effect
+from workbench.diagnosis.effects.extension import variables
 from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.linearized import LinearizedPoint, Point
-from workbench.diagnosis.inference.quadratic import Joint, Quadratic, RecordingSystem, add, minimum
+from workbench.diagnosis.inference.quadratic import (
+    Joint,
+    Key,
+    Quadratic,
+    RecordingSystem,
+    add,
+    minimum,
+)
 from workbench.diagnosis.inference.rivals import Rival, Rivals
+from workbench.diagnosis.inference.thresholds import SOUND, Thresholds
+from workbench.diagnosis.inference.unknowns import ALL
 from workbench.diagnosis.simulation.residual_model import ResidualModel
+from workbench.errors import InputError
+from workbench.models.fmu import CoSimulation
 from workbench.recordings.case import Case
 from workbench.studies.design.candidates import Experiment
-from workbench.studies.design.recorded import start_of
-from workbench.studies.design.refit import Refit
 from workbench.studies.design.separation import discrimination_chance, precision, refitted
-from workbench.system.experiments import Experiments
+from workbench.studies.design.simulation import predict_recording, start_of
+from workbench.system.comparison import Channel
+from workbench.system.expression import Expression
+from workbench.system.parts import Signal
 from workbench.system.system import System
 
 LIKELY = 0.5  # a chance that is more likely than not
@@ -94,14 +113,12 @@ class DesignProblem:
     Attributes
     ----------
     everything : FMU with all effects.
-    experiments : that the system allows.
     rivals : that they are to tell apart.
     effects : of the FMU, by name.
     """
 
     everything: Path
     system: System
-    experiments: Experiments
     rivals: Rivals
     effects: Mapping[str, Effect]
 
@@ -111,8 +128,8 @@ class DesignProblem:
         return ModelSource(self.everything, self.system, self.rivals.given)
 
 
-def predicted(
-    asked: DesignProblem, model: OpenModel, candidate: Experiment, case: Case, *, in_full: bool
+def predict(
+    problem: DesignProblem, model: OpenModel, candidate: Experiment, case: Case, *, in_full: bool
 ) -> Prediction:
     """What an experiment would tell.
 
@@ -122,22 +139,33 @@ def predicted(
     case : a recording of it as the first rival predicts it.
     in_full : whether rivals are fitted again, or taken as they are linearised where they are.
     """
-    with ResidualModel(asked.source, [case], model=model) as simulations:
-        fit = Fit(simulations, list(asked.effects.values()), beside=[case])
-        begun = _begun(fit, start_of(asked.system, asked.experiments, candidate))
-        rows = [_linearised(fit, asked, model, begun) for model in asked.rivals.models]
+    with ResidualModel(problem.source, [case], model=model) as simulations:
+        fit = Fit(simulations, list(problem.effects.values()), beside=[case])
+        deviations = _initial_deviations(fit, start_of(problem.system, candidate))
+        points = [_linearize(fit, problem, rival, deviations) for rival in problem.rivals.models]
 
-        def again(true: _Row, other: _Row) -> tuple[float, Matrix]:
-            refit = Refit(fit, other.lin, true.own.r, other.so_far)
-            return refit.left(other.active)
+        def refit(true: _RivalPoint, other: _RivalPoint) -> tuple[float, Matrix]:
+            return Refit(fit, other.lin, true.own.r, other.so_far).left(other.active)
 
-        return _prediction(
-            simulations, fit, asked.rivals, rows, candidate, again if in_full else _once
+        pairwise, chance, left = _compare(
+            problem.rivals, points, fit.decides, refit if in_full else _linear_fit
+        )
+        first = points[0]
+        sizes = [first.joint.shared.index(key) for key in problem.rivals.models[0].sizes]
+        (samples,), (counted,) = simulations.recordings, simulations.cases
+        return Prediction(
+            candidate=candidate,
+            case=counted,
+            pairwise=pairwise,
+            chance=chance,
+            precision=precision(first.own.eliminated().N, first.information, sizes),
+            block_time=samples.time[samples.blocks.mean(axis=1).astype(int)],
+            left=left,
         )
 
 
 @dataclass(frozen=True, eq=False)
-class _Row:
+class _RivalPoint:
     """A rival about its point, along an experiment.
 
     Attributes
@@ -158,8 +186,8 @@ class _Row:
     @property
     def own(self) -> RecordingSystem:
         """Of the experiment alone."""
-        (one,) = self.joint.systems
-        return one
+        (system,) = self.joint.systems
+        return system
 
     @property
     def information(self) -> Matrix:
@@ -167,7 +195,7 @@ class _Row:
         return add([self.so_far.eliminated(), self.joint.prior]).N
 
 
-def _begun(fit: Fit, start: Mapping[str, float]) -> Matrix:
+def _initial_deviations(fit: Fit, start: Mapping[str, float]) -> Matrix:
     """Deviations of an experiment whose states start as they are set, in standard deviations."""
     point = fit.unknowns.start()
     deviations = point.deviations.copy()
@@ -179,69 +207,58 @@ def _begun(fit: Fit, start: Mapping[str, float]) -> Matrix:
     return deviations
 
 
-def _linearised(fit: Fit, asked: DesignProblem, rival: Rival, begun: Matrix) -> _Row:
-    rivals, effects = asked.rivals, asked.effects
+def _linearize(fit: Fit, problem: DesignProblem, rival: Rival, deviations: Matrix) -> _RivalPoint:
+    rivals, effects = problem.rivals, problem.effects
     start = fit.unknowns.start()
     levels = {key: rival.levels.get(key, usual) for key, usual in start.levels.items()}
     turning = {name for name, parameter in rival.sizes if parameter == "amplitude"}
     phases = {name: np.zeros(fit.unknowns.count) for name in turning}
-    point = Point(rival.sizes, levels, begun, phases)
+    point = Point(rival.sizes, levels, deviations, phases)
     active = tuple(effects[name] for name in rival.effects)
     lin = fit.linearise(fit.at(point), active)
     # A further sensor has noise alone.
     variance_factors = np.ones(lin.variance_factors.size)
     variance_factors[: rivals.variance_factors.size] = rivals.variance_factors
     lin = replace(lin, variance_factors=variance_factors)
-    (one,), (without,) = lin.residuals, fit.at(Point({}, levels, begun, {})).residuals
-    bare = replace(one, errors=without.errors, rest=without.rest)
+    (whole,), (without,) = lin.residuals, fit.at(Point({}, levels, deviations, {})).residuals
+    bare = replace(whole, errors=without.errors, rest=without.rest)
     joint = fit.quadratics(lin)
     (unexplained,) = fit.quadratics(replace(lin, residuals=(bare,))).systems
     so_far = rival.so_far(joint.shared, fit.decides.furthest_level)
-    return _Row(active, lin, joint, so_far, unexplained)
+    return _RivalPoint(active, lin, joint, so_far, unexplained)
 
 
-def _once(true: _Row, other: _Row) -> tuple[float, Matrix]:
+def _linear_fit(true: _RivalPoint, other: _RivalPoint) -> tuple[float, Matrix]:
     """Chi-squared that a rival leaves, and errors by block and channel, linearised."""
     away = _away(other.own, true.own)
     left, z = refitted(away.eliminated(), other.information)
     return left, away.errors(z)
 
 
-def _prediction(
-    simulations: ResidualModel,
-    fit: Fit,
+def _compare(
     rivals: Rivals,
-    rows: Sequence[_Row],
-    candidate: Experiment,
-    leaves: Callable[[_Row, _Row], tuple[float, Matrix]],
-) -> Prediction:
-    count_, first = len(rows), rows[0]
-    pairwise, chance = np.zeros((count_, count_)), np.ones((count_, count_))
+    points: Sequence[_RivalPoint],
+    decides: Thresholds,
+    leaves: Callable[[_RivalPoint, _RivalPoint], tuple[float, Matrix]],
+) -> tuple[Matrix, Matrix, NDArray[np.float64]]:
+    """`pairwise`, `chance` and `left` of a `Prediction`."""
+    number, first = len(points), points[0]
+    pairwise, chance = np.zeros((number, number)), np.ones((number, number))
     left = [np.zeros_like(first.own.errors(np.zeros(len(first.joint.shared))))]
-    for i, (true, model) in enumerate(zip(rows, rivals.models, strict=True)):
+    for i, (true, model) in enumerate(zip(points, rivals.models, strict=True)):
         explained = model.explained + _explained(true)
-        for j, (other, rival) in enumerate(zip(rows, rivals.models, strict=True)):
+        for j, (other, rival) in enumerate(zip(points, rivals.models, strict=True)):
             if i == j:
                 continue
             total, errors = leaves(true, other)
             pairwise[i, j] = total + rival.chi_squared - model.chi_squared
-            chance[i, j] = discrimination_chance(pairwise[i, j], explained, fit.decides)
+            chance[i, j] = discrimination_chance(pairwise[i, j], explained, decides)
             if i == 0:
                 left.append(errors)
-    at = [first.joint.shared.index(key) for key in rivals.models[0].sizes]
-    (samples,), (case,) = simulations.recordings, simulations.cases
-    return Prediction(
-        candidate=candidate,
-        case=case,
-        pairwise=pairwise,
-        chance=chance,
-        precision=precision(first.own.eliminated().N, first.information, at),
-        block_time=samples.time[samples.blocks.mean(axis=1).astype(int)],
-        left=np.array(left),
-    )
+    return pairwise, chance, np.array(left)
 
 
-def _explained(true: _Row) -> float:
+def _explained(true: _RivalPoint) -> float:
     """Chi-squared that the causes explain in an experiment, beyond what levels do."""
     away = _away(true.bare, true.own).eliminated()
     at = [j for j, key in enumerate(true.joint.shared) if key in true.joint.levels]
@@ -252,3 +269,177 @@ def _explained(true: _Row) -> float:
 def _away(rival: RecordingSystem, true: RecordingSystem) -> RecordingSystem:
     """A rival in an experiment where another is true, noise left out."""
     return replace(rival, r=rival.r - true.r, deviations=np.zeros(rival.deviations.size))
+
+
+class Refit(Fit):
+    """Least squares of a rival against the response of a true model, without noise.
+
+    Recordings so far go on counting, as their derivatives have them.
+
+    Parameters
+    ----------
+    fit : of the one recording.
+    start : the rival as it was fitted, about the experiment's own start.
+    true : whitened errors of the true model, (n,).
+    so_far : the recordings so far, over the rival's common unknowns.
+    """
+
+    def __init__(
+        self, fit: Fit, start: LinearizedPoint, true: Vector, so_far: RecordingSystem
+    ) -> None:
+        self.__dict__.update(vars(fit))
+        self._start, self._true, self._so_far = start, true, so_far
+
+    def quadratics(self, lin: LinearizedPoint, extra: Sequence[Key] = ()) -> Joint:
+        """As `Fit.quadratics`: errors from the true model, deviations from the rival's start."""
+        joint = super().quadratics(lin, extra)
+        (system,), start = joint.systems, self._start.point
+        deviations = system.deviations - start.deviations[0]
+        away = replace(system, r=system.r - self._true, deviations=deviations)
+        now, then = ({**point.sizes, **point.levels} for point in (lin.point, start))
+        z = np.array([now[key] - then[key] for key in joint.shared])
+        return replace(joint, systems=(away, self._so_far.moved(z)))
+
+    def left(self, active: Sequence[Effect]) -> tuple[float, Matrix]:
+        """Chi-squared that the rival leaves beyond what it began with.
+
+        Returns
+        -------
+        left : chi-squared.
+        errors : whitened, of the experiment by block and channel, (b, c).
+        """
+        right = self._so_far.chi_squared + self.quadratics(self._start).prior.c
+        value, lin = self.least(self._start, active, self._start.variance_factors, right)
+        system = self.quadratics(lin.derived_as(self._start)).systems[0]
+        return value - right, system.r[:-1].reshape(-1, system.channels)
+
+
+class ExperimentPredictor:
+    """The model with all effects, opened once for all experiments."""
+
+    def __init__(self, problem: DesignProblem, model: CoSimulation, derived: OpenModel) -> None:
+        self._problem, self._model, self._derived = problem, model, derived
+
+    def predict_experiment(
+        self, candidate: Experiment, number: int, sensor: Signal | None, in_full: bool
+    ) -> Prediction | None:
+        """Predict an experiment; None if too few samples of it would count.
+
+        Parameters
+        ----------
+        number : of the recording.
+        sensor : that it has besides.
+        in_full : see `predict`.
+        """
+        problem = self._problem
+        if sensor is not None:
+            problem = replace(problem, system=with_sensor(problem.system, sensor))
+        case = self._recorded(problem, candidate, problem.rivals.models[0], number)
+        if not counts(case, problem.system):
+            return None
+        return predict(problem, self._derived, candidate, case, in_full=in_full)
+
+    def confirm(self, prediction: Prediction, number: int) -> Prediction | None:
+        """Predict it with models fitted again in full; None where validity differs by rival.
+
+        It does not where all stay within the system's validity range, or leave it for the same
+        reasons. Where only one of them leaves it, none predicts the recording.
+        """
+        problem = self._problem
+        first = exclusion_reasons(prediction.case, problem.system)
+        if first is None:
+            return None
+        for rival in problem.rivals.models[1:]:
+            other = self._recorded(problem, prediction.candidate, rival, number)
+            if exclusion_reasons(other, problem.system) != first:
+                return None
+        return predict(problem, self._derived, prediction.candidate, prediction.case, in_full=True)
+
+    def _recorded(
+        self, problem: DesignProblem, candidate: Experiment, rival: Rival, number: int
+    ) -> Case:
+        """A recording of an experiment as a rival predicts it."""
+        system, names = problem.system, set(problem.rivals.signals)
+        if system.experiments:
+            names |= {sensor.name for sensor in system.experiments.sensors}
+        references = tuple(s.name for s in system.reference_signals if s.name in names)
+        values = _values(problem, candidate, rival)
+        return predict_recording(self._model, system, candidate, values, references, number)
+
+
+@contextmanager
+def open_predictor(problem: DesignProblem) -> Iterator[ExperimentPredictor]:
+    """Open the models of a worker."""
+    with CoSimulation(problem.everything) as model, opened(problem.source) as derived:
+        yield ExperimentPredictor(problem, model, derived)
+
+
+def _values(problem: DesignProblem, candidate: Experiment, rival: Rival) -> dict[str, float]:
+    """Parameters of a rival in an experiment."""
+    system, rivals, effects = problem.system, problem.rivals, problem.effects
+    values = dict(rivals.given)
+    for condition in system.conditions:
+        setting = candidate.settings.get(condition.name)
+        usual = condition.choices[0] if condition.choices else ""
+        values |= condition.means(setting.value if setting else usual)
+    for (name, choice), level in rival.levels.items():
+        if name in system.comparison.levels and choice in _choices(system, name, candidate):
+            values[name] = level
+    for (name, parameter), size in rival.sizes.items():
+        part = "cosine" if parameter == "amplitude" else parameter
+        if effects[name].late:
+            continue  # a matter of its recording, not of the model
+        for variable in variables(effects[name], part):
+            start = rivals.given.get(variable, 0.0) if part in effects[name].sizes else 0.0
+            values[variable] = start + size
+    return values
+
+
+def _choices(system: System, level: str, candidate: Experiment) -> set[str]:
+    """Names that the level of a parameter may have in an experiment."""
+    by = system.comparison.levels[level].by
+    if not by:
+        return {ALL}
+    setting = candidate.settings.get(by)
+    if setting is None:
+        return {str(system.condition(by).choices[0])}
+    values = setting.value if isinstance(setting.value, tuple) else (setting.value,)
+    return set(map(str, values))
+
+
+def with_sensor(system: System, sensor: Signal) -> System:
+    """The system with a further signal that is compared."""
+    channel = Channel(
+        sensor.name,
+        sensor.unit,
+        sensor.label,
+        sensor.shown,
+        Expression(sensor.name, f"{system.source}, [next.sensors.{sensor.name}]"),
+    )
+    compared = replace(system.comparison, channels=(*system.comparison.channels, channel))
+    return replace(
+        system, reference_signals=(*system.reference_signals, sensor), comparison=compared
+    )
+
+
+def counts(case: Case, system: System) -> bool:
+    """Whether a recording has enough that counts."""
+    return _counted(case, system, restarting=True) is not None
+
+
+def exclusion_reasons(case: Case, system: System) -> set[str] | None:
+    """Reasons why samples are excluded, but for the end; None if too few samples count."""
+    counted = _counted(case, system, restarting=False)
+    if counted is None:
+        return None
+    reasons = [
+        exclusion.reason for exclusion in system.comparison.exclusions if not exclusion.to_the_end
+    ]
+    return {reason for reason in reasons if counted.excluded[reason].any()}
+
+
+def _counted(case: Case, system: System, *, restarting: bool) -> CountedSamples | None:
+    try:
+        return count(case, system, tuple(case.signals), SOUND, restarting=restarting)
+    except InputError:
+        return None

@@ -71,7 +71,8 @@ def responses_figure(proposal: NextStop) -> "Figure":
     with styled(4.2 * len(best), 0.8 + 1.5 * rows, font_size=8) as sheet:
         panels = sheet.subplots(rows, len(best), sharey="row", sharex="col", squeeze=False)
         for column, experiment in enumerate(best):
-            case, predicted = experiment.prediction.case, experiment.prediction
+            prediction = experiment.prediction
+            case = prediction.case
             title = f"{column + 1}. {experiment.text}".replace("; ", "\n")
             panels[0, column].set_title(title, fontsize=7, loc="left")
             for axes, profile in zip(panels[:, column], varied, strict=False):
@@ -80,9 +81,9 @@ def responses_figure(proposal: NextStop) -> "Figure":
                 axes.plot(case.time, case[signal.name] / factor, color=LIGHT["measured"])
             for c, axes in enumerate(panels[len(varied) :, column]):
                 axes.axhspan(-_BAND, _BAND, color=LIGHT["raw"], alpha=0.2, linewidth=0.0)
-                curves = zip(proposal.names, predicted.left, ESTIMATORS, strict=False)
+                curves = zip(proposal.names, prediction.left, ESTIMATORS, strict=False)
                 for name, left, style in curves:
-                    axes.plot(predicted.block_time, left[:, c], color=LIGHT[style], label=name)
+                    axes.plot(prediction.block_time, left[:, c], color=LIGHT[style], label=name)
             panels[-1, column].set_xlabel("time [s]")
         for axes, profile in zip(panels[:, 0], varied, strict=False):
             signal = system.signals[profile.input.name]
@@ -112,7 +113,7 @@ def write_next_stop_page(proposal: NextStop, summary: Mapping[str, Any], out: Pa
     )
     parts = [
         Part("shown", "The recording to make next", [shown, first]),
-        Part("tried", "All experiments that were tried, best first", [_tried(summary)]),
+        Part("tried", "All experiments that were tried, best first", [_experiments(summary)]),
         Part("definitions", "Definitions", [Definitions(_TERMS)]),
     ]
     if others:
@@ -122,13 +123,13 @@ def write_next_stop_page(proposal: NextStop, summary: Mapping[str, Any], out: Pa
 
 def _figure(proposal: NextStop, experiment: RankedExperiment, place: int) -> CaseFigure:
     """Inputs and what each model leaves by channel, at the blocks."""
-    predicted = experiment.prediction
-    time = predicted.block_time
+    prediction = experiment.prediction
+    time = prediction.block_time
     panels = []
-    for profile in predicted.candidate.profiles:
+    for profile in prediction.candidate.profiles:
         signal = proposal.system.signals[profile.input.name]
         factor = si_factor(signal.shown, signal.unit, signal.name)
-        values = np.interp(time, predicted.case.time, predicted.case[signal.name]) / factor
+        values = np.interp(time, prediction.case.time, prediction.case[signal.name]) / factor
         low, high = float(values.min()), float(values.max())
         room = 0.08 * (high - low) or 1.0
         title = f"{capital(signal.label)} {signal.name} [{signal.shown}]"
@@ -137,7 +138,7 @@ def _figure(proposal: NextStop, experiment: RankedExperiment, place: int) -> Cas
     for c, channel in enumerate(proposal.channels):
         curves = tuple(
             Curve(style, left[:, c])
-            for left, style in zip(predicted.left, ESTIMATORS, strict=False)
+            for left, style in zip(prediction.left, ESTIMATORS, strict=False)
         )
         band = Curve("raw", np.zeros(time.size), np.full(time.size, _BAND))
         reach = 1.1 * max(_BAND, *(float(np.abs(curve.values).max()) for curve in curves))
@@ -156,7 +157,7 @@ def _figure(proposal: NextStop, experiment: RankedExperiment, place: int) -> Cas
     )
 
 
-def _tried(summary: Mapping[str, Any]) -> Table:
+def _experiments(summary: Mapping[str, Any]) -> Table:
     single = len(summary["rivals"]) == 1
     columns: list[object] = ["place", "experiment"]
     if single:
@@ -165,12 +166,13 @@ def _tried(summary: Mapping[str, Any]) -> Table:
         columns += [Numbers("separation [standard deviations]"), Numbers("chance [%]")]
     columns.append(Numbers(f"cost [{summary['tried'][0]['cost']['unit']}]"))
     rows = []
-    for k, tried in enumerate(summary["tried"], 1):
-        row: list[object] = [str(k), tried["experiment"]]
+    for k, experiment in enumerate(summary["tried"], 1):
+        row: list[object] = [str(k), experiment["experiment"]]
         if single:
-            row.append(number(tried["deviation"]["before"] / tried["deviation"]["after"], ".2g"))
+            deviation = experiment["deviation"]
+            row.append(number(deviation["before"] / deviation["after"], ".2g"))
         else:
-            chance = tried["chance"]
-            row += [number(tried["separation"], ".1f"), number(100.0 * chance, ".0f", chance)]
-        rows.append((*row, number(tried["cost"]["value"], ".3g")))
+            chance = experiment["chance"]
+            row += [number(experiment["separation"], ".1f"), number(100.0 * chance, ".0f", chance)]
+        rows.append((*row, number(experiment["cost"]["value"], ".3g")))
     return Table("tried-table", "What each experiment would tell.", columns, rows)

@@ -38,8 +38,8 @@ def refitted(new: Quadratic, information: Matrix) -> tuple[float, Vector]:
     --------
     A rival that differs by 3 everywhere and has nothing to fit, in four samples:
 
-    >>> one = Quadratic(np.zeros((0, 0)), np.zeros(0), 4 * 3.0**2, 4)
-    >>> refitted(one, np.zeros((0, 0)))[0]
+    >>> rival = Quadratic(np.zeros((0, 0)), np.zeros(0), 4 * 3.0**2, 4)
+    >>> refitted(rival, np.zeros((0, 0)))[0]
     36.0
     """
     total = add([new, Quadratic(information, np.zeros(len(information)), 0.0, 0)])

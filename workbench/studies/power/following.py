@@ -16,7 +16,7 @@ from workbench.runtime.engine import ALONE, Engine
 from workbench.runtime.pool import Pool
 from workbench.runtime.progress import StepReporter
 from workbench.studies.design import RankedExperiment, next_stop, predict_experiments, with_sensor
-from workbench.studies.design.candidates import drawn
+from workbench.studies.design.candidates import draw_experiment
 from workbench.studies.power.diagnosing import (
     distance,
     distances_in_set,
@@ -165,7 +165,7 @@ def _fill(row: dict[str, Any], setup: Setup, planting: Planting) -> None:
         return
     assert experiments is not None  # or nothing were proposed
     rng = np.random.default_rng(planting.seed)
-    plan = [drawn(experiments, rng) for _ in range(_DRAWN)]
+    plan = [draw_experiment(experiments, rng) for _ in range(_DRAWN)]
     rest = (setup, planting, rivals, cases)
     row["proposed"] = _made(asked.tried[0], *rest)
     if not row["proposed"]["foreseen"]:

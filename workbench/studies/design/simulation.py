@@ -21,22 +21,19 @@ from workbench.models.native import (
 )
 from workbench.recordings.case import Case, Value, make_case
 from workbench.studies.design.candidates import Experiment
-from workbench.system.experiments import Experiments
 from workbench.system.parts import LARGEST, Condition
 from workbench.system.system import System
 
 
-def recorded(
+def predict_recording(
     model: CoSimulation,
     system: System,
-    experiments: Experiments,
     candidate: Experiment,
     values: Mapping[str, float],
-    name: str,
-    judged: tuple[str, ...],
-    seed: int,
+    references: tuple[str, ...],
+    number: int,
 ) -> Case:
-    """What the sensors would record of an experiment if the model with these values were true.
+    """Simulate what the sensors would record of an experiment if the model were true.
 
     Inputs that a controller makes follow from the model's variables, anew in each of the blocks
     whose means are compared; those that a profile makes go from sample to sample in a line, of
@@ -45,48 +42,48 @@ def recorded(
     Parameters
     ----------
     values : of the model's parameters, SI.
-    judged : names of signals that are only there to judge by, and are recorded.
-    seed : of the noise of the sensors.
+    references : names of the validation sensors that are recorded.
+    number : of the recording; seeds the noise of the sensors.
     """
-    h = system.sample_time
-    time: Vector = h * np.arange(round(experiments.lasts / h) + 1.0)
-    u, y = _driven(model, system, experiments, candidate, values, judged, time)
-    time, rng = time[: len(y)], np.random.default_rng(seed)
-    names = [*(signal.name for signal in (*system.inputs, *system.outputs)), *judged]
+    u, y = _simulate(model, system, candidate, values, references)
+    time, rng = system.sample_time * np.arange(float(len(y))), np.random.default_rng(number)
+    names = [*(signal.name for signal in (*system.inputs, *system.outputs)), *references]
     clean = dict(zip(names, (*u.T, *y.T), strict=True))
     signals = {
         key: column + system.signals[key].deviation(column) * rng.standard_normal(time.size)
         for key, column in clean.items()
     }
     conditions = _conditions(system, candidate, clean)
-    case = make_case(name, (time, signals), conditions, system)
+    case = make_case(f"{number:03}", (time, signals), conditions, system)
     return replace(case, title=candidate.text(system), aids=())
 
 
-def start_of(system: System, experiments: Experiments, candidate: Experiment) -> dict[str, float]:
+def start_of(system: System, candidate: Experiment) -> dict[str, float]:
     """States at the start of an experiment, SI."""
+    assert system.experiments is not None
     known = {**system.values, **candidate.numbers}
-    return {state: float(formula(known)) for state, formula in experiments.start.items()}
+    return {state: float(formula(known)) for state, formula in system.experiments.start.items()}
 
 
-def _driven(
+def _simulate(
     model: CoSimulation,
     system: System,
-    experiments: Experiments,
     candidate: Experiment,
     values: Mapping[str, float],
-    judged: tuple[str, ...],
-    time: Vector,
+    references: tuple[str, ...],
 ) -> tuple[Matrix, Matrix]:
     """Inputs (n, m) and readings (n, c) without noise, until the recording ends."""
+    assert system.experiments is not None
+    experiments, h = system.experiments, system.sample_time
+    time: Vector = h * np.arange(round(experiments.lasts / h) + 1.0)
     known: dict[str, Any] = {**system.values, **candidate.numbers}
     model.start(
-        start_of(system, experiments, candidate),
+        start_of(system, candidate),
         {key: value for key, value in values.items() if key in model.defaults},
     )
     names = [signal.name for signal in system.inputs]
     outputs = [output.name for output in system.outputs]
-    readings = [system.signals[key].reading for key in (*outputs, *judged)]
+    readings = [system.signals[key].reading for key in (*outputs, *references)]
     formulas = [*experiments.driven.values()]
     formulas += [experiments.ends.formula] if experiments.ends else []
     variables = {v.name for v in model.description.variables}
@@ -97,25 +94,27 @@ def _driven(
     for profile in candidate.profiles:
         u[:, names.index(profile.input.name)] = profile.signal(time)
     held = np.array([signal.held for signal in system.inputs], np.bool_)
-    h = float(time[1] - time[0])
-    every = max(1, round(system.comparison.block / h))
+    size = max(1, round(system.comparison.block / h))
     model.set(model.variables(names), u[0])
     running = co_simulation_instance(model, names, readings)
-    for k in range(0, time.size, every):
-        block = slice(k, k + every + 1)
+    for k in range(0, time.size, size):
+        block = slice(k, k + size + 1)
         feels = {**known, **dict(zip(felt.names, model.get(felt).tolist(), strict=True))}
         for key, formula in experiments.driven.items():
             u[block, names.index(key)] = formula(feels)
         ends = experiments.ends
         if ends is not None and abs(float(ends.formula(feels))) < ends.below:
             return u[:k], y[:k]
-        raise_on_failure(_followed(running, h, held, u[block], y[block]), model)
+        raise_on_failure(_step_block(running, h, held, u[block], y[block]), model)
     return u, y
 
 
 @compiled
-def _followed(model, h, held, u, y):  # type: ignore[no-untyped-def]
-    """Readings (n, c) while inputs go from sample to sample, (n, m), h [s] apart; a status."""
+def _step_block(model, h, held, u, y):  # type: ignore[no-untyped-def]
+    """Write readings y (n, c) for inputs u (n, m), samples h [s] apart; returns a status.
+
+    A step from sample k - 1 to k is driven by (u_{k-1} + u_k) / 2, or by u_{k-1} if held.
+    """
     m = u.shape[1]
     for k in range(len(u)):
         if k > 0:
@@ -147,12 +146,12 @@ def _conditions(
                 else condition.choices[0]
             )
         elif not condition.sets:
-            conditions[condition.name] = _told(system, condition, clean)
+            conditions[condition.name] = _condition_value(system, condition, clean)
     return conditions
 
 
-def _told(system: System, condition: Condition, clean: Mapping[str, Vector]) -> float:
-    """A quantity as a recording says it."""
+def _condition_value(system: System, condition: Condition, clean: Mapping[str, Vector]) -> float:
+    """A quantity, by the formula that recordings must agree with."""
     if condition.agrees is None:
         raise InputError(
             where=f"{system.source}, [next.conditions]",
