@@ -270,15 +270,15 @@ def _power() -> Schema:
 
 
 def _thresholds() -> Schema:
-    one = {"rig": TEXT, "kind": TEXT, "planted": listed(TEXT), "said": listed(TEXT)}
-    sets = listed(closed({**one, "changed": listed(declared(VerdictChange))}))
+    row = {"rig": TEXT, "kind": TEXT, "planted": listed(TEXT), "said": listed(TEXT)}
+    sets = listed(closed({**row, "changed": listed(declared(VerdictChange))}))
     return summary("power --thresholds", _SETS, {"usual": by_name(NUMBER), "sets": sets})
 
 
 def _sheet_error() -> Schema:
-    one = {"rig": TEXT, "wrong": by_name(NUMBER), "verdict": TEXT, "error": TEXT}
-    one |= {"causes": listed(listed(TEXT)), "wrong_name": FLAG}
-    return summary("power --sheet-error", _SETS, {"sets": listed(closed(one))})
+    row = {"rig": TEXT, "wrong": by_name(NUMBER), "verdict": TEXT, "error": TEXT}
+    row |= {"causes": listed(listed(TEXT)), "wrong_name": FLAG}
+    return summary("power --sheet-error", _SETS, {"sets": listed(closed(row))})
 
 
 def _left_out() -> Schema:
@@ -286,7 +286,7 @@ def _left_out() -> Schema:
     ends = {
         name: or_null(NUMBER) for name in ("before", "after", "after_with_it", "function_error")
     }
-    one = {
+    row = {
         "rig": TEXT,
         "verdict": TEXT,
         "error": TEXT,
@@ -296,7 +296,7 @@ def _left_out() -> Schema:
         **dict.fromkeys(ends, or_null(NUMBER)),
     }
     shares = {name: SHARE for name in left_out.SHARES}
-    return summary("power --leave-out-effect", _SETS, {**shares, "sets": listed(closed(one))})
+    return summary("power --leave-out-effect", _SETS, {**shares, "sets": listed(closed(row))})
 
 
 def _followed() -> Schema:
@@ -305,7 +305,7 @@ def _followed() -> Schema:
     flags = {name: FLAG for name in ("foreseen", "parts")}
     said = {**texts, **flags, "named": listed(TEXT), "separations": listed(away)}
     made = closed(said)
-    one = {
+    row = {
         **{name: TEXT for name in ("rig", "planted", "verdict", "sentence", "error")},
         "multiple": NUMBER,
         **{name: listed(TEXT) for name in ("group", "sensors")},
@@ -314,7 +314,7 @@ def _followed() -> Schema:
         "sensed": or_null(closed({"sensor": TEXT, **said})),
     }
     shares = {name: SHARE for name in following.SHARES}
-    return summary("power --follow", _SETS, {**shares, "sets": listed(closed(one))})
+    return summary("power --follow", _SETS, {**shares, "sets": listed(closed(row))})
 
 
 def _plan() -> Schema:

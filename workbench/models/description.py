@@ -176,7 +176,7 @@ class Description:
             If there is none, or it is empty.
         """
         file = f"{self.interfaces[interface].identifier}{fmpy.sharedLibraryExtension}"
-        names = [f"binaries/{one}/{file}" for one in (fmpy.platform, fmpy.platform_tuple)]
+        names = [f"binaries/{platform}/{file}" for platform in (fmpy.platform, fmpy.platform_tuple)]
         if found := next((name for name in names if self.binaries.get(name)), None):
             return found
         empty = next((name for name in names if name in self.binaries), None)

@@ -627,10 +627,10 @@ class FMU:
         for j in range(columns):
             known = ctypes.c_void_p(knowns.references[j:].ctypes.data)
             unknown = ctypes.c_void_p(unknowns.ctypes.data)
-            size, one = ctypes.c_size_t(unknowns.size), ctypes.c_size_t(1)
+            size, single = ctypes.c_size_t(unknowns.size), ctypes.c_size_t(1)
             seeds, out = ctypes.c_void_p(seed.ctypes.data), ctypes.c_void_p(result[j].ctypes.data)
-            tail = (seeds, one, out, size) if self.version == "3.0" else (seeds, out)
-            self._loaded.call("directional", unknown, size, known, one, *tail)
+            tail = (seeds, single, out, size) if self.version == "3.0" else (seeds, out)
+            self._loaded.call("directional", unknown, size, known, single, *tail)
         return result.T
 
     def _difference(self, unknowns: NDArray[np.uint32], knowns: Variables) -> Matrix:

@@ -136,7 +136,7 @@ def _marks(description: Description, interface: str) -> tuple[str, str]:
 def _packaged() -> frozenset[str]:
     """Hashes of the FMUs that come with the workbench."""
     manifest = json.loads((fmus() / "manifest.json").read_text(encoding="utf-8"))
-    return frozenset(one["sha256"] for one in manifest["fmus"].values())
+    return frozenset(entry["sha256"] for entry in manifest["fmus"].values())
 
 
 def run_trial(description: Description, interface: str, folder: Path, limits: Limits) -> str:
@@ -238,7 +238,7 @@ def _task(description: Description, interface: str, folder: Path, limits: Limits
         "reals": list(references.values()),
         "inputs": inputs,
         "start": begin,
-        "directional": [one for one in wanted if all(one)]
+        "directional": [pair for pair in wanted if all(pair)]
         if exchange and offered.directional_derivatives
         else [],
         "saves": offered.saves_state,

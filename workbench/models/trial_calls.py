@@ -200,10 +200,15 @@ def _step(call: _Calls, t: float) -> None:
 
 
 def _differentiate(call: _Calls, unknowns: list[int], known: int) -> None:
-    rows, one = _SIZE(len(unknowns)), _SIZE(1)
+    rows, single = _SIZE(len(unknowns)), _SIZE(1)
     result, seed = (_DOUBLE * len(unknowns))(), (_DOUBLE * 1)(1.0)
-    references = ((ctypes.c_uint * len(unknowns))(*unknowns), rows, (ctypes.c_uint * 1)(known), one)
-    tail = (seed, one, result, rows) if call.three else (seed, result)
+    references = (
+        (ctypes.c_uint * len(unknowns))(*unknowns),
+        rows,
+        (ctypes.c_uint * 1)(known),
+        single,
+    )
+    tail = (seed, single, result, rows) if call.three else (seed, result)
     call("GetDirectionalDerivative", *references, *tail)
 
 
@@ -277,7 +282,7 @@ def _orphans() -> list[int]:
     """Processes that the child left to this one (`_ADOPT`); each that ends may leave others."""
     try:
         with open(f"/proc/self/task/{os.getpid()}/children") as listing:
-            return [int(one) for one in listing.read().split()]
+            return [int(reference) for reference in listing.read().split()]
     except OSError:
         return []
 

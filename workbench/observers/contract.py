@@ -117,7 +117,7 @@ class Estimator(ABC):
         self.system = system = self.fed(system)
         check_model(system, fmu.description)
         self.gains = gains
-        inputs = [one.name for one in system.inputs]
+        inputs = [signal.name for signal in system.inputs]
         unseen = [output.name for output in system.outputs if output.name not in fmu.states]
         outputs = [*system.reported, *unseen]
         self._model: Any = instance(fmu, inputs, system.corrections, outputs)
@@ -250,9 +250,9 @@ class Estimator(ABC):
         """Start FMU and state from the first sample; `advance` takes it again, after no time."""
         measured = zip(self.system.outputs, self._measured(y), strict=True)
         begin = {
-            one.name: float(value)
-            for one, value in measured
-            if one.name in self.fmu.states and not np.isnan(value)
+            output.name: float(value)
+            for output, value in measured
+            if output.name in self.fmu.states and not np.isnan(value)
         }
         rolling = self.system.rolling
         if rolling is not None and rolling.follower not in begin and rolling.leader in begin:

@@ -458,7 +458,7 @@ def linearise_along(fmu: FMU, system: System, time: Vector, x: Matrix, u: Matrix
     transition = exponentials(generator * steps[:, None, None])
     kept = [*range(count), *range(count + m, count + m + q)]
     driven = slice(count, count + m)
-    noise = np.array([one.noise_at_scale for one in system.inputs])
+    noise = np.array([signal.noise_at_scale for signal in system.inputs])
     sensors = np.column_stack(
         [output.deviation(values) for output, values in zip(system.outputs, y.T, strict=True)]
     )
@@ -472,4 +472,4 @@ def linearise_along(fmu: FMU, system: System, time: Vector, x: Matrix, u: Matrix
 
 
 def _inputs(system: System) -> list[str]:
-    return [*(one.name for one in system.inputs), *system.corrections]
+    return [*(signal.name for signal in system.inputs), *system.corrections]

@@ -135,13 +135,13 @@ def write_observability(
         "useful": {quantity.correction: quantity.useful for quantity in system.estimated},
         "linear": {test.model: _linear(test) for test in linear},
         "cases": {
-            one.case.name: {
-                "title": one.case.title,
-                "judged_windows": int(one.judged.sum()),
-                **{f"median_{name}": value for name, value in _medians(one).items()},
-                "models": {test.model: _shares(test, one) for test in one.tests},
+            result.case.name: {
+                "title": result.case.title,
+                "judged_windows": int(result.judged.sum()),
+                **{f"median_{name}": value for name, value in _medians(result).items()},
+                "models": {test.model: _shares(test, result) for test in result.tests},
             }
-            for one in done
+            for result in done
         },
     }
     write_json(path, with_answer(observed(system, summary), summary))
@@ -233,7 +233,7 @@ def _point(system: System) -> str:
 
 def _case_lines(system: System, done: Sequence[CaseObservability]) -> list[str]:
     first, last = done[0].tests[0], done[0].tests[-1]
-    width = max([len("case"), *(len(one.case.name) for one in done)])
+    width = max([len("case"), *(len(result.case.name) for result in done)])
     header = f"{'case':<{width}}" + "".join(
         f"{quantity.name:>9}{f'{quantity.correction} < {quantity.useful:g}':>16}{'median':>10}"
         for quantity in system.estimated
@@ -247,13 +247,13 @@ def _case_lines(system: System, done: Sequence[CaseObservability]) -> list[str]:
         header,
         "-" * len(header),
     ]
-    for one in done:
-        row = f"{one.case.name:<{width}}"
-        shares, states = _shares(one.tests[0], one), _shares(one.tests[-1], one)
+    for result in done:
+        row = f"{result.case.name:<{width}}"
+        shares, states = _shares(result.tests[0], result), _shares(result.tests[-1], result)
         if shares["useful"] is None:
             lines.append(f"{row}  nothing is judged")
             continue
-        medians = _medians(one)
+        medians = _medians(result)
         for quantity in system.estimated:
             row += f"{medians[quantity.name]:>9.2g}"
             row += f"{100 * shares['useful'][quantity.correction]:>14.0f} %"
@@ -280,7 +280,7 @@ def write_observability_page(
     planned : number of cases that were asked for.
     """
     system = done[0].system
-    figures = [_figure(one) for one in sorted(done, key=_share)]
+    figures = [_figure(result) for result in sorted(done, key=_share)]
     first, *others = zoomable(figures, summary, out)
     names = ", ".join(capital(quantity.label) for quantity in system.estimated) or "States"
     parts = [

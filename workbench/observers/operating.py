@@ -55,7 +55,7 @@ def settle(
     x : (n,) states.
     u : (m + q,) measured inputs and corrections.
     """
-    rolling, names = system.rolling, [one.name for one in system.inputs]
+    rolling, names = system.rolling, [signal.name for signal in system.inputs]
     places = layout(fmu, system)
     held = {name: float(formula(fmu.defaults)) for name, formula in point.held.items()}
     fmu.start(held)

@@ -66,7 +66,10 @@ def replay(case: Case, estimator: Estimator) -> Run:
     return Run(
         case=case.name,
         estimator=estimator.name,
-        columns={**system.columns, **{n: one.unit for n, (one, _) in system.indirect.items()}},
+        columns={
+            **system.columns,
+            **{n: signal.unit for n, (signal, _) in system.indirect.items()},
+        },
         time=case.time,
         estimate=values,
         sigma=sigma,
@@ -85,11 +88,11 @@ def with_indirect(system: System, values: Matrix, sigma: Matrix) -> tuple[Matrix
     Standard deviations to first order: by what a formula changes over both of its column's.
     """
     more, deviations = [values], [sigma]
-    for one, name in system.indirect.values():
+    for signal, name in system.indirect.values():
         at = list(system.columns).index(name)
         value, reach = values[:, at], sigma[:, at]
         middle, high, low = (
-            system.evaluate(one.formula, {name: column})
+            system.evaluate(signal.formula, {name: column})
             for column in (value, value + reach, value - reach)
         )
         more.append(middle[:, None])

@@ -134,9 +134,12 @@ def run_figure(run: Run) -> CaseFigure:
 
 def probability_panel(runs: Iterable[Run]) -> Panel:
     """Probability of each mode of the estimators that weigh models, one line style each."""
-    modes = [one for run in runs for one in run.probability.items()]
+    modes = [mode for run in runs for mode in run.probability.items()]
     title = "Probability of " + ", ".join(name.replace("_", " ") for name, _ in modes) + " [1]"
-    curves = [Curve(ESTIMATORS[i % len(ESTIMATORS)], one) for i, (_, one) in enumerate(modes)]
+    curves = [
+        Curve(ESTIMATORS[i % len(ESTIMATORS)], probability)
+        for i, (_, probability) in enumerate(modes)
+    ]
     return Panel(title, "1", -0.05, 1.05, 0.6, tuple(curves))
 
 

@@ -54,7 +54,7 @@ def read_conditions(table: Table, system: System) -> dict[str, Value]:
         for condition in system.conditions
         if condition.name in table or not condition.sets
     ]
-    return {one.name: _condition(table, one, remedy) for one in said}
+    return {condition.name: _condition(table, condition, remedy) for condition in said}
 
 
 def _condition(table: Table, condition: Condition, remedy: str) -> Value:
@@ -469,8 +469,14 @@ def _found_folders(path: Path) -> list[Path]:
         )
     if (path / "case.toml").exists():
         return [path]
-    below = sorted((one for one in path.iterdir() if one.is_dir()), key=lambda path: path.name)
-    folders = [one for one in below if re.match(r"\d+_", one.name) or (one / "case.toml").exists()]
+    below = sorted(
+        (entry for entry in path.iterdir() if entry.is_dir()), key=lambda path: path.name
+    )
+    folders = [
+        folder
+        for folder in below
+        if re.match(r"\d+_", folder.name) or (folder / "case.toml").exists()
+    ]
     if not folders:
         raise InputError(
             where=str(path),

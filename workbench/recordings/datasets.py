@@ -205,18 +205,18 @@ def read_recorded(folder: Path, system: System) -> Case:
     readers = [layout.one for layout in layouts if layout.one is not None]
     if set(document.content) <= set(KEYS) or not readers:
         return read_case(folder, system)
-    one = readers[0](folder)
+    recording = readers[0](folder)
     with tempfile.TemporaryDirectory(prefix="recorded-") as scratch:
-        for file, text in _texts(one).items():
-            write_whole(Path(scratch) / one.name / file, text)
+        for file, text in _texts(recording).items():
+            write_whole(Path(scratch) / recording.name / file, text)
         try:
-            case = read_case(Path(scratch) / one.name, system)
+            case = read_case(Path(scratch) / recording.name, system)
         except InputError as error:  # of files that are not the user's
             where = error.where.replace(scratch, str(folder.parent))
             raise InputError(
                 where=where, found=error.found, expected=error.expected, remedy=error.remedy
             ) from None
-    return replace(case, source=folder.parent / one.file)
+    return replace(case, source=folder.parent / recording.file)
 
 
 def _described(recording: PublishedRecording) -> dict[str, Any]:

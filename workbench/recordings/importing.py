@@ -237,8 +237,8 @@ def import_recording(
     many = len(kept) > 1
     names = [f"{k:02d}_{name}" if many else name for k in range(1, len(kept) + 1)]
     pieces = [
-        _piece(own, one, measured, system, conditions, where)
-        for own, one in zip(names, kept, strict=True)
+        _piece(own, recording, measured, system, conditions, where)
+        for own, recording in zip(names, kept, strict=True)
     ]
     return Import(recording, measured, tuple(parts), tuple(pieces))
 
@@ -298,11 +298,11 @@ def store(out: Path, named: Mapping[str, NamedChannel]) -> None:
     InputError
         If the file cannot be written.
     """
-    tables = {signal: one.to_dict() for signal, one in named.items()}
+    tables = {signal: channel.to_dict() for signal, channel in named.items()}
     write_whole(out / COLUMNS, tomli_w.dumps({"columns": tables}))
 
 
-def write(one: Import, out: Path, system: System) -> None:
+def write(imported: Import, out: Path, system: System) -> None:
     """Write case folders of an import.
 
     Raises
@@ -311,10 +311,10 @@ def write(one: Import, out: Path, system: System) -> None:
         If they cannot be written.
     """
     written: dict[str, str] = {}
-    for piece in one.pieces:
-        names = ", ".join(file.path.name for file in one.recording.files)
-        names += f", '{one.recording.name}'" if one.recording.name else ""
-        date = one.measured.date(piece.samples[0])
+    for piece in imported.pieces:
+        names = ", ".join(file.path.name for file in imported.recording.files)
+        names += f", '{imported.recording.name}'" if imported.recording.name else ""
+        date = imported.measured.date(piece.samples[0])
         dated = {"date": date} if date else {}
         case = {"title": f"{piece.name}, imported from {names}", **dated}
         conditions = {"conditions": dict(piece.conditions)} if piece.conditions else {}
@@ -330,9 +330,9 @@ def write(one: Import, out: Path, system: System) -> None:
         write_whole(out / path, text)
 
 
-def describe(one: Import, system: System) -> dict[str, Any]:
+def describe(imported: Import, system: System) -> dict[str, Any]:
     """What was read, converted, dropped and cut, for programs."""
-    time, measured = one.measured.time, one.measured
+    time, measured = imported.measured.time, imported.measured
     return {
         "files": [
             {
@@ -342,23 +342,23 @@ def describe(one: Import, system: System) -> dict[str, Any]:
                 "notes": list(file.notes),
                 "doubts": list(file.doubts),
             }
-            for file in one.recording.files
+            for file in imported.recording.files
         ],
-        "recording": one.recording.name or None,
+        "recording": imported.recording.name or None,
         "began": measured.date(0) or None,
-        "time": _described_clocks(one),
-        "channels": _described_channels(one, system),
-        "dropped": list(one.recording.proposal.left),
+        "time": _described_clocks(imported),
+        "channels": _described_channels(imported, system),
+        "dropped": list(imported.recording.proposal.left),
         "notes": list(measured.notes),
         "cut": [
             {
                 "begins": float(time[part.first]),
                 "ends": float(time[part.end - 1]),
                 "samples": part.end - part.first,
-                "case": next((p.name for p in one.pieces if p.samples[0] == part.first), None),
+                "case": next((p.name for p in imported.pieces if p.samples[0] == part.first), None),
                 "left_out": part.reason or None,
             }
-            for part in one.parts
+            for part in imported.parts
         ],
         "cases": {
             piece.name: {
@@ -370,13 +370,13 @@ def describe(one: Import, system: System) -> dict[str, Any]:
                 },
                 "doubts": list(piece.doubts),
             }
-            for piece in one.pieces
+            for piece in imported.pieces
         },
     }
 
 
-def _described_clocks(one: Import) -> list[dict[str, Any]]:
-    files = one.recording.files
+def _described_clocks(imported: Import) -> list[dict[str, Any]]:
+    files = imported.recording.files
     return [
         {
             "file": files[file].path.name,
@@ -385,12 +385,12 @@ def _described_clocks(one: Import) -> list[dict[str, Any]]:
             "unit": clock.unit,
             "reason": clock.reason,
         }
-        for (file, group), clock in one.recording.proposal.clocks.items()
+        for (file, group), clock in imported.recording.proposal.clocks.items()
     ]
 
 
-def _described_channels(one: Import, system: System) -> dict[str, dict[str, Any]]:
-    files = one.recording.files
+def _described_channels(imported: Import, system: System) -> dict[str, dict[str, Any]]:
+    files = imported.recording.files
     return {
         name: {
             "file": files[found.file].path.name,
@@ -407,7 +407,7 @@ def _described_channels(one: Import, system: System) -> dict[str, dict[str, Any]
             "missing": list(found.missing),
             "reason": found.reason,
         }
-        for name, found in one.recording.proposal.assigned.items()
+        for name, found in imported.recording.proposal.assigned.items()
     }
 
 

@@ -95,13 +95,13 @@ def doubts(
         ):
             found += check
     _refuse(found)
-    return (*origin.doubts, *(str(one.refusal()) for one in found))
+    return (*origin.doubts, *(str(finding.refusal()) for finding in found))
 
 
 def _refuse(found: list[_Finding]) -> None:
-    for one in found:
-        if one.impossible:
-            raise one.refusal()
+    for finding in found:
+        if finding.impossible:
+            raise finding.refusal()
 
 
 def _ranges(
@@ -326,10 +326,10 @@ def shown_by(condition: Condition, signals: Mapping[str, Vector], system: System
     )
 
 
-def _apart(one: float, other: float, tolerance: Tolerance) -> float:
+def _apart(first: float, other: float, tolerance: Tolerance) -> float:
     """Difference as a share of the larger one, 0 where it means nothing."""
-    difference = abs(one - other)
-    return difference / max(abs(one), abs(other)) if difference > tolerance.slack else 0.0
+    difference = abs(first - other)
+    return difference / max(abs(first), abs(other)) if difference > tolerance.slack else 0.0
 
 
 def _worded(condition: Condition, value: float) -> str:

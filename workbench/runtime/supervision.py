@@ -304,7 +304,9 @@ def _confine_sockets(libc: ctypes.CDLL) -> bool:
         (_RETURN, 0, 0, _ALLOW),
         (_RETURN, 0, 0, refuse),
     ]
-    code = ctypes.create_string_buffer(b"".join(struct.pack("HBBI", *one) for one in program))
+    code = ctypes.create_string_buffer(
+        b"".join(struct.pack("HBBI", *instruction) for instruction in program)
+    )
     header = struct.pack("HxxxxxxP", len(program), ctypes.addressof(code))
     libc.prctl(_NO_NEW_PRIVILEGES, 1, 0, 0, 0)
     failed = libc.prctl(_SECCOMP, _FILTER, header, 0, 0)

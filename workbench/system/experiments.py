@@ -220,9 +220,13 @@ class Experiments:
     @property
     def varied(self) -> tuple[VariedInput, ...]:
         """Inputs that follow profiles."""
-        return tuple(one for one in self.inputs if isinstance(one, VariedInput))
+        return tuple(varied for varied in self.inputs if isinstance(varied, VariedInput))
 
     @property
     def driven(self) -> dict[str, Expression]:
         """Formulas of inputs that follow from the model's variables."""
-        return {one.name: one.formula for one in self.inputs if isinstance(one, ControlledInput)}
+        return {
+            controlled.name: controlled.formula
+            for controlled in self.inputs
+            if isinstance(controlled, ControlledInput)
+        }

@@ -418,7 +418,7 @@ class System:
         names = tuple(output.name for output in self.outputs)
         if signal in names:
             return tuple(float(name == signal) for name in names)
-        derived = next(one for one in self.derived if one.name == signal)
+        derived = next(channel for channel in self.derived if channel.name == signal)
         return derived.formula.slopes(names, self.values)
 
     def with_names(self, names: Mapping[str, str]) -> "System":

@@ -245,8 +245,8 @@ def said(values: Sequence[float], unit: str) -> tuple[list[float], str]:
     (([150.0], 'N'), ([120.0], 'mbar'), ([0.000405], 'm2/s'))
     """
     size = abs(values[0])
-    one, _, divisor = unit.partition("/")
-    if one == "1" and divisor:
+    numerator, _, divisor = unit.partition("/")
+    if numerator == "1" and divisor:
         step = next((n for n in _STEPS if size * n >= _WHOLE), _STEPS[-1])
         per = divisor if step == 1 else f"{step} {divisor}"
         return [round(100.0 * step * value, 12) for value in values], f"% per {per}"

@@ -100,7 +100,7 @@ def flatten(package: Path, model: str) -> FlatModel:
         )
     library = read_library(package)
     refuse_dropped(library, check(library, model))
-    used = [str(one.parent) for one in packages(package)[1:]]
+    used = [str(file.parent) for file in packages(package)[1:]]
     try:
         with _quiet_panic():
             dae = rumoca.Session(roots=used).load(str(package), model=model).to_dict("dae")

@@ -139,7 +139,7 @@ def errors_in(output: str) -> list[Message]:
 
 def _build(omc: str, package: Path, model: str, folder: Path) -> Path:
     name = f"{identifier(model)}.fmu"
-    library, *used = (one.resolve() for one in packages(package))
+    library, *used = (file.resolve() for file in packages(package))
     with tempfile.TemporaryDirectory() as scratch:
         (Path(scratch) / "build.mos").write_text(script(library, model, used))
         run = subprocess.run(

@@ -52,7 +52,7 @@ def check(library: Library, model: str = "") -> tuple[str, ...]:
     checker = _Checker(library)
     waiting = [library.find(model).name] if model else list(library.classes)
     for name in waiting:
-        waiting += [one for one in checker.reached(name) if one not in waiting]
+        waiting += [reached for reached in checker.reached(name) if reached not in waiting]
     if model:
         for outer in checker.outside(library.find(model).name, _NOTHING, ()):
             _refuse(
@@ -134,7 +134,7 @@ class _Checker:
         if found in self.library.classes:
             self._reached[found] = None
         elif found not in ATTRIBUTES.keys() | _OTHERS and name:
-            short = {one.rpartition(".")[2] for one in self.library.classes}
+            short = {full_name.rpartition(".")[2] for full_name in self.library.classes}
             _refuse(
                 where,
                 f"no class '{name}'{closest(name.rpartition('.')[2], short)}",
@@ -151,9 +151,9 @@ class _Checker:
 
     def _predefined(self, kind: str) -> str:
         """Predefined type that a class extends in the end; empty if none."""
-        while (one := self.library.classes.get(kind)) is not None:
-            if not one.extends:
-                return "enumeration" if one.kind == "type" else ""
+        while (cls := self.library.classes.get(kind)) is not None:
+            if not cls.extends:
+                return "enumeration" if cls.kind == "type" else ""
             kind = self.library.bases(kind)[0]
         return kind
 
@@ -217,8 +217,8 @@ class _Checker:
     def _final(self, attribute: str, kind: str, before: Modifier) -> bool:
         """Whether a type, or what modified it before, has fixed an attribute for good."""
         modifiers = [before]
-        while (one := self.library.classes.get(kind)) is not None and one.extends:
-            modifiers.append(one.extends[0].modifier)
+        while (cls := self.library.classes.get(kind)) is not None and cls.extends:
+            modifiers.append(cls.extends[0].modifier)
             kind = self.library.bases(kind)[0]
         return any(m.inner[attribute].final for m in modifiers if attribute in m.inner)
 
@@ -295,8 +295,8 @@ class _Checker:
         left, right = (self._end(names, connection, owner) for names in connection.ends)
         if left is None or right is None:
             return  # within an expandable connector, which gets what is connected to it
-        one, other = self._signature(left), self._signature(right)
-        if one != other:
+        first, other = self._signature(left), self._signature(right)
+        if first != other:
             ends = " and ".join(".".join(names) for names in connection.ends)
             _refuse(
                 connection.where,
@@ -340,7 +340,7 @@ class _Checker:
 
     def _connector(self, found: Class) -> bool:
         lineage = (found.name, *self.library.ancestors(found.name))
-        return any(self.library.classes[one].kind == "connector" for one in lineage)
+        return any(self.library.classes[ancestor].kind == "connector" for ancestor in lineage)
 
     def _prefixes(self, kind: str) -> frozenset[str]:
         found = self.library.classes.get(kind)

@@ -31,15 +31,15 @@ class Library:
         self.file = file
         self.name = classes[0].name
         self.classes: dict[str, Class] = {}
-        for one in classes:
-            if one.name in self.classes:
+        for cls in classes:
+            if cls.name in self.classes:
                 raise InputError(
-                    where=one.where,
-                    found=f"a second class {one.name}",
-                    expected=f"one, which is in {self.classes[one.name].where}",
+                    where=cls.where,
+                    found=f"a second class {cls.name}",
+                    expected=f"one, which is in {self.classes[cls.name].where}",
                     remedy="remove one of the two, or rename it",
                 )
-            self.classes[one.name] = one
+            self.classes[cls.name] = cls
         self._bases: dict[str, tuple[str, ...]] = {}
 
     def find(self, name: str) -> Class:
@@ -66,7 +66,7 @@ class Library:
         """Dotted name of what `name` means in a class; `name` itself if it is of no class here."""
         head, *rest = name.removeprefix(".").split(".")
         scopes = [""] if name.startswith(".") else _outward(scope)
-        found = next((one for at in scopes if (one := self._visible(head, at))), "")
+        found = next((visible for at in scopes if (visible := self._visible(head, at))), "")
         if found not in self.classes:
             return ".".join([found or head, *rest])
         for part in rest:
@@ -101,17 +101,17 @@ class Library:
         found: list[str] = []
         waiting = list(self.bases(name))
         while waiting:
-            one = waiting.pop(0)
-            if one == name:
+            current = waiting.pop(0)
+            if current == name:
                 raise InputError(
                     where=self.classes[name].where,
                     found=f"{name} extends itself",
                     expected="a class that ends in one without 'extends'",
                     remedy="correct what it extends",
                 )
-            if one in self.classes and one not in found:
-                found.append(one)
-                waiting += self.bases(one)
+            if current in self.classes and current not in found:
+                found.append(current)
+                waiting += self.bases(current)
         return tuple(found)
 
     def components(self, name: str) -> dict[str, Component]:
@@ -191,7 +191,7 @@ class Library:
         """Class within another one, or within what that extends; empty if none."""
         holders = (of, *self.ancestors(of)) if of in self.classes else (of,)
         inside = (f"{holder}.{name}".removeprefix(".") for holder in holders)
-        return next((one for one in inside if one in self.classes), "")
+        return next((name for name in inside if name in self.classes), "")
 
 
 def read_library(file: Path) -> Library:
@@ -207,7 +207,7 @@ def read_library(file: Path) -> Library:
         With file and line, if something is not Modelica, or not in its place; if a library that it
         uses is not found.
     """
-    return Library(file, [one for package in packages(file) for one in _read(package, "")])
+    return Library(file, [cls for package in packages(file) for cls in _read(package, "")])
 
 
 def _read(file: Path, enclosing: str) -> Iterator[Class]:

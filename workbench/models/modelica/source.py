@@ -218,12 +218,12 @@ class Reader(Cursor):
         constraint, constraining, description = self._constraint()
         return [
             replace(
-                one,
+                component,
                 constraint=constraint,
                 constraining=constraining,
-                description=one.description or description,
+                description=component.description or description,
             )
-            for one in found
+            for component in found
         ]
 
     def _component(self, declared: str, prefixes: frozenset[str]) -> Component:
@@ -260,8 +260,8 @@ class Reader(Cursor):
         while True:
             where, prefixes = self.where, self.words(PREFIXES | _PROPAGATION)
             if prefixes & {"redeclare", "replaceable"}:
-                one = self._redeclaration(prefixes)
-                name, made = one.name, Modifier("", {}, where, "final" in prefixes, one)
+                component = self._redeclaration(prefixes)
+                name, made = component.name, Modifier("", {}, where, "final" in prefixes, component)
             else:
                 name = self.name()
                 made = self._modification(where, "final" in prefixes)
@@ -287,15 +287,15 @@ class Reader(Cursor):
             (base,) = self._alias() or [Extends("", Modifier(), where)]
             description = self._inner_comment()
             nothing = Modifier()
-            one = Component(
+            component = Component(
                 *(name, self._owner, base.name, prefixes | kind, base.modifier),
                 *("", nothing, description, where),
             )
         else:
             declared = self.name()
             self.subscripts()
-            one = self._component(declared, prefixes)
-        return self._constrained([one])[0]
+            component = self._component(declared, prefixes)
+        return self._constrained([component])[0]
 
     def _expression(self) -> str:
         """Text up to what cannot be of the same expression."""

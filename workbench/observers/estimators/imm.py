@@ -54,14 +54,14 @@ def hypotheses(system: System) -> tuple[Hypothesis, ...]:
     ]
     return tuple(
         Hypothesis(
-            {one.name: choice for one, choice in zip(telling, chosen, strict=True)},
+            {condition.name: choice for condition, choice in zip(telling, chosen, strict=True)},
             {
                 name: value
-                for one, choice in zip(telling, chosen, strict=True)
-                for name, value in one.parameters[choice].items()
+                for condition, choice in zip(telling, chosen, strict=True)
+                for name, value in condition.parameters[choice].items()
             },
         )
-        for chosen in product(*(one.parameters for one in telling))
+        for chosen in product(*(condition.parameters for condition in telling))
     )
 
 
@@ -236,24 +236,24 @@ class InteractingMultipleModel(ExtendedKalmanFilter):
 
     def __init__(self, fmu: FMU, system: System, gains: Gains) -> None:
         found = hypotheses(system)
-        self.modes = tuple(one.name for one in found)
-        self.finds = frozenset(name for one in found for name in one.choices)
+        self.modes = tuple(mode.name for mode in found)
+        self.finds = frozenset(name for mode in found for name in mode.choices)
         super().__init__(fmu, system, gains)
         names = [quantity.name for quantity in system.estimated]
         filters = [
-            ExtendedKalmanFilter(fmu.variant(_held(one, fmu, names)), system, gains)
-            for one in found
+            ExtendedKalmanFilter(fmu.variant(_held(mode, fmu, names)), system, gains)
+            for mode in found
         ]
         self._filters = filters
         self._starts = [
-            np.array([one.parameters.get(name, np.nan) for name in names]) - self._layout.nominal
-            for one in found
+            np.array([mode.parameters.get(name, np.nan) for name in names]) - self._layout.nominal
+            for mode in found
         ]
         k, size = len(found), len(self._settings.walk)
-        self._model = tuple(one._model for one in filters)
-        self._bank = BankSettings(tuple(one._settings for one in filters), changes(system))
+        self._model = tuple(member._model for member in filters)
+        self._bank = BankSettings(tuple(member._settings for member in filters), changes(system))
         self._state = BankState(
-            members=tuple(one._state for one in filters),
+            members=tuple(member._state for member in filters),
             probability=np.zeros(k),
             expected=np.zeros(k),
             change=np.zeros((k, 2 * k)),
@@ -266,16 +266,16 @@ class InteractingMultipleModel(ExtendedKalmanFilter):
     @property
     def models(self) -> tuple[FMU, ...]:
         """See Estimator."""
-        return tuple(one.fmu for one in self._filters)
+        return tuple(member.fmu for member in self._filters)
 
     def _arguments(self) -> tuple[Any, Any]:
         return self._bank, self._state
 
     def start(self, u: Vector, y: Vector) -> None:
         """See Estimator; each hypothesis is as likely."""
-        for one, quantities in zip(self._filters, self._starts, strict=True):
-            one.start(u, y)
-            z, known = one._state.z[len(one.fmu.states) :], np.isfinite(quantities)
+        for member, quantities in zip(self._filters, self._starts, strict=True):
+            member.start(u, y)
+            z, known = member._state.z[len(member.fmu.states) :], np.isfinite(quantities)
             z[known] = quantities[known]
         self._state.probability[:] = 1.0 / len(self._filters)
 

@@ -604,8 +604,8 @@ class ExtendedKalmanFilter(Estimator):
             walk=np.array([*of_states, *(gains[quantity.name] for quantity in system.estimated)]),
             spread=np.array([*np.maximum(of_states, self._spreads()), *initial]),
             learning=learns,
-            driven=told * np.array([one.noise for one in system.inputs]),
-            driven_relative=told * np.array([one.relative_noise for one in system.inputs]),
+            driven=told * np.array([signal.noise for signal in system.inputs]),
+            driven_relative=told * np.array([signal.relative_noise for signal in system.inputs]),
         )
         self._state: Any = filter_state(n, system, n + q)
 

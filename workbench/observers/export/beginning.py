@@ -80,7 +80,7 @@ def remembered(estimator: Estimator, sample: Vector) -> Remembered:
     parts = estimator.parts
     _refuse_shared(estimator)
     both = zip(parts.models, estimator.models, strict=True)
-    models = tuple(_model(one, fmu, number) for number, (one, fmu) in enumerate(both))
+    models = tuple(_model(model, fmu, number) for number, (model, fmu) in enumerate(both))
     return copy.deepcopy(Remembered(models, parts.state))
 
 
@@ -107,7 +107,7 @@ def said_by_first(estimator: Estimator) -> list[FirstValue]:
     # By powers of two, so that what is measured is found without rounding where zero is usual.
     steps = 2.0 ** np.round(np.log2(sizes))
     moved = [_flat(remembered(estimator, usual + step))[1] for step in np.diag(steps)]
-    slopes = np.array([_change(begin, one) for one in moved]).T / steps
+    slopes = np.array([_change(begin, step) for step in moved]).T / steps
     whole = np.round(slopes)
     slopes = np.where(np.abs(slopes - whole) < _ROUNDING, whole, slopes)
     share = np.random.default_rng(0).uniform(0.5, 1.0, sizes.size)  # of each signal another one
@@ -152,7 +152,7 @@ def _refuse_shared(estimator: Estimator) -> None:
     parts = estimator.parts
     arrays = [*_arrays(tuple(parts.settings)), *_arrays(tuple(map(tuple, parts.models)))]
     for array in _arrays(parts.state):
-        if any(np.shares_memory(array, one) for one in arrays):
+        if any(np.shares_memory(array, other) for other in arrays):
             raise InputError(
                 where=f"estimator {estimator.name}",
                 found="an array that stands in two places of its memory, or in its settings",
@@ -166,8 +166,8 @@ def _arrays(value: Any) -> Iterator[NDArray[Any]]:
     if isinstance(value, np.ndarray):
         yield value
     elif isinstance(value, tuple):
-        for one in value:
-            yield from _arrays(one)
+        for entry in value:
+            yield from _arrays(entry)
 
 
 def _flat(value: Remembered) -> tuple[list[str], Vector]:
@@ -179,11 +179,11 @@ def _flat(value: Remembered) -> tuple[list[str], Vector]:
 def _numbers(value: Any, place: str) -> Iterator[tuple[str, float]]:
     if isinstance(value, tuple) and hasattr(value, "_fields"):
         mark = "->" if isinstance(value, Remembered) else "."
-        for name, one in zip(value._fields, value, strict=True):
-            yield from _numbers(one, f"{place}{mark}{name_in_c(name)}")
+        for name, entry in zip(value._fields, value, strict=True):
+            yield from _numbers(entry, f"{place}{mark}{name_in_c(name)}")
     elif isinstance(value, tuple | np.ndarray):
         listed = value.ravel().tolist() if isinstance(value, np.ndarray) else value
-        for k, one in enumerate(listed):
-            yield from _numbers(one, f"{place}[{k}]")
+        for k, entry in enumerate(listed):
+            yield from _numbers(entry, f"{place}[{k}]")
     else:
         yield place, float(value)

@@ -145,7 +145,7 @@ def _law_code(estimator: Estimator) -> dict[str, str]:
         program.text(step),
         "static void estimator_begin(Law *law, const double *sample) {",
         "    *law = law_start;",
-        *(f"    {one.text}" for one in said_by_first(estimator)),
+        *(f"    {assignment.text}" for assignment in said_by_first(estimator)),
         "}",
         "",
         "static int estimator_step(Law *law, double h, const double *sample, double *row) {",
@@ -190,7 +190,10 @@ def _shell(estimator: Estimator) -> StateSpace:
         for signal in (*system.inputs, *system.outputs)
     ]
     states = _entries(estimator)
-    x, u = (ca.vertcat(ca.SX(0, 1), *(one.symbol for one in group)) for group in (states, inputs))
+    x, u = (
+        ca.vertcat(ca.SX(0, 1), *(variable.symbol for variable in group))
+        for group in (states, inputs)
+    )
     nothing = ca.SX(0, 1)
     return StateSpace(
         name="",

@@ -51,7 +51,7 @@ def wiring(system: System) -> Wiring:
     An observer gives its estimate of an output `y` as `yEstimate`, and other estimates under their
     own names; the package gives estimates as `nameEstimate`, beside the truth of the machine.
     """
-    inputs = {one.name: ("input", one.unit) for one in system.inputs}
+    inputs = {signal.name: ("input", signal.unit) for signal in system.inputs}
     outputs = {output.name: ("input", output.unit) for output in system.outputs}
     estimates = {
         **system.reported,

@@ -30,7 +30,11 @@ def plant_of(estimator: Estimator) -> StateSpace:
     states = [state.name for state in space.states]
     ours = [fmu.names.get(state, state) for state in fmu.states]
     known = {fmu.names.get(default, default) for default in fmu.defaults}
-    missing = [one.name for one in (*space.parameters, *space.inputs) if one.name not in known]
+    missing = [
+        variable.name
+        for variable in (*space.parameters, *space.inputs)
+        if variable.name not in known
+    ]
     if states != ours or missing:
         raise InputError(
             where=fmu.place,
@@ -46,7 +50,7 @@ def plant_of(estimator: Estimator) -> StateSpace:
             remedy="make what depends on time an input of the model",
         )
     listed = [output.name for output in space.outputs]
-    read = [listed.index(one) for one in _read(estimator) if one not in states]
+    read = [listed.index(name) for name in _read(estimator) if name not in states]
     return replace(
         space,
         w=ca.vertcat(ca.SX(0, 1), *(space.w[k] for k in read)),
@@ -60,8 +64,10 @@ def plant_code(plant: StateSpace, estimator: Estimator) -> dict[str, str]:
     """Text of plant_code.h, the model, and of plant.h, how the law sees it."""
     code = generate(plant, "", "plant")
     fmu, system = estimator.fmu, estimator.system
-    states, inputs = ([one.name for one in group] for group in (plant.states, plant.inputs))
-    known = [*(one.name for one in system.inputs), *system.corrections]
+    states, inputs = (
+        [variable.name for variable in group] for group in (plant.states, plant.inputs)
+    )
+    known = [*(signal.name for signal in system.inputs), *system.corrections]
     outputs, unknown = [], [*range(len(states))]
     for column, name in enumerate(_read(estimator)):
         if name in states:

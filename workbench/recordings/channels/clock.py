@@ -121,18 +121,18 @@ def read_clock(
 
 def _refuse_contradiction(clocks: Sequence[Clock], where: str) -> None:
     """Refuse clocks of one recording of which one is so many times as fast as another."""
-    for one, other in combinations(clocks, 2):
-        spans = [float(np.nanmax(c.times) - np.nanmin(c.times)) for c in (one, other)]
+    for clock, other in combinations(clocks, 2):
+        spans = [float(np.nanmax(c.times) - np.nanmin(c.times)) for c in (clock, other)]
         ratio = max(spans) / min(spans)
         if ratio > _FACTOR:
             raise InputError(
                 where=where,
-                found=f"'{one.channel}' in [{one.unit}] over {spans[0]:.6g} s, and "
+                found=f"'{clock.channel}' in [{clock.unit}] over {spans[0]:.6g} s, and "
                 f"'{other.channel}' in [{other.unit}] over {spans[1]:.6g} s, {ratio:.4g} times "
                 "apart",
                 expected="clocks of one recording that agree",
                 remedy=f"say which is right and in which unit, --column '{TIME}={other.channel}' "
-                f"or --column '{TIME}={one.channel} [UNIT]'",
+                f"or --column '{TIME}={clock.channel} [UNIT]'",
             )
 
 

@@ -176,8 +176,10 @@ def match(
     assigned, doubts = dict(named), dict[str, str]()
     _by_name(assigned, doubts, places, system)
     assigned |= _by_unit((*system.inputs, *system.outputs), assigned, doubts, places, system)
-    for name, one in _by_unit(system.reference_signals, assigned, doubts, places, system).items():
-        doubts[name] = f"it may be '{one.label}'; {one.doubt}"
+    for name, channel in _by_unit(
+        system.reference_signals, assigned, doubts, places, system
+    ).items():
+        doubts[name] = f"it may be '{channel.label}'; {channel.doubt}"
     return assigned, doubts
 
 
@@ -251,25 +253,25 @@ def _by_name(
             if likeness and is_asked(place.channel.name) and not signal.exact:
                 doubts[signal.name] = f"'{place.channel.name}' is asked for, not measured"
             elif likeness:
-                one, doubt = _candidate(place, signal, system, likeness)
-                if one is not None:
-                    found[likeness].append((signal, one))
+                channel, doubt = _candidate(place, signal, system, likeness)
+                if channel is not None:
+                    found[likeness].append((signal, channel))
                 else:
                     doubts[signal.name] = doubt
     settled = set(assigned)
     for level in found.values():
         taken = {id(assignment.channel) for assignment in assigned.values()}
         left = [(s, o) for s, o in level if s.name not in settled and id(o.channel) not in taken]
-        for signal, one in left:
+        for signal, channel in left:
             rivals = [o.label for s, o in left if s is signal]
-            claims = [s.name for s, o in left if o.channel is one.channel]
+            claims = [s.name for s, o in left if o.channel is channel.channel]
             settled.add(signal.name)
             if len(rivals) == len(claims) == 1:
-                assigned[signal.name] = one
+                assigned[signal.name] = channel
             elif len(rivals) > 1:
                 doubts[signal.name] = f"it may be {' or '.join(map(repr, rivals))}"
             else:
-                doubts[signal.name] = f"'{one.channel.name}' may be {' or '.join(claims)}"
+                doubts[signal.name] = f"'{channel.channel.name}' may be {' or '.join(claims)}"
 
 
 def _by_unit(
@@ -282,19 +284,19 @@ def _by_unit(
     """The only channel that has its unit, for each signal that alone lacks one of it."""
     taken = {id(assignment.channel) for assignment in assigned.values()}
     fitting = [
-        (signal, one)
+        (signal, channel)
         for signal in signals
         if signal.name not in assigned and signal.name not in doubts
         for place in places
         if id(place.channel) not in taken
         and place.channel.unit
         and not is_asked(place.channel.name)
-        and (one := _candidate(place, signal, system, 0)[0]) is not None
+        and (channel := _candidate(place, signal, system, 0)[0]) is not None
     ]
     return {
-        signal.name: one
-        for signal, one in fitting
-        if sum(s is signal or o.channel is one.channel for s, o in fitting) == 1
+        signal.name: channel
+        for signal, channel in fitting
+        if sum(s is signal or o.channel is channel.channel for s, o in fitting) == 1
     }
 
 

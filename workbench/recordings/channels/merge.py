@@ -84,8 +84,8 @@ def merge(
     outputs = {output.name for output in system.outputs}
     slowest = max((track for track in tracks if track.signal.name in outputs), key=lambda t: t.step)
     asked = [track for track in tracks if track.signal not in system.intermittent]
-    begin = max(float(one.times[0]) for one in asked)
-    end = min(float(one.times[-1]) for one in asked)
+    begin = max(float(track.times[0]) for track in asked)
+    end = min(float(track.times[-1]) for track in asked)
     inside = (slowest.times >= begin) & (slowest.times <= end)
     time = slowest.times[inside]
     limit = system.sampling.gap if math.isfinite(system.sampling.gap) else system.comparison.block
@@ -136,12 +136,12 @@ def _mixed(files: Sequence[RecordedFile], proposal: ProposedMapping) -> Iterator
 
     Where both have dates, they are brought together by these.
     """
-    for (name, one), (_, other) in permutations(proposal.assigned.items(), 2):
-        keys = (one.file, one.group), (other.file, other.group)
+    for (name, assigned), (_, other) in permutations(proposal.assigned.items(), 2):
+        keys = (assigned.file, assigned.group), (other.file, other.group)
         dated = all(math.isfinite(proposal.clocks[key].start) for key in keys)
-        if one.file != other.file or one.group == other.group or dated:
+        if assigned.file != other.file or assigned.group == other.group or dated:
             continue
-        file = files[one.file]
+        file = files[assigned.file]
         own, theirs = (file.groups[group] for _, group in keys)
         if any(channel.name == other.channel.name for channel in own.channels):
             yield (
@@ -194,14 +194,16 @@ def _track(signal: Signal, assigned: Assignment, proposal: ProposedMapping, star
     return _Track(signal, times[held], values[held], step, int((~held).sum()), bounds)
 
 
-def _at(one: _Track, time: Vector, limit: float) -> tuple[Vector, np.ndarray]:
+def _at(track: _Track, time: Vector, limit: float) -> tuple[Vector, np.ndarray]:
     """Values at some times, (n,), and whether samples stand near enough around them, (n,)."""
-    after = np.clip(np.searchsorted(one.times, time), 0, one.times.size - 1)
-    exact = one.times[after] == time
+    after = np.clip(np.searchsorted(track.times, time), 0, track.times.size - 1)
+    exact = track.times[after] == time
     before = np.where(exact, after, np.maximum(after - 1, 0))
-    near = one.times[after] - one.times[before] <= limit * (1.0 + 1e-9)
-    near &= (time >= one.times[0]) & (time <= one.times[-1])
-    lowest, highest = (np.searchsorted(one.censored, one.times[k]) for k in (before, after))
+    near = track.times[after] - track.times[before] <= limit * (1.0 + 1e-9)
+    near &= (time >= track.times[0]) & (time <= track.times[-1])
+    lowest, highest = (np.searchsorted(track.censored, track.times[k]) for k in (before, after))
     near &= lowest == highest
-    values = one.values[before] if one.signal.held else np.interp(time, one.times, one.values)
+    values = (
+        track.values[before] if track.signal.held else np.interp(time, track.times, track.values)
+    )
     return values, near

@@ -208,8 +208,12 @@ def usable(
             unit = "" if channel.stamp else channel.unit
             units[channel.name] = units[f"{group.name}/{channel.name}"] = unit
     return {
-        signal: one
-        for signal, one in stored.items()
-        if one.channel in units
-        and (not one.unit or not units[one.channel] or one.unit == units[one.channel])
+        signal: assignment
+        for signal, assignment in stored.items()
+        if assignment.channel in units
+        and (
+            not assignment.unit
+            or not units[assignment.channel]
+            or assignment.unit == units[assignment.channel]
+        )
     }

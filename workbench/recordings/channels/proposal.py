@@ -101,8 +101,8 @@ def propose(
     places = _places(files)
     where = ", ".join(str(file.path) for file in files)
     assigned = {
-        name: _as_named(one, system.signals[name], places, system, where)
-        for name, one in given.items()
+        name: _as_named(channel, system.signals[name], places, system, where)
+        for name, channel in given.items()
         if name != TIME
     }
     _refuse_shared(assigned, where)
@@ -148,9 +148,13 @@ def _places(files: Sequence[RecordedFile]) -> list[PlacedChannel]:
     counts = Counter(channel.name for *_, channel in found)
     return [
         PlacedChannel(
-            i, j, group, one, one.name if counts[one.name] == 1 else f"{group.name}/{one.name}"
+            i,
+            j,
+            group,
+            channel,
+            channel.name if counts[channel.name] == 1 else f"{group.name}/{channel.name}",
         )
-        for i, j, group, one in found
+        for i, j, group, channel in found
     ]
 
 
@@ -299,11 +303,15 @@ def _contradictions(
     system: System,
 ) -> Iterator[str]:
     """Units that a user names, and that the files contradict: one of the two is wrong."""
-    for name in (one for one in given if one in assigned):
-        one, signal = assigned[name], system.signals[name]
-        ways = [conversion_to(unit, signal, system) for unit in (one.unit, one.channel.unit)]
-        if one.channel.unit and ways[0] != ways[1]:
-            yield _contradiction(files[one.file], one.label, one.unit, one.channel.unit)
+    for name in (name for name in given if name in assigned):
+        channel, signal = assigned[name], system.signals[name]
+        ways = [
+            conversion_to(unit, signal, system) for unit in (channel.unit, channel.channel.unit)
+        ]
+        if channel.channel.unit and ways[0] != ways[1]:
+            yield _contradiction(
+                files[channel.file], channel.label, channel.unit, channel.channel.unit
+            )
     for (i, j), clock in clocks.items():
         stated = {channel.name: channel.unit for channel in files[i].groups[j].channels}.get(
             clock.channel

@@ -43,7 +43,7 @@ def read_measured(
     recorded = read_recorded_file(path)
     found = propose_recordings([recorded], system, stored, options)
     if len(found.held) > 1:
-        names = [f"'{one.name}'" for one in found.held]
+        names = [f"'{recording.name}'" for recording in found.held]
         raise InputError(
             where=str(path),
             found=f"{len(names)} recordings, {listed(names)}",
@@ -51,7 +51,7 @@ def read_measured(
             remedy=f"run 'workbench import {path} --out CASES', which makes a case of each, or "
             "name the channels of one, --column 'SIGNAL=GROUP/CHANNEL'",
         )
-    (proposal,) = (one.proposal for one in found.held)
+    (proposal,) = (recording.proposal for recording in found.held)
     if not proposal.certain:
         raise _unsure(path, proposal)
     return merge([recorded], proposal, system)

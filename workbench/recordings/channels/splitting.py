@@ -65,34 +65,34 @@ class ProposedRecordings:
     @property
     def certain(self) -> bool:
         """Whether nobody need be asked."""
-        return all(one.proposal.certain for one in self.held)
+        return all(recording.proposal.certain for recording in self.held)
 
     @property
     def problems(self) -> list[str]:
         """Why signals that are needed have no channel, in words."""
-        return _once(one.proposal.problems for one in self.held)
+        return _once(recording.proposal.problems for recording in self.held)
 
     @property
     def doubts(self) -> list[str]:
         """What somebody must confirm, in words."""
-        return _once(one.proposal.doubts for one in self.held)
+        return _once(recording.proposal.doubts for recording in self.held)
 
     @property
     def unmatched(self) -> list[str]:
         """Why channels are not taken for signals that recordings may be without, in words."""
-        return _once(one.proposal.unmatched for one in self.held)
+        return _once(recording.proposal.unmatched for recording in self.held)
 
     @property
     def left(self) -> list[str]:
         """Channels that nobody takes."""
-        return _once(one.proposal.left for one in self.held)
+        return _once(recording.proposal.left for recording in self.held)
 
     @property
     def named(self) -> dict[str, NamedChannel]:
         """Channels by signal, as they are stored; the first recording that has one tells."""
         found: dict[str, NamedChannel] = {}
-        for one in self.held:
-            found = {**one.proposal.named, **found}
+        for recording in self.held:
+            found = {**recording.proposal.named, **found}
         return found
 
 
@@ -130,8 +130,8 @@ def propose_recordings(
     """
     whole = _tried("", files, system, stored, options)
     settled = isinstance(whole, ProposedRecording) and not whole.proposal.problems
-    one = options.apart is False or len(files) > 1 or settled or _names_a_group(options, files)
-    found = None if one else _apart(files[0], system, stored, options)
+    single = options.apart is False or len(files) > 1 or settled or _names_a_group(options, files)
+    found = None if single else _apart(files[0], system, stored, options)
     if found is not None:
         doubt = "" if options.apart else at_one_time(found.held, system)
         if not doubt:
@@ -199,7 +199,8 @@ def _apart(
             held[name] = replace(file, groups=tuple(groups))
             tried[name] = _tried(name, [held[name]], system, stored, options)
         alike = _alike(
-            [one for one in tried.values() if isinstance(one, ProposedRecording)], system
+            [recording for recording in tried.values() if isinstance(recording, ProposedRecording)],
+            system,
         )
         if alike:
             return _sorted_out(alike, tried, held, system)
@@ -213,10 +214,12 @@ def _needed(system: System) -> list[str]:
 def _alike(tried: Sequence[ProposedRecording], system: System) -> list[ProposedRecording]:
     """Most of those that hold the same channels, at least two; those without problems first."""
     classes: dict[_Signature, list[ProposedRecording]] = {}
-    for one in tried:
+    for recording in tried:
         # A part with fewer channels than a recording has signals is that of one logger.
-        if not one.proposal.problems or len(_names(one.files[0])) >= len(_needed(system)):
-            classes.setdefault(_signature(one, system), []).append(one)
+        if not recording.proposal.problems or len(_names(recording.files[0])) >= len(
+            _needed(system)
+        ):
+            classes.setdefault(_signature(recording, system), []).append(recording)
     several = [held for held in classes.values() if len(held) > 1]
     complete = [held for held in several if not held[0].proposal.problems]
     return max(complete or several, key=len, default=[])
@@ -260,8 +263,10 @@ def _sorted_out(
             beside.append(f"'{name}' holds other channels: {listed(sorted(names))}")
     notes = tuple(beside)
     recordings = [
-        replace(one, files=tuple(replace(f, notes=(*f.notes, *notes)) for f in one.files))
-        for one in alike
+        replace(
+            recording, files=tuple(replace(f, notes=(*f.notes, *notes)) for f in recording.files)
+        )
+        for recording in alike
     ]
     return ProposedRecordings(tuple(recordings), tuple(refused), notes)
 
@@ -331,9 +336,9 @@ def at_one_time(parts: Sequence[ProposedRecording], system: System) -> str:
     rows = [_rows(part, system) for part in parts]
     for i, j in combinations(range(len(parts)), 2):
         names = f"'{parts[i].name}' and '{parts[j].name}'"
-        one, other = spans[i], spans[j]
-        if one and other and one.meets(other):
-            return f"{names} hold the same channels at one time, {one} and {other}{_CHOICE}"
+        span, other = spans[i], spans[j]
+        if span and other and span.meets(other):
+            return f"{names} hold the same channels at one time, {span} and {other}{_CHOICE}"
         if same := _same_output(parts[i], parts[j], system) or _same_rows(rows[i], rows[j]):
             return f"{names} hold the same samples of {same}{_CHOICE}"
     return ""
@@ -391,16 +396,16 @@ def _rows(part: ProposedRecording, system: System) -> Vector:
     """A number for each row of signals that differs from all others; empty if rates differ."""
     needed = [signal.name for signal in (*system.inputs, *system.outputs)]
     held = [part.proposal.assigned[name] for name in needed if name in part.proposal.assigned]
-    if not held or len({(one.file, one.group) for one in held}) > 1:
+    if not held or len({(channel.file, channel.group) for channel in held}) > 1:
         return np.empty(0)
     weights = np.sqrt(np.arange(2.0, 2.0 + len(held)))
     with np.errstate(over="ignore", invalid="ignore"):
-        sums = (np.column_stack([one.values for one in held]) * weights).sum(axis=1)
+        sums = (np.column_stack([channel.values for channel in held]) * weights).sum(axis=1)
     return np.unique(sums[np.isfinite(sums)])
 
 
-def _same_rows(one: Vector, other: Vector) -> str:
+def _same_rows(first: Vector, other: Vector) -> str:
     """What to call rows that are nearly all in both; or nothing."""
-    short, long = sorted((one, other), key=np.size)
+    short, long = sorted((first, other), key=np.size)
     copied = short.size > _FEW and np.isin(short, long).mean() >= _COPIED
     return "all signals" if copied else ""

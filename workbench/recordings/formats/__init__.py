@@ -159,7 +159,9 @@ def _here(module: str, path: Path, raw: bytes) -> Contents:
     ):
         found: Contents = reader.read(path, raw)
     # What libraries warn of is about the file, or is about themselves.
-    notes = [str(one.message)[:200] for one in told if issubclass(one.category, _OF_THE_FILE)]
+    notes = [
+        str(warning.message)[:200] for warning in told if issubclass(warning.category, _OF_THE_FILE)
+    ]
     return found._replace(notes=[*found.notes, *dict.fromkeys(notes)])
 
 

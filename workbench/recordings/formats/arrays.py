@@ -174,7 +174,7 @@ def _columns(
     units = next((held for key, held in lists.items() if _UNIT.fullmatch(key)), [unit] * width)
     names = [held for key, held in lists.items() if not _UNIT.fullmatch(key)]
     own = names[0] if len(names) == 1 else [f"{name}({i + 1})" for i in range(width)]
-    labels = [named(one) for one in own]
+    labels = [named(label) for label in own]
     return [
         FileChannel(label, stated or spelled(units[i]), _flat(table[:, i]))
         for i, (label, stated) in enumerate(labels)

@@ -270,7 +270,7 @@ def _joined(
     if not any(kinds) or not any(clocks):
         return labels, columns
     day, clock = kinds.index(True), clocks.index(True)
-    joined = [f"{one} {other}" for one, other in zip(columns[day], columns[clock], strict=True)]
+    joined = [f"{date} {other}" for date, other in zip(columns[day], columns[clock], strict=True)]
     left = [i for i in range(len(columns)) if i not in (day, clock)]
     name = f"{labels[day][0]} {labels[clock][0]}", ""
     return [name, *(labels[i] for i in left)], [joined, *(columns[i] for i in left)]

@@ -42,11 +42,11 @@ def _heard(doubts: list[str]) -> Iterator[None]:
 def _groups(held: Any, notes: list[str]) -> list[Group]:
     """A group of the file; channels with other times or lengths are groups of their own."""
     found: dict[tuple[int, float, float, float], list[FileChannel]] = {}
-    for one in held.channels():
-        name, unit = named(one.name)
-        stated: Mapping[str, Any] = one.properties
+    for recorded in held.channels():
+        name, unit = named(recorded.name)
+        stated: Mapping[str, Any] = recorded.properties
         unit = unit or spelled(str(next((stated[key] for key in _UNITS if key in stated), "")))
-        values = one[:]
+        values = recorded[:]
         step, offset = _counted(stated)
         begun = stated.get("wf_start_time")
         start = _since_1970(begun) if begun is not None and step > 0.0 else np.nan

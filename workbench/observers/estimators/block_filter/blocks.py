@@ -50,7 +50,7 @@ def blocks(fmu: FMU, system: System, layout: Layout) -> Blocks:
     number = {name: i for i, name in enumerate(names)}
 
     def knowns(name: str) -> list[int]:
-        return [number[one] for one in said.get(name, names) if one in number]
+        return [number[state] for state in said.get(name, names) if state in number]
 
     rates = [knowns(name) for name in fmu.description.rates]
     fed = {j: knowns(output.name) for j, output in enumerate(system.outputs) if layout.seen[j] < 0}
@@ -100,8 +100,8 @@ def divide(
     links : pairs of nodes.
     """
 
-    def kind(one: Sequence[int]) -> tuple[int, int]:
-        return sum(k < states for k in one), len(one)
+    def kind(block: Sequence[int]) -> tuple[int, int]:
+        return sum(k < states for k in block), len(block)
 
     adjacent = np.zeros((size + others, size + others), bool)
     for a, b in links:
@@ -116,9 +116,9 @@ def divide(
         found = _components(adjacent[np.ix_(nodes, nodes)], nodes, size)
         # Few unlike ones are shared: what stands between blocks is known of like ones.
         most = Counter(map(kind, found)).most_common(1)[0][0]
-        alike = [one for one in found if kind(one) == most]
-        rest = shared + [k for one in found if kind(one) != most for k in one]
-        operations = sum((len(one) + len(rest)) ** 3 for one in alike)
+        alike = [block for block in found if kind(block) == most]
+        rest = shared + [k for block in found if kind(block) != most for k in block]
+        operations = sum((len(block) + len(rest)) ** 3 for block in alike)
         if operations < fewest:
             fewest, best = operations, (alike, sorted(rest))
     return best
@@ -128,9 +128,9 @@ def _components(adjacent: NDArray[np.bool_], nodes: Indices, size: int) -> list[
     """Sets of nodes below `size` that are linked with each other, through any nodes."""
     _, label = connected_components(adjacent, directed=False)
     found: dict[int, list[int]] = {}
-    for node, one in zip(nodes, label, strict=True):
+    for node, part in zip(nodes, label, strict=True):
         if node < size:
-            found.setdefault(int(one), []).append(int(node))
+            found.setdefault(int(part), []).append(int(node))
     return list(found.values())
 
 

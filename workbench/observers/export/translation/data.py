@@ -45,8 +45,8 @@ class Data:
         """
         if isinstance(value, tuple) and hasattr(value, "_fields"):
             fields = tuple(
-                (name, self.type_of(one, f"{place}.{name}"))
-                for name, one in zip(value._fields, value, strict=True)
+                (name, self.type_of(entry, f"{place}.{name}"))
+                for name, entry in zip(value._fields, value, strict=True)
             )
             return Record(self._struct(type(value).__name__, fields), fields, constant=False)
         if isinstance(value, tuple):
@@ -120,7 +120,7 @@ def _field(name: str, type_: Type) -> str:
     if isinstance(type_, Number):
         return f"{c_number(type_.kind)} {name}"
     if isinstance(type_, Array):
-        size = int(np.prod([one or 0 for one in type_.shape]))
+        size = int(np.prod([length or 0 for length in type_.shape]))
         return f"{c_number(type_.kind)} {name}[{max(size, 1)}]"
     if isinstance(type_, Several):
         return f"{type_.of.name} {name}[{type_.count}]"
@@ -134,10 +134,10 @@ def contents(value: Any) -> str:
     '{{1.0, INFINITY}, 2}'
     """
     if isinstance(value, tuple):
-        return "{" + (", ".join(contents(one) for one in value) or "0") + "}"
+        return "{" + (", ".join(contents(entry) for entry in value) or "0") + "}"
     if isinstance(value, np.ndarray):
         flat = value.ravel().tolist()
-        if not any(one != 0 for one in flat):
+        if not any(number != 0 for number in flat):
             return "{0}"
-        return "{" + ", ".join(literal(one) for one in flat) + "}"
+        return "{" + ", ".join(literal(number) for number in flat) + "}"
     return literal(value.item() if isinstance(value, np.generic) else value)

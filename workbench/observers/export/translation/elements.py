@@ -75,7 +75,7 @@ def _times(index: str, stride: int) -> str:
 def _piece(piece: Piece, size: Value) -> tuple[str, Value]:
     """First element of a slice, and its size."""
     first, last = (
-        _end(one, size, instead) for one, instead in zip(piece, (number(0), size), strict=True)
+        _end(end, size, instead) for end, instead in zip(piece, (number(0), size), strict=True)
     )
     if first.known is not None and last.known is not None:
         return first.text, number(max(int(last.known - first.known), 0))

@@ -96,13 +96,15 @@ class Expressions(ABC):
             self.lines = []
             parts.append((self.value(node), self.lines))
         self.lines = outer
-        last = max((k for k, (one, lines) in enumerate(parts) if lines or one.acts), default=-1)
+        last = max(
+            (k for k, (operand, lines) in enumerate(parts) if lines or operand.acts), default=-1
+        )
         found = []
-        for k, (one, lines) in enumerate(parts):
+        for k, (operand, lines) in enumerate(parts):
             self.lines += lines
-            changes = one.acts and len(parts) > 1
-            kept = isinstance(one.type, Number) and (changes or (k < last and one.reads))
-            found.append(self.temporary(one) if kept else one)
+            changes = operand.acts and len(parts) > 1
+            kept = isinstance(operand.type, Number) and (changes or (k < last and operand.reads))
+            found.append(self.temporary(operand) if kept else operand)
         return found
 
     # --- any expression ---
@@ -126,8 +128,8 @@ class Expressions(ABC):
     def numbers(self, nodes: Sequence[ast.expr]) -> list[Value]:
         """Operands that are numbers."""
         found = self.operands(nodes)
-        for node, one in zip(nodes, found, strict=True):
-            self._checked(node, one)
+        for node, value in zip(nodes, found, strict=True):
+            self._checked(node, value)
         return found
 
     def found(self, node: ast.expr) -> Found:
@@ -204,7 +206,8 @@ class Expressions(ABC):
         if not isinstance(of.type, Array):
             raise self.refused(node, "an index of what is no array")
         indices = [
-            self._piece(one) if isinstance(one, ast.Slice) else self._index(one) for one in listed
+            self._piece(index) if isinstance(index, ast.Slice) else self._index(index)
+            for index in listed
         ]
         if len(indices) > len(of.type.shape):
             raise self.refused(node, "more indices than there are")
@@ -219,7 +222,7 @@ class Expressions(ABC):
     def _piece(self, node: ast.Slice) -> tuple[Value | None, Value | None]:
         if node.step is not None:
             raise self.refused(node, "a slice with a step")
-        ends = [None if one is None else self._index(one) for one in (node.lower, node.upper)]
+        ends = [None if end is None else self._index(end) for end in (node.lower, node.upper)]
         # What may change before the view is used is kept.
         kept = [self.temporary(e) if e and e.known is None and e.reads else e for e in ends]
         return kept[0], kept[1]
@@ -307,7 +310,7 @@ class Expressions(ABC):
     def _boolop(self, node: ast.BoolOp) -> Value:
         """The operand that decides, as in Python."""
         values = [self._apart(value) for value in node.values]
-        kinds = {one.kind for one, _ in values}
+        kinds = {value.kind for value, _ in values}
         if DOUBLE in kinds:
             raise self.refused(node, "a number that is no whole one as a truth")
         if kinds == {BOOL} and not any(before for _, before in values[1:]):
@@ -345,7 +348,7 @@ class Expressions(ABC):
         """A truth; any whole number but zero is one."""
         if isinstance(node, ast.BoolOp):
             values = [
-                (self._truth(node, one), before) for one, before in self.tests_apart(node.values)
+                (self._truth(node, test), before) for test, before in self.tests_apart(node.values)
             ]
             if not any(before for _, before in values[1:]):
                 return self._joined(node.op, values)

@@ -94,12 +94,14 @@ class Program:
         if primitive is not None:
             if len(given) != primitive.arguments:
                 raise refused(f"a call that does not have {primitive.arguments} arguments")
-            listed = ", ".join(one.address for one in given)
+            listed = ", ".join(argument.address for argument in given)
             return Value(Number(INT), f"{primitive.name}({listed})", acts=True)
         if len(given) != function.__code__.co_argcount:
             raise refused(f"a call that does not have {function.__code__.co_argcount} arguments")
-        done = self._translated(function, tuple(one.type for one in given))
-        listed = ", ".join(text for one in given for text in (one.address, *_open_sizes(one)))
+        done = self._translated(function, tuple(argument.type for argument in given))
+        listed = ", ".join(
+            text for argument in given for text in (argument.address, *_open_sizes(argument))
+        )
         text = f"{done.name}({listed})"
         of = Number(done.result.kinds[0]) if len(done.result.kinds) == 1 else done.result
         return Value(of, text, reads=True, acts=done.acts)
@@ -134,7 +136,11 @@ class Program:
         name = self._name(function)
         lines = _without_unused([*body.declared, *lines])
         text = "\n".join(lines)
-        used = [f"(void){one};" for one in signature if not re.search(rf"\b{one}\b", text)]
+        used = [
+            f"(void){parameter};"
+            for parameter in signature
+            if not re.search(rf"\b{parameter}\b", text)
+        ]
         shown = ", ".join(signature.values()) or "void"
         says = (inspect.getdoc(function) or "").split("\n")[0]
         self._texts[name] = "\n".join(
@@ -150,10 +156,12 @@ class Program:
 
     def _name(self, function: FunctionType) -> str:
         base = f"law_{function.__name__.strip('_')}"
-        taken = {one.name for one in self._done.values() if one is not None}
+        taken = {function.name for function in self._done.values() if function is not None}
         if base not in taken:
             return base
-        return next(one for k in range(2, len(taken) + 3) if (one := f"{base}_{k}") not in taken)
+        return next(
+            candidate for k in range(2, len(taken) + 3) if (candidate := f"{base}_{k}") not in taken
+        )
 
 
 class _Body(Statements):

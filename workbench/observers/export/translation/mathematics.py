@@ -50,12 +50,12 @@ def of_numbers(function: Any, given: Sequence[Value]) -> Value | None:
     """A function of numbers; None if it is another one."""
     if function is builtins.len and len(given) == _ONE and isinstance(given[0].type, Array):
         return given[0].sizes[0]
-    if not given or not all(isinstance(one.type, Number) for one in given):
+    if not given or not all(isinstance(argument.type, Number) for argument in given):
         return None
-    listed = ", ".join(one.text for one in given)
+    listed = ", ".join(argument.text for argument in given)
     for table, kind in ((_REAL, DOUBLE), (_TRUTH, BOOL)):
         for name, functions in table.items():
-            if any(function is one for one in functions):
+            if any(function is known for known in functions):
                 count = _TWO if name in ("atan2", "hypot") else _ONE
                 return (
                     expression(kind, f"{name}({listed})", *given) if len(given) == count else None
@@ -88,9 +88,11 @@ def _extreme(name: str, given: Sequence[Value]) -> Value | None:
     if len(given) < _TWO:
         return None
     found = given[0]
-    for one in given[1:]:
-        kind = common(common(found.kind, one.kind), INT)
+    for argument in given[1:]:
+        kind = common(common(found.kind, argument.kind), INT)
         of = name if kind == DOUBLE else f"{name}_int"
-        natural = kind == INT and found.natural and one.natural
-        found = expression(kind, f"{of}({found.text}, {one.text})", found, one, natural=natural)
+        natural = kind == INT and found.natural and argument.natural
+        found = expression(
+            kind, f"{of}({found.text}, {argument.text})", found, argument, natural=natural
+        )
     return found

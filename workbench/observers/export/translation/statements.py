@@ -80,7 +80,7 @@ class Statements(Expressions):
         lines, self.lines, self._here = self.lines, outer, here
         # What is declared in a block ends with it.
         at_top = self._open - self.names.local
-        self.env = {name: one for name, one in self.env.items() if name in at_top} | env
+        self.env = {name: variable for name, variable in self.env.items() if name in at_top} | env
         self._open = opened | at_top
         return lines
 
@@ -150,7 +150,9 @@ class Statements(Expressions):
     def _moves(self, end: Value) -> bool:
         """Whether a loop may change its own end."""
         within = set(re.findall(r"[A-Za-z_]\w*", end.text))
-        changing = {name_in_c(one) for one, count in self.names.assigned.items() if count > 1}
+        changing = {
+            name_in_c(variable) for variable, count in self.names.assigned.items() if count > 1
+        }
         return end.known is None and (end.reads or bool(within & changing))
 
     def _return(self, node: ast.Return) -> None:
@@ -191,11 +193,11 @@ class Statements(Expressions):
         if not isinstance(target, ast.Name) or not isinstance(value, ast.BoolOp):
             return False
         first, *later = value.values
-        used = {n.id for one in later for n in ast.walk(one) if isinstance(n, ast.Name)}
+        used = {n.id for statement in later for n in ast.walk(statement) if isinstance(n, ast.Name)}
         if target.id in used:
             return False
         ((start, before),), rest = self.apart([first]), self.apart(later)
-        if {INT} != {one.kind for one, _ in [(start, before), *rest]}:
+        if {INT} != {value.kind for value, _ in [(start, before), *rest]}:
             return False
         self.lines += before
         name = self._give(target.id, start, constant=False)

@@ -152,8 +152,8 @@ def expression(kind: str, text: str, *of: Value, natural: bool = False) -> Value
         Number(kind),
         text,
         natural=natural,
-        reads=any(one.reads for one in of),
-        acts=any(one.acts for one in of),
+        reads=any(operand.reads for operand in of),
+        acts=any(operand.acts for operand in of),
     )
 
 
