@@ -115,8 +115,8 @@ class Outcome:
         """The verdict in one sentence."""
         found = self.diagnosis
         cost = "".join(
-            f" Without a measured {one.label}, fewer effects can be told apart."
-            for one in self.missing
+            f" Without a measured {signal.label}, fewer effects can be told apart."
+            for signal in self.missing
         )
         if found.verdict == "nothing":
             return f"Nothing significant is missing: what remains is noise and tolerance.{cost}"
@@ -124,9 +124,9 @@ class Outcome:
             return f"{self._unexplained()}{cost}"
         names = []
         for cause in found.causes:
-            label, one = next(iter(cause.parameters.items()))
+            label, size = next(iter(cause.parameters.items()))
             twins = f" (or {', '.join(cause.confusable_with)})" if cause.confusable_with else ""
-            names.append(f"{cause.effect.text}: {cause.effect.name}{twins}, {label} {one.text}")
+            names.append(f"{cause.effect.text}: {cause.effect.name}{twins}, {label} {size.text}")
         assert found.gain is not None
         more = " The search was interrupted: more may be missing." if found.interrupted else ""
         return (
@@ -306,7 +306,8 @@ class Outcome:
 
     def _lasting_errors(self) -> dict[str, dict[str, float]]:
         before, after = (
-            one.linearised.variance_factors for one in (self.diagnosis.base, self.diagnosis.best)
+            model.linearised.variance_factors
+            for model in (self.diagnosis.base, self.diagnosis.best)
         )
         return {
             channel.name: {"before": float(b), "after": float(a)}
@@ -482,7 +483,7 @@ def recording_figures(outcome: Outcome) -> list[CaseFigure]:
     span = FAST if outcome.turns else lasting_blocks(system)
     pairs = list(zip(outcome.residuals, outcome.cases, strict=True))
     pairs.sort(key=lambda pair: -_clearness(pair[0], span, bool(found.causes)))
-    return [recording_figure(one, case, system, extension, span) for one, case in pairs]
+    return [recording_figure(recording, case, system, extension, span) for recording, case in pairs]
 
 
 def shown_first(figures: Sequence[CaseFigure], recording: str) -> CaseFigure:
@@ -640,7 +641,7 @@ def _context(system: System) -> tuple[str, ...]:
     """Signals that say what happens: the led one, and what begins a recording or all inputs."""
     leading, begins = system.comparison.leading, system.comparison.begins
     first = [leading.output] if leading is not None else []
-    driven = [one.name for one in system.inputs] if begins is None else [begins.signal]
+    driven = [signal.name for signal in system.inputs] if begins is None else [begins.signal]
     return tuple(dict.fromkeys([*first, *driven]))
 
 

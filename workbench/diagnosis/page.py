@@ -440,8 +440,8 @@ def _confusable(summary: Mapping[str, Any]) -> list[Block]:
         if cosines[i][j] >= _SIMILAR
     ]
     pairs = sorted(pairs, key=lambda pair: -pair[2])[:_PAIRS]
-    alike = "; ".join(f"{one} and {other} ({cosine:.0f})" for one, other, cosine in pairs)
-    read = " ".join(f"{one} and {other}: {cosine:.0f}." for one, other, cosine in pairs)
+    alike = "; ".join(f"{first} and {other} ({cosine:.0f})" for first, other, cosine in pairs)
+    read = " ".join(f"{first} and {other}: {cosine:.0f}." for first, other, cosine in pairs)
     caption = (
         "Cosine of the angle between what two effects leave in the errors, levels and tolerances "
         "apart, in percent; 100 cannot be told apart, numbers are given from 70 on"

@@ -75,10 +75,12 @@ def late_signals(system: System) -> dict[str, dict[str, float]]:
     were moved: where the clock of the reference is late, all others are early.
     """
     first, found = reference(system), {}
-    for one in (*clocks(system), *own_clocks(system)):
-        others = [name for name in system.signals if name not in one.late]
-        moving = dict.fromkeys(others, -1.0) if first in one.late else dict.fromkeys(one.late, 1.0)
-        found[variables(one, SKEW)[0]] = moving
+    for clock in (*clocks(system), *own_clocks(system)):
+        others = [name for name in system.signals if name not in clock.late]
+        moving = (
+            dict.fromkeys(others, -1.0) if first in clock.late else dict.fromkeys(clock.late, 1.0)
+        )
+        found[variables(clock, SKEW)[0]] = moving
     return found
 
 

@@ -91,9 +91,9 @@ def count(
     }
     restarted = [own[exclusion.reason] for exclusion in compare.exclusions if exclusion.restarted]
     spans = np.logical_or.reduce(restarted) if restarted else np.zeros(time.size, np.bool_)
-    for one in compare.exclusions if restarting else ():
-        if one.restarted:
-            own[one.reason] = np.zeros(time.size, np.bool_)
+    for exclusion in compare.exclusions if restarting else ():
+        if exclusion.restarted:
+            own[exclusion.reason] = np.zeros(time.size, np.bool_)
     excluded = {
         FAULTY: np.logical_or.reduce(list(faulty.values())),
         BEYOND: np.logical_or.reduce(list(beyond.values())),

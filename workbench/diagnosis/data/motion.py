@@ -104,13 +104,13 @@ def motion(fmu: FMU, system: System) -> Motion:
     states = corrected_states(fmu, system)
     model = linearised(fmu, system).of(states)
     at = [fmu.states.index(name) for name in states]
-    inputs = fmu.variables([one.name for one in system.inputs])
+    inputs = fmu.variables([signal.name for signal in system.inputs])
     B = fmu.input_jacobian(inputs)[at]
     outputs = [output.name for output in system.outputs]
     # A state shows no input at once; not every FMU differentiates it.
     shown = [name not in fmu.states for name in outputs]
     D = np.zeros((len(outputs), len(system.inputs)))
-    seen = fmu.variables([name for name, one in zip(outputs, shown, strict=True) if one])
+    seen = fmu.variables([name for name, is_shown in zip(outputs, shown, strict=True) if is_shown])
     D[shown] = fmu.jacobian(seen.references, inputs)
     ratio = rolling_ratio(fmu, system) if system.rolling else 0.0
     return Motion(states, model.A, B, model.C, D, model.nominal, ratio)

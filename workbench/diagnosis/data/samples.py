@@ -164,10 +164,10 @@ class Samples:
         """
         inverse = np.linalg.inv(self.whitening)
         covariance = np.einsum("bij,bkj->bik", inverse, inverse)
-        for one in moved:
-            covariance += one[:, :, None] * one[:, None, :]
-        for one in apart:
-            covariance += one[:, :, None] ** 2 * np.eye(one.shape[1])
+        for slopes in moved:
+            covariance += slopes[:, :, None] * slopes[:, None, :]
+        for slopes in apart:
+            covariance += slopes[:, :, None] ** 2 * np.eye(slopes.shape[1])
         return replace(self, whitening=np.linalg.inv(np.linalg.cholesky(covariance)))
 
     def channels(self, errors: Matrix) -> Matrix:
@@ -226,14 +226,16 @@ def prepare(
     counted = count(case, system, (*case.inputs, *own), sound, restarting=restarting)
     clean, deviation, blocks = counted.clean, counted.deviation, counted.blocks
     formed, told = channels(system, signals), channels(system, own)
-    slopes = np.array([one.formula.slopes(signals, model.fmu.defaults) for one in formed])
-    own_slopes = np.array([one.formula.slopes(own, model.fmu.defaults) for one in told])
+    slopes = np.array([signal.formula.slopes(signals, model.fmu.defaults) for signal in formed])
+    own_slopes = np.array([signal.formula.slopes(own, model.fmu.defaults) for signal in told])
     gain, lead, ahead = _led(case, system, own, counted, model.motion)
-    silent = np.array([one not in told for one in formed])
+    silent = np.array([signal not in told for signal in formed])
     scales = np.abs(slopes) @ [system.signals[name].scale for name in signals]
     white = whitening(system, counted, own, own_slopes, ahead)
     nothing = np.zeros(time.size)
-    driving = [smooth(clean[one.name], one.smoothed, h, sound.held) for one in system.inputs]
+    driving = [
+        smooth(clean[signal.name], signal.smoothed, h, sound.held) for signal in system.inputs
+    ]
     rest, rest_noise = _at_rest(system.comparison, clean, counted.applied)
     start = slice(0, max(1, round(_STARTING * system.sample_time / h)))
     first = {n: first_value(time[start], clean[n][start], deviation[n]) for n in case.outputs}
@@ -252,7 +254,7 @@ def prepare(
         gain=gain,
         lead=lead,
         restarts=restarts_of(system, counted),
-        held=np.array([one.held for one in system.inputs]),
+        held=np.array([signal.held for signal in system.inputs]),
         begin=_begin(system, first, model.motion),
         rest=rest,
         rest_noise=rest_noise,
@@ -287,7 +289,7 @@ def _led(
     leading = system.comparison.leading
     if leading is None:
         ahead = np.zeros((time.size, len(signals), len(signals)))
-        inputs, outputs = (noise_of(one, deviation) for one in (case.inputs, case.outputs))
+        inputs, outputs = (noise_of(part, deviation) for part in (case.inputs, case.outputs))
         lead = led_by(motion, inputs, outputs, h)
         count = len(case.outputs)
         ahead[:, :count, :count] = lead.ahead

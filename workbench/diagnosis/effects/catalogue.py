@@ -152,18 +152,18 @@ def read_effects(library: Library, base: str) -> tuple[Effect, ...]:
     slots = read_slots(library, base)
     effects: dict[str, Effect] = {}
     after: dict[str, str] = {}
-    for one in library.classes.values():
-        if not one.name.startswith(f"{library.name}."):
+    for cls in library.classes.values():
+        if not cls.name.startswith(f"{library.name}."):
             continue
-        said = AnnotationReader(f"{one.where}, __Workbench", one.vendor)
+        said = AnnotationReader(f"{cls.where}, __Workbench", cls.vendor)
         said.only("effect")
-        if "effect" not in one.vendor:
+        if "effect" not in cls.vendor:
             continue
         entry = said.part("effect")
-        effect = _read(library, slots, one, entry)
+        effect = _read(library, slots, cls, entry)
         if effect.name in effects:
             raise InputError(
-                where=one.where,
+                where=cls.where,
                 found=f"a second effect {effect.name}",
                 expected=f"one, which is {effects[effect.name].model}",
                 remedy="rename one of the two",
@@ -172,7 +172,7 @@ def read_effects(library: Library, base: str) -> tuple[Effect, ...]:
         if other := entry.text("after", ""):
             after[effect.name] = other
     ordered = [effects[name] for name in _ordered(library, list(effects), after)]
-    return tuple(placed for one in ordered for placed in _placed(library, one))
+    return tuple(placed for effect in ordered for placed in _placed(library, effect))
 
 
 def choose(names: Sequence[str], effects: Sequence[Effect]) -> tuple[Effect, ...]:
@@ -223,7 +223,7 @@ def _placed(library: Library, effect: Effect) -> list[Effect]:
     return [replace(effect, name=name, place=k, places=int(count)) for k, name in names]
 
 
-def _read(library: Library, slots: Sequence[Slot], one: Class, said: AnnotationReader) -> Effect:
+def _read(library: Library, slots: Sequence[Slot], cls: Class, said: AnnotationReader) -> Effect:
     said.only(
         *("size", "matters", "shapes", "separation", "hidden", "slots", "after"),
         *("where", "unless", "falling", "restarted"),
@@ -235,12 +235,12 @@ def _read(library: Library, slots: Sequence[Slot], one: Class, said: AnnotationR
         size = said.text("size")
     shapes = said.part("shapes") if "shapes" in said.content else AnnotationReader(said.where, {})
     effect = Effect(
-        name=one.name.rpartition(".")[2],
-        model=one.name,
-        slots=_slots(library, slots, one, said),
+        name=cls.name.rpartition(".")[2],
+        model=cls.name,
+        slots=_slots(library, slots, cls, said),
         size=size,
         matters=said.number("matters"),
-        text=_within_sentence(one.description),
+        text=_within_sentence(cls.description),
         separation=said.text("separation"),
         shapes=tuple((name, shapes.numbers(name)) for name in shapes.content),
         hidden=said.text("hidden", ""),
@@ -249,17 +249,17 @@ def _read(library: Library, slots: Sequence[Slot], one: Class, said: AnnotationR
         falling=_falling(said),
         restarted=_restarted(said),
     )
-    _check_parameters(library, one, effect)
-    _check_extends(library, one)
+    _check_parameters(library, cls, effect)
+    _check_extends(library, cls)
     return effect
 
 
 def _slots(
-    library: Library, slots: Sequence[Slot], one: Class, said: AnnotationReader
+    library: Library, slots: Sequence[Slot], cls: Class, said: AnnotationReader
 ) -> tuple[str, ...]:
-    extended = library.ancestors(one.name)
+    extended = library.ancestors(cls.name)
     # A class that adds inputs to the partial class of a slot is for one that has them.
-    parts = library.components(one.name).items()
+    parts = library.components(cls.name).items()
     asked = {name for name, part in parts if "input" in part.prefixes and not part.modifier.value}
     fitting = tuple(
         slot.name for slot in slots if slot.partial in extended and asked <= set(slot.inputs)
@@ -267,8 +267,8 @@ def _slots(
     if not fitting:
         partials = dict.fromkeys(slot.partial for slot in slots)
         raise InputError(
-            where=one.where,
-            found=f"effect {one.name}, which extends no slot of the base model",
+            where=cls.where,
+            found=f"effect {cls.name}, which extends no slot of the base model",
             expected=f"one that extends {' or '.join(partials) or 'a slot, but there is none'}",
             remedy="let it extend the partial class of its slot, or remove its annotation",
         )
@@ -317,9 +317,9 @@ def _restarted(said: AnnotationReader) -> str:
     return part.text("because")
 
 
-def _check_extends(library: Library, one: Class) -> None:
+def _check_extends(library: Library, cls: Class) -> None:
     """Refuse `extends Law(p(max=1) = 0.5)`, of which the compiler takes the value alone."""
-    for name in (one.name, *library.ancestors(one.name)):
+    for name in (cls.name, *library.ancestors(cls.name)):
         for base in library.classes[name].extends:
             for key, modifier in base.modifier.inner.items():
                 if modifier.value and modifier.inner:
@@ -331,9 +331,9 @@ def _check_extends(library: Library, one: Class) -> None:
                     )
 
 
-def _check_parameters(library: Library, one: Class, effect: Effect) -> None:
+def _check_parameters(library: Library, cls: Class, effect: Effect) -> None:
     """All that the annotation names is a parameter, and a size is zero by default."""
-    components = library.components(one.name)
+    components = library.components(cls.name)
     parameters = {name: c for name, c in components.items() if "parameter" in c.prefixes}
     shared = (effect.where.share,) if effect.where and effect.where.share else ()
     for name in (*effect.sizes, *(name for name, _ in effect.shapes), *shared):
@@ -341,8 +341,8 @@ def _check_parameters(library: Library, one: Class, effect: Effect) -> None:
             raise unknown_name(
                 name,
                 parameters,
-                where=one.where,
-                found=f"effect {one.name} without a parameter '{name}'",
+                where=cls.where,
+                found=f"effect {cls.name} without a parameter '{name}'",
                 expected=f"one of {', '.join(parameters) or 'its parameters, but it has none'}",
                 remedy="correct the annotation, or declare the parameter",
             )
@@ -352,7 +352,7 @@ def _check_parameters(library: Library, one: Class, effect: Effect) -> None:
             raise InputError(
                 where=parameters[name].where,
                 found=f"{name} = {value}" if value else f"{name} without a value",
-                expected=f"'= 0.0': by default, {one.name} is the nominal model exactly",
+                expected=f"'= 0.0': by default, {cls.name} is the nominal model exactly",
                 remedy="let the size of the effect be zero by default",
             )
 

@@ -104,7 +104,9 @@ class ExtendedModel:
         modifiers = ",\n".join(redeclared)
         return (
             f'model {self.name} "{self.about}"\n'
-            + "".join(f"  import {USED}{one} = {one};\n" for one in sorted(used - {library.name}))
+            + "".join(
+                f"  import {USED}{name} = {name};\n" for name in sorted(used - {library.name})
+            )
             + f"  extends {library.find(self.base).name}(\n{modifiers});\n\n"
             + "\n".join(nested)
             + f"end {self.name};\n"

@@ -84,13 +84,13 @@ def read_slots(library: Library, base: str) -> tuple[Slot, ...]:
             for declaration in declared.values()
             if declaration.type == "Integer" and "parameter" in declaration.prefixes
         )
-        names = {*counts, *(one.name for one in inputs)}
+        names = {*counts, *(variable.name for variable in inputs)}
         slots.append(
             Slot(
                 name=component.name,
                 partial=partial,
                 counts=counts,
-                inputs=tuple(one.name for one in inputs),
+                inputs=tuple(variable.name for variable in inputs),
                 outputs=tuple(output.name for output in outputs),
                 chained=len(outputs) <= len(inputs)
                 and all(

@@ -29,7 +29,7 @@ def best_estimate(outcome: Outcome, recording: str) -> CaseResult | None:
     models = {"nominal_model": (system, case)}
     if extension is not None:
         models["extended_model"] = (with_model(system, OBSERVER, extension.fmu), in_time)
-    found = {name: smoothed(recorded, one) for name, (one, recorded) in models.items()}
+    found = {name: smoothed(recorded, model) for name, (model, recorded) in models.items()}
     runs = {name: run for name, run in found.items() if run is not None}
     scores = {name: score(in_time, run, system) for name, run in runs.items()}
     return CaseResult(system, in_time, runs, scores, None) if runs else None

@@ -55,12 +55,14 @@ class Certainty:
     @property
     def same(self) -> int:
         """Fits from elsewhere that ended where the best one did."""
-        return sum(one is not None and abs(one) <= self.tolerance for one in self.behind)
+        return sum(
+            distance is not None and abs(distance) <= self.tolerance for distance in self.behind
+        )
 
     @property
     def lower(self) -> float:
         """By how much the lowest of them is below the best fit, 0 if none is."""
-        least = min((one for one in self.behind if one is not None), default=0.0)
+        least = min((distance for distance in self.behind if distance is not None), default=0.0)
         return max(0.0, -least) if least < -self.tolerance else 0.0
 
     @property
@@ -138,8 +140,8 @@ def _end(
     if start is None or tried == value:
         return None
     # Begun where the derivatives have the least, one step more is enough.
-    one = differentiable(partial(fit.refine, start, best.active, 1, held=held))
-    if one is None or (rise := one.deviance - lin.deviance) < _LITTLE:
+    refined = differentiable(partial(fit.refine, start, best.active, 1, held=held))
+    if refined is None or (rise := refined.deviance - lin.deviance) < _LITTLE:
         return None
     end = value + (tried - value) * BAND / float(np.sqrt(rise))
     return end if low <= end <= high else None
@@ -169,5 +171,5 @@ def _behind(fit: Fit, best: FittedModel, lin: LinearizedPoint, point: Point) -> 
     start = fit.tried(point)
     if start is None:
         return None
-    one = differentiable(partial(fitted, fit, start, best.active, rounds=ROUNDS))
-    return None if one is None else one.linearised.deviance - lin.deviance
+    refitted = differentiable(partial(fitted, fit, start, best.active, rounds=ROUNDS))
+    return None if refitted is None else refitted.linearised.deviance - lin.deviance

@@ -44,7 +44,7 @@ class CrossValidation:
 
     def explained(self, less: FittedModel, best: FittedModel, *, fast: bool) -> tuple[float, float]:
         """Share of the explainable by which two fits differ; mean square error of the first."""
-        before, after = (float(self.squares(one, fast=fast).mean()) for one in (less, best))
+        before, after = (float(self.squares(model, fast=fast).mean()) for model in (less, best))
         return float(np.clip((before - after) / max(before - 1.0, 1e-9), 0.0, 1.0)), before
 
     def _told(self, fitted: FittedModel) -> list[Mask]:

@@ -77,10 +77,10 @@ class Fit:
         self.unknowns = Unknowns(simulations, effects, beside)
         self._hidden = slice(0)  # blocks that do not count
         if self.unknowns.count == 1 and not beside and self.parts < 2:
-            one, compare = simulations.recordings[0], self._compare
+            recording, compare = simulations.recordings[0], self._compare
             raise InputError(
-                where=one.name,
-                found=f"one recording, {compare.block * len(one.blocks):.3g} s that count",
+                where=recording.name,
+                found=f"one recording, {compare.block * len(recording.blocks):.3g} s that count",
                 expected=f"{2 * compare.lasting:g} s or more of one alone, because a cause is "
                 "judged on a part it was not fitted to",
                 remedy="give more recordings of this machine, or a longer one",
@@ -105,8 +105,10 @@ class Fit:
     @property
     def own_clocks(self) -> tuple[Effect, ...]:
         """A clock of each recorded signal but the reference, whatever the loggers."""
-        one, system = self._simulations.recordings[0], self._simulations.system
-        return tuple(c for c in own_clocks(system) if {*c.late} <= {*one.inputs, *one.signals})
+        recording, system = self._simulations.recordings[0], self._simulations.system
+        return tuple(
+            c for c in own_clocks(system) if {*c.late} <= {*recording.inputs, *recording.signals}
+        )
 
     def beside(self, effects: Sequence[Effect]) -> "Fit":
         """The same with more effects that may be asked for."""
@@ -130,11 +132,11 @@ class Fit:
     def _shown(self, residuals: Sequence[WhitenedResiduals]) -> Sequence[WhitenedResiduals]:
         if self._hidden == slice(0):
             return residuals
-        (one,) = residuals
-        errors, jacobian = one.errors.copy(), one.jacobian.copy()
+        (residual,) = residuals
+        errors, jacobian = residual.errors.copy(), residual.jacobian.copy()
         errors[self._hidden] = 0.0
         jacobian[:-1].reshape(*errors.shape, -1)[self._hidden] = 0.0
-        return (replace(one, errors=errors, jacobian=jacobian),)
+        return (replace(residual, errors=errors, jacobian=jacobian),)
 
     @property
     def delays(self) -> tuple[Key, ...]:
@@ -160,7 +162,7 @@ class Fit:
     def restarted(self) -> list[int]:
         """Recordings of which samples count where states are restarted, and a law is simplified."""
         found = self._simulations.recordings
-        return [k for k, one in enumerate(found) if one.restarted.any()]
+        return [k for k, residual in enumerate(found) if residual.restarted.any()]
 
     def astray(self, lin: LinearizedPoint) -> list[int]:
         """Recordings in which errors last where states are restarted: another law holds there."""

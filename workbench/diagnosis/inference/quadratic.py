@@ -254,22 +254,22 @@ class Joint:
         """
         if len(self.systems) > 1:
             return self
-        (one,) = self.systems
-        own = tuple(("", f"own {j}") for j in range(one.P.shape[1]))
+        (part,) = self.systems
+        own = tuple(("", f"own {j}") for j in range(part.P.shape[1]))
         known, extra = len(self.known), self.shared[len(self.known) :]
-        J = np.hstack([one.J[:, :known], one.P, one.J[:, known:]])
-        at = slice(known, known + one.deviations.size)  # of the new unknowns that have a prior
+        J = np.hstack([part.J[:, :known], part.P, part.J[:, known:]])
+        at = slice(known, known + part.deviations.size)  # of the new unknowns that have a prior
         N, g = np.zeros((J.shape[1],) * 2), np.zeros(J.shape[1])
         old = np.delete(np.arange(J.shape[1]), range(known, known + len(own)))
         N[np.ix_(old, old)], g[old] = self.prior.N, self.prior.g
-        N[at, at], g[at] = np.eye(one.deviations.size), one.deviations
-        c = self.prior.c + float(one.deviations @ one.deviations)
+        N[at, at], g[at] = np.eye(part.deviations.size), part.deviations
+        c = self.prior.c + float(part.deviations @ part.deviations)
         none = np.zeros(0)
         return Joint(
             shared=(*self.known, *own, *extra),
             known=(*self.known, *own),
             levels=(*self.levels, *own),
-            systems=_cut(RecordingSystem(one.r, J, J[:, :0], none, none, one.channels), parts),
+            systems=_cut(RecordingSystem(part.r, J, J[:, :0], none, none, part.channels), parts),
             prior=Quadratic(N, g, c, 0),
         )
 

@@ -140,28 +140,28 @@ def dependences(simulations: ResidualModel, found: Sequence[Residuals]) -> list[
     signs = [sign(case, system) for case in simulations.cases]
     pairs = list(zip(signs, found, strict=True))
     table = []
-    for channel in dict.fromkeys(channel for one in found for channel in one.channels):
+    for channel in dict.fromkeys(channel for residual in found for channel in residual.channels):
         before, after, along = [], [], []
-        for (mark, one), own in zip(pairs, influences, strict=True):
-            if channel in one.channels:
-                c = one.channels.index(channel)
-                before.append(mark * one.before[:, c] / one.sigma[:, c])
-                after.append(mark * one.after[:, c] / one.sigma[:, c])
+        for (mark, residual), own in zip(pairs, influences, strict=True):
+            if channel in residual.channels:
+                c = residual.channels.index(channel)
+                before.append(mark * residual.before[:, c] / residual.sigma[:, c])
+                after.append(mark * residual.after[:, c] / residual.sigma[:, c])
                 along.append(own)
         for name in (name for name in influences[0] if all(name in own for own in along)):
             shares = (
                 _explained(errors, along, name, apart=name in turning) for errors in (before, after)
             )
             table.append(Dependence(channel.name, name, *shares))
-    return sorted(table, key=lambda one: -one.before)
+    return sorted(table, key=lambda row: -row.before)
 
 
 def _influences(simulations: ResidualModel, k: int) -> dict[str, Vector]:
     """Each influence at the blocks of one recording."""
-    case, one, system = simulations.cases[k], simulations.recordings[k], simulations.system
+    case, recording, system = simulations.cases[k], simulations.recordings[k], simulations.system
     time, h = case.time, np.gradient(case.time)
-    measured = dict(zip(one.inputs, one.u.T, strict=True))
-    measured |= dict(zip(one.signals, one.y.T, strict=True))
+    measured = dict(zip(recording.inputs, recording.u.T, strict=True))
+    measured |= dict(zip(recording.signals, recording.y.T, strict=True))
     signals = {BEGINNING: time - time[0]}
     if (begins := system.comparison.begins) is not None:
         size = np.abs(system.signal(begins.signal, measured))
@@ -184,7 +184,7 @@ def _influences(simulations: ResidualModel, k: int) -> dict[str, Vector]:
         signals[influence.name] = values
     if any(condition.sign for condition in system.conditions):
         signals[DIRECTION] = np.full(time.size, sign(case, system))
-    middle = one.blocks.mean(axis=1).astype(int)
+    middle = recording.blocks.mean(axis=1).astype(int)
     return {name: values[middle] for name, values in signals.items()}
 
 

@@ -146,7 +146,7 @@ def gathered(
     """
     variance_factors = fits[0].linearised.variance_factors
     return Rivals(
-        models=tuple(_rival(fit, base, one, variance_factors) for one in fits),
+        models=tuple(_rival(fit, base, model, variance_factors) for model in fits),
         effects=tuple(fit.unknowns.effects),
         given=simulations.given,
         signals=tuple(simulations.recordings[0].signals),

@@ -59,7 +59,7 @@ def shapes(effect: Effect) -> list[dict[str, float]]:
     """Shapes with which an effect is tried."""
     tried: list[dict[str, float]] = [{}]
     for name, values in effect.shapes:
-        tried = [{**one, name: value} for one in tried for value in values]
+        tried = [{**point, name: value} for point in tried for value in values]
     return tried
 
 
@@ -100,7 +100,7 @@ class ScoreTest:
         share = self._beside_levels()
         # Of twins, by their cosine, levels take all but 1 - (1 - twin)^2.
         self._immaterial = {
-            name: one for name, one in middle.items() if share[one[0]] > 2.0 * fit.decides.twin
+            name: form for name, form in middle.items() if share[form[0]] > 2.0 * fit.decides.twin
         }
         alone = self._select({}, alone=True)
         self._without, self._prior = _held_out(*alone), alone[1]
@@ -108,7 +108,7 @@ class ScoreTest:
         total = add([*base[0], base[1]])
         best = minimum(total)
         self._reference, self._away = total.at(best), self._far(best)
-        self._lacking = [one.at(minimum(one)) for one in _without_each(total, base[0])]
+        self._lacking = [form.at(minimum(form)) for form in _without_each(total, base[0])]
 
     def _far(self, z: Vector) -> float:
         """Chi-squared of known unknowns against what is expected of them."""
@@ -136,7 +136,7 @@ class ScoreTest:
         self, own: Mapping[int, Matrix], name: str = "", *, alone: bool = False
     ) -> tuple[list[Quadratic], Quadratic]:
         """Stops and prior over known unknowns, immaterial ones and, last, the candidate."""
-        others = [one for key, one in self._immaterial.items() if key != name and not alone]
+        others = [form for key, form in self._immaterial.items() if key != name and not alone]
         columns = [*self._known, *(at for at, _ in others)]
         count = len(columns) + bool(own)
         transforms = []
@@ -162,7 +162,7 @@ class ScoreTest:
     def scores(self) -> list[CandidateScore]:
         """All candidates, best first."""
         found = [self._score(effect, shape) for effect, shape in self._candidates]
-        return sorted(found, key=lambda one: -one.score)
+        return sorted(found, key=lambda score: -score.score)
 
     def _score(self, effect: Effect, shape: Mapping[str, float]) -> CandidateScore:
         at = [self.joint.shared.index((variant(effect, shape), name)) for name in effect.sizes]
@@ -183,7 +183,7 @@ class ScoreTest:
             stops, prior = [_fixed(stop, size) for stop in stops], _fixed(prior, size)
             total = add([*stops, prior])
             best = minimum(total)
-        lacking = [one.at(minimum(one)) for one in _without_each(total, stops)]
+        lacking = [form.at(minimum(form)) for form in _without_each(total, stops)]
         alone, own_prior = self._select(own, alone=True)
         single = float(minimum(add([*alone, own_prior]))[-1])
         if not low <= single <= high:

@@ -110,7 +110,7 @@ def _step(
     fits = _fits(fit, best, rivals)
     if not fits:
         return None
-    equals = [one for one in fits if beyond(one, fits[0]) < fit.decides.tied]
+    equals = [other for other in fits if beyond(other, fits[0]) < fit.decides.tied]
     first = min(equals, key=lambda equal: catalogue.index(equal.active[-1]))
     return Step(best, scores, (first, *(fit for fit in fits if fit is not first)))
 
@@ -137,18 +137,18 @@ def _fits(
 ) -> list[FittedModel]:
     """Fits with one more effect that gain by it, best first; one far behind is not finished."""
     tried = fit.together(partial(_begun, fit, best), rivals)
-    begun = [one for one in tried if one is not None]
+    begun = [start for start in tried if start is not None]
     if not begun:
         return []
     left = misfits(begun)
     near = left < fit.decides.behind * left.min()
-    worth = [i for i, one in enumerate(begun) if near[i] and not one.linearised.settled]
+    worth = [i for i, model in enumerate(begun) if near[i] and not model.linearised.settled]
 
-    def finished(one: FittedModel) -> FittedModel | None:
-        return differentiable(partial(fitted, fit, one.linearised, one.active))
+    def finished(model: FittedModel) -> FittedModel | None:
+        return differentiable(partial(fitted, fit, model.linearised, model.active))
 
     ends = dict(zip(worth, fit.together(finished, [begun[i] for i in worth]), strict=True))
-    every = [end for i, one in enumerate(begun) if (end := ends.get(i, one)) is not None]
+    every = [end for i, model in enumerate(begun) if (end := ends.get(i, model)) is not None]
     order = np.argsort(misfits(every)) if every else ()
     return [every[i] for i in order if _gains(fit, best, every[i])]
 
@@ -167,12 +167,12 @@ def _begun(fit: Fit, best: FittedModel, variants: Sequence[CandidateScore]) -> F
     first, tried = variants[0], []
     halves = [replace(first, size=0.5**k * first.size) for k in range(1, _HALVINGS + 1)]
     for start in (*variants[:_VARIANTS], *halves):
-        if (one := extended(fit, best, start, BEGUN)) is None:
+        if (model := extended(fit, best, start, BEGUN)) is None:
             continue
-        if _gains(fit, best, one):
-            return one
-        tried.append(one)
-    return min(tried, key=lambda one: one.linearised.deviance, default=None)
+        if _gains(fit, best, model):
+            return model
+        tried.append(model)
+    return min(tried, key=lambda model: model.linearised.deviance, default=None)
 
 
 def extended(
@@ -245,8 +245,8 @@ def pruned(
             clear = size / max(sigma[trial.joint.known.index(key)], 1e-300)
             ratios[effect] = min(clear / fit.decides.significant, size / effect.matters)
         if len(less) > 1 or fit.restarted:
-            for effect, one in less.items():
-                ratios[effect] = min(ratios[effect], beyond(one, best) / fit.decides.needed)
+            for effect, reduced in less.items():
+                ratios[effect] = min(ratios[effect], beyond(reduced, best) / fit.decides.needed)
         weakest = min(ratios, key=lambda effect: ratios[effect])
         if ratios[weakest] >= 1.0:
             break
@@ -272,8 +272,8 @@ def leave_one_out_fits(
         start = fit.tried(without(best.point, effect))
         if start is None:  # without it, the others stand for more than the machine can do
             return known[frozenset()]
-        one = fitted(fit, start, kept)
-        return replace(one, linearised=fit.linearise(one.linearised, kept))
+        model = fitted(fit, start, kept)
+        return replace(model, linearised=fit.linearise(model.linearised, kept))
 
     fits = fit.together(refitted, best.active)
     return dict(zip(best.active, fits, strict=True))
@@ -335,4 +335,4 @@ def _rivals(
             able.setdefault(score.effect.name, []).append(score)
     ranked = list(able.values())[: decides.rivals]
     best_score = ranked[0][0].score if ranked else 0.0
-    return [one for one in ranked if one[0].score > decides.near * best_score]
+    return [candidate for candidate in ranked if candidate[0].score > decides.near * best_score]

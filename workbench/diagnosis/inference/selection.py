@@ -105,7 +105,7 @@ def select(
     validation, dropped = CrossValidation(fit), set[Effect]()
     while True:
         met = (base, *(step.before for step in steps[earlier:]))
-        known = {frozenset(one.active): one for one in met}
+        known = {frozenset(model.active): model for model in met}
         before = set(best.active)
         best, trial, less = pruned(fit, catalogue, best, known, trial, report)
         while (idle := _idle(fit, validation, best, less)) is not None:
@@ -126,19 +126,19 @@ def select(
         }
         alike = {e: _alike(fit, e, best, less[e], steps, similar[e]) for e in less}
         replaced = [fit for fits in alike.values() for fit in fits.values()]
-        better = min(replaced, key=lambda one: beyond(one, best), default=best)
+        better = min(replaced, key=lambda model: beyond(model, best), default=best)
         if interrupted or beyond(best, better) < fit.decides.needed:
             break
         report(f"{better.active[-1].name} explains more than what it replaces")
         best, trial, interrupted = forward_selection(fit, catalogue, better, steps, dropped, report)
     twins = {
-        one: dict(
+        effect: dict(
             sorted(
-                (pair for pair in fits.items() if _close(fit, less[one], pair[1], best)),
+                (pair for pair in fits.items() if _close(fit, less[effect], pair[1], best)),
                 key=lambda pair: beyond(pair[1], best),
             )
         )
-        for one, fits in alike.items()
+        for effect, fits in alike.items()
     }
     return Selection(
         base=base,
@@ -157,8 +157,8 @@ def select(
 def anew(fit: Fit, point: Point, active: tuple[Effect, ...]) -> FittedModel:
     """A fit that begins at a point, with all derivatives."""
     # A point of its own, by which it is told from a fit to other samples.
-    one = fitted(fit, fit.at(replace(point)), active)
-    return replace(one, linearised=fit.linearise(one.linearised, active))
+    model = fitted(fit, fit.at(replace(point)), active)
+    return replace(model, linearised=fit.linearise(model.linearised, active))
 
 
 def _idle(
@@ -168,8 +168,8 @@ def _idle(
     if len(best.active) < 2:
         return None
     shares = {
-        effect: validation.explained(one, best, fast=effect.order_locked)[0]
-        for effect, one in less.items()
+        effect: validation.explained(reduced, best, fast=effect.order_locked)[0]
+        for effect, reduced in less.items()
     }
     weakest = min(shares, key=lambda effect: shares[effect])
     return weakest if shares[weakest] < fit.decides.idle else None
@@ -206,8 +206,8 @@ def _alike(
         if named and winner.point is best.point:
             found |= {name: rivals[name] for name in close}
             alike -= set(rivals)
-    active = {one.name for one in best.active}
-    found = {name: one for name, one in found.items() if name not in active}
+    active = {effect.name for effect in best.active}
+    found = {name: model for name, model in found.items() if name not in active}
     alike -= active | set(found)
     others: dict[str, CandidateScore] = {}
     for score in (score for step in steps for score in step.scores):
@@ -215,7 +215,7 @@ def _alike(
             others.setdefault(score.effect.name, score)
     fits = fit.together(partial(extended, fit, less), list(others.values()))
     tried = zip(others, fits, strict=True)
-    return found | {name: one for name, one in tried if one is not None}
+    return found | {name: model for name, model in tried if model is not None}
 
 
 def _close(fit: Fit, before: FittedModel, fitted: FittedModel, best: FittedModel) -> bool:

@@ -148,9 +148,11 @@ def conclude(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnos
     if verdict == "found":
         report("held-out recordings")
         fast = any(effect.order_locked for effect in best.active)
-        before, after = (chosen.validation.squares(one, fast=fast) for one in (base, best))
+        before, after = (chosen.validation.squares(model, fast=fast) for model in (base, best))
         gain = _gain(fit.tests, before, after)
-        causes = [_cause(fit, chosen, one) for one in _strongest_first(fit, chosen, catalogue)]
+        causes = [
+            _cause(fit, chosen, effect) for effect in _strongest_first(fit, chosen, catalogue)
+        ]
         twins = [fits.values() for fits in chosen.twins.values()]
         rivals = (best, *(fit for fits in twins for fit in fits))
     presence = fit.unknowns.presence
@@ -168,7 +170,7 @@ def conclude(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnos
         scores=chosen.steps[0].scores if chosen.steps else tuple(chosen.trial.scores()),
         names=chosen.names,
         cosines=chosen.cosines,
-        not_visible={one.name: why for one in catalogue if (why := presence.unseen(one))},
+        not_visible={effect.name: why for effect in catalogue if (why := presence.unseen(effect))},
     )
 
 
@@ -216,7 +218,7 @@ def _strongest_first(fit: Fit, chosen: Selection, catalogue: Sequence[Effect]) -
     ordered = list[Effect]()
     while rest := [effect for effect in causes if effect not in ordered]:
         least = min(left.get(effect, np.inf) for effect in rest)
-        equals = [one for one in rest if left.get(one, np.inf) <= least + fit.decides.tied]
+        equals = [other for other in rest if left.get(other, np.inf) <= least + fit.decides.tied]
         ordered.append(min(equals, key=catalogue.index))
     return ordered
 

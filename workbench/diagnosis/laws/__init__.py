@@ -115,10 +115,10 @@ def _turning(prospects: Sequence[LawScore]) -> list[FittedLaw]:
     likeliest = [prospect for prospect in prospects if _turns(prospect)][:_TRIED]
     return [
         FittedLaw(
-            one, one.smoothness.evidence, one.smoothness.coefficients, one.smoothness.posterior
+            law, law.smoothness.evidence, law.smoothness.coefficients, law.smoothness.posterior
         )
-        for one in likeliest
-        if one.smoothness.evidence > 0.0
+        for law in likeliest
+        if law.smoothness.evidence > 0.0
     ]
 
 
@@ -141,11 +141,11 @@ def _likeliest(prospects: Sequence[LawScore]) -> list[LawScore]:
         kind = "" if influence is None or influence.kind in ("value", "size") else influence.kind
         best.setdefault((prospect.law.place.name, kind, *factors), prospect)
     of_place: dict[str, list[LawScore]] = {}
-    for one in best.values():
-        of_place.setdefault(one.law.place.name, []).append(one)
-    kept = [one for every in of_place.values() for one in every[:_OF_PLACE]]
-    first = sorted(kept, key=lambda one: -one.smoothness.evidence)[:_TRIED]
-    wanted = {_called(one.law) for one in first}
+    for law in best.values():
+        of_place.setdefault(law.law.place.name, []).append(law)
+    kept = [law for every in of_place.values() for law in every[:_OF_PLACE]]
+    first = sorted(kept, key=lambda law: -law.smoothness.evidence)[:_TRIED]
+    wanted = {_called(law.law) for law in first}
     return [
         prospect
         for prospect in prospects
@@ -197,7 +197,7 @@ def _surviving(
     before, rivals = steps[0].before, steps[0].rivals
     near = max(decides.form, decides.form_share * beyond(before, rivals[0]))
     alike = [rival for rival in rivals if beyond(rival, rivals[0]) < near]
-    names = [one.active[-1].name for one in sorted(alike, key=description_length)]
+    names = [model.active[-1].name for model in sorted(alike, key=description_length)]
     return {name: forms[name] for name in names}
 
 

@@ -120,7 +120,7 @@ def _harmonic(law: Law, influence: LawInfluence, scale: float) -> LawClass:
     known = _bounded(law.carrier.unit, -_KEPT * unit, _KEPT * unit)
     period = f"parameter Real period({unit_of(influence.unit)}) = {number(influence.span)}"
     lines = [
-        *(f'parameter Real {one}({known}) = 0.0 "Part of {one}";' for one in ("cosine", "sine")),
+        *(f'parameter Real {part}({known}) = 0.0 "Part of {part}";' for part in ("cosine", "sine")),
         f'{period} "As errors have it";',
     ]
     angle = f"{number(2.0 * np.pi)}*{CLOCK}/period"

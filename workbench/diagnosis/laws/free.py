@@ -96,8 +96,8 @@ class FittedLaw:
         values = np.linspace(knots.low, knots.high, _POINTS)
         basis = knots.basis(values)
         whole, shape = (
-            np.sqrt(np.einsum("ij,jk,ik->i", one, self.posterior, one))
-            for one in (basis, basis - basis.mean(axis=0))
+            np.sqrt(np.einsum("ij,jk,ik->i", functions, self.posterior, functions))
+            for functions in (basis, basis - basis.mean(axis=0))
         )
         return values, basis @ self.coefficients, whole, shape
 
@@ -158,8 +158,8 @@ def estimated(
             engine.report("fitting free functions")
             job = partial(_estimate, simulations, anew(fit, about.point, about.active))
             tried = fit.together(job, list(zip(effects, able, strict=True)))
-    found = [one for one in tried if one is not None]
-    return sorted(found, key=lambda one: -one.evidence)
+    found = [smoothness for smoothness in tried if smoothness is not None]
+    return sorted(found, key=lambda smoothness: -smoothness.evidence)
 
 
 def _effects(library: Library, prospects: Sequence[LawScore]) -> list[FreeFunction]:
@@ -231,7 +231,7 @@ def _fitted(
         posterior: Matrix = np.asarray(np.linalg.inv(N + effect.precision), np.float64)
         found.append(FittedLaw(prospect, 0.5 * (gained - float(spread)), now, posterior))
         smoothness = smoothest(N, g, most=prospect.most)
-    return max(found, key=lambda one: one.evidence)
+    return max(found, key=lambda smoothness: smoothness.evidence)
 
 
 def _started(

@@ -89,7 +89,7 @@ class Proposal:
         if not self.tied:
             return f"{_NONE}: no function of one quantity in one place explains what is missing."
         first = self.tied[0].law
-        others = list(dict.fromkeys(one.law.short for one in self.tied[1:]))
+        others = list(dict.fromkeys(law.law.short for law in self.tied[1:]))
         where = first.text + f" (or {', '.join(others)})" * bool(others)
         if not self.laws or self.outcome is None or (gain := self.outcome.diagnosis.gain) is None:
             why = "no closed form of it holds on recordings that were held out"
@@ -191,7 +191,7 @@ class Proposal:
         return {
             "sentence": self.sentence,
             "mark": MARK,
-            "tied": [one.law.text for one in self.tied],
+            "tied": [law.law.text for law in self.tied],
             "alike": {name: form.text for name, form in self.forms.items()},
             "laws": [
                 {
@@ -222,9 +222,9 @@ def _falls(errors: Sequence[Errors]) -> bool:
     Channels have units of their own.
     """
     squares: dict[str, Vector] = {}
-    for one in errors:
-        square = one.samples * np.square(one.rms)
-        squares[one.channel] = squares.get(one.channel, np.zeros(2)) + square
+    for error in errors:
+        square = error.samples * np.square(error.rms)
+        squares[error.channel] = squares.get(error.channel, np.zeros(2)) + square
     shares = np.array([after / before for before, after in squares.values() if before > 0.0])
     return bool(shares.size and shares.min() <= (1.0 - _WORTH) ** 2 and shares.mean() < 1.0)
 

@@ -331,9 +331,9 @@ def laws(
 def turning(place: Place) -> Iterator[LawInfluence]:
     """What may begin anew with each period, which is not known yet: time, what inputs turn."""
     yield LawInfluence("turn")
-    for one in place.inputs:
-        if one.unit and quotient(one.unit, "Hz") in ("m", "rad"):
-            yield LawInfluence("turn", (one,))
+    for variable in place.inputs:
+        if variable.unit and quotient(variable.unit, "Hz") in ("m", "rad"):
+            yield LawInfluence("turn", (variable,))
 
 
 def turning_laws(
@@ -358,33 +358,35 @@ def _carriers(place: Place, recordings: Sequence[Mapping[str, Vector]]) -> Itera
         yield Carrier(place.nominal, "1", f"multiplies {what}")
     if _varies(values) or not any(np.any(value) for value in values):
         yield Carrier("1.0", output.unit, f"adds to {what}")
-    for one in place.inputs:
-        passes = place.slot.chained and one.name == place.nominal
-        own = [place.at(watched, one.name) for watched in recordings]
-        if output.unit and one.unit == output.unit and not passes and _varies(own):
-            yield Carrier(one.name, "1", f"adds a share of {one.name} ({one.text}) to {what}")
+    for variable in place.inputs:
+        passes = place.slot.chained and variable.name == place.nominal
+        own = [place.at(watched, variable.name) for watched in recordings]
+        if output.unit and variable.unit == output.unit and not passes and _varies(own):
+            yield Carrier(
+                variable.name, "1", f"adds a share of {variable.name} ({variable.text}) to {what}"
+            )
 
 
 def _influences(
     place: Place, recordings: Sequence[Mapping[str, Vector]], span: float, longest: float
 ) -> Iterator[LawInfluence]:
-    for one in place.inputs:
-        own = [place.at(watched, one.name) for watched in recordings]
+    for variable in place.inputs:
+        own = [place.at(watched, variable.name) for watched in recordings]
         values = np.concatenate(own)
         both = values.min() < -0.1 * values.max() and values.max() > -0.1 * values.min()
-        yield LawInfluence("value", (one,))
+        yield LawInfluence("value", (variable,))
         if both:
-            yield LawInfluence("size", (one,))
+            yield LawInfluence("size", (variable,))
         if _varies(own):
-            yield LawInfluence("rate", (one,), span)
+            yield LawInfluence("rate", (variable,), span)
         there = _THERE * float(np.abs(values).max())
         if max(abs(float(course[0])) for course in own) < there:
-            yield LawInfluence("since", (one,), float(f"{there:.2g}"))
+            yield LawInfluence("since", (variable,), float(f"{there:.2g}"))
     yield LawInfluence("time")
-    known = [one for one in place.inputs if one.unit not in ("", "1")]
+    known = [variable for variable in place.inputs if variable.unit not in ("", "1")]
     for count in (2, 3):
         for group in combinations(known, count):
-            product = ".".join(f"({one.unit})" for one in group)
+            product = ".".join(f"({variable.unit})" for variable in group)
             if quotient(product, "W") in ("1", "rad"):
                 # What has no unit is the coefficient of that power, such as one of friction.
                 factors = (*group, place.output) if place.output.unit == "1" else group

@@ -54,10 +54,10 @@ def functions_figure(found: Proposal) -> "Figure":
     ]
     table = found.functions()
     with styled(4.2 * max(1, len(shown)), 3.0, font_size=8) as sheet:
-        for axes, one in zip(
+        for axes, fitted in zip(
             sheet.subplots(1, max(1, len(shown)), squeeze=False)[0], shown, strict=False
         ):
-            law = one.law
+            law = fitted.law
             assert law.influence is not None
             own = table[
                 (table.slot == law.place.slot.name)
@@ -72,7 +72,7 @@ def functions_figure(found: Proposal) -> "Figure":
             axes.axhline(0.0, color=LIGHT["raw"], linewidth=0.6)
             axes.set_xlabel(f"{law.influence.short} [{law.influence.unit or '?'}]")
             axes.set_ylabel(f"function [{law.carrier.unit or '?'}]")
-            tied = "tied" if one in found.tied else f"{one.evidence:.0f} nat"
+            tied = "tied" if fitted in found.tied else f"{fitted.evidence:.0f} nat"
             axes.set_title(
                 f"{law.carrier.text},\n{law.place.text} ({tied})", fontsize=7, loc="left"
             )

@@ -105,7 +105,7 @@ class Scan:
         self._lasting = system.comparison.lasting
         where = tuple(places(library, base, read_slots(library, base)))
         names = list(
-            dict.fromkeys(f"{place.slot.name}.{one}" for place in where for one in _seen(place))
+            dict.fromkeys(f"{place.slot.name}.{name}" for place in where for name in _seen(place))
         )
         with tempfile.TemporaryDirectory() as scratch:
             extended = extended_library(library, map(_probe, where), Path(scratch))
@@ -130,7 +130,7 @@ class Scan:
                 engine.report(f"{len(every)} laws in {len(where)} places")
                 found = self._judged(simulations, values, every)
                 found += self._turning(simulations, values, where)
-        self.prospects = sorted(found, key=lambda one: -one.smoothness.evidence)
+        self.prospects = sorted(found, key=lambda prospect: -prospect.smoothness.evidence)
 
     def _judged(
         self,
@@ -240,7 +240,9 @@ class Scan:
     def _largest(self, place: Place) -> float:
         """Largest size of an output, without a law."""
         name = place.output.name
-        return max(float(np.abs(place.at(one, name)).max()) for _, one in self._recordings)
+        return max(
+            float(np.abs(place.at(recording, name)).max()) for _, recording in self._recordings
+        )
 
     def _basis(self, law: Law) -> tuple[Knots | None, list[Matrix]]:
         """Columns of a law in each recording: carrier times basis functions."""
@@ -271,7 +273,7 @@ def watching(text: str, names: Sequence[str]) -> str:
 
 
 def _seen(place: Place) -> list[str]:
-    return [place.output.name, *(one.name for one in place.inputs)]
+    return [place.output.name, *(variable.name for variable in place.inputs)]
 
 
 def eliminated(joint: Joint, keys: Sequence[Key]) -> tuple[Matrix, Vector]:

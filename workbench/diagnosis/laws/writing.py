@@ -43,7 +43,7 @@ class LawClass:
         if slot.chained:
             nominal = dict(zip(slot.outputs, slot.inputs, strict=False))
         else:
-            bindings = ", ".join(f"{one}={one}" for one in slot.inputs)
+            bindings = ", ".join(f"{name}={name}" for name in slot.inputs)
             nominal = {output: f"unchanged.{output}" for output in slot.outputs}
             lines += [
                 "  protected",
@@ -77,14 +77,14 @@ def clock(influence: LawInfluence | None) -> tuple[tuple[str, ...], tuple[str, .
 def package(library: Library, classes: Iterable[LawClass]) -> str:
     """Source of a package with classes of slots of a library."""
     every = list(classes)
-    slots = [one.place.slot for one in every]
+    slots = [law.place.slot for law in every]
     names = {name.partition(".")[0] for slot in slots for name in (slot.partial, slot.nominal)}
     return "\n".join(
         [
             f"within {library.name};",
             f'package {PACKAGE} "Laws that were proposed from recordings: not known physics"',
             *(f"  import {USED}{name} = {name};" for name in sorted(names - {library.name})),
-            *(one.source(library) for one in every),
+            *(law.source(library) for law in every),
             f"end {PACKAGE};\n",
         ]
     )

@@ -230,7 +230,7 @@ class Predictor:
         watched: Sequence[str] = (),
     ) -> None:
         self._fmu, self._system = fmu, system
-        inputs = [one.name for one in system.inputs]
+        inputs = [signal.name for signal in system.inputs]
         readings = [*(system.signals[name].reading for name in signals), *watched]
         self._model = instance(fmu, inputs, system.corrections, readings)
         self._longest = _LONGEST * system.sample_time / parts

@@ -260,5 +260,5 @@ class ResidualModel:
             return {name: task.result() for name, task in under_way.items()}
         finally:
             # After Ctrl-C nobody waits for the others.
-            for one in under_way.values():
-                one.cancel()
+            for future in under_way.values():
+                future.cancel()

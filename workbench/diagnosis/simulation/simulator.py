@@ -97,13 +97,13 @@ class Simulator:
     def errors(self, values: Mapping[str, float]) -> list[Matrix]:
         """Prediction errors of the samples that count, of each recording, (m, c)."""
         recordings = enumerate(self._recordings)
-        return [self._simulated(k, values)[0][one.told] for k, one in recordings]
+        return [self._simulated(k, values)[0][recording.told] for k, recording in recordings]
 
     def along(self, number: int, values: Mapping[str, float], watched: Sequence[str]) -> Matrix:
         """Variables of the FMU at each sample of one recording, (n, w)."""
-        one = self._in_time(number, values)
-        predictor = Predictor(self._fmu, self._system, one.signals, self._parts, watched)
-        return predictor.along(one, self._known(values))
+        recording = self._in_time(number, values)
+        predictor = Predictor(self._fmu, self._system, recording.signals, self._parts, watched)
+        return predictor.along(recording, self._known(values))
 
     def begin(self, number: int) -> dict[str, float]:
         """Start values of states that a recording's outputs show."""
@@ -145,8 +145,8 @@ class Simulator:
         sizes : variables by the component of the FMU that is nominal while they are zero: then
             nothing depends on its states.
         """
-        one, fmu = self._in_time(number, values), self._fmu
-        jacobian = np.zeros((len(one.blocks) * len(one.slopes) + 1, len(columns)))
+        recording, fmu = self._in_time(number, values), self._fmu
+        jacobian = np.zeros((len(recording.blocks) * len(recording.slopes) + 1, len(columns)))
         clocks = [j for j, column in enumerate(columns) if column.variables[0] in self._clocks]
         if clocks:
             jacobian[:-1, clocks] = self._by_clocks(number, values, [columns[j] for j in clocks])
@@ -154,7 +154,7 @@ class Simulator:
             varied = [columns[j] for j in part]
             shares = None if courses is None else courses[:, part]
             absent = self._absent(values, varied, sizes or {})
-            given = one, self._known(values), varied, shares, absent
+            given = recording, self._known(values), varied, shares, absent
             _, found = self._predictor.derivatives(*given)
             by = self._whitened(number, self._late(number, found.errors, values))
             jacobian[:-1, part] = by.reshape(-1, len(part))
@@ -164,7 +164,7 @@ class Simulator:
                 for q, column in enumerate(varied):
                     acting = [name for name in column.variables if name not in fmu.states]
                     slopes[q] += fmu.jacobian(place, fmu.variables(acting)).sum()
-                jacobian[-1, part] = -slopes / one.rest_noise
+                jacobian[-1, part] = -slopes / recording.rest_noise
         return jacobian
 
     def _absent(
@@ -178,7 +178,7 @@ class Simulator:
         return [
             name
             for name, own in sizes.items()
-            if not any(one in acting or values.get(one, self._fmu.defaults[one]) for one in own)
+            if not any(name in acting or values.get(name, self._fmu.defaults[name]) for name in own)
         ]
 
     def _by_clocks(
@@ -197,7 +197,7 @@ class Simulator:
         now = errors(values)
         names = [column.variables[0] for column in columns]
         later = [errors({**values, name: values.get(name, 0.0) + step}) for name in names]
-        return np.column_stack([(one - now) / step for one in later])
+        return np.column_stack([(point - now) / step for point in later])
 
     def weighed(self, number: int, values: Mapping[str, float]) -> Samples:
         """A recording whose errors are weighed by how sharply they depend on what is not known.
@@ -246,11 +246,11 @@ class Simulator:
 
     def _simulated(self, number: int, values: Mapping[str, float]) -> tuple[Matrix, float]:
         """Prediction errors of all samples, and the whitened error of the input at rest."""
-        one, in_time = self._recordings[number], self._in_time(number, values)
-        errors = self._predictor.errors(in_time, self._known(values)) + (one.y - in_time.y)
+        recording, in_time = self._recordings[number], self._in_time(number, values)
+        errors = self._predictor.errors(in_time, self._known(values)) + (recording.y - in_time.y)
         if self._rest is None:
             return errors, 0.0
-        return errors, (one.rest - float(self._fmu.get(self._rest)[0])) / one.rest_noise
+        return errors, (recording.rest - float(self._fmu.get(self._rest)[0])) / recording.rest_noise
 
     def _in_time(self, number: int, values: Mapping[str, float]) -> Samples:
         """A recording as by one clock."""
@@ -268,15 +268,15 @@ class Simulator:
 
     def _late(self, number: int, signals: Matrix, values: Mapping[str, float]) -> Matrix:
         """What sensors read of signals (n, c, ...), behind structures and late."""
-        one, late = self._recordings[number], lateness(self._clocks, values)
+        recording, late = self._recordings[number], lateness(self._clocks, values)
         if self._delays or late:
             signals = signals.copy()
         for j, (name, _) in self._delays.items():
-            behind = one.behind_structure(j, signals[:, j])
-            signals[:, j] = behind - values[name] * np.gradient(behind, one.time, axis=0)
-        for j, name in enumerate(one.signals):
+            behind = recording.behind_structure(j, signals[:, j])
+            signals[:, j] = behind - values[name] * np.gradient(behind, recording.time, axis=0)
+        for j, name in enumerate(recording.signals):
             if name in late:
-                signals[:, j] = moved(one.time, signals[:, j], late[name])
+                signals[:, j] = moved(recording.time, signals[:, j], late[name])
         return signals
 
     def _whitened(self, number: int, errors: Matrix) -> Matrix:

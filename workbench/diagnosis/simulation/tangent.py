@@ -86,7 +86,7 @@ def tangent(
     stiff : states that are stepped implicitly.
     absent : components of the FMU whose states nothing depends on.
     """
-    within = tuple(f"{one}." for one in absent)
+    within = tuple(f"{component}." for component in absent)
     used = [i for i, name in enumerate(fmu.states) if not name.startswith(within)]
     own = np.array([i for i in stiff if i in used], np.intp)
     n, p, c = len(fmu.states), len(columns), model.y.size
