@@ -177,8 +177,8 @@ class Description:
         """
         file = f"{self.interfaces[interface].identifier}{fmpy.sharedLibraryExtension}"
         names = [f"binaries/{platform}/{file}" for platform in (fmpy.platform, fmpy.platform_tuple)]
-        if found := next((name for name in names if self.binaries.get(name)), None):
-            return found
+        if library := next((name for name in names if self.binaries.get(name)), None):
+            return library
         empty = next((name for name in names if name in self.binaries), None)
         raise InputError(
             where=str(self.path),
@@ -217,18 +217,18 @@ def read_description(path: Path) -> Description:
         _refuse_entities(xml)
         root = ElementTree.fromstring(xml)
         with path.open("rb") as stream:  # FMPy leaves a file open that it opened and refused
-            found = fmpy.read_model_description(stream, validate=False)
+            description = fmpy.read_model_description(stream, validate=False)
     except Exception as error:  # FMPy raises bare Exception for anything that is no FMU
         raise damaged(path, error) from None
-    if found.fmiVersion not in ("2.0", "3.0"):
+    if description.fmiVersion not in ("2.0", "3.0"):
         raise InputError(
             where=str(path),
-            found=f"FMI {found.fmiVersion}",
+            found=f"FMI {description.fmiVersion}",
             expected="FMI 2.0 or 3.0",
             remedy="export the model for one of these versions",
         )
     try:
-        return _description(path, found, root, files)
+        return _description(path, description, root, files)
     except _WrongError as error:
         raise InputError(
             where=f"{path}, {DESCRIPTION}",
@@ -255,43 +255,43 @@ def _refuse_entities(xml: bytes) -> None:
 
 def _description(
     path: Path,
-    found: "fmpy.model_description.ModelDescription",
+    description: "fmpy.model_description.ModelDescription",
     root: ElementTree.Element,
     files: Mapping[str, int],
 ) -> Description:
     offered = {MODEL_EXCHANGE: root.find("ModelExchange"), CO_SIMULATION: root.find("CoSimulation")}
-    experiment = found.defaultExperiment
-    if not found.guid:
+    experiment = description.defaultExperiment
+    if not description.guid:
         raise _WrongError("no guid or instantiationToken")
     places = [name.split("/") for name in files]
     for element in root.iter():
         for key in ("index", "derivative"):
-            if (element.get(key) or "1").startswith(("0", "-")) and found.fmiVersion == "2.0":
+            if (element.get(key) or "1").startswith(("0", "-")) and description.fmiVersion == "2.0":
                 raise _WrongError(f"{key} = '{element.get(key)}' of an element <{element.tag}>")
-    variables = tuple(_variable(v) for v in found.modelVariables)
+    variables = tuple(_variable(v) for v in description.modelVariables)
     _refuse_twice(v.name for v in variables)
-    if any(unknown.variable.derivative is None for unknown in found.derivatives):
+    if any(unknown.variable.derivative is None for unknown in description.derivatives):
         raise _WrongError("a derivative in the model structure that is the derivative of nothing")
     return Description(
         path=path,
         sha256=hashlib.sha256(path.read_bytes()).hexdigest(),
-        version=found.fmiVersion,
-        name=found.modelName or "",
-        text=found.description or "",
-        tool=found.generationTool or "",
-        token=found.guid,
+        version=description.fmiVersion,
+        name=description.modelName or "",
+        text=description.description or "",
+        tool=description.generationTool or "",
+        token=description.guid,
         interfaces={name: _interface(tag) for name, tag in offered.items() if tag is not None},
         platforms=tuple(sorted({p[1] for p in places if p[0] == "binaries" and len(p) > 2})),
         binaries={name: size for name, size in files.items() if name.startswith("binaries/")},
         variables=variables,
-        states=tuple(unknown.variable.derivative.name for unknown in found.derivatives),
-        rates=tuple(unknown.variable.name for unknown in found.derivatives),
+        states=tuple(unknown.variable.derivative.name for unknown in description.derivatives),
+        rates=tuple(unknown.variable.name for unknown in description.derivatives),
         dependencies={
             unknown.variable.name: tuple(known.name for known in unknown.dependencies)
-            for unknown in (*found.derivatives, *found.outputs)
+            for unknown in (*description.derivatives, *description.outputs)
             if unknown.dependencies is not None
         },
-        event_indicators=max(found.numberOfEventIndicators, len(found.eventIndicators)),
+        event_indicators=max(description.numberOfEventIndicators, len(description.eventIndicators)),
         start=_number(experiment.startTime, "the start time") if experiment else None,
         step=_number(experiment.stepSize, "the step size") if experiment else None,
         stop=_number(experiment.stopTime, "the stop time") if experiment else None,

@@ -92,9 +92,9 @@ def key(library: Path, *parts: str) -> str:
     parts : such as the name and the source of a model that extends it.
     """
     digest = hashlib.sha256()
-    found = [(package.parent, files(package)) for package in packages(library)]
-    found.append((_COMPILER, tuple(p for p in sorted(_COMPILER.rglob("*")) if p.suffix in _CODE)))
-    for root, inside in found:
+    sources = [(package.parent, files(package)) for package in packages(library)]
+    sources.append((_COMPILER, tuple(p for p in sorted(_COMPILER.rglob("*")) if p.suffix in _CODE)))
+    for root, inside in sources:
         for file in inside:
             for part in (file.relative_to(root).as_posix().encode(), file.read_bytes()):
                 digest.update(len(part).to_bytes(8, "little") + part)

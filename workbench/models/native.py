@@ -281,8 +281,8 @@ def do_step(model, h):  # type: ignore[no-untyped-def]
     if model.fmi == 2:
         status = _call(model.do_step, (model.address, t, h, 0))
     else:
-        told, words = model.told, (model.address, t, h, 0)
-        status = _call(model.do_step, (*words, told, told[1:], told[2:], model.reached))
+        flags, words = model.told, (model.address, t, h, 0)
+        status = _call(model.do_step, (*words, flags, flags[1:], flags[2:], model.reached))
     model.time[0] = t + h
     return REFUSED if status > 1 else OK
 

@@ -27,8 +27,8 @@ def estimators_of(system: System) -> dict[str, type[Estimator]]:
         If the system has bands of an estimator that there is not.
     """
     packages = (f"{__name__}.estimators", find_plugin(system.plugin).estimators)
-    found = [kind for package in packages if package for kind in _estimators(package)]
-    known = {kind.name: kind for kind in sorted(found, key=lambda kind: kind.rank)}
+    kinds = [kind for package in packages if package for kind in _estimators(package)]
+    known = {kind.name: kind for kind in sorted(kinds, key=lambda kind: kind.rank)}
     for name in system.bands:
         _refuse_unknown(name, known, f"{system.source}, [bands.{name}]")
     return known

@@ -238,8 +238,8 @@ class Estimator(ABC):
         Those that estimators are told, and their model has; estimates of quantities start there.
         One that finds a condition by itself has a model for each choice, to which this is nothing.
         """
-        told = self.system.set_by(conditions, told=True)
-        self._known = {name: told[name] for name in told if name in self.fmu.parameters}
+        known = self.system.set_by(conditions, told=True)
+        self._known = {name: known[name] for name in known if name in self.fmu.parameters}
 
     def tell(self, conditions: Mapping[str, Value]) -> None:
         """Call `set_conditions`; the former name, for one version."""

@@ -67,12 +67,12 @@ def feedback_meanings(
     corrections = [(f"{name}", unit) for name, unit in columns.items()]
     integrals = [(f"∫ {name}", f"({unit}).s") for name, unit in columns.items()]
     names = matrix_names("L", len(rows), 2 * len(columns))
-    told = [
+    meanings = [
         (f"{row} by {column}", quotient(own, unit))
         for row, own in rows.items()
         for column, unit in (*corrections, *integrals)
     ]
-    return dict(zip(names, told, strict=True))
+    return dict(zip(names, meanings, strict=True))
 
 
 @dataclass(frozen=True, eq=False)

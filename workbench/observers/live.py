@@ -70,22 +70,22 @@ class LiveWindow:
         """Step each estimator through a recording, one after the other, and draw what it says."""
         if not self._open():
             return
-        judged, *quantities = self._axes
+        reference, *quantities = self._axes
         for axes, title in zip(self._axes, self._titles, strict=True):
             axes.clear()
             axes.set_title(title, loc="left", fontsize=9)
             axes.grid(alpha=0.25)
         self._axes[-1].set_xlabel("time [s]")
-        judged.set_xlim(case.time[0], case.time[-1])
+        reference.set_xlim(case.time[0], case.time[-1])
         for axes, quantity in zip(quantities, self._system.estimated, strict=True):
             axes.set_ylim(quantity.low, quantity.high)
         if self._signals[0] in case:
             measured = case[self._signals[0]] / self._units[0]
-            judged.plot(case.time, measured, color=LIGHT["raw"], lw=0.5, label="measured")
+            reference.plot(case.time, measured, color=LIGHT["raw"], lw=0.5, label="measured")
         for estimator, style in zip(estimators, cycle(ESTIMATORS), strict=False):
             name = estimator.label
             lines = [axes.plot([], [], color=LIGHT[style], label=name)[0] for axes in self._axes]
-            judged.legend(loc="lower center", ncols=4, fontsize=8)
+            reference.legend(loc="lower center", ncols=4, fontsize=8)
             self._figure.suptitle(f"{case.name}: {name}", fontsize=10)
             self._step(case, estimator, lines)
 

@@ -275,8 +275,8 @@ def case_observability(
     for role, scale in scales.items():
         with open_model(system, role) as fmu:
             tests.append(window_test(fmu, system, case, run, scale))
-    judged = np.isin(tests[0].time, case.time[judged_window(case, system)])
-    return CaseObservability(system, case, run, judged, tuple(tests))
+    counted = np.isin(tests[0].time, case.time[judged_window(case, system)])
+    return CaseObservability(system, case, run, counted, tuple(tests))
 
 
 def linear_test(fmu: FMU, system: System, point: OperatingPoint | None = None) -> LinearTest:
@@ -379,14 +379,14 @@ def inseparable(fmu: FMU, system: System, case: Case) -> dict[tuple[str, ...], f
     left = np.linalg.inv(np.eye(n + q) + gramian * np.outer(before, before))[n:, n:]
     if not np.isfinite(left).all():
         return {}
-    found = {}
+    known_of = {}
     variances, directions = np.linalg.eigh(left)
     for variance, direction in zip(variances, directions.T, strict=True):
         of = np.flatnonzero(direction**2 > _PART)
         if variance > _LEFT**2 and of.size > 1:
             known = left[of[0], of[1]] / np.sqrt(left[of[0], of[0]] * left[of[1], of[1]])
-            found[tuple(system.estimated[i].name for i in of)] = float(known)
-    return found
+            known_of[tuple(system.estimated[i].name for i in of)] = float(known)
+    return known_of
 
 
 def follow(fmu: FMU, system: System, case: Case, run: Run) -> tuple[Matrix, Matrix]:
@@ -446,9 +446,9 @@ def linearise_along(fmu: FMU, system: System, time: Vector, x: Matrix, u: Matrix
         fmu.set_states(x[k])
         fmu.set(inputs, u[k])
         if others:
-            found = fmu.linearise(inputs, unseen)
-            generator[k, :count] = np.hstack([found.A, found.B])
-            slopes[k, others] = np.hstack([found.C, found.D])
+            linear = fmu.linearise(inputs, unseen)
+            generator[k, :count] = np.hstack([linear.A, linear.B])
+            slopes[k, others] = np.hstack([linear.C, linear.D])
             y[k, others] = fmu.get(unseen)
         else:
             generator[k, :count, :count] = fmu.state_jacobian()

@@ -89,18 +89,18 @@ def linearised(fmu: FMU, system: System) -> LinearModel:
     names = [output.name for output in system.outputs]
     # A state is an output by itself; not every FMU differentiates it.
     unseen = [name for name in names if name not in fmu.states]
-    found = fmu.linearise(fmu.variables(system.corrections), fmu.variables(unseen))
-    C, D = np.zeros((len(names), len(fmu.states))), np.zeros((len(names), found.B.shape[1]))
+    linear = fmu.linearise(fmu.variables(system.corrections), fmu.variables(unseen))
+    C, D = np.zeros((len(names), len(fmu.states))), np.zeros((len(names), linear.B.shape[1]))
     for j, name in enumerate(names):
         if name in fmu.states:
             C[j, fmu.states.index(name)] = 1.0
         else:
-            C[j], D[j] = found.C[unseen.index(name)], found.D[unseen.index(name)]
+            C[j], D[j] = linear.C[unseen.index(name)], linear.D[unseen.index(name)]
     nominal = {v.name: abs(v.nominal or 1.0) for v in fmu.description.variables}
     return LinearModel(
         fmu.states,
-        found.A,
-        found.B,
+        linear.A,
+        linear.B,
         C,
         D,
         np.array([nominal[name] for name in fmu.states]),
@@ -164,8 +164,8 @@ def loops(model: LinearModel) -> tuple[Matrix, Matrix]:
     chain = np.maximum(np.abs(model.B), np.abs(common))
     for order in range(2, 2 + len(model.A)):
         reach = np.abs(model.C) @ np.abs(chain)
-        found = (reach.T > 0.0) & np.isnan(orders)
-        orders[found], effects[found] = order, reach.T[found]
+        reached = (reach.T > 0.0) & np.isnan(orders)
+        orders[reached], effects[reached] = order, reach.T[reached]
         chain = model.A @ chain
     direct = np.abs(model.D.T) > 0.0
     orders[direct], effects[direct] = 1.0, np.abs(model.D.T)[direct]

@@ -44,7 +44,7 @@ def replay(case: Case, estimator: Estimator) -> Run:
     estimate = Estimate(
         blank, blank, blank[:, 0], np.full((len(blank), len(estimator.modes)), np.nan)
     )
-    claimed: dict[str, NDArray[np.bool_]] = {}
+    validity: dict[str, NDArray[np.bool_]] = {}
     ending, message = Ending.OK, ""
     try:
         estimator.set_conditions(case.conditions)
@@ -57,12 +57,12 @@ def replay(case: Case, estimator: Estimator) -> Run:
         elif (lost := np.flatnonzero(~np.isfinite(values[:, given]).all(axis=1))).size:
             ending = Ending.NOT_FINITE
             message = f"at t = {case.time[lost[0]]:.3f} s"
-        claimed = _claims(case, estimator, values, np.asarray(estimate.probability))
+        validity = _claims(case, estimator, values, np.asarray(estimate.probability))
     except FMUError as error:
         seconds = time.perf_counter() - begin
         ending, message = Ending.FMU_FAILED, str(error)
-    told = np.asarray(estimate.values), np.asarray(estimate.sigma)
-    values, sigma = with_indirect(system.under(case.conditions), *told)
+    both = np.asarray(estimate.values), np.asarray(estimate.sigma)
+    values, sigma = with_indirect(system.under(case.conditions), *both)
     return Run(
         case=case.name,
         estimator=estimator.name,
@@ -77,7 +77,7 @@ def replay(case: Case, estimator: Estimator) -> Run:
         ending=ending,
         message=message,
         seconds=seconds,
-        claimed=claimed or {name: np.zeros(case.time.size, bool) for name in _doubted(estimator)},
+        claimed=validity or {name: np.zeros(case.time.size, bool) for name in _doubted(estimator)},
         probability=dict(zip(estimator.modes, np.asarray(estimate.probability).T, strict=True)),
     )
 
@@ -125,7 +125,7 @@ def _claims(
     So the rule must be met for as long as the quantity takes to walk as far as is useful.
     """
     rules, system = _rules(estimator), estimator.system
-    claimed = {}
+    validity = {}
     for name in _doubted(estimator):
         quantity = next(quantity for quantity in system.estimated if quantity.name == name)
         met = all(
@@ -137,10 +137,10 @@ def _claims(
             weights = probability if estimator.modes else np.ones((case.time.size, 1))
             sure = (np.column_stack(shares) * weights).sum(axis=1) > SURE
             span = (quantity.useful / quantity.walk) ** 2 if quantity.walk > 0.0 else 0.0
-            claimed[name] = lasting(sure, case.time, span)
+            validity[name] = lasting(sure, case.time, span)
         else:
-            claimed[name] = np.full(case.time.size, met)
-    return claimed
+            validity[name] = np.full(case.time.size, met)
+    return validity
 
 
 def lasting(met: NDArray[np.bool_], time: Vector, span: float) -> NDArray[np.bool_]:

@@ -117,7 +117,7 @@ class Standing:
     seconds: float
 
 
-def standings(summary: Mapping[str, Any], judged: str) -> list[Standing]:
+def standings(summary: Mapping[str, Any], reference: str) -> list[Standing]:
     """Estimators, the one with the least worst case first; those never judged last.
 
     Parameters
@@ -129,7 +129,7 @@ def standings(summary: Mapping[str, Any], judged: str) -> list[Standing]:
     table = []
     for name in names:
         scores = {case: values["estimators"][name] for case, values in cases.items()}
-        shares = {case: s[f"{judged}_nrmse"] for case, s in scores.items()}
+        shares = {case: s[f"{reference}_nrmse"] for case, s in scores.items()}
         errors = {case: share for case, share in shares.items() if share is not None}
         worst = max(errors, key=lambda case: errors[case], default="")
         table.append(
@@ -170,19 +170,19 @@ def usual_error(errors: Sequence[float]) -> tuple[float | None, float | None, fl
 
 def simulated(system: System, summary: Mapping[str, Any]) -> Answer:
     """The answer of `simulate`."""
-    judged = system.objective.signal
-    ranking = standings(summary, judged)
+    reference = system.objective.signal
+    ranking = standings(summary, reference)
     best = ranking[0]
     headline = {}
     for standing in ranking:
-        headline[f"worst error of {judged}, {standing.name}"] = percentage(standing.worst)
+        headline[f"worst error of {reference}, {standing.name}"] = percentage(standing.worst)
         usual = [None if end is None else 100.0 * end for end in standing.usual]
-        headline[f"usual error of {judged}, {standing.name}"] = Measure(
+        headline[f"usual error of {reference}, {standing.name}"] = Measure(
             usual[0], "%", "lower", *usual[1:]
         )
         headline[f"objective z, {standing.name}"] = Measure(standing.z, "1", "lower")
     details = {
-        f"{case}: error of {judged}, {name}": percentage(score[f"{judged}_nrmse"])
+        f"{case}: error of {reference}, {name}": percentage(score[f"{reference}_nrmse"])
         for case, values in summary["cases"].items()
         for name, score in values["estimators"].items()
     }
@@ -191,7 +191,7 @@ def simulated(system: System, summary: Mapping[str, Any]) -> Answer:
     if best.worst is None:
         sentence = f"{len(ranking)} estimators ran on {recordings(count)}; none could be judged."
         return Answer(sentence + trust, headline, details)
-    share, signal = percent(best.worst), called(system, judged)
+    share, signal = percent(best.worst), called(system, reference)
     first = f"The {label(best.name, system)} errs least: {share} of the mean {signal} in"
     if best.judged == 1:
         only = f"{best.case}, the only recording that was judged; one cannot say how others differ."
@@ -219,18 +219,18 @@ def write_page(
     figures : one per case of the summary.
     planned : number of cases that were asked for; more than there are after an interruption.
     """
-    judged = system.objective.signal
-    ranking = standings(summary, judged)
+    reference = system.objective.signal
+    ranking = standings(summary, reference)
     best = ranking[0]
 
     def badness(name: str) -> float:
-        error = summary["cases"][name]["estimators"][best.name][f"{judged}_nrmse"]
+        error = summary["cases"][name]["estimators"][best.name][f"{reference}_nrmse"]
         return -np.inf if error is None else float(error)
 
     ordered = sorted(figures, key=lambda figure: badness(figure.name), reverse=True)
     order = [figure.name for figure in ordered]
     first, *others = zoomable(ordered, summary, path.parent, own_files=True)
-    quantity = called(system, judged)
+    quantity = called(system, reference)
     shown = (
         f"From top to bottom: what was measured and fed to the estimators, the {quantity} measured "
         "and estimated, its error, and the quantities behind it. Estimators are judged in the "
@@ -317,17 +317,17 @@ def _estimators(system: System, ranking: Sequence[Standing]) -> Table:
 def _cases(
     system: System, summary: Mapping[str, Any], ranking: Sequence[Standing], order: Sequence[str]
 ) -> Table:
-    judged, best = system.objective.signal, ranking[0]
-    unit, quantity = system.unit(judged), called(system, judged)
+    reference, best = system.objective.signal, ranking[0]
+    unit, quantity = system.unit(reference), called(system, reference)
     rows = []
     for name in order:
         case = summary["cases"][name]
         scores = case["estimators"]
-        rms = scores[best.name][f"{judged}_rms_{unit}"]
+        rms = scores[best.name][f"{reference}_rms_{unit}"]
         row = (
             _link(name),
             Markup('<span class="conditions">{}</span>').format(case["title"]),
-            *(_share(scores[standing.name][f"{judged}_nrmse"]) for standing in ranking),
+            *(_share(scores[standing.name][f"{reference}_nrmse"]) for standing in ranking),
             Cell("n/a") if rms is None else Cell(rounded(rms), rms),
             number(scores[best.name]["z"], ".3f"),
         )
@@ -365,24 +365,24 @@ def _doubts(system: System, summary: Mapping[str, Any], order: Sequence[str]) ->
 
 
 def _terms(system: System) -> dict[str, str]:
-    judged, limit = system.objective.signal, below(system)
+    reference, limit = system.objective.signal, below(system)
     filtered = (
         f", without what is not {limit}, by a low-pass that shifts no phase (sensors ring above "
         "that)"
     )
     unseen = (
         ""
-        if judged in (output.name for output in system.outputs)
-        else (f" {judged} was measured only to judge by; no estimator sees it.")
+        if reference in (output.name for output in system.outputs)
+        else (f" {reference} was measured only to judge by; no estimator sees it.")
     )
     weighed = " + ".join(
         f"{weight} {inverse(system.unit(name))} · |error of {name}|"
         for name, weight in system.objective.weights.items()
     )
     return {
-        f"Error of the {called(system, judged)}": f"Estimated minus measured {judged}"
+        f"Error of the {called(system, reference)}": f"Estimated minus measured {reference}"
         f"{filtered if limit else ''}; root of the mean square {window(system)}, over the mean of "
-        f"|{judged}| in the same time.{unseen}",
+        f"|{reference}| in the same time.{unseen}",
         "Objective z": "As in equation (12) of Schwarz, Brembeck, Heckmann (2018): the mean over "
         f"the whole recording of {weighed}{f', of errors {limit}' if limit else ''}. Of several "
         "cases, the largest counts.",

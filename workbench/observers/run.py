@@ -79,9 +79,9 @@ class Run:
                 columns[f"{name} [{unit}]"] = self.signal(name)
             if not np.isnan(self.deviation(name)).all():
                 columns[f"sigma_{name} [{unit}]"] = self.deviation(name)
-        for name, claimed in self.claimed.items():
+        for name, valid in self.claimed.items():
             if not np.isnan(self.signal(name)).all():
-                columns[f"{name}_claimed [1]"] = claimed.astype(int)
+                columns[f"{name}_claimed [1]"] = valid.astype(int)
         for mode, probability in self.probability.items():
             columns[f"probability_{mode} [1]"] = probability
         return columns
@@ -147,10 +147,10 @@ def claimed_parts(curve: Curve, run: Run, signal: str) -> list[Curve]:
     """A curve in up to two parts: what is claimed, and dashed what is not."""
     if signal not in run.claimed:
         return [curve]
-    claimed = run.claimed[signal]
+    valid = run.claimed[signal]
     parts = (
-        replace(curve, values=np.where(claimed, curve.values, np.nan)),
-        Curve(curve.style, np.where(claimed, np.nan, curve.values), dashed=True),
+        replace(curve, values=np.where(valid, curve.values, np.nan)),
+        Curve(curve.style, np.where(valid, np.nan, curve.values), dashed=True),
     )
     return [part for part in parts if np.isfinite(part.values).any()]
 

@@ -78,17 +78,17 @@ class CaseResult:
 
     def measured(self) -> Vector | None:
         """The judged signal as it judges, below the bandwidth, (n,); None if not measured."""
-        judged, bandwidth = self.system.objective.signal, self.system.objective.bandwidth
-        if judged not in self.case:
+        reference, bandwidth = self.system.objective.signal, self.system.objective.bandwidth
+        if reference not in self.case:
             return None
-        return low_pass(self.case.time, self.case[judged], bandwidth)
+        return low_pass(self.case.time, self.case[reference], bandwidth)
 
     def error(self, name: str) -> Vector | None:
         """Estimated minus measured signal below the bandwidth, (n,); None if not measured."""
-        judged, bandwidth = self.system.objective.signal, self.system.objective.bandwidth
-        if judged not in self.case:
+        reference, bandwidth = self.system.objective.signal, self.system.objective.bandwidth
+        if reference not in self.case:
             return None
-        error = self.runs[name].signal(judged) - self.case[judged]
+        error = self.runs[name].signal(reference) - self.case[reference]
         return low_pass(self.case.time, error, bandwidth)
 
     def surprise(self, name: str) -> float:
@@ -146,18 +146,18 @@ class CaseResult:
         `sigma_...` are standard deviations, `..._claimed` is 1 where a quantity may be claimed.
         """
         system, case = self.system, self.case
-        judged, bandwidth = system.objective.signal, system.objective.bandwidth
+        reference, bandwidth = system.objective.signal, system.objective.bandwidth
         columns: dict[str, Any] = {"time [s]": case.time}
         for name, signal in system.signals.items():
             if name in case:
                 columns[f"measured.{name} [{signal.unit}]"] = case[name]
-        unit, measured = system.unit(judged), self.measured()
+        unit, measured = system.unit(reference), self.measured()
         if measured is not None and np.isfinite(bandwidth):
-            columns[f"measured.{judged}_{bandwidth:g}Hz [{unit}]"] = measured
+            columns[f"measured.{reference}_{bandwidth:g}Hz [{unit}]"] = measured
         for name, run in self.runs.items():
             columns |= {f"{name}.{key}": values for key, values in run.to_columns().items()}
             if (error := self.error(name)) is not None:
-                columns[f"{name}.{judged}_error [{unit}]"] = error
+                columns[f"{name}.{reference}_error [{unit}]"] = error
         if (best := self.reference) is not None:
             columns |= {
                 f"{best.estimator}.{key}": to_column for key, to_column in best.to_columns().items()
@@ -166,8 +166,8 @@ class CaseResult:
 
     def to_dict(self) -> dict[str, Any]:
         """Title and doubts of the case, and scores by estimator, as plain numbers and texts."""
-        judged = self.system.objective.signal
-        unit = self.system.unit(judged)
+        reference = self.system.objective.signal
+        unit = self.system.unit(reference)
         return {
             "title": self.case.title,
             "doubts": [*self.case.doubts, *self.guesses()],
@@ -175,8 +175,8 @@ class CaseResult:
             "reference": None if self.reference is None else self.reference.estimator,
             "estimators": {
                 name: {
-                    f"{judged}_rms_{unit}": score.rms,
-                    f"{judged}_nrmse": score.nrmse,
+                    f"{reference}_rms_{unit}": score.rms,
+                    f"{reference}_nrmse": score.nrmse,
                     "z": score.z,
                     "outcome": self.runs[name].ending.name,
                     "reason": score.reason,
@@ -242,14 +242,14 @@ class Simulation:
         with self.estimators() as estimators:
             runs = {name: replay(case, estimator) for name, estimator in estimators.items()}
         scores = {name: score(case, run, self.system) for name, run in runs.items()}
-        apart, best = self._inseparable(case), self._reference(case, runs)
-        guessed = {name: np.zeros(case.time.size, bool) for names in apart for name in names}
+        inseparable, best = self._inseparable(case), self._reference(case, runs)
+        guessed = {name: np.zeros(case.time.size, bool) for names in inseparable for name in names}
         marked = {
             name: replace(run, claimed={**run.claimed, **guessed}) for name, run in runs.items()
         }
         if best is not None:
             best = replace(best, claimed={**best.claimed, **guessed})
-        return CaseResult(self.system, case, marked, scores, best, apart)
+        return CaseResult(self.system, case, marked, scores, best, inseparable)
 
     def _inseparable(self, case: Case) -> dict[tuple[str, ...], float]:
         """See `inseparable`; nothing where the model does not run along the recording."""
@@ -412,7 +412,7 @@ def case_figure(result: CaseResult, styles: Sequence[str] = ESTIMATORS) -> CaseF
     system, case = result.system, result.case
     chosen = dict(zip(result.runs, cycle(styles), strict=False))
     window = judged_window(case, system)
-    judged, panels = case.time[window], []
+    counted, panels = case.time[window], []
     for view in views(system):
         panels.append(_seen(result, chosen, view))
         if system.objective.signal in view.signals:
@@ -423,7 +423,7 @@ def case_figure(result: CaseResult, styles: Sequence[str] = ESTIMATORS) -> CaseF
         title=case.title,
         finding=_finding(result),
         time=case.time,
-        window=(float(judged[0]), float(judged[-1])) if judged.size else None,
+        window=(float(counted[0]), float(counted[-1])) if counted.size else None,
         legend=tuple(_legend(result, chosen)),
         panels=tuple(panel for panel in panels if panel.curves),
     )
@@ -443,11 +443,11 @@ def _seen(result: CaseResult, styles: dict[str, str], view: View) -> Panel:
     curves: list[Curve] = []
     measured, here = None, system.under(case.conditions)
     for number, name in enumerate(view.signals):
-        factor, judged = per_shown(system, name, unit), name == system.objective.signal
-        if judged or name not in fed:
+        factor, is_reference = per_shown(system, name, unit), name == system.objective.signal
+        if is_reference or name not in fed:
             for style, run in known if name in fed else known + best:
                 curves += _estimated(run, style, name, factor)
-        if judged and (measured := result.measured()) is not None:
+        if is_reference and (measured := result.measured()) is not None:
             measured = measured / factor
             if below(system):
                 curves.insert(0, Curve("raw", case[name] / factor))
@@ -469,25 +469,25 @@ def _seen(result: CaseResult, styles: dict[str, str], view: View) -> Panel:
 
 def _is_fed(system: System, name: str) -> bool:
     """Whether a signal is derived from what is fed; a sensor that only judges has its own panel."""
-    judged = {signal.name for signal in system.reference_signals}
+    references = {signal.name for signal in system.reference_signals}
     return any(
-        signal.name == name and not signal.formula.names & judged for signal in system.derived
+        signal.name == name and not signal.formula.names & references for signal in system.derived
     )
 
 
 def _residual(result: CaseResult, styles: dict[str, str], window: slice) -> Panel:
     """Error of the judged signal by estimator."""
     system = result.system
-    judged = system.objective.signal
-    unit = shown_unit(system, judged)
+    reference = system.objective.signal
+    unit = shown_unit(system, reference)
     curves = [
-        Curve(styles[name], error / per_shown(system, judged, unit))
+        Curve(styles[name], error / per_shown(system, reference, unit))
         for name in result.runs
         if (error := result.error(name)) is not None
     ]
     reach = _reach([np.abs(curve.values[window]) for curve in curves])
     within = f", {below(system)}" if below(system) else ""
-    title = f"Error of {judged}, estimated - measured{within} [{unit}]"
+    title = f"Error of {reference}, estimated - measured{within} [{unit}]"
     return Panel(title, unit, -reach, reach, 1.1, tuple(curves))
 
 
@@ -512,12 +512,12 @@ def _reach(errors: Sequence[Vector]) -> float:
 
 def _legend(result: CaseResult, styles: dict[str, str]) -> list[tuple[str, str]]:
     """Style and text of each entry."""
-    system, judged = result.system, result.system.objective.signal
+    system, reference = result.system, result.system.objective.signal
     entries = [("measured", "measured")]
-    if judged in result.case and below(system):
+    if reference in result.case and below(system):
         entries = [
-            ("measured", f"measured ({judged} {below(system)})"),
-            ("raw", f"measured {judged}, unfiltered"),
+            ("measured", f"measured ({reference} {below(system)})"),
+            ("raw", f"measured {reference}, unfiltered"),
         ]
     for name, style in styles.items():
         share, text = result.scores[name].nrmse, label(name, system)
@@ -531,16 +531,16 @@ def _legend(result: CaseResult, styles: dict[str, str]) -> list[tuple[str, str]]
 def _finding(result: CaseResult) -> str:
     """Errors of the estimators, the least first."""
     system, signal = result.system, result.system.objective.signal
-    judged = sorted(
+    shares = sorted(
         (score.nrmse, label(name, system), score.rms)
         for name, score in result.scores.items()
         if score.nrmse is not None and score.rms is not None
     )
-    if not judged:
+    if not shares:
         reasons = sorted({score.reason for score in result.scores.values()})
         return f"Estimated, not judged: {'; '.join(reasons)}."
-    share, first, rms = judged[0]
-    others = ", ".join(f"{name} {percent(value)}" for value, name, _ in judged[1:])
+    share, first, rms = shares[0]
+    others = ", ".join(f"{name} {percent(value)}" for value, name, _ in shares[1:])
     trust = "".join(
         f" The {label(name, system)} is overconfident: its innovations have {ratio:.1f} times the "
         "variance that it says."

@@ -114,17 +114,17 @@ def conditions_shown(signals: Mapping[str, Vector], system: System) -> dict[str,
     ----------
     signals : (n,) each, SI.
     """
-    found: dict[str, Any] = {}
+    texts: dict[str, Any] = {}
     for condition in system.conditions:
         value = shown_by(condition, signals, system)
         if value is None or not np.isfinite(value):
             continue
         if not condition.choices:
             if value > condition.least or (value == condition.least and not condition.exclusive):
-                found[condition.name] = f"{value:.6g} {condition.unit}"
+                texts[condition.name] = f"{value:.6g} {condition.unit}"
         elif value in condition.choices:
-            found[condition.name] = next(choice for choice in condition.choices if choice == value)
-    return found
+            texts[condition.name] = next(choice for choice in condition.choices if choice == value)
+    return texts
 
 
 _NOTHING = RecordingOptions()

@@ -97,7 +97,7 @@ def read_columns(
     _refuse_long(path, lines)
     separator = _separator(path, lines[0])
     header, *rows = _split(path, lines, separator)
-    found = _find(path, header, required, optional)
+    columns = _find(path, header, required, optional)
     if not rows:
         raise InputError(
             where=f"{path}, line 2",
@@ -106,7 +106,7 @@ def read_columns(
             remedy="export the recording again, with its samples",
         )
     table = list(zip(*rows, strict=True))
-    cells = {name: table[index] for name, (index, _) in found.items()}
+    cells = {name: table[index] for name, (index, _) in columns.items()}
     gaps = {
         name: np.array([not cell.strip() for cell in column])
         for name, column in cells.items()
@@ -121,7 +121,7 @@ def read_columns(
         raise _first_problem(path, filled, separator)
     return {
         name: Column(unit, np.where(gaps[name], np.nan, column) if name in gaps else column)
-        for (name, (_, unit)), column in zip(found.items(), values, strict=True)
+        for (name, (_, unit)), column in zip(columns.items(), values, strict=True)
     }
 
 
@@ -144,14 +144,14 @@ def _separator(path: Path, header: str) -> str:
         return separators[0]
     names = {",": "commas", ";": "semicolons", "\t": "tabs"}
     if not header.strip():
-        found = "an empty file or an empty first line"
+        fault = "an empty file or an empty first line"
     elif not separators:
-        found = f"no separator in '{header[:60]}'"
+        fault = f"no separator in '{header[:60]}'"
     else:
-        found = " and ".join(names[mark] for mark in separators)
+        fault = " and ".join(names[mark] for mark in separators)
     raise InputError(
         where=f"{path}, line 1",
-        found=found,
+        found=fault,
         expected="a header 'name [unit]' per column with one kind of separator: "
         "comma, semicolon or tab",
         remedy="write the header as the first line and keep other separators out of it",

@@ -267,11 +267,11 @@ def _check(path: Path, sha256: str) -> None:
             expected="all files of the set",
             remedy="complete the folder",
         )
-    found = _sha256(path.read_bytes())
-    if found != sha256:
+    digest = _sha256(path.read_bytes())
+    if digest != sha256:
         raise InputError(
             where=str(path),
-            found=f"another file (SHA-256 {found})",
+            found=f"another file (SHA-256 {digest})",
             expected=f"the file as it was published (SHA-256 {sha256})",
             remedy="get it again; to use other recordings, write case folders for them",
         )
@@ -286,8 +286,8 @@ def _written(out: Path) -> dict[str, str]:
     path = out / PREPARED
     if not path.is_file():
         return {}
-    found: dict[str, str] = json.loads(path.read_text()).get("written", {})
-    return found
+    written: dict[str, str] = json.loads(path.read_text()).get("written", {})
+    return written
 
 
 def _remove(out: Path, files: Mapping[str, str]) -> None:

@@ -67,8 +67,8 @@ def cut(time: Vector, signals: Mapping[str, Vector], system: System) -> list[Cut
     parts = _parts(time, signals, system.cutting, pieces, system) if system.cutting else []
     if sum(not part.reason for part in parts) < 2:
         parts = [Cut(first, end) for first, end in pieces]
-    judged = [_long_enough(part, time, system) for part in parts]
-    return list(_with_rest(judged, time.size))
+    cuts = [_long_enough(part, time, system) for part in parts]
+    return list(_with_rest(cuts, time.size))
 
 
 def _parts(
@@ -81,15 +81,15 @@ def _parts(
     """Parts between a rise and a fall, with what is kept around them."""
     applied = np.abs(system.signal(rule.begins.signal, signals)) > rule.begins.level
     moving = np.abs(system.signal(rule.ends.signal, signals)) > rule.ends.level
-    found: list[Cut] = []
+    cuts: list[Cut] = []
     for low, high in pieces:
         last = low
         for begin, end, reason in _runs(time, applied, moving, rule.released, low, high):
             first = max(last, int(np.searchsorted(time, time[begin] - rule.before)))
             stop = min(high, int(np.searchsorted(time, time[end - 1] + rule.after, "right")))
-            found.append(Cut(first, stop, reason))
+            cuts.append(Cut(first, stop, reason))
             last = stop
-    return found
+    return cuts
 
 
 def _runs(
@@ -285,9 +285,9 @@ def _piece(
         for key in read
     }
     origin = Origin(f"{where}, {name}", None, {}, "command line, --condition")
-    found = doubts(time, signals, read, system, origin)
+    doubtful = doubts(time, signals, read, system, origin)
     ordered = {key: conditions[key] for key in read}
-    return Piece(name, (cut.first, cut.end), time, signals, ordered, sources, found)
+    return Piece(name, (cut.first, cut.end), time, signals, ordered, sources, doubtful)
 
 
 def store(out: Path, named: Mapping[str, NamedChannel]) -> None:
@@ -393,21 +393,21 @@ def _described_channels(imported: Import, system: System) -> dict[str, dict[str,
     files = imported.recording.files
     return {
         name: {
-            "file": files[found.file].path.name,
-            "group": files[found.file].groups[found.group].name,
-            "channel": found.channel.name,
-            "unit": found.unit,
-            "unit_stated": not found.concluded,
+            "file": files[assignment.file].path.name,
+            "group": files[assignment.file].groups[assignment.group].name,
+            "channel": assignment.channel.name,
+            "unit": assignment.unit,
+            "unit_stated": not assignment.concluded,
             "converted": {
                 "to": system.signals[name].unit,
-                "factor": found.factor,
-                "zero": found.zero,
-                "recorded_as": found.formula or None,
+                "factor": assignment.factor,
+                "zero": assignment.zero,
+                "recorded_as": assignment.formula or None,
             },
-            "missing": list(found.missing),
-            "reason": found.reason,
+            "missing": list(assignment.missing),
+            "reason": assignment.reason,
         }
-        for name, found in imported.recording.proposal.assigned.items()
+        for name, assignment in imported.recording.proposal.assigned.items()
     }
 
 
@@ -421,8 +421,8 @@ def imported(out: Path) -> list[dict[str, Any]]:
     """
     path = out / IMPORTED
     if path.is_file():
-        found: list[dict[str, Any]] = json.loads(path.read_text())["imports"]
-        return found
+        imports: list[dict[str, Any]] = json.loads(path.read_text())["imports"]
+        return imports
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise InputError(
             where=str(out),

@@ -84,8 +84,8 @@ def doubts(
         At what is impossible.
     """
     system = system.under(conditions)
-    found = list(_ranges(time, signals, system, origin))
-    _refuse(found)  # what is out of range has no use in formulas
+    findings = list(_ranges(time, signals, system, origin))
+    _refuse(findings)  # what is out of range has no use in formulas
     with np.errstate(all="ignore"):  # a formula may divide by a signal at rest
         for check in (
             _still(signals, system, origin),
@@ -93,13 +93,13 @@ def doubts(
             _redundancies(time, signals, system, origin),
             _conditions(signals, conditions, system, origin),
         ):
-            found += check
-    _refuse(found)
-    return (*origin.doubts, *(str(finding.refusal()) for finding in found))
+            findings += check
+    _refuse(findings)
+    return (*origin.doubts, *(str(finding.refusal()) for finding in findings))
 
 
-def _refuse(found: list[_Finding]) -> None:
-    for finding in found:
+def _refuse(findings: list[_Finding]) -> None:
+    for finding in findings:
         if finding.impossible:
             raise finding.refusal()
 
@@ -188,10 +188,10 @@ def _redundancies(
     time: Vector, signals: Mapping[str, Vector], system: System, origin: Origin
 ) -> Iterator[_Finding]:
     """Signals that contradict each other while they ought to agree."""
-    told: set[str] = set()  # of several that tell the same of one, the first
+    named: set[str] = set()  # of several that tell the same of one, the first
     for redundancy in system.redundancies:
         names = _named(redundancy)
-        if redundancy.formula.text in told or not _has(names, signals, system):
+        if redundancy.formula.text in named or not _has(names, signals, system):
             continue
         left, right = _sides(redundancy, time, signals, system)
         large = np.maximum(np.abs(left), np.abs(right))
@@ -207,7 +207,7 @@ def _redundancies(
         share = float(np.median(shares))  # whatever single samples read
         if not share > redundancy.tolerance.likely:
             continue
-        told.add(redundancy.formula.text)
+        named.add(redundancy.formula.text)
         first = int(chosen[shares > redundancy.tolerance.likely][0])
         columns = [name for name in signals if name in _compared(redundancy)]
         told_by = [

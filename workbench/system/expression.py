@@ -73,10 +73,10 @@ class Expression:
     @cached_property
     def names(self) -> frozenset[str]:
         """Names of what the formula is made of."""
-        found: list[str] = []
+        names: list[str] = []
 
         def note(name: str) -> float:
-            found.append(name)
+            names.append(name)
             return 1.0
 
         try:
@@ -84,7 +84,7 @@ class Expression:
                 self._formula(note)
         except (RecursionError, OverflowError):
             raise self._wrong(self.text) from None
-        return frozenset(found)
+        return frozenset(names)
 
     def __call__(self, values: Mapping[str, Any]) -> Any:
         """Value where names have `values`, a float or an array."""
@@ -106,11 +106,11 @@ class Expression:
         points = np.vstack([np.eye(count), -np.arange(2.0, 2.0 + count), np.zeros(count)])
         others = {name: values[name] for name in self.names if name not in names}
         with np.errstate(all="ignore"):
-            found = np.array(
+            sums = np.array(
                 [float(self({**others, **dict(zip(names, p, strict=True))})) for p in points]
             )
-        slopes = found[:count]
-        if not (np.isfinite(found).all() and np.allclose(found, points @ slopes)):
+        slopes = sums[:count]
+        if not (np.isfinite(sums).all() and np.allclose(sums, points @ slopes)):
             raise InputError(
                 where=self.where,
                 found=f"'{self.text}'",

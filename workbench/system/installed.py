@@ -43,13 +43,15 @@ def installed_plugins() -> list[Plugin]:
 
 def built_models() -> dict[Path, list[str]]:
     """Models whose FMUs come with the workbench: dotted names by library, its `package.mo`."""
-    found = {}
+    by_library = {}
     for path, content in _own().items():
         models = content["models"].values()
         built = [model["class"] for model in models if _is_kept(path.parent / model.get("fmu", ""))]
         if built:
-            found[path.with_name("package.mo")] = [f"{path.parent.name}.{name}" for name in built]
-    return found
+            by_library[path.with_name("package.mo")] = [
+                f"{path.parent.name}.{name}" for name in built
+            ]
+    return by_library
 
 
 def system_path(which: str | Path) -> Path:
@@ -88,8 +90,8 @@ def _own() -> dict[Path, dict[str, Any]]:
 
 def _brought() -> dict[Path, dict[str, Any]]:
     """System files that come with plugins of installed distributions."""
-    found = (plugin.system for plugin in distributed_plugins().values())
-    return _contents([path for path in found if path is not None])
+    files = (plugin.system for plugin in distributed_plugins().values())
+    return _contents([path for path in files if path is not None])
 
 
 def _contents(paths: list[Path]) -> dict[Path, dict[str, Any]]:

@@ -102,7 +102,7 @@ def find_plugin(plugin: str) -> Plugin:
         return Plugin()
     place = place_of(plugin)
     try:
-        found = resolve_name(place)
+        value = resolve_name(place)
     except (ImportError, AttributeError, ValueError) as error:
         raise unknown_name(
             plugin,
@@ -112,19 +112,19 @@ def find_plugin(plugin: str) -> Plugin:
             expected=f"an entry point of the group '{GROUP}', or 'package.module:NAME' of a Plugin",
             remedy="install the distribution that has it, or correct the name",
         ) from None
-    return found if isinstance(found, Plugin) else _by_module_names(place, found)
+    return value if isinstance(value, Plugin) else _by_module_names(place, value)
 
 
 @cache
 def distributed_plugins() -> dict[str, Plugin]:
     """Plugins of installed distributions, by place; one that is broken is left out with a word."""
-    found = {}
+    plugins = {}
     for place in _places().values():
         try:
-            found[place] = find_plugin(place)
+            plugins[place] = find_plugin(place)
         except InputError as error:
             warnings.warn(str(error), stacklevel=2)
-    return found
+    return plugins
 
 
 # Modules that a package was asked for until it declared them.

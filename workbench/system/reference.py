@@ -121,12 +121,12 @@ def _of_type(hint: Any, declared: Key) -> Schema:
 
 def tables(cls: type) -> dict[str, type]:
     """All tables that there may be in a table, and itself, by the name of the class."""
-    found = {cls.__name__: cls}
+    classes = {cls.__name__: cls}
     for entry in _expanded(cls):
         for inner in _tables_in(entry.hint):
-            if inner.__name__ not in found:
-                found |= tables(inner)
-    return found
+            if inner.__name__ not in classes:
+                classes |= tables(inner)
+    return classes
 
 
 def _tables_in(hint: Any) -> list[type]:

@@ -332,8 +332,10 @@ class System:
     def constants(self) -> frozenset[str]:
         """Parameters of the model that formulas of derived signals use, of those that are fed."""
         known = {*self.signals, *(signal.name for signal in self.derived)}
-        judged = {signal.name for signal in self.reference_signals}
-        fed = [signal.formula.names for signal in self.derived if not signal.formula.names & judged]
+        references = {signal.name for signal in self.reference_signals}
+        fed = [
+            signal.formula.names for signal in self.derived if not signal.formula.names & references
+        ]
         return frozenset(name for names in fed for name in names if name not in known)
 
     @property
@@ -344,13 +346,13 @@ class System:
     @property
     def indirect(self) -> dict[str, tuple[DerivedSignal, str]]:
         """Derived signals of one column of an estimate, with it: who estimates one knows both."""
-        found = {}
+        indirect = {}
         for signal in self.derived:
             columns = signal.formula.names & self.columns.keys()
             known = signal.formula.names - columns <= self.values.keys()
             if len(columns) == 1 and known and signal.name not in self.columns:
-                found[signal.name] = signal, min(columns)
-        return found
+                indirect[signal.name] = signal, min(columns)
+        return indirect
 
     def unit(self, name: str) -> str:
         """SI unit of a measured, derived or estimated signal."""
@@ -362,11 +364,11 @@ class System:
 
     def set_by(self, conditions: Mapping[str, object], *, told: bool = False) -> dict[str, float]:
         """Parameters that the conditions of a recording set, SI; if `told`, those told alone."""
-        found: dict[str, float] = {}
+        values: dict[str, float] = {}
         for condition in self.conditions:
             if condition.name in conditions and (condition.told or not told):
-                found |= condition.means(conditions[condition.name])
-        return found
+                values |= condition.means(conditions[condition.name])
+        return values
 
     def under(self, conditions: Mapping[str, object]) -> "System":
         """The same machine, with the parameters that the conditions of a recording set."""

@@ -106,15 +106,15 @@ def si_factor(unit: str, si: str, where: str) -> float:
     remedy = "convert the values, or correct the unit if it is misspelt (case matters)"
     parsed, expected = _parsed(unit), _parsed(si)
     if parsed is None or expected is None:
-        found = f"unknown unit [{unit}]"
+        fault = f"unknown unit [{unit}]"
     elif parsed.is_compatible_with(expected):
         return float(_units().Quantity(1.0, parsed).to(expected).magnitude)
     elif si == "rad/s" and parsed.is_compatible_with("Hz"):
-        found = f"[{unit}], which leaves open whether it counts revolutions or radians"
+        fault = f"[{unit}], which leaves open whether it counts revolutions or radians"
     else:
-        found = f"[{unit}], a unit of another dimension"
+        fault = f"[{unit}], a unit of another dimension"
     raise InputError(
-        where=where, found=found, expected=f"a unit such as {_EXAMPLES.get(si, si)}", remedy=remedy
+        where=where, found=fault, expected=f"a unit such as {_EXAMPLES.get(si, si)}", remedy=remedy
     )
 
 

@@ -90,16 +90,16 @@ def check(
         obstacle = f"needs '{failed}'" if failed else _obstacle(questions[0], description)
         begin(questions[0].name)
         if obstacle:
-            found = [replace(q, reason=f"not tried: {obstacle}") for q in questions]
+            results = [replace(q, reason=f"not tried: {obstacle}") for q in questions]
         elif questions[0] is START and (refused := _unproved(description, limits)):
-            found = [
+            results = [
                 refused,
                 *(replace(q, reason=f"not tried: needs '{START.name}'") for q in questions[1:]),
             ]
         else:
             task = functools.partial(attempted, path, instantiations)
-            found = isolated(task, questions, limits)
-        for finding in found:
+            results = isolated(task, questions, limits)
+        for finding in results:
             findings[finding.name] = finding
             report(finding)
     return list(findings.values())

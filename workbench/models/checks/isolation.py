@@ -39,7 +39,7 @@ def isolated(task: Task, questions: Sequence[CheckResult], limits: Limits) -> li
     with temporary_folder() as scratch:
         process = start(_work, (task, to_parent, scratch, limits, dict(os.environ)))
         to_parent.close()
-        found, reached, reason = _listen(reports, wait)
+        answers, reached, reason = _listen(reports, wait)
         process.join(1.0 if reason else wait)
         unknown = isinstance(reason, NoAnswerError)
         if process.exitcode is None:
@@ -47,20 +47,22 @@ def isolated(task: Task, questions: Sequence[CheckResult], limits: Limits) -> li
             process.join()
             unknown = unknown or not reason
             reason = reason or f"the FMU did not let itself be freed within {wait:.0f} s"
-    missing = any(question.name not in found for question in questions)
+    missing = any(question.name not in answers for question in questions)
     if not reason and (process.exitcode or missing):
         end = describe_end(process.exitcode or 0, "a call", f"{limits.processor:g}")
         reason = f"the FMU {end}"
     reports.close()
     if not reason:
-        return [found[question.name] for question in questions]
-    blamed = next((q for q in questions if q.name not in found), questions[-1])
+        return [answers[question.name] for question in questions]
+    blamed = next((q for q in questions if q.name not in answers), questions[-1])
     progress = f" after {reached} {blamed.unit}" if reached is not None else ""
-    told = f"{'not measured: ' if unknown else ''}{reason}{progress}"
+    explanation = f"{'not measured: ' if unknown else ''}{reason}{progress}"
     passed = None if unknown else False
-    found[blamed.name] = replace(blamed, passed=passed, unknown=unknown, value=reached, reason=told)
+    answers[blamed.name] = replace(
+        blamed, passed=passed, unknown=unknown, value=reached, reason=explanation
+    )
     return [
-        found.get(q.name, replace(q, unknown=unknown, reason=f"not measured: {reason}"))
+        answers.get(q.name, replace(q, unknown=unknown, reason=f"not measured: {reason}"))
         for q in questions
     ]
 
@@ -69,21 +71,21 @@ def _listen(
     reports: "Connection[None, _Report]", timeout: float
 ) -> tuple[dict[str, CheckResult], int | None, str | NoAnswerError]:
     """Collect reports to the end: findings, progress since the last, and what went wrong."""
-    found: dict[str, CheckResult] = {}
+    answers: dict[str, CheckResult] = {}
     reached: int | None = None
     while reports.poll(timeout):
         try:
             report = reports.recv()
         except EOFError:
-            return found, reached, ""
+            return answers, reached, ""
         if isinstance(report, str | NoAnswerError):
-            return found, reached, report
+            return answers, reached, report
         if isinstance(report, CheckResult):
-            found[report.name] = report
+            answers[report.name] = report
             reached = None
         else:
             reached = report
-    return found, reached, NoAnswerError(f"the FMU did not answer within {timeout:.0f} s")
+    return answers, reached, NoAnswerError(f"the FMU did not answer within {timeout:.0f} s")
 
 
 def _work(

@@ -38,10 +38,10 @@ def source_hash(*libraries: Path) -> str:
     """SHA-256 over all files of libraries, of those that they use, and of the compiler."""
     here = Path(__file__).parent
     every = dict.fromkeys(package for library in libraries for package in packages(library))
-    found = [(package.parent, files(package)) for package in every]
-    found.append((here, tuple(sorted([*here.glob("*.py"), *RUNTIME.glob("*.[ch]")]))))
+    sources = [(package.parent, files(package)) for package in every]
+    sources.append((here, tuple(sorted([*here.glob("*.py"), *RUNTIME.glob("*.[ch]")]))))
     parts: list[str | bytes] = []
-    for root, inside in found:
+    for root, inside in sources:
         for file in inside:
             parts += [file.relative_to(root).as_posix(), file.read_bytes()]
     return digest(parts)

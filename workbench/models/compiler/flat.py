@@ -173,11 +173,11 @@ def _diagnostics(package: Path, model: str, fallback: str) -> str:
     """The compiler's diagnostics as 'file:line:column: message'; its summary where it has none."""
     with contextlib.redirect_stdout(io.StringIO()):
         try:
-            found = rumoca.validate(str(package), model=model)
+            diagnostics = rumoca.validate(str(package), model=model)
         except rumoca.RumocaError:
             return fallback
     lines = []
-    for diagnostic in found:
+    for diagnostic in diagnostics:
         # Syntax errors carry their place in a drawing, all others as attributes.
         drawn = re.findall(r"\u00d7 (.+?)\n\s*\u256d\u2500\[(.+?)\]", diagnostic.message)
         lines += [f"{place}: {message}" for message, place in drawn]

@@ -124,11 +124,11 @@ def errors_in(output: str) -> list[Message]:
     [Message(place='/lib/A/package.mo:3', text='Class Foo not found in scope A.')]
     """
     placed = [
-        Message(f"{found['file']}:{found['line']}", found["text"].rstrip('"'))
-        for found in _MESSAGE.finditer(output)
-        if found["kind"] == "Error"
+        Message(f"{match['file']}:{match['line']}", match["text"].rstrip('"'))
+        for match in _MESSAGE.finditer(output)
+        if match["kind"] == "Error"
     ]
-    unplaced = [Message("", found["text"].rstrip('"')) for found in _UNPLACED.finditer(output)]
+    unplaced = [Message("", match["text"].rstrip('"')) for match in _UNPLACED.finditer(output)]
     # The unplaced ones sum up: "Error occurred while flattening model".
     counts = _COUNTS.search(output)
     if not placed and not unplaced and counts and counts[1] != counts[2]:
@@ -146,10 +146,10 @@ def _build(omc: str, package: Path, model: str, folder: Path) -> Path:
             [omc, *_OPTIONS, "build.mos"], cwd=scratch, capture_output=True, text=True, check=False
         )
         built = Path(scratch) / name
-        found = errors_in(run.stdout + run.stderr)
-        if found or not built.is_file():
+        errors = errors_in(run.stdout + run.stderr)
+        if errors or not built.is_file():
             said = (run.stdout + run.stderr).strip()[-500:]
-            first = found[0] if found else Message("", said or "nothing printed")
+            first = errors[0] if errors else Message("", said or "nothing printed")
             raise InputError(
                 where=first.place or f"omc, model {model}",
                 found=first.text,

@@ -99,12 +99,12 @@ class _Checker:
         self, kind: str, modifier: Modifier, around: tuple[str, ...]
     ) -> Iterator[Component]:
         """Outer components of a class, as modified, for which it has no inner one."""
-        found = self.library.classes.get(kind)
-        if found is None:
+        cls = self.library.classes.get(kind)
+        if cls is None:
             return
         if kind in around:
             _refuse(
-                found.where,
+                cls.where,
                 f"{kind}, which has a component of its own class",
                 "components that end in predefined types",
                 "remove it",
@@ -130,18 +130,18 @@ class _Checker:
 
     def _type(self, name: str, scope: str, where: str) -> str:
         """Dotted name of a class that something is of."""
-        found = self.library.resolve(name, scope)
-        if found in self.library.classes:
-            self._reached[found] = None
-        elif found not in ATTRIBUTES.keys() | _OTHERS and name:
-            short = {full_name.rpartition(".")[2] for full_name in self.library.classes}
+        full_name = self.library.resolve(name, scope)
+        if full_name in self.library.classes:
+            self._reached[full_name] = None
+        elif full_name not in ATTRIBUTES.keys() | _OTHERS and name:
+            short = {known.rpartition(".")[2] for known in self.library.classes}
             _refuse(
                 where,
                 f"no class '{name}'{closest(name.rpartition('.')[2], short)}",
                 f"a class that is known in {scope}",
                 "correct the name, or import it",
             )
-        return found
+        return full_name
 
     def _parts(self, kind: str, modifier: Modifier) -> Mapping[str, Component]:
         """Components of a class, as modified."""
@@ -328,8 +328,8 @@ class _Checker:
                     f"make '{name}' public",
                 )
             kind, modifier = self._kind(part), part.modifier
-        found = self.library.classes.get(kind)
-        if found is None or not self._connector(found):
+        cls = self.library.classes.get(kind)
+        if cls is None or not self._connector(cls):
             _refuse(
                 connection.where,
                 f"connect with '{whole}', which is a {kind}",
@@ -338,13 +338,13 @@ class _Checker:
             )
         return kind
 
-    def _connector(self, found: Class) -> bool:
-        lineage = (found.name, *self.library.ancestors(found.name))
+    def _connector(self, cls: Class) -> bool:
+        lineage = (cls.name, *self.library.ancestors(cls.name))
         return any(self.library.classes[ancestor].kind == "connector" for ancestor in lineage)
 
     def _prefixes(self, kind: str) -> frozenset[str]:
-        found = self.library.classes.get(kind)
-        return found.prefixes if found is not None else frozenset()
+        cls = self.library.classes.get(kind)
+        return cls.prefixes if cls is not None else frozenset()
 
     def _signature(self, kind: str) -> object:
         """What two connectors must share: a predefined type, or names, kinds and what flows."""

@@ -25,16 +25,16 @@ def packages(file: Path) -> tuple[Path, ...]:
     InputError
         If there is no such file, or a library that it uses is in neither place.
     """
-    found = {file: file.resolve()}
+    places = {file: file.resolve()}
     waiting = [file]
     while waiting:
         package = waiting.pop(0)
         for name, where in _Uses(package, read(package)).names().items():
             used = _used(name, package, where)
-            if used.resolve() not in found.values():
-                found[used] = used.resolve()
+            if used.resolve() not in places.values():
+                places[used] = used.resolve()
                 waiting.append(used)
-    return tuple(found)
+    return tuple(places)
 
 
 def files(package: Path) -> tuple[Path, ...]:
@@ -80,16 +80,16 @@ class _Uses(Cursor):
 
     def names(self) -> dict[str, str]:
         """Names of used libraries, each with file and line."""
-        found: dict[str, str] = {}
+        names: dict[str, str] = {}
         while self.token.kind != "end":
             if self.advance().text != "uses" or not self.took("("):
                 continue
             while not self.took(")"):
                 where = self.where
-                found[self.identifier()] = where
+                names[self.identifier()] = where
                 self.group()
                 self.took(",")
-        return found
+        return names
 
 
 def _used(name: str, by: Path, where: str) -> Path:

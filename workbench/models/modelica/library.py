@@ -66,20 +66,20 @@ class Library:
         """Dotted name of what `name` means in a class; `name` itself if it is of no class here."""
         head, *rest = name.removeprefix(".").split(".")
         scopes = [""] if name.startswith(".") else _outward(scope)
-        found = next((visible for at in scopes if (visible := self._visible(head, at))), "")
-        if found not in self.classes:
-            return ".".join([found or head, *rest])
+        full_name = next((visible for at in scopes if (visible := self._visible(head, at))), "")
+        if full_name not in self.classes:
+            return ".".join([full_name or head, *rest])
         for part in rest:
-            if not (inside := self.inside(part, found)):
-                hidden = f"; to mean the library {head}, import it" if head != found else ""
+            if not (inside := self.inside(part, full_name)):
+                hidden = f"; to mean the library {head}, import it" if head != full_name else ""
                 raise InputError(
                     where=self.classes[scope].where,
-                    found=f"'{name}', but {found} has no class '{part}'",
+                    found=f"'{name}', but {full_name} has no class '{part}'",
                     expected="a class of the library",
                     remedy=f"correct the name{hidden}",
                 )
-            found = inside
-        return found
+            full_name = inside
+        return full_name
 
     def bases(self, name: str) -> tuple[str, ...]:
         """Dotted names of what a class extends directly."""
@@ -98,7 +98,7 @@ class Library:
         InputError
             If a class extends itself.
         """
-        found: list[str] = []
+        bases: list[str] = []
         waiting = list(self.bases(name))
         while waiting:
             current = waiting.pop(0)
@@ -109,42 +109,46 @@ class Library:
                     expected="a class that ends in one without 'extends'",
                     remedy="correct what it extends",
                 )
-            if current in self.classes and current not in found:
-                found.append(current)
+            if current in self.classes and current not in bases:
+                bases.append(current)
                 waiting += self.bases(current)
-        return tuple(found)
+        return tuple(bases)
 
     def components(self, name: str) -> dict[str, Component]:
         """Components of a class, inherited ones first, with the types and values it gives them."""
         self.ancestors(name)  # refuses a class that extends itself
-        found: dict[str, Component] = {}
+        components: dict[str, Component] = {}
         for base, dotted in zip(self.classes[name].extends, self.bases(name), strict=True):
             inherited = self.components(dotted) if dotted in self.classes else {}
             for key, component in self.modified(inherited, base.modifier).items():
                 modifier = component.modifier
-                if key in found:  # a class may be inherited on two ways
-                    modifier = _merged(found[key].modifier, modifier)
-                found[key] = replace(component, modifier=modifier)
-        return found | {component.name: component for component in self.classes[name].components}
+                if key in components:  # a class may be inherited on two ways
+                    modifier = _merged(components[key].modifier, modifier)
+                components[key] = replace(component, modifier=modifier)
+        return components | {
+            component.name: component for component in self.classes[name].components
+        }
 
     def modified(
         self, components: Mapping[str, Component], modifier: Modifier
     ) -> dict[str, Component]:
         """Components of a class as a modifier leaves them; what it names and is none is ignored."""
-        found = dict(components)
+        modified = dict(components)
         for key, modification in modifier.inner.items():
             new = modification.redeclared
-            if key in found and new is None:
-                found[key] = replace(
-                    found[key], modifier=_merged(found[key].modifier, modification)
+            if key in modified and new is None:
+                modified[key] = replace(
+                    modified[key], modifier=_merged(modified[key].modifier, modification)
                 )
-            elif key in found and new is not None:
-                found[key] = self._redeclared(found[key], new)
+            elif key in modified and new is not None:
+                modified[key] = self._redeclared(modified[key], new)
             elif new is not None:  # a class, of which components may be
                 for name, old in components.items():
                     if self.resolve(old.type, old.owner).rpartition(".")[2] == key:
-                        found[name] = replace(found[name], type=self._absolute(new.type, new.owner))
-        return found
+                        modified[name] = replace(
+                            modified[name], type=self._absolute(new.type, new.owner)
+                        )
+        return modified
 
     def _redeclared(self, old: Component, new: Component) -> Component:
         constraint, scope = old.constraint or old.type, old.owner
@@ -160,8 +164,8 @@ class Library:
 
     def _absolute(self, name: str, scope: str) -> str:
         """A name that means in any scope what `name` means in one."""
-        found = self.resolve(name, scope)
-        return f".{found}" if found in self.classes else name
+        full_name = self.resolve(name, scope)
+        return f".{full_name}" if full_name in self.classes else name
 
     def unit(self, component: Component) -> str:
         """Unit of a component; where it has none, the name of the type that could have one."""
@@ -178,13 +182,13 @@ class Library:
 
     def _visible(self, name: str, scope: str) -> str:
         """Class of a simple name, by the declarations and imports of one scope; empty if none."""
-        if found := self.inside(name, scope):
-            return found
+        if full_name := self.inside(name, scope):
+            return full_name
         for alias, target in self.classes[scope].imports if scope else ():
             if alias == name:
                 return target.removeprefix(".")
-            if alias == "*" and (found := self.inside(name, target)):
-                return found
+            if alias == "*" and (full_name := self.inside(name, target)):
+                return full_name
         return ""
 
     def inside(self, name: str, of: str) -> str:

@@ -209,12 +209,12 @@ class Reader(Cursor):
     def _components(self, prefixes: frozenset[str]) -> list[Component]:
         declared = self.name()
         self.subscripts()
-        found = [self._component(declared, prefixes)]
+        components = [self._component(declared, prefixes)]
         while self.took(","):
-            found.append(self._component(declared, prefixes))
-        return self._constrained(found)
+            components.append(self._component(declared, prefixes))
+        return self._constrained(components)
 
-    def _constrained(self, found: list[Component]) -> list[Component]:
+    def _constrained(self, components: list[Component]) -> list[Component]:
         constraint, constraining, description = self._constraint()
         return [
             replace(
@@ -223,7 +223,7 @@ class Reader(Cursor):
                 constraining=constraining,
                 description=component.description or description,
             )
-            for component in found
+            for component in components
         ]
 
     def _component(self, declared: str, prefixes: frozenset[str]) -> Component:

@@ -257,12 +257,12 @@ class DisturbanceObserver(Estimator):
         estimates = {name: fmu.units.get(name, "1") for name in states}
         estimates |= {quantity.correction: quantity.unit for quantity in system.estimated}
         rates = {f"rate of {name}": quotient(unit, "s") for name, unit in estimates.items()}
-        told = feedback_meanings(rates, {output.name: output.unit for output in system.outputs})
+        meanings = feedback_meanings(rates, {output.name: output.unit for output in system.outputs})
         decays = {
             f"T_{quantity.name}": (f"rate at which {quantity.correction} decays", "1/s")
             for quantity in system.estimated
         }
-        return told | decays
+        return meanings | decays
 
     @classmethod
     def of(cls, L: Matrix, T: Vector, effect: Vector, system: System, source: str = "") -> Gains:
@@ -349,8 +349,8 @@ class DisturbanceObserver(Estimator):
         order = np.vstack([np.ones_like(on_states), orders])
         effect = np.vstack([on_states, on_quantities])
         orders = np.append(np.hstack([order, order + 1.0]), np.ones(q))
-        found = np.append(np.hstack([effect, effect]), np.ones(q))
-        space = feedback_space(orders, found, slowest, fastest, gains.values)
+        effects = np.append(np.hstack([effect, effect]), np.ones(q))
+        space = feedback_space(orders, effects, slowest, fastest, gains.values)
         space.upper[space.upper.size - q :] = (
             0.0  # a deviation that grows by itself is no disturbance model
         )

@@ -139,8 +139,8 @@ def _mix(settings, state, h):  # type: ignore[no-untyped-def]
             for b in range(size):
                 P[a, b] = 0.0
                 for i in range(count):
-                    apart = (state.z[i, a] - z[a]) * (state.z[i, b] - z[b])
-                    P[a, b] += change[i, j] * (state.P[i, a, b] + apart)
+                    product = (state.z[i, a] - z[a]) * (state.z[i, b] - z[b])
+                    P[a, b] += change[i, j] * (state.P[i, a, b] + product)
     return status
 
 
@@ -169,8 +169,8 @@ def _combine(state, estimate):  # type: ignore[no-untyped-def]
         for j in range(count):
             mean += probability[j] * estimates[j, i]
         for j in range(count):
-            apart = estimates[j, i] - mean
-            spread += probability[j] * (estimates[j, width + i] ** 2 + apart * apart)
+            distance = estimates[j, i] - mean
+            spread += probability[j] * (estimates[j, width + i] ** 2 + distance * distance)
         estimate[i], estimate[width + i] = mean, np.sqrt(spread)
     estimate[estimate.size - 1] = 0.0
     for j in range(count):
@@ -235,21 +235,21 @@ class InteractingMultipleModel(ExtendedKalmanFilter):
     _loop = staticmethod(_loop)
 
     def __init__(self, fmu: FMU, system: System, gains: Gains) -> None:
-        found = hypotheses(system)
-        self.modes = tuple(mode.name for mode in found)
-        self.finds = frozenset(name for mode in found for name in mode.choices)
+        modes = hypotheses(system)
+        self.modes = tuple(mode.name for mode in modes)
+        self.finds = frozenset(name for mode in modes for name in mode.choices)
         super().__init__(fmu, system, gains)
         names = [quantity.name for quantity in system.estimated]
         filters = [
             ExtendedKalmanFilter(fmu.variant(_held(mode, fmu, names)), system, gains)
-            for mode in found
+            for mode in modes
         ]
         self._filters = filters
         self._starts = [
             np.array([mode.parameters.get(name, np.nan) for name in names]) - self._layout.nominal
-            for mode in found
+            for mode in modes
         ]
-        k, size = len(found), len(self._settings.walk)
+        k, size = len(modes), len(self._settings.walk)
         self._model = tuple(member._model for member in filters)
         self._bank = BankSettings(tuple(member._settings for member in filters), changes(system))
         self._state = BankState(

@@ -596,7 +596,7 @@ class ExtendedKalmanFilter(Estimator):
         of_states = gains["model"] * walks(fmu, system)
         initial = [gains["initial"] * quantity.spread for quantity in system.estimated]
         learns = learning(system)
-        told = float(learns.within < np.inf)
+        learnt = float(learns.within < np.inf)
         self._settings: Any = FilterSettings(
             layout=self._layout,
             relative=np.array([_share(gains, output.name) for output in system.outputs]),
@@ -604,8 +604,8 @@ class ExtendedKalmanFilter(Estimator):
             walk=np.array([*of_states, *(gains[quantity.name] for quantity in system.estimated)]),
             spread=np.array([*np.maximum(of_states, self._spreads()), *initial]),
             learning=learns,
-            driven=told * np.array([signal.noise for signal in system.inputs]),
-            driven_relative=told * np.array([signal.relative_noise for signal in system.inputs]),
+            driven=learnt * np.array([signal.noise for signal in system.inputs]),
+            driven_relative=learnt * np.array([signal.relative_noise for signal in system.inputs]),
         )
         self._state: Any = filter_state(n, system, n + q)
 
@@ -638,16 +638,16 @@ class ExtendedKalmanFilter(Estimator):
     @classmethod
     def meanings(cls, fmu: FMU, system: System, gains: Gains) -> dict[str, tuple[str, str]]:
         """See Estimator."""
-        told = {
+        meanings = {
             "model": ("random walk of every state, over what the system says", "1"),
             "initial": ("what is known of quantities at the start, over what it says", "1"),
         }
         for output in cls.fed(system).outputs:
-            told[output.name] = f"scatter of {output.name}", output.unit
-            told[f"{output.name}_relative"] = f"scatter of {output.name}, as a share of it", "1"
+            meanings[output.name] = f"scatter of {output.name}", output.unit
+            meanings[f"{output.name}_relative"] = f"scatter of {output.name}, as a share of it", "1"
         for quantity in system.estimated:
-            told[quantity.name] = f"random walk of {quantity.name}", f"{quantity.unit}/sqrt(s)"
-        return {name: told[name] for name in gains.names}
+            meanings[quantity.name] = f"random walk of {quantity.name}", f"{quantity.unit}/sqrt(s)"
+        return {name: meanings[name] for name in gains.names}
 
     @classmethod
     def default_gains(cls, fmu: FMU, system: System) -> Gains:

@@ -221,8 +221,8 @@ class ParameterEstimator(Estimator):
         """Bounds by the loops that gains close."""
         orders, effect = loops(linearised(fmu, system))
         orders = np.hstack([orders - 1.0, orders])
-        found = np.hstack([effect, effect])
-        return feedback_space(orders, found, slowest, fastest, gains.values)
+        effects = np.hstack([effect, effect])
+        return feedback_space(orders, effects, slowest, fastest, gains.values)
 
     @classmethod
     def error_dynamics(

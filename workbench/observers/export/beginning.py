@@ -113,9 +113,9 @@ def said_by_first(estimator: Estimator) -> list[FirstValue]:
     share = np.random.default_rng(0).uniform(0.5, 1.0, sizes.size)  # of each signal another one
     for trial in _TRIALS:
         change = trial * share * sizes
-        found = _change(begin, _flat(remembered(estimator, usual + change))[1])
+        changed = _change(begin, _flat(remembered(estimator, usual + change))[1])
         large = np.abs(slopes) @ np.abs(change) + np.abs(np.where(np.isfinite(begin), begin, 0.0))
-        if (bad := np.flatnonzero(np.abs(found - slopes @ change) > _ROUNDING * large)).size:
+        if (bad := np.flatnonzero(np.abs(changed - slopes @ change) > _ROUNDING * large)).size:
             raise InputError(
                 where=f"estimator {estimator.name}",
                 found=f"{places[bad[0]]}, which is not linear in the first sample",

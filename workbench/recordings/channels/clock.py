@@ -81,9 +81,9 @@ def read_clock(
         return Clock("", count * step, math.nan, "s", f"every {step:g} s, as given", True, True)
     if named is not None:
         own = (*group.channels, *group.left)
-        found = next((channel for channel in own if channel.name == named.channel), None)
-        if found is not None:
-            return _going_on(_named(found, named, system, where), where)
+        channel_of_time = next((channel for channel in own if channel.name == named.channel), None)
+        if channel_of_time is not None:
+            return _going_on(_named(channel_of_time, named, system, where), where)
     if group.time is not None:
         time = group.time
         said = "the file says it"
@@ -138,7 +138,7 @@ def _refuse_contradiction(clocks: Sequence[Clock], where: str) -> None:
 
 def _no_time(group: Group, system: System, where: str) -> InputError:
     """What a group has in place of times."""
-    found, name = f"no time among {listed([channel.name for channel in group.channels])}", "NAME"
+    problem, name = f"no time among {listed([channel.name for channel in group.channels])}", "NAME"
     for channel in group.left:
         if is_time(channel.name):
             text = next(filter(None, channel.texts), "")
@@ -154,10 +154,10 @@ def _no_time(group: Group, system: System, where: str) -> InputError:
         if not channel.unit and is_time(channel.name):
             units = _unstated(channel.values, system)
             likely = f"likely in {' or in '.join(units)}" if units else "likely in none"
-            found, name = f"'{channel.name}' without a unit, {likely}", channel.name
+            problem, name = f"'{channel.name}' without a unit, {likely}", channel.name
     return InputError(
         where=where,
-        found=found,
+        found=problem,
         expected="a channel of times, or a known rate",
         remedy=f"name it, --column '{TIME}={name} [UNIT]', or give --sample-rate '200 Hz'",
     )
@@ -336,11 +336,11 @@ def _going_on(clock: Clock, where: str) -> Clock:
         return clock
     held = clock.times[np.isfinite(clock.times)]
     late = int(np.argmin(np.diff(held) > 0)) if held.size > 1 else -1
-    found = f"{held[late + 1]:.9g} s after {held[late]:.9g} s" if late >= 0 else "no times"
+    fault = f"{held[late + 1]:.9g} s after {held[late]:.9g} s" if late >= 0 else "no times"
     count = int((np.diff(held) <= 0).sum()) if held.size > 1 else 0
     raise InputError(
         where=f"{where}, '{clock.channel}'" if clock.channel else where,
-        found=f"{found} in sample {late + 2}" + (f", and {count - 1} more" if count > 1 else ""),
+        found=f"{fault} in sample {late + 2}" + (f", and {count - 1} more" if count > 1 else ""),
         expected="times that go on",
         remedy="if samples are evenly spaced say how, --sample-rate '200 Hz'; else export more "
         "digits",

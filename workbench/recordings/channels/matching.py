@@ -246,7 +246,7 @@ def _by_name(
     system: System,
 ) -> None:
     """Assign channels whose names tell, the most alike first; doubts say why a signal has none."""
-    found: dict[int, list[tuple[Signal, Assignment]]] = {EXACT: [], WORDS: [], WITHIN: []}
+    candidates: dict[int, list[tuple[Signal, Assignment]]] = {EXACT: [], WORDS: [], WITHIN: []}
     for signal in system.signals.values():
         for place in places:
             likeness = alike(place.channel.name, place.channel.about, signal)
@@ -255,11 +255,11 @@ def _by_name(
             elif likeness:
                 channel, doubt = _candidate(place, signal, system, likeness)
                 if channel is not None:
-                    found[likeness].append((signal, channel))
+                    candidates[likeness].append((signal, channel))
                 else:
                     doubts[signal.name] = doubt
     settled = set(assigned)
-    for level in found.values():
+    for level in candidates.values():
         taken = {id(assignment.channel) for assignment in assigned.values()}
         left = [(s, o) for s, o in level if s.name not in settled and id(o.channel) not in taken]
         for signal, channel in left:
@@ -331,11 +331,13 @@ def conversion_to(unit: str, signal: Signal, system: System) -> tuple[Conversion
         turned = Conversion(direct.factor) if is_difference(signal) else direct
         return turned, ""
     other = signal.recorded_as
-    found = conversion(unit, other.unit) if other is not None else None
-    if other is None or found is None:
+    conversion_to_other = conversion(unit, other.unit) if other is not None else None
+    if other is None or conversion_to_other is None:
         return None
     (slope,) = other.formula.slopes((signal.name,), system.values)
-    return Conversion(found.factor / slope, found.zero / slope), other.formula.text
+    return Conversion(
+        conversion_to_other.factor / slope, conversion_to_other.zero / slope
+    ), other.formula.text
 
 
 def fitting_units(samples: Vector, signal: Signal, system: System) -> list[str]:

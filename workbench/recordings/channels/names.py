@@ -66,10 +66,10 @@ def read_named(table: Table, system: System) -> dict[str, NamedChannel]:
         If a signal is none of the system, or an entry is unknown.
     """
     table.refuse_unknown((TIME, *system.signals))
-    found: dict[str, NamedChannel] = {}
+    channels: dict[str, NamedChannel] = {}
     for signal, entry in table.content.items():
         if isinstance(entry, str):
-            found[signal] = NamedChannel(table.take(signal, str))
+            channels[signal] = NamedChannel(table.take(signal, str))
             continue
         table.take(signal, dict)
         own = table.table(signal)
@@ -77,8 +77,8 @@ def read_named(table: Table, system: System) -> dict[str, NamedChannel]:
         unit = spelled(own.text("unit", ""))
         other = "reversed" in own and own.take("reversed", bool)
         missing = _missing(own) if "missing" in own else None
-        found[signal] = NamedChannel(own.take("channel", str), unit, other, missing)
-    return found
+        channels[signal] = NamedChannel(own.take("channel", str), unit, other, missing)
+    return channels
 
 
 def _missing(table: Table) -> tuple[float, ...]:
@@ -121,8 +121,8 @@ def words(name: str) -> tuple[str, ...]:
     >>> words("Brems-Druck_2"), words("rollSpeed"), words("n Rolle (gefiltert)")
     (('brems', 'druck', '2'), ('roll', 'speed'), ('n', 'rolle', 'gefiltert'))
     """
-    apart = re.sub(r"([a-zäöüß])([A-ZÄÖÜ])", r"\1 \2", name)
-    folded = apart.casefold().translate(_UMLAUTS)
+    separated = re.sub(r"([a-zäöüß])([A-ZÄÖÜ])", r"\1 \2", name)
+    folded = separated.casefold().translate(_UMLAUTS)
     return tuple(re.findall(r"[^\W\d_]+|\d+", folded))
 
 

@@ -57,25 +57,25 @@ class ProposedMapping:
     @property
     def doubts(self) -> list[str]:
         """What somebody must confirm, in words: nobody has said it, nor does a file."""
-        found = [
+        texts = [
             f"{name}: {assignment.doubt}"
             for name, assignment in self.assigned.items()
             if assignment.doubt
         ]
         times = {clock.channel: clock.unit for clock in self.clocks.values() if not clock.certain}
-        return found + [
+        return texts + [
             f"{TIME}: {unconfirmed(TIME, name, unit)}" for name, unit in times.items() if name
         ]
 
     @property
     def named(self) -> dict[str, NamedChannel]:
         """As it is stored."""
-        found = {name: assignment.named for name, assignment in self.assigned.items()}
+        channels = {name: assignment.named for name, assignment in self.assigned.items()}
         for clock in self.clocks.values():
             if clock.channel:
                 unit = clock.stated or ("" if clock.certain else clock.unit)
-                found.setdefault(TIME, NamedChannel(clock.channel, unit))
-        return found
+                channels.setdefault(TIME, NamedChannel(clock.channel, unit))
+        return channels
 
 
 def propose(
@@ -139,13 +139,13 @@ def propose(
 
 def _places(files: Sequence[RecordedFile]) -> list[PlacedChannel]:
     """All channels, each with a name that no other has, if groups have names."""
-    found = [
+    channels = [
         (i, j, group, channel)
         for i, file in enumerate(files)
         for j, group in enumerate(file.groups)
         for channel in group.channels
     ]
-    counts = Counter(channel.name for *_, channel in found)
+    counts = Counter(channel.name for *_, channel in channels)
     return [
         PlacedChannel(
             i,
@@ -154,7 +154,7 @@ def _places(files: Sequence[RecordedFile]) -> list[PlacedChannel]:
             channel,
             channel.name if counts[channel.name] == 1 else f"{group.name}/{channel.name}",
         )
-        for i, j, group, channel in found
+        for i, j, group, channel in channels
     ]
 
 
@@ -163,22 +163,24 @@ def _find(
 ) -> PlacedChannel:
     """The place that a user names."""
     name = channel.channel
-    found = [place for place in places if place.channel.name == name]
-    found = found or [place for place in places if name in (place.label, place.full)]
-    found = found or [p for p in places if p.channel.name.casefold() == name.casefold()]
-    found = found or [place for place in places if place.channel.about == name]  # its number
-    if signal == TIME and found:
-        return found[0]
-    if len(found) != 1:
+    candidates = [place for place in places if place.channel.name == name]
+    candidates = candidates or [place for place in places if name in (place.label, place.full)]
+    candidates = candidates or [p for p in places if p.channel.name.casefold() == name.casefold()]
+    candidates = candidates or [
+        place for place in places if place.channel.about == name
+    ]  # its number
+    if signal == TIME and candidates:
+        return candidates[0]
+    if len(candidates) != 1:
         names = [place.channel.name for place in places]
         raise InputError(
             where=f"{where}, channel '{name}'",
-            found=f"{len(found)} channels of this name" if found else "no such channel",
+            found=f"{len(candidates)} channels of this name" if candidates else "no such channel",
             expected=f"one for {signal} among {listed(names)}{closest(name, names)}",
             remedy=f"correct the name, --column '{signal}=NAME'"
-            + (", or GROUP/NAME where several groups have it" if found else ""),
+            + (", or GROUP/NAME where several groups have it" if candidates else ""),
         )
-    return found[0]
+    return candidates[0]
 
 
 def _as_named(
@@ -231,16 +233,16 @@ def _no_unit_of(
     """A unit that cannot become that of a signal; where one is stated, no other is proposed."""
     name = f"--column '{signal.name}={place.label}"
     if not unit:
-        found, remedy = "no unit in the file", f"give it, {name} [UNIT]'"
+        unit_found, remedy = "no unit in the file", f"give it, {name} [UNIT]'"
     elif not is_unit(unit):
-        found = f"[{unit}], a unit that is not known"
+        unit_found = f"[{unit}], a unit that is not known"
         remedy = f"convert the values, or name one that is the same, {name} [UNIT]'"
     else:
-        found = f"[{unit}], no unit of {signal.label}"
+        unit_found = f"[{unit}], no unit of {signal.label}"
         remedy = "correct the unit" if stated_by_user else "name another channel"
     return InputError(
         where=f"{where}, channel '{place.channel.name}'",
-        found=found,
+        found=unit_found,
         expected=f"one that can become {signal.unit}"
         + (f" or {signal.recorded_as.unit}" if signal.recorded_as else ""),
         remedy=remedy,

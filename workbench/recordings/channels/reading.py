@@ -41,9 +41,9 @@ def read_measured(
         channels are.
     """
     recorded = read_recorded_file(path)
-    found = propose_recordings([recorded], system, stored, options)
-    if len(found.held) > 1:
-        names = [f"'{recording.name}'" for recording in found.held]
+    proposed = propose_recordings([recorded], system, stored, options)
+    if len(proposed.held) > 1:
+        names = [f"'{recording.name}'" for recording in proposed.held]
         raise InputError(
             where=str(path),
             found=f"{len(names)} recordings, {listed(names)}",
@@ -51,7 +51,7 @@ def read_measured(
             remedy=f"run 'workbench import {path} --out CASES', which makes a case of each, or "
             "name the channels of one, --column 'SIGNAL=GROUP/CHANNEL'",
         )
-    (proposal,) = (recording.proposal for recording in found.held)
+    (proposal,) = (recording.proposal for recording in proposed.held)
     if not proposal.certain:
         raise _unsure(path, proposal)
     return merge([recorded], proposal, system)
@@ -63,8 +63,8 @@ def _unsure(path: Path, proposal: ProposedMapping) -> InputError:
         for name, assignment in proposal.assigned.items()
         if not assignment.certain
     ]
-    found = [*proposal.problems, *(f"perhaps {proposal}" for proposal in proposed)]
-    found += [
+    unconfirmed = [*proposal.problems, *(f"perhaps {proposal}" for proposal in proposed)]
+    unconfirmed += [
         f"perhaps time = {clock.channel} [{clock.unit}]"
         if clock.channel
         else f"perhaps time {clock.reason}"
@@ -73,7 +73,7 @@ def _unsure(path: Path, proposal: ProposedMapping) -> InputError:
     ]
     return InputError(
         where=str(path),
-        found=f"channels that nobody confirmed: {'; '.join(found)}",
+        found=f"channels that nobody confirmed: {'; '.join(unconfirmed)}",
         expected="the system's own names with units, or channels that are named",
         remedy=f"run 'workbench import {path} --out CASES', which asks, or name them with --column",
     )

@@ -90,10 +90,10 @@ class ProposedRecordings:
     @property
     def named(self) -> dict[str, NamedChannel]:
         """Channels by signal, as they are stored; the first recording that has one tells."""
-        found: dict[str, NamedChannel] = {}
+        channels: dict[str, NamedChannel] = {}
         for recording in self.held:
-            found = {**recording.proposal.named, **found}
-        return found
+            channels = {**recording.proposal.named, **channels}
+        return channels
 
 
 def _once(lists: Iterable[Iterable[str]]) -> list[str]:
@@ -131,12 +131,12 @@ def propose_recordings(
     whole = _tried("", files, system, stored, options)
     settled = isinstance(whole, ProposedRecording) and not whole.proposal.problems
     single = options.apart is False or len(files) > 1 or settled or _names_a_group(options, files)
-    found = None if single else _apart(files[0], system, stored, options)
-    if found is not None:
-        doubt = "" if options.apart else at_one_time(found.held, system)
+    parts = None if single else _apart(files[0], system, stored, options)
+    if parts is not None:
+        doubt = "" if options.apart else at_one_time(parts.held, system)
         if not doubt:
-            return found
-        if not found.problems:
+            return parts
+        if not parts.problems:
             whole = _doubted(whole, doubt, files)
     if isinstance(whole, InputError):
         raise whole
@@ -280,15 +280,15 @@ def _refusal(
 ) -> InputError:
     """Why a part of a file is no recording, where others are."""
     if isinstance(outcome, InputError):
-        found, remedy = outcome.found, outcome.remedy
+        problem, remedy = outcome.found, outcome.remedy
     else:
         differences = _differences(outcome, first, system)
         proposal = outcome.proposal
-        found = "; ".join([*proposal.problems, *differences, *proposal.contradictions])
+        problem = "; ".join([*proposal.problems, *differences, *proposal.contradictions])
         remedy = "give it the names and units of the others, or --column 'SIGNAL=CHANNEL [unit]'"
     return InputError(
         where=where([file], name),
-        found=found,
+        found=problem,
         expected=f"the channels of '{first.name}'",
         remedy=f"{remedy}; or name its channels alone, --column 'SIGNAL={name}/CHANNEL'",
     )
@@ -376,8 +376,8 @@ def _same_output(recording: ProposedRecording, other: ProposedRecording, system:
         near = u <= t[-1]
         with np.errstate(over="ignore", invalid="ignore"):  # what no machine reads
             spread = float(np.std(y[near]))
-            apart = float(np.sqrt(np.mean((np.interp(u[near], t, x) - y[near]) ** 2)))
-        if near.sum() > _FEW and spread > 0.0 and apart <= _SAME * spread:
+            distance = float(np.sqrt(np.mean((np.interp(u[near], t, x) - y[near]) ** 2)))
+        if near.sum() > _FEW and spread > 0.0 and distance <= _SAME * spread:
             return signal.name
     return ""
 

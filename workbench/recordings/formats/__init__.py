@@ -155,14 +155,16 @@ def _here(module: str, path: Path, raw: bytes) -> Contents:
     # Some print what puzzles them, where results are expected.
     with (
         redirect_stdout(io.StringIO()),
-        warnings.catch_warnings(record=True, action="always") as told,
+        warnings.catch_warnings(record=True, action="always") as warned,
     ):
-        found: Contents = reader.read(path, raw)
+        contents: Contents = reader.read(path, raw)
     # What libraries warn of is about the file, or is about themselves.
     notes = [
-        str(warning.message)[:200] for warning in told if issubclass(warning.category, _OF_THE_FILE)
+        str(warning.message)[:200]
+        for warning in warned
+        if issubclass(warning.category, _OF_THE_FILE)
     ]
-    return found._replace(notes=[*found.notes, *dict.fromkeys(notes)])
+    return contents._replace(notes=[*contents.notes, *dict.fromkeys(notes)])
 
 
 def _apart(module: str, path: Path, raw: bytes) -> Contents:

@@ -48,8 +48,8 @@ def _collect(
             timed = _simulink(name, value) or _timed(name, value)
             if timed is not None:
                 groups.append(replace(timed, within=within))
-            elif (found := _single(name, value)) is not None:
-                by_size.setdefault(found.values.size, []).append(found)
+            elif (channel := _single(name, value)) is not None:
+                by_size.setdefault(channel.values.size, []).append(channel)
             else:
                 _collect((*within, key), value, groups, notes)
         elif isinstance(value, np.ndarray):
@@ -80,20 +80,20 @@ def _step(content: Mapping[str, Any]) -> float:
 
 def _units(content: Mapping[str, Any]) -> dict[str, str]:
     """Units by name, from texts beside the arrays."""
-    found: dict[str, str] = {}
+    units: dict[str, str] = {}
     vectors = [key for key, value in content.items() if isinstance(value, np.ndarray)]
     for key, value in content.items():
         match = _UNIT.fullmatch(key)
         if match is None:
             continue
         if isinstance(value, str) and match["of"]:
-            found[match["of"]] = spelled(value)
+            units[match["of"]] = spelled(value)
         elif isinstance(value, list) and len(value) == len(vectors):
-            found |= {name: spelled(unit) for name, unit in zip(vectors, value, strict=True)}
+            units |= {name: spelled(unit) for name, unit in zip(vectors, value, strict=True)}
         elif isinstance(value, Mapping):
             texts = {name: unit for name, unit in value.items() if isinstance(unit, str)}
-            found |= {name: spelled(unit) for name, unit in texts.items()}
-    return found
+            units |= {name: spelled(unit) for name, unit in texts.items()}
+    return units
 
 
 def _entry(content: Mapping[str, Any], names: tuple[str, ...]) -> tuple[str, Any]:

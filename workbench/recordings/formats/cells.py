@@ -106,13 +106,13 @@ def find_table(rows: Sequence[Sequence[str]], lines: Sequence[int], where: str) 
     names, units = _header(rows[:first], width)
     head = tuple(" ".join(filter(None, row)) for row in rows[:first])
     kept = [i for i in samples if i >= first]
-    found = [list(rows[i][:width]) for i in kept]
+    body = [list(rows[i][:width]) for i in kept]
     if names:
-        _refuse_narrow(names, units, found, f"{where}, above line {lines[first]}")
+        _refuse_narrow(names, units, body, f"{where}, above line {lines[first]}")
     else:
         names = [f"column {i + 1}" for i in range(width)]
     filled = (tuple((row + [""] * width)[:width]) for row in (names, units))
-    return Cells(found, [lines[i] for i in kept], head, *filled)
+    return Cells(body, [lines[i] for i in kept], head, *filled)
 
 
 def _refuse_narrow(

@@ -31,21 +31,21 @@ def _members(group: h5py.Group, file: h5py.File) -> dict[str, Any]:
 
 def _entries(items: Mapping[str, Any], file: h5py.File) -> dict[str, Any]:
     """Values of entries, their units, and what is nested in them."""
-    found: dict[str, Any] = {}
+    members: dict[str, Any] = {}
     for name, item in items.items():
         if name.startswith("#"):
             continue
         if isinstance(item, h5py.Group):
-            found[name] = _members(item, file)
+            members[name] = _members(item, file)
             continue
         value = _value(item, file)
         if value is None:
             continue
-        found[name] = value
+        members[name] = value
         unit = next((item.attrs[key] for key in _UNITS if key in item.attrs), None)
         if unit is not None:
-            found[f"{name}_unit"] = unit.decode() if isinstance(unit, bytes) else str(unit)
-    return found
+            members[f"{name}_unit"] = unit.decode() if isinstance(unit, bytes) else str(unit)
+    return members
 
 
 def _structures(group: h5py.Group, file: h5py.File) -> list[dict[str, Any]]:

@@ -69,11 +69,11 @@ def markers(values: Vector) -> tuple[dict[float, int], dict[float, int]]:
             rest = left[left != extreme]
             if np.unique(rest[: 100 * _FEWEST]).size < _FEWEST:
                 continue  # steps between a few values
-            apart = float(np.abs(rest - extreme).min()) / float(np.ptp(rest) or 1.0)
+            distance = float(np.abs(rest - extreme).min()) / float(np.ptp(rest) or 1.0)
             count = left.size - rest.size
             marker = abs(extreme) in _MARKERS or _LARGE[0] <= abs(extreme) <= _LARGE[1]
-            rare = count > 1 and count <= _RARE * left.size and apart > _FARTHER
-            if apart > _FAR and (rare or marker or abs(extreme) in _MAYBE):
+            rare = count > 1 and count <= _RARE * left.size and distance > _FARTHER
+            if distance > _FAR and (rare or marker or abs(extreme) in _MAYBE):
                 (known if marker else others)[extreme] = count
                 left = rest
                 break
@@ -124,19 +124,19 @@ def reading_of(columns: Sequence[Sequence[str]], where: str, *, commas: bool) ->
     if len(marks) == 1:
         usual, other = (_POINT, _THOUSANDS_POINT) if "." in marks else (_COMMA, _THOUSANDS_COMMA)
         # The first number that no mark between thousands explains decides: mostly the first at all.
-        found = set(islice(cells, 1)) if _all_fit(columns, other) else set()
-        different = [usual, other] if found else [usual]
+        other_marks = set(islice(cells, 1)) if _all_fit(columns, other) else set()
+        different = [usual, other] if other_marks else [usual]
     else:
-        found = {cell for cell in cells if _NUMBER.fullmatch(cell)}
+        other_marks = {cell for cell in cells if _NUMBER.fullmatch(cell)}
         ways = {
-            name: tuple(float(python(cell)) for cell in sorted(found))
+            name: tuple(float(python(cell)) for cell in sorted(other_marks))
             for name, (pattern, python) in _READINGS.items()
-            if all(map(pattern.fullmatch, found))
+            if all(map(pattern.fullmatch, other_marks))
         }
         different = list({values: name for name, values in reversed(ways.items())}.values())
     if len(different) == 1:
         return different[0]
-    example = min(found, key=len)
+    example = min(other_marks, key=len)
     raise InputError(
         where=where,
         found=f"numbers such as '{example}', which can be read with {' or with '.join(different)}"

@@ -39,11 +39,11 @@ def read(path: Path, raw: bytes) -> Contents:
             channels.append(FileChannel(name, unit, _numbers(column.cast(pa.float64())), about))
         else:
             texts = [str(value) if value is not None else "" for value in column.to_pylist()]
-            found = read_stamps(name, texts) if any(map(is_stamp, texts[:100])) else None
-            if found is None:
+            stamps = read_stamps(name, texts) if any(map(is_stamp, texts[:100])) else None
+            if stamps is None:
                 notes.append(f"'{name}' holds {kind}")
             else:
-                channels.append(found)
+                channels.append(stamps)
     return Contents("Parquet", [Group("", tuple(channels))], notes)
 
 

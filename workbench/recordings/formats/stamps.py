@@ -72,8 +72,8 @@ def is_stamp(cell: str) -> bool:
 
 def _match(text: str) -> re.Match[str] | None:
     patterns = (_DAY, _OF_DAY, _OF_HOUR, _COMPACT, _CALLED_FIRST)
-    found = next((match for pattern in patterns if (match := pattern.fullmatch(text))), None)
-    return found if found is None or _zone_known(found.groupdict().get("zone")) else None
+    stamp = next((match for pattern in patterns if (match := pattern.fullmatch(text))), None)
+    return stamp if stamp is None or _zone_known(stamp.groupdict().get("zone")) else None
 
 
 def _zone_known(zone: str | None) -> bool:
@@ -166,13 +166,13 @@ def _of_day(name: str, texts: Sequence[str], pattern: re.Pattern[str]) -> FileCh
     # A step back by more than half a period is the next day, or the next hour.
     back = np.diff(times[known]) < -period / 2
     times[known] += np.concatenate([[0], np.cumsum(back)]) * period
-    told: tuple[str, ...] = ()
+    corrections: tuple[str, ...] = ()
     if pattern is _OF_DAY and not any(match and match["zone"] for match in matches):
-        times[known], told = _mended(times[known], dated=False)
+        times[known], corrections = _mended(times[known], dated=False)
     shown = float(times[known][0])
     values = _from_first(times, known)
     return FileChannel(
-        name, "s", values, stamp=True, shown=shown, corrections=told, texts=tuple(texts)
+        name, "s", values, stamp=True, shown=shown, corrections=corrections, texts=tuple(texts)
     )
 
 
@@ -231,7 +231,7 @@ def _channel(
 ) -> FileChannel:
     """A channel of local seconds, their fractions, and seconds that they are ahead of UTC."""
     whole, parts, shift = moment
-    told: tuple[str, ...] = ()
+    corrections: tuple[str, ...] = ()
     local = whole.astype(np.float64)
     if zone is not None and not shift.any():
         local[known] -= _ahead(local[known] + parts[known], zone)
@@ -239,7 +239,7 @@ def _channel(
     elif zoned:
         local -= shift
     else:
-        mended, told = _mended(local[known] + parts[known], dated=True)
+        mended, corrections = _mended(local[known] + parts[known], dated=True)
         local[known] = np.round(mended - parts[known])
     begin = local[known][0]
     start = float(begin + parts[known][0])
@@ -251,7 +251,7 @@ def _channel(
         start=start,
         stamp=True,
         shown=start,
-        corrections=told,
+        corrections=corrections,
         zoned=zoned,
         texts=tuple(texts),
     )

@@ -41,7 +41,7 @@ def _heard(doubts: list[str]) -> Iterator[None]:
 
 def _groups(held: Any, notes: list[str]) -> list[Group]:
     """A group of the file; channels with other times or lengths are groups of their own."""
-    found: dict[tuple[int, float, float, float], list[FileChannel]] = {}
+    by_times: dict[tuple[int, float, float, float], list[FileChannel]] = {}
     for recorded in held.channels():
         name, unit = named(recorded.name)
         stated: Mapping[str, Any] = recorded.properties
@@ -59,9 +59,9 @@ def _groups(held: Any, notes: list[str]) -> list[Group]:
             notes.append(f"'{name}' holds texts")
             continue
         key = values.size, step, offset, -1.0 if np.isnan(start) else start
-        found.setdefault(key, []).append(channel)
+        by_times.setdefault(key, []).append(channel)
     groups = []
-    for (size, step, offset, start), channels in found.items():
+    for (size, step, offset, start), channels in by_times.items():
         if size < 2:
             continue
         clock = None

@@ -56,17 +56,17 @@ def blocks(fmu: FMU, system: System, layout: Layout) -> Blocks:
     fed = {j: knowns(output.name) for j, output in enumerate(system.outputs) if layout.seen[j] < 0}
     links = [(i, k) for i, row in enumerate(rates) for k in row]
     links += [(len(names) + j, k) for j, row in enumerate(fed.values()) for k in row]
-    found, shared = divide(n, len(names), len(fed), links)
-    parts = [*found, shared]
+    blocks, shared = divide(n, len(names), len(fed), links)
+    parts = [*blocks, shared]
     order = np.array([k for part in parts for k in part], np.intp)
     block = {k: i for i, part in enumerate(parts) for k in part}
     where = {int(k): i for i, k in enumerate(order)}
     states = [sum(k < n for k in part) for part in parts]
     asked = [
         [k for k in part[:count] + shared[: states[-1]]]
-        for part, count in zip(found, states, strict=False)
+        for part, count in zip(blocks, states, strict=False)
     ]
-    references = np.zeros((len(found), max(map(len, asked), default=0)), np.uint32)
+    references = np.zeros((len(blocks), max(map(len, asked), default=0)), np.uint32)
     for i, row in enumerate(asked):
         references[i, : len(row)] = fmu.rate_references[row]
     return Blocks(
@@ -76,7 +76,7 @@ def blocks(fmu: FMU, system: System, layout: Layout) -> Blocks:
         rates=references,
         home=np.array(
             [
-                min((block[k] for k in fed[j]), default=len(found)) if j in fed else block[int(at)]
+                min((block[k] for k in fed[j]), default=len(blocks)) if j in fed else block[int(at)]
                 for j, at in enumerate(layout.seen)
             ],
             np.intp,
@@ -113,11 +113,11 @@ def divide(
         shared.append(int(neighbours[:size].argmax()))
         left[shared[-1]] = False
         nodes = np.flatnonzero(left)
-        found = _components(adjacent[np.ix_(nodes, nodes)], nodes, size)
+        components = _components(adjacent[np.ix_(nodes, nodes)], nodes, size)
         # Few unlike ones are shared: what stands between blocks is known of like ones.
-        most = Counter(map(kind, found)).most_common(1)[0][0]
-        alike = [block for block in found if kind(block) == most]
-        rest = shared + [k for block in found if kind(block) != most for k in block]
+        most = Counter(map(kind, components)).most_common(1)[0][0]
+        alike = [block for block in components if kind(block) == most]
+        rest = shared + [k for block in components if kind(block) != most for k in block]
         operations = sum((len(block) + len(rest)) ** 3 for block in alike)
         if operations < fewest:
             fewest, best = operations, (alike, sorted(rest))
@@ -127,11 +127,11 @@ def divide(
 def _components(adjacent: NDArray[np.bool_], nodes: Indices, size: int) -> list[list[int]]:
     """Sets of nodes below `size` that are linked with each other, through any nodes."""
     _, label = connected_components(adjacent, directed=False)
-    found: dict[int, list[int]] = {}
+    members: dict[int, list[int]] = {}
     for node, part in zip(nodes, label, strict=True):
         if node < size:
-            found.setdefault(int(part), []).append(int(node))
-    return list(found.values())
+            members.setdefault(int(part), []).append(int(node))
+    return list(members.values())
 
 
 def widths(parts: Blocks) -> tuple[int, int]:

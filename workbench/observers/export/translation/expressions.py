@@ -99,38 +99,38 @@ class Expressions(ABC):
         last = max(
             (k for k, (operand, lines) in enumerate(parts) if lines or operand.acts), default=-1
         )
-        found = []
+        values = []
         for k, (operand, lines) in enumerate(parts):
             self.lines += lines
             changes = operand.acts and len(parts) > 1
             kept = isinstance(operand.type, Number) and (changes or (k < last and operand.reads))
-            found.append(self.temporary(operand) if kept else operand)
-        return found
+            values.append(self.temporary(operand) if kept else operand)
+        return values
 
     # --- any expression ---
 
     def value(self, node: ast.expr) -> Value:
         """One value."""
-        found = self.found(node)
-        if isinstance(found, tuple):
+        value = self.found(node)
+        if isinstance(value, tuple):
             raise self.refused(node, "a tuple where one value is needed")
-        return found
+        return value
 
     def number(self, node: ast.expr) -> Value:
         """One number."""
         return self._checked(node, self.value(node))
 
-    def _checked(self, node: ast.expr, found: Value) -> Value:
-        if not isinstance(found.type, Number):
+    def _checked(self, node: ast.expr, value: Value) -> Value:
+        if not isinstance(value.type, Number):
             raise self.refused(node, "an array or tuple where a number is needed")
-        return found
+        return value
 
     def numbers(self, nodes: Sequence[ast.expr]) -> list[Value]:
         """Operands that are numbers."""
-        found = self.operands(nodes)
-        for node, value in zip(nodes, found, strict=True):
+        values = self.operands(nodes)
+        for node, value in zip(nodes, values, strict=True):
             self._checked(node, value)
-        return found
+        return values
 
     def found(self, node: ast.expr) -> Found:
         """One value or several."""
@@ -174,10 +174,10 @@ class Expressions(ABC):
             return self._outside(node)
         of = self.value(node.value)
         if isinstance(of.type, Record):
-            found = field(of, node.attr)
-            if found is None:
+            value = field(of, node.attr)
+            if value is None:
                 raise self.refused(node, "a field that is not there")
-            return found
+            return value
         if isinstance(of.type, Array) and node.attr in ("size", "shape"):
             sizes = sizes_of(of)
             if node.attr == "shape":
@@ -356,13 +356,13 @@ class Expressions(ABC):
 
     def tests_apart(self, nodes: Sequence[ast.expr]) -> list[tuple[Value, list[str]]]:
         """Truths, each with the statements that it needs before it."""
-        found = []
+        values = []
         for node in nodes:
             outer, self.lines = self.lines, []
             value = self.test(node)
-            found.append((value, self.lines))
+            values.append((value, self.lines))
             self.lines = outer
-        return found
+        return values
 
     def _truth(self, node: ast.expr, value: Value) -> Value:
         if value.kind == DOUBLE:

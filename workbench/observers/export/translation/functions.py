@@ -179,9 +179,9 @@ class _Body(Statements):
         self._program = program
 
     def called(self, node: ast.Call, function: Any, given: Sequence[Value]) -> Value:
-        found = self._program.call(lambda found: self.refused(node, found), function, given)
-        self.acts = self.acts or found.acts
-        return found
+        result = self._program.call(lambda found: self.refused(node, found), function, given)
+        self.acts = self.acts or result.acts
+        return result
 
 
 def _function(called: Any) -> FunctionType | None:
@@ -214,22 +214,22 @@ def _source(function: FunctionType) -> tuple[ast.FunctionDef, Callable[[ast.AST]
 
 def _arguments(body: Statements, tree: ast.FunctionDef, given: Sequence[Type]) -> dict[str, str]:
     """Give a body its arguments; their declarations by name in C."""
-    found = {}
+    declarations = {}
     for argument, type_ in zip(tree.args.args, given, strict=True):
         name = name_in_c(argument.arg)
         sizes: list[Value] = []
-        found[name] = declaration(type_, name)
+        declarations[name] = declaration(type_, name)
         if isinstance(type_, Number) and body.names.assigned[argument.arg] > 1:
-            found[name] = found[name].removeprefix("const ")
+            declarations[name] = declarations[name].removeprefix("const ")
         for axis, size in enumerate(type_.shape if isinstance(type_, Array) else ()):
             if size is None:
                 size_name = f"{name}_size{axis}"
-                found[size_name] = f"const int {size_name}"
+                declarations[size_name] = f"const int {size_name}"
                 sizes.append(Value(Number(INT), size_name, natural=True))
             else:
                 sizes.append(number(size))
         body.argument(argument.arg, Value(type_, name, sizes=tuple(sizes)))
-    return found
+    return declarations
 
 
 def _commented(text: str) -> list[str]:

@@ -87,12 +87,12 @@ def _extreme(name: str, given: Sequence[Value]) -> Value | None:
     """The least or largest, the first of equal ones, by comparisons in Python's order."""
     if len(given) < _TWO:
         return None
-    found = given[0]
+    result = given[0]
     for argument in given[1:]:
-        kind = common(common(found.kind, argument.kind), INT)
+        kind = common(common(result.kind, argument.kind), INT)
         of = name if kind == DOUBLE else f"{name}_int"
-        natural = kind == INT and found.natural and argument.natural
-        found = expression(
-            kind, f"{of}({found.text}, {argument.text})", found, argument, natural=natural
+        natural = kind == INT and result.natural and argument.natural
+        result = expression(
+            kind, f"{of}({result.text}, {argument.text})", result, argument, natural=natural
         )
-    return found
+    return result

@@ -31,23 +31,23 @@ class Names:
 
 def names_of(function: ast.FunctionDef) -> Names:
     """Study a function."""
-    found = Names()
+    names = Names()
     for node in ast.walk(function):
         if isinstance(node, ast.For) and isinstance(node.target, ast.Name):
-            found.counters.add(node.target.id)
+            names.counters.add(node.target.id)
         elif isinstance(node, ast.Assign):
-            found.assigned.update(name for target in node.targets for name in _targets(target))
+            names.assigned.update(name for target in node.targets for name in _targets(target))
         elif isinstance(node, ast.AugAssign) and isinstance(node.target, ast.Name):
-            found.assigned[node.target.id] += 1
+            names.assigned[node.target.id] += 1
     parameters = [argument.arg for argument in function.args.args]
-    found.assigned.update(parameters)
+    names.assigned.update(parameters)
     uses: dict[str, list[_Use]] = {}
     for name, use in _uses(function.body, (id(function),)):
         uses.setdefault(name, []).append(use)
-    found.local = {
-        name for name in found.assigned if name not in parameters and _declared_there(uses[name])
+    names.local = {
+        name for name in names.assigned if name not in parameters and _declared_there(uses[name])
     }
-    return found
+    return names
 
 
 def _declared_there(uses: list[_Use]) -> bool:

@@ -156,8 +156,8 @@ class Statements(Expressions):
         return end.known is None and (end.reads or bool(within & changing))
 
     def _return(self, node: ast.Return) -> None:
-        found = () if node.value is None else self.found(node.value)
-        values = found if isinstance(found, tuple) else (found,)
+        returned = () if node.value is None else self.found(node.value)
+        values = returned if isinstance(returned, tuple) else (returned,)
         if not all(isinstance(value.type, Number) for value in values):
             raise self.refused(node, "a result that is no number")
         if self.returned not in (None, len(values)):
@@ -226,8 +226,8 @@ class Statements(Expressions):
         return wider
 
     def _assign_several(self, node: ast.Assign, target: ast.Tuple) -> None:
-        found = self.found(node.value)
-        values = list(found) if isinstance(found, tuple) else self._parts(node, found)
+        assigned = self.found(node.value)
+        values = list(assigned) if isinstance(assigned, tuple) else self._parts(node, assigned)
         if len(values) != len(target.elts):
             raise self.refused(node, "another number of values than of names")
         written = {elt.id for elt in target.elts if isinstance(elt, ast.Name)}
@@ -242,14 +242,14 @@ class Statements(Expressions):
     def _is_open(value: Value) -> bool:
         return isinstance(value.type, Number) and value.known is None
 
-    def _parts(self, node: ast.Assign, found: Value) -> list[Value]:
+    def _parts(self, node: ast.Assign, value: Value) -> list[Value]:
         """Numbers of a call that gives several."""
-        if not isinstance(found.type, Results):
+        if not isinstance(value.type, Results):
             raise self.refused(node, "one value for several names")
         self._temporaries += 1
         name = f"given{self._temporaries}"
-        self.lines.append(f"{declaration(found.type, name)} = {found.text};")
-        return [Value(Number(kind), f"{name}.part{k}") for k, kind in enumerate(found.type.kinds)]
+        self.lines.append(f"{declaration(value.type, name)} = {value.text};")
+        return [Value(Number(kind), f"{name}.part{k}") for k, kind in enumerate(value.type.kinds)]
 
     def _store(self, target: ast.expr, value: Value) -> None:
         if isinstance(target, ast.Name):

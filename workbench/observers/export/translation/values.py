@@ -182,19 +182,19 @@ def c_number(kind: str) -> str:
 def field(record: Value, name: str) -> Value | None:
     """A field of a record; None if it has none of this name."""
     assert isinstance(record.type, Record)
-    found = dict(record.type.fields).get(name)
-    if found is None:
+    value = dict(record.type.fields).get(name)
+    if value is None:
         return None
     text = f"{record.member}{name_in_c(name)}"
-    if isinstance(found, Number):
-        return Value(found, text, reads=not record.type.constant)
-    if isinstance(found, Array):
-        type_ = replace(found, constant=record.type.constant)
-        return Value(type_, text, sizes=tuple(number(size or 0) for size in found.shape))
-    if isinstance(found, Several):
-        return Value(replace(found, of=_as(found.of, record.type.constant)), text)
-    assert isinstance(found, Record)
-    return Value(_as(found, record.type.constant), f"&{text}")
+    if isinstance(value, Number):
+        return Value(value, text, reads=not record.type.constant)
+    if isinstance(value, Array):
+        type_ = replace(value, constant=record.type.constant)
+        return Value(type_, text, sizes=tuple(number(size or 0) for size in value.shape))
+    if isinstance(value, Several):
+        return Value(replace(value, of=_as(value.of, record.type.constant)), text)
+    assert isinstance(value, Record)
+    return Value(_as(value, record.type.constant), f"&{text}")
 
 
 def _as(record: Record, constant: bool) -> Record:
