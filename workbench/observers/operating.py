@@ -143,6 +143,23 @@ def walks(fmu: FMU, system: System) -> Vector:
     return np.array([system.walks.get(name, 2e-4 * nominal[name]) for name in fmu.states])
 
 
+def start_spreads(fmu: FMU, system: System) -> Vector:
+    """Standard deviation of the states at the start, (n,), where no sample shows them [unit].
+
+    Declared, or the nominal value, which says of what size a state is; never more than that of any
+    value between the limits that the model has. A walk says nothing of a start.
+    """
+    variables = {variable.name: variable for variable in fmu.description.variables}
+    spreads = []
+    for name in fmu.states:
+        size = abs(variables[name].nominal or 1.0)
+        low, high = variables[name].minimum, variables[name].maximum
+        if low is not None and high is not None:
+            size = min(size, (high - low) / np.sqrt(12.0))
+        spreads.append(system.spreads.get(name, size))
+    return np.array(spreads)
+
+
 def loops(model: LinearModel) -> tuple[Matrix, Matrix]:
     """Order of the loop that each gain closes from an output to a quantity's rate, and its effect.
 

@@ -346,7 +346,7 @@ class StateNoise:
         "standard deviation at the start, where no output shows it",
         unit=lambda scope, _: unit_in_model(scope, scope.own["name"]),
         absent=None,
-        otherwise="`walk`",
+        otherwise="its nominal value, or that of any value from its `min` to its `max`, if less",
     )
 
 

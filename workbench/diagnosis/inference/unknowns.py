@@ -79,7 +79,8 @@ class Unknowns:
         # What rolls along a measured state may have no sensor of its own.
         seen = [] if led else [name for name in begin if name in system.signals]
         shown = {name: ALONG * system.signals[name].noise_at_scale for name in seen}
-        return {**shown, **system.spreads}
+        hidden = {name: spread for name, spread in system.spreads.items() if spread > 0.0}
+        return {**shown, **hidden}
 
     def level_unit(self, key: Key) -> str:
         """Unit of a level, or of a delay."""

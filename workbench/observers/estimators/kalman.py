@@ -36,7 +36,7 @@ from workbench.observers.layout import (
     report,
     stick,
 )
-from workbench.observers.operating import walks
+from workbench.observers.operating import start_spreads, walks
 from workbench.system.system import System
 
 _OUTLYING = 9.0  # three standard deviations, squared: what is larger counts as this
@@ -602,16 +602,12 @@ class ExtendedKalmanFilter(Estimator):
             relative=np.array([_share(gains, output.name) for output in system.outputs]),
             floor=np.array([gains[output.name] for output in system.outputs]),
             walk=np.array([*of_states, *(gains[quantity.name] for quantity in system.estimated)]),
-            spread=np.array([*np.maximum(of_states, self._spreads()), *initial]),
+            spread=np.array([*start_spreads(fmu, system), *initial]),
             learning=learns,
             driven=learnt * np.array([signal.noise for signal in system.inputs]),
             driven_relative=learnt * np.array([signal.relative_noise for signal in system.inputs]),
         )
         self._state: Any = filter_state(n, system, n + q)
-
-    def _spreads(self) -> Vector:
-        """What is not known of the states at the start, (n,)."""
-        return np.array([self.system.spreads.get(name, 0.0) for name in self.fmu.states])
 
     def _arguments(self) -> tuple[Any, Any]:
         return self._settings, self._state
