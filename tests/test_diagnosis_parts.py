@@ -12,8 +12,9 @@ pytest.importorskip("rumoca")
 
 from workbench.arrays import Matrix, Vector
 from workbench.diagnosis import build_everything, choose, given_values, read_effects
-from workbench.diagnosis.data.cleaning import outliers
+from workbench.diagnosis.data.cleaning import outliers, smooth
 from workbench.diagnosis.data.clocks import in_time
+from workbench.diagnosis.data.counting import count
 from workbench.diagnosis.data.motion import ModelSource, OpenModel, motion, opened
 from workbench.diagnosis.data.samples import Samples, compared
 from workbench.diagnosis.data.samples import prepare as prepare_samples
@@ -49,7 +50,7 @@ from workbench.diagnosis.simulation.simulator import (
 from workbench.errors import FMUError, InputError
 from workbench.models.fmu import FMU, CoSimulation
 from workbench.models.modelica import read_library
-from workbench.recordings.case import Case, read_cases
+from workbench.recordings.case import Case, make_case, read_cases
 from workbench.system.registry import load_system
 from workbench.system.template import write_system
 
@@ -225,6 +226,49 @@ def test_spikes_are_set_aside_with_their_blocks() -> None:
     for k in spikes:
         assert not any(first <= k < end for first, end in samples.blocks)
         assert samples.gain[k] == 0.0
+
+
+def test_blocks_span_equal_times_where_steps_do_not(tmp_path: Path) -> None:
+    """A cycler: 0.5 s while it pulses, one sample in 60 s while it rests; nearly all counts."""
+    write_system(tmp_path / "tank")
+    tank = load_system(tmp_path / "tank")
+    bursts = [
+        3060.0 * k + np.append(np.arange(0.0, 60.0, 0.5), 60.0 * np.arange(1, 51)) for k in (0, 1)
+    ]
+    time = np.concatenate(bursts)
+    noise = np.random.default_rng(1)
+    signals = {
+        "inflow": 4e-3 + 5e-5 * noise.standard_normal(time.size),
+        "h": 1.0 + 0.1 * np.sin(time / 500.0) + 2e-3 * noise.standard_normal(time.size),
+    }
+    case = make_case("cycler", (time, signals), {}, tank)
+    counted = count(case, tank, ("inflow", "h"), SOUND, restarting=False)
+    first, end = counted.blocks.T
+    seconds = np.append(time, time[-1])[end] - time[first]
+    assert seconds.sum() > 0.95 * (time[-1] - time[0])
+    assert counted.missing == 0
+    dense = np.diff(np.append(time, time[-1] + 60.0))[first] < 1.0
+    assert (end - first)[dense].tolist() == [5] * dense.sum()
+    assert (end - first)[~dense].max() == 1
+    held = smooth(time, signals["inflow"], (5.0, 10.0), 0.5, SOUND.held)
+    resting = (np.diff(time, prepend=0.0) > 1.0) & (np.diff(time, append=np.inf) > 1.0)
+    assert (held[resting] == signals["inflow"][resting]).all()
+
+
+def test_a_gap_is_in_no_block_and_leaves_others_as_they_are(tmp_path: Path) -> None:
+    write_system(tmp_path / "tank")
+    tank = load_system(tmp_path / "tank")
+    time = np.delete(np.arange(0.0, 600.0, 0.5), slice(400, 440))
+    noise = np.random.default_rng(1)
+    signals = {
+        "inflow": 4e-3 + 5e-5 * noise.standard_normal(time.size),
+        "h": 1.0 + 2e-3 * noise.standard_normal(time.size),
+    }
+    case = make_case("gap", (time, signals), {}, tank)
+    blocks = count(case, tank, ("inflow", "h"), SOUND, restarting=False).blocks
+    assert set((blocks[:, 1] - blocks[:, 0]).tolist()) == {5}
+    spans = np.array([time[first:end] for first, end in blocks])
+    assert np.diff(spans).max() < 5.0
 
 
 @pytest.mark.parametrize("name", ["pB", "tauR", "omegaW", "omegaR", "Fx"])

@@ -81,12 +81,35 @@ def bridge(time: Vector, values: Vector, wrong: Mask) -> Vector:
     return np.interp(time, time[~wrong], values[~wrong]) if wrong.any() else values
 
 
-def smooth(values: Vector, windows: Sequence[float], h: float, held: float) -> Vector:
+def smooth(time: Vector, values: Vector, windows: Sequence[float], h: float, held: float) -> Vector:
     """An input without most of its sensor's noise, and without lag.
 
     The machine does not feel that noise; fed to a model, any effect that lags or sticks would gain
-    by keeping it from the rest. Where the input holds, the mean is taken over longer.
+    by keeping it from the rest. Where the input holds, the mean is taken over longer. Parts that
+    are sampled at other rates than each h (`uneven_steps`) are left as they are.
     """
+    edges = np.flatnonzero(uneven_steps(time, h)) + 1
+    parts = np.split(values, edges)
+    return np.concatenate(
+        [_smooth_evenly(part, windows, h, held) if part.size > _FEW else part for part in parts]
+    )
+
+
+def uneven_steps(time: Vector, h: float) -> Mask:
+    """Which steps are of a part that is sampled at another rate than each h, (n - 1,).
+
+    There, a step of more than 2 h, or less than h/2, has another one beside it; alone it is a gap.
+    """
+    steps = np.diff(time)
+    other = (steps > 2.0 * h) | (steps < 0.5 * h)
+    beside = np.zeros_like(other)
+    beside[1:] |= other[:-1]
+    beside[:-1] |= other[1:]
+    uneven: Mask = other & beside
+    return uneven
+
+
+def _smooth_evenly(values: Vector, windows: Sequence[float], h: float, held: float) -> Vector:
     best, noise = values, deviation_of(values)
     for seconds, order in zip(windows, (2, 1), strict=False):
         window = 2 * (round(seconds / h) // 2) + 1

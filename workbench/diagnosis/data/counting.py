@@ -7,7 +7,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.arrays import Vector
-from workbench.diagnosis.data.cleaning import Mask, bridge, noise_in, outliers, runs, saturated
+from workbench.diagnosis.data.cleaning import (
+    Mask,
+    bridge,
+    noise_in,
+    outliers,
+    runs,
+    saturated,
+    uneven_steps,
+)
 from workbench.diagnosis.inference.thresholds import Soundness
 from workbench.errors import InputError
 from workbench.recordings.case import Case
@@ -101,10 +109,12 @@ def count(
         LEADING: time < case.counts_from,
         "settling": time < time[0] + compare.settling,
     }
-    blocks = blocks_of(~np.logical_or.reduce(list(excluded.values())), time, compare.block, h)
-    refuse_too_short(case, system, blocks, excluded)
+    usable = ~np.logical_or.reduce(list(excluded.values()))
+    blocks, seconds = blocks_of(usable, time, compare.block, h)
+    refuse_too_short(case, system, seconds, excluded)
     deviation = {n: noise_in(clean[n][~beyond[n]], system.signals[n]) for n in names}
-    missing = int(np.sum(np.maximum(0, np.round(np.diff(time) / h) - 1)))
+    lost = np.maximum(0.0, np.round(np.diff(time) / h) - 1.0)
+    missing = int(lost[~uneven_steps(time, h)].sum())
     return CountedSamples(clean, wrong, deviation, excluded, spans, applied, blocks, missing)
 
 
@@ -127,9 +137,13 @@ def refuse_too_few(cases: Sequence[Case], system: System) -> None:
 
 
 def refuse_too_short(
-    case: Case, system: System, blocks: NDArray[np.int64], excluded: Mapping[str, Mask]
+    case: Case, system: System, seconds: float, excluded: Mapping[str, Mask]
 ) -> None:
     """Refuse a recording with too little that counts.
+
+    Parameters
+    ----------
+    seconds : that count.
 
     Raises
     ------
@@ -137,11 +151,11 @@ def refuse_too_short(
         With what was set aside, by reason.
     """
     compare = system.comparison
-    if len(blocks) * compare.block < compare.least * (1.0 - 1e-9):
+    if seconds < compare.least * (1.0 - 1e-9):
         lost = ", ".join(f"{reason}: {mask.sum()}" for reason, mask in excluded.items())
         raise InputError(
             where=str(case.source),
-            found=f"{compare.block * len(blocks):.3g} s that count; samples set aside: {lost}",
+            found=f"{seconds:.3g} s that count; samples set aside: {lost}",
             expected=f"{compare.least:g} s or more, because less does not tell noise from cause",
             remedy="leave this recording out, or repair it",
         )
@@ -186,13 +200,33 @@ def excluded_by(
     return mask
 
 
-def blocks_of(usable: Mask, time: Vector, block: float, h: float) -> NDArray[np.int64]:
-    """First sample and end of each block of samples that count, without a gap, (b, 2)."""
+def blocks_of(
+    usable: Mask, time: Vector, block: float, h: float
+) -> tuple[NDArray[np.int64], float]:
+    """First sample and end of each block of samples that count, (b, 2); and seconds in all of them.
+
+    Where samples are h apart, a block holds as many of them as make its time, and one with a gap is
+    none. Where a recorder samples at another rate (`uneven_steps`), a block holds the samples of
+    its time, be it one, which stands for the time to the next.
+    """
     size = max(1, round(block / h))
-    found = [
-        (k, k + size)
-        for first, end in runs(usable)
-        for k in range(first, end - size + 1, size)
-        if time[k + size - 1] - time[k] < 2.0 * max(block, h)
-    ]
-    return np.array(found, dtype=np.int64).reshape(-1, 2)
+    uneven = np.append(uneven_steps(time, h), False)
+    blocks: list[tuple[int, int]] = []
+    seconds = 0.0
+    for first, end in runs(usable):
+        k = first
+        while k < end:
+            if not uneven[k : k + max(1, size - 1)].any():
+                whole = k + size <= end and time[k + size - 1] - time[k] < 2.0 * max(block, h)
+                if whole:
+                    blocks.append((k, k + size))
+                    seconds += block
+                k += size
+                continue
+            # The first sample at the end of this block's time, within rounding of times.
+            after = max(k + 1, int(np.searchsorted(time, time[k] + block * (1.0 - 1e-9))))
+            if after <= min(end, time.size - 1):
+                blocks.append((k, after))
+                seconds += float(time[after] - time[k])
+            k = after
+    return np.array(blocks, dtype=np.int64).reshape(-1, 2), seconds

@@ -41,7 +41,7 @@ def restarts_of(system: System, counted: CountedSamples) -> Restarts | None:
     if not counted.spans.any():
         return None
     at = np.zeros(counted.spans.size, np.bool_)
-    size = int(counted.blocks[0, 1] - counted.blocks[0, 0])
+    size = int(np.median(np.diff(counted.blocks)))
     for first, end in runs(~counted.usable):
         at[first:end:size] = counted.spans[first:end].any()
     for first, end in counted.blocks:

@@ -234,7 +234,7 @@ def prepare(
     white = whitening(system, counted, own, own_slopes, ahead)
     nothing = np.zeros(time.size)
     driving = [
-        smooth(clean[signal.name], signal.smoothed, h, sound.held) for signal in system.inputs
+        smooth(time, clean[signal.name], signal.smoothed, h, sound.held) for signal in system.inputs
     ]
     rest, rest_noise = _at_rest(system.comparison, clean, counted.applied)
     start = slice(0, max(1, round(_STARTING * system.sample_time / h)))

@@ -28,7 +28,7 @@ def whitening(
     """
     clean, deviation, blocks = counted.clean, counted.deviation, counted.blocks
     spans = np.array([counted.spans[first:end].any() for first, end in blocks])
-    size = int(blocks[0, 1] - blocks[0, 0])
+    size = blocks[:, 1] - blocks[:, 0]
     fixed = np.array([deviation[name] ** 2 for name in signals])
     covariance = np.tile(slopes * fixed @ slopes.T, (len(blocks), 1, 1))
     for c, row in enumerate(slopes):
@@ -51,7 +51,8 @@ def whitening(
     covariance += slopes @ predicted @ slopes.T
     # A signal that rests within a step of its reading is wrong by the same in all samples.
     steps = np.array([system.signals[name].resolution ** 2 / 12.0 for name in signals])
-    return np.linalg.inv(np.linalg.cholesky(covariance / size + slopes * steps @ slopes.T))
+    covariance = covariance / size[:, None, None] + slopes * steps @ slopes.T
+    return np.linalg.inv(np.linalg.cholesky(covariance))
 
 
 def _ringing(means: Vector, late: float) -> Vector:
