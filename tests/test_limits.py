@@ -1,47 +1,35 @@
 """Sizes of causes at their bounds, and what is said of them."""
 
-from collections import defaultdict
-from types import SimpleNamespace
-from typing import Any
+import math
 
-import numpy as np
 import pytest
 
-from workbench.diagnosis.effects.catalogue import Effect
-from workbench.diagnosis.inference import verdict
 from workbench.diagnosis.inference.verdict import Interval
 
-BOUNDS = {"friction": (0.0, 0.0133)}
-KEY = ("Dry", "friction")
-
-
-def estimated(value: float) -> Interval:
-    """What a cause says of its size, which may go from zero to a bound."""
-    effect = Effect("Dry", "Dry", ("bearing",), "friction", 1e-3, "dry friction", "a slow turn")
-    unknowns = SimpleNamespace(bounds=lambda effect, name: BOUNDS[name], unit=lambda *_: "N.m")
-    trial = SimpleNamespace(
-        covariance=lambda: np.full((1, 1), 1e-8), joint=SimpleNamespace(known=(KEY,))
-    )
-    chosen: Any = SimpleNamespace(
-        best=SimpleNamespace(point=SimpleNamespace(sizes={KEY: value}, phases={})),
-        trial=trial,
-        twins=defaultdict(dict),
-        less=defaultdict(dict),
-        validation=SimpleNamespace(explained=lambda *_, fast: (1.0, 1.0)),
-    )
-    fit: Any = SimpleNamespace(unknowns=unknowns)
-    return verdict._cause(fit, chosen, effect).parameters["friction"]
+ESTIMATE = Interval(0.01, 0.009, 0.011, "N.m")
+GREATEST = Interval(0.0133, 0.012, math.inf, "N.m", "greatest")
+BETTER = Interval(0.0133, 0.012, math.inf, "N.m", "greatest", beyond=0.015)
+ALONE = Interval(0.0133, 0.012, math.inf, "N.m", "greatest", beyond=0.015, alone=True)
+LEAST = Interval(-0.2, -math.inf, -0.18, "1", "least")
 
 
 @pytest.mark.parametrize(
-    ("value", "limit", "said"),
+    ("size", "text"),
     [
-        (0.0133, "greatest", "at its limit of 0.0133 N.m, which is no estimate: larger may fit"),
-        (0.0, "least", "smaller may fit better"),
-        (0.01, "", "95 %: "),
+        (ESTIMATE, "0.01 N.m (95 %: 0.009 to 0.011)"),
+        (GREATEST, "at its limit of 0.0133 N.m, which is no estimate: larger may fit better"),
+        (LEAST, "at its limit of -20 %, which is no estimate: smaller may fit better"),
+        (BETTER, "no estimate: 0.015 N.m, beyond it, fits better"),
+        (ALONE, "no estimate: 0.015 N.m, beyond it, fits better, alone"),
     ],
 )
-def test_a_size_at_its_bound_is_no_estimate(value: float, limit: str, said: str) -> None:
-    size = estimated(value)
-    assert size.limit == limit
-    assert said in size.text
+def test_a_size_at_its_bound_is_no_estimate(size: Interval, text: str) -> None:
+    assert size.text.endswith(text)
+
+
+def test_an_interval_is_open_to_the_side_of_a_bound() -> None:
+    """JSON has no infinity."""
+    assert (GREATEST.to_dict()["low"], GREATEST.to_dict()["high"]) == (0.012, None)
+    assert (LEAST.to_dict()["low"], LEAST.to_dict()["high"]) == (None, -0.18)
+    assert GREATEST.to_dict()["limit"] == "greatest"
+    assert ESTIMATE.to_dict()["high"] == 0.011

@@ -309,6 +309,74 @@ def test_a_logger_of_the_system_file_that_is_late_is_named(fan: System, tmp_path
     assert "late by" in undeclared.sentence
 
 
+# --- what is beyond a bound, and what is a part ---
+
+
+@pytest.fixture(scope="module")
+def bounded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Outcome, Path]:
+    """A bearing that rubs by more than its class allows, and brushes that cannot stand for it."""
+    folder = tmp_path_factory.mktemp("bounded")
+    library = LIBRARY.replace("min=0.0, max=1.0", f"min=0.0, max={0.6 * FRICTION}")
+    system = declare(folder, library.replace("max=3.0", "max=0.06"), SYSTEM)
+    cases = recorded(folder / "recordings", system, rubbing)
+    return diagnosis(system, cases, folder / "results"), folder / "results"
+
+
+def test_a_cause_beyond_its_bound_is_told_with_it(bounded: tuple[Outcome, Path]) -> None:
+    """And not two causes, of which one stands for what the other may not be."""
+    outcome, out = bounded
+    assert outcome.diagnosis.verdict == "partly explained"
+    (cause,) = outcome.diagnosis.causes
+    friction = cause.parameters["tau_c"]
+    assert (cause.effect.name, friction.limit) == ("BearingFriction", "greatest")
+    assert friction.high == np.inf
+    # As sure as a size within its bounds is, in the test of a bearing that rubs.
+    assert friction.beyond == pytest.approx(FRICTION, rel=0.15)
+    page = write_diagnosis(outcome, {"run": run_of("diagnose", outcome.system, {})}, out, 1)
+    (doubt,) = json.loads((out / "summary.json").read_text())["warnings"]
+    warnings = lxml.html.fromstring(page.read_bytes()).find_class("warning")
+    assert doubt in [" ".join(one.text_content().split()) for one in warnings]
+    assert f"doubt: {doubt}" in outcome.summary()
+    assert "at its limit of 0.03 N.m" in doubt
+
+
+def windy(t: float, w: float) -> float:
+    """A bearing that rubs, in wind that no class of the library knows."""
+    return rubbing(t, w) + 0.6 * gusts(t, w)
+
+
+def test_a_part_is_told_with_its_size_and_what_remains(diagnosed: Diagnosed) -> None:
+    outcome, out = diagnosed(windy)
+    assert outcome.diagnosis.verdict == "partly explained"
+    (cause,) = outcome.diagnosis.causes
+    friction = cause.parameters["tau_c"]
+    assert {cause.effect.name, *cause.confusable_with} >= {"BearingFriction"}
+    assert friction.low <= FRICTION <= friction.high
+    # What remains widens it.
+    sure = diagnosed(rubbing)[0].diagnosis.causes[0].parameters["tau_c"]
+    assert friction.high - friction.low > sure.high - sure.low
+    gain = outcome.diagnosis.gain
+    assert gain is not None
+    assert gain.after < gain.before
+    assert "This is a part" in outcome.sentence
+    assert outcome.rivals is not None
+    assert outcome.extension is not None
+    assert "a part of what is missing" in outcome.extension.modelica.read_text()
+    write_diagnosis(outcome, {"run": run_of("diagnose", outcome.system, {})}, out, 1)
+    summary = json.loads((out / "summary.json").read_text())
+    assert summary["partial"] == [cause.effect.name]
+    assert summary["model"]["partial"] is True
+
+
+def test_where_nothing_is_accepted_the_nearest_candidates_say_why(diagnosed: Diagnosed) -> None:
+    outcome, _ = diagnosed(gusts)
+    assert "nearest candidates" in outcome.summary()
+    assert "--propose" in outcome.summary()
+    for candidate in outcome.diagnosis.nearest:
+        assert 0.0 < candidate.removed < 0.9
+        assert candidate.reasons
+
+
 def test_drag_that_differs_by_nature_is_a_level_and_no_cause(diagnosed: Diagnosed) -> None:
     outcome, _ = diagnosed(nothing)
     value, unit = outcome.levels["c", "all"]

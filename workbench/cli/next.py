@@ -89,7 +89,7 @@ def _read(file: Path) -> dict[str, Any]:
     text = read_text(file, remedy)
     try:
         summary = json.loads(text)
-        if summary["verdict"] not in ("nothing", "found", "unexplained"):
+        if summary["verdict"] not in ("nothing", "found", "partly explained", "unexplained"):
             raise KeyError("verdict")
         str(summary["provenance"]["system"])
     except (ValueError, KeyError, TypeError, RecursionError):
@@ -102,7 +102,7 @@ def _rivals(summary: dict[str, Any], file: Path) -> Rivals:
     """What it left undecided."""
     from workbench.diagnosis.inference.rivals import read_rivals
 
-    if summary["verdict"] != "found":
+    if summary["verdict"] not in ("found", "partly explained"):
         raise InputError(
             where=str(file),
             found=f"the verdict '{summary['verdict']}'",

@@ -13,6 +13,7 @@ from typing import Any, Union
 from workbench.diagnosis.inference.residuals import Dependence
 from workbench.diagnosis.inference.sample_errors import Errors
 from workbench.diagnosis.inference.timing import LateSignals
+from workbench.diagnosis.inference.verdict import NearestCandidate
 from workbench.observers import estimators_of
 from workbench.pages.answer import Measure
 from workbench.recordings.case import UNKNOWN
@@ -141,9 +142,6 @@ BOTH = closed({"before": NUMBER, "after": NUMBER})
 
 
 VALUE = closed({"value": NUMBER, "unit": TEXT})
-
-
-INTERVAL = closed({"value": NUMBER, "low": NUMBER, "high": NUMBER, "unit": TEXT})
 
 
 SHARE = closed({"hits": WHOLE, "of": WHOLE, "share": ERROR, "low": NUMBER, "high": NUMBER})
@@ -410,11 +408,14 @@ def _tune() -> Schema:
 
 
 def _diagnose() -> Schema:
+    limit = {"enum": ["", "least", "greatest"]}
+    numbers = {"value": NUMBER, "low": ERROR, "high": ERROR, "beyond": ERROR}
+    size = {**numbers, "unit": TEXT, "limit": limit, "text": TEXT}
     cause = closed(
         {
             "effect": TEXT,
             "text": TEXT,
-            "parameters": by_name(INTERVAL),
+            "parameters": by_name(closed(size)),
             "phases": or_null(listed(NUMBER)),
             "confusable_with": listed(TEXT),
             "explained": NUMBER,
@@ -437,16 +438,24 @@ def _diagnose() -> Schema:
     }
     step = {"before": NUMBER, "rivals": listed(closed({"effect": TEXT, "misfit": NUMBER}))}
     matrix = listed(listed(NUMBER))
-    model = {"modelica": or_null(TEXT), "fmu": or_null(TEXT), "difference_from_fit": ERROR}
+    model = {
+        "partial": FLAG,
+        "modelica": or_null(TEXT),
+        "fmu": or_null(TEXT),
+        "difference_from_fit": ERROR,
+    }
     entries = {
-        "verdict": {"enum": ["nothing", "found", "unexplained"]},
+        "verdict": {"enum": ["nothing", "found", "partly explained", "unexplained"]},
         "sentence": NAMED,
         "interrupted": FLAG,
+        "warnings": listed(TEXT),
         "doubts": by_name(listed(TEXT)),
         "causes": listed(cause),
         "gain": or_null(closed(gain)),
         "model": closed(model),
         "partial": listed(TEXT),
+        "nearest": listed(declared(NearestCandidate)),
+        "next_steps": listed(TEXT),
         "late": or_null(declared(LateSignals)),
         "lasting_errors": by_name(BOTH),
         "dependences": listed(declared(Dependence)),

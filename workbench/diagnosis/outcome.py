@@ -122,6 +122,7 @@ class Outcome:
             return f"Nothing significant is missing: what remains is noise and tolerance.{cost}"
         if found.verdict == "unexplained":
             return f"{self._unexplained()}{cost}"
+        part = found.verdict == "partly explained"
         names = []
         for cause in found.causes:
             label, size = next(iter(cause.parameters.items()))
@@ -129,30 +130,71 @@ class Outcome:
             names.append(f"{cause.effect.text}: {cause.effect.name}{twins}, {label} {size.text}")
         assert found.gain is not None
         more = " The search was interrupted: more may be missing." if found.interrupted else ""
+        if part:
+            sizes = [size for cause in found.causes for size in cause.parameters.values()]
+            rest = f"no effect of the catalogue explains the rest{self._goes}"
+            if any(np.isfinite(size.beyond) for size in sizes):
+                rest = "a size beyond its bound explains more"
+            more = f" This is a part: {rest}."
         return (
             f"The model lacks {'; and '.join(names)}; on held-out recordings its error falls from "
             f"{found.gain.before:.1f} to {found.gain.after:.1f} times the noise.{more}{cost}"
         )
+
+    @property
+    def warnings(self) -> list[str]:
+        """What makes the answer doubtful, and what to do."""
+        return [
+            f"{cause.effect.name}: {name} {size.text}. "
+            f"If physics allows it, widen the bounds of {name} in {cause.effect.model}."
+            for cause in self.diagnosis.causes
+            for name, size in cause.parameters.items()
+            if size.limit
+        ]
+
+    @property
+    def next_steps(self) -> list[str]:
+        """What to do about what remains unexplained."""
+        if self.diagnosis.verdict not in ("unexplained", "partly explained"):
+            return []
+        if self.diagnosis.late is not None:
+            return []
+        steps = ["infer a law from these recordings: workbench diagnose ... --propose"]
+        if any("at its bound" in why for one in self.diagnosis.nearest for why in one.reasons):
+            steps.append("widen the bounds of a parameter at its bound, if physics allows it")
+        steps.append("add an effect for it to the library, and diagnose again")
+        return steps
 
     def _unexplained(self) -> str:
         partial, late = self.diagnosis.partial, self.diagnosis.late
         if late is not None:
             return f"Something is missing that clocks explain: {_late(late)}."
         part = f", though {' and '.join(partial)} would explain a part" * bool(partial)
+        return f"Something is missing that no effect of the catalogue explains{part}{self._goes}."
+
+    @property
+    def _goes(self) -> str:
+        """What that goes with which remains."""
         strongest = max(self.dependences, key=lambda dependence: dependence.after)
-        goes = f"; it goes with {strongest.influence}" if strongest.after > 0.0 else ""
-        return f"Something is missing that no effect of the catalogue explains{part}{goes}."
+        return f"; it goes with {strongest.influence}" if strongest.after > 0.0 else ""
 
     def summary(self) -> str:
         """The verdict, its causes and what they rest on, for people."""
-        lines = [self.sentence]
+        lines = [self.sentence, *(f"doubt: {warning}" for warning in self.warnings)]
         for cause in self.diagnosis.causes:
             lines += ["", *_told(cause)]
+        if self.diagnosis.verdict == "unexplained" and self.diagnosis.late is None:
+            lines += ["", "nearest candidates, on held-out recordings:"]
+            nearest = [candidate.text for candidate in self.diagnosis.nearest]
+            lines += [f"  {text}" for text in nearest or ["none removes any of it"]]
+        if self.next_steps:
+            lines += ["", "what to do:", *(f"  {step}" for step in self.next_steps)]
         if self.certainty is not None:
             lines += ["", self.certainty.sentence]
         lines += ["", *self._sample_errors()]
         if self.extension is not None:
-            lines += ["", f"extended model: {self.extension.modelica}, {self.extension.fmu}"]
+            part = " (a part of what is missing)" * (self.diagnosis.verdict == "partly explained")
+            lines += ["", f"extended model{part}: {self.extension.modelica}, {self.extension.fmu}"]
         aside = sum(counts[FAULTY] + counts[MISSING] for counts in self.set_aside.values())
         if aside:
             lines.append(f"{aside} samples were missing or wrong, and set aside")
@@ -205,11 +247,14 @@ class Outcome:
             "verdict": found.verdict,
             "sentence": self.sentence,
             "interrupted": found.interrupted,
+            "warnings": self.warnings,
             "doubts": {case.name: list(case.doubts) for case in self.cases if case.doubts},
             "causes": [_cause(cause) for cause in found.causes],
             "gain": None if found.gain is None else self._gain(found.gain),
-            "model": _model(self.extension),
+            "model": _model(self.extension, partial=found.verdict == "partly explained"),
             "partial": list(found.partial),
+            "nearest": [asdict(candidate) for candidate in found.nearest],
+            "next_steps": self.next_steps,
             "late": None if found.late is None else asdict(found.late),
             "lasting_errors": self._lasting_errors(),
             "dependences": [asdict(dependence) for dependence in self.dependences],
@@ -362,15 +407,7 @@ def _cause(cause: Cause) -> dict[str, Any]:
     return {
         "effect": cause.effect.name,
         "text": cause.effect.text,
-        "parameters": {
-            name: {
-                "value": parameter.value,
-                "low": parameter.low,
-                "high": parameter.high,
-                "unit": parameter.unit,
-            }
-            for name, parameter in cause.parameters.items()
-        },
+        "parameters": {name: size.to_dict() for name, size in cause.parameters.items()},
         "phases": None if cause.phases is None else [float(phase) for phase in cause.phases],
         "confusable_with": list(cause.confusable_with),
         "explained": cause.explained,
@@ -378,8 +415,9 @@ def _cause(cause: Cause) -> dict[str, Any]:
     }
 
 
-def _model(extension: Extension | None) -> dict[str, Any]:
+def _model(extension: Extension | None, *, partial: bool) -> dict[str, Any]:
     return {
+        "partial": partial,
         "modelica": None if extension is None else str(extension.modelica),
         "fmu": None if extension is None else str(extension.fmu),
         "difference_from_fit": None if extension is None else extension.difference,

@@ -48,7 +48,7 @@ from workbench.pages.parts import (
 from workbench.pages.templates import anchor
 from workbench.pages.views import called, capital, named, per_shown, shown_unit
 from workbench.system.system import System
-from workbench.system.units import si_factor, with_interval
+from workbench.system.units import si_factor
 
 _FLAGGED = 2.5  # standard deviations of a tolerance that deserve a look
 _SIMILAR = 0.7  # cosine from which on a pair is worth a word
@@ -78,7 +78,7 @@ def write_diagnosis_page(
     more = [] if best is None else [estimate_figure(best)]
     first, *others = zoomable([figures[0], *more, *figures[1:]], summary, folder, own_files=True)
     estimate = replace(others.pop(0), own_files=False, headed=False) if more else None
-    found = summary["verdict"] == "found"
+    found = bool(summary["causes"])
     title = "recording that shows it best" if found else "recording with the largest errors"
     parts = [
         Part("shown", f"The {title}", [*_shown(system, summary, figures, others, first)]),
@@ -123,6 +123,7 @@ def _warnings(system: System, summary: Mapping[str, Any]) -> list[str]:
             "The search was interrupted: the causes below were found before that, and there may be "
             "more."
         )
+    warnings += summary["warnings"]
     warnings += [doubt for doubts in summary["doubts"].values() for doubt in doubts]
     judged = [
         signal.name for signal in system.reference_signals if signal.name not in summary["channels"]
@@ -249,6 +250,23 @@ def _causes(summary: Mapping[str, Any]) -> list[Block]:
                 "</a>."
             ).format(part)
         )
+        if summary["nearest"]:
+            rows = [
+                (" and ".join(n["effects"]), number(n["removed"], ".0%"), "; ".join(n["reasons"]))
+                for n in summary["nearest"]
+            ]
+            caption = "Candidates that come nearest, and why they are not accepted."
+            columns = ("effects", Numbers("removed on held-out recordings"), "why not")
+            blocks.append(Table("nearest-table", caption, columns, rows, sortable=False))
+    elif verdict == "partly explained":
+        blocks.append(
+            Markup(
+                "These causes are a part of what is missing. No effect of the catalogue explains "
+                'the rest; what that goes with is <a href="#dependences">above</a>.'
+            )
+        )
+    if summary["next_steps"]:
+        blocks.append(f"What to do: {'; '.join(summary['next_steps'])}.")
     for place, cause in enumerate(summary["causes"], 1):
         title = f"{place}. {cause['effect']}: {cause['text']}"
         blocks.append(Article(f"cause-{place}", title, _cause(cause, certainty)))
@@ -283,11 +301,10 @@ def _cause(cause: Mapping[str, Any], certainty: Mapping[str, Any] | None) -> lis
         )
     rows = []
     for name, size in cause["parameters"].items():
-        shown = with_interval(size["value"], size["low"], size["high"], size["unit"])
         row = [
             name,
             *(number(size[key], ".4g") for key in ("value", "low", "high")),
-            *(size["unit"], shown),
+            *(size["unit"], size["text"]),
         ]
         if certainty:
             ends = certainty["likelihood"][f"{effect} {name}"]
@@ -606,7 +623,8 @@ def _with_band(estimate: Mapping[str, Any], factor: float) -> Cell:
 def _model(model: Mapping[str, Any], folder: Path) -> list[Block]:
     # What is written into the folder is linked from there.
     source, fmu = (Path(model[key]).relative_to(folder).as_posix() for key in ("modelica", "fmu"))
-    told = Markup(
+    part = "It explains a part of what is missing. " * model["partial"]
+    told = Markup(part) + Markup(
         'Modelica source <a href="{}">{}</a> and FMU <a href="{}">{}</a>, beside this page. '
         "Compiled, it predicts as the fit does: the largest difference on these recordings is "
         "{:.1e} standard deviations of the noise."

@@ -184,7 +184,8 @@ class _Found:
         every = {n: v for n, v in simulations.nominal.items() if n.partition("[")[0] in arrays}
         own = {**every, **own}
         added = ", ".join(effect.name for effect in present) or "calibrated levels"
-        about = f"{base} with {added}"
+        part = ", a part of what is missing" * (self.diagnosis.verdict == "partly explained")
+        about = f"{base} with {added}{part}"
         text = ExtendedModel(library, base, EXTENDED, present, about, values, own).source()
         folder = self.engine.out / "model"
         folder.mkdir(parents=True, exist_ok=True)

@@ -42,6 +42,28 @@ class CrossValidation:
             ]
         )
 
+    def chance(self, fitted: FittedModel, *, fast: bool) -> tuple[Vector, float]:
+        """Mean squares that noise exceeds as seldom as it raises an alarm, (K,), and of all.
+
+        Estimates of noise may be wrong by what `excess` says.
+        """
+        span = 1 if fast else fitted.linearised.lasting
+        told, parts = self._told(fitted), self._fit.parts if self._fit.unknowns.count == 1 else 1
+        blocks = [len(one.errors) for one in fitted.linearised.residuals for _ in range(parts)]
+        counts = [
+            max(1, n // parts // span) * int(one.sum()) for n, one in zip(blocks, told, strict=True)
+        ]
+        decides = self._fit.decides
+        most = [decides.fall_of(n) / n for n in (*counts, sum(counts))]
+        each = (1.0 + decides.excess) * np.array(most)
+        return each[:-1], float(each[-1])
+
+    def worsened(self, before: FittedModel, after: FittedModel, *, fast: bool) -> list[str]:
+        """Recordings that a fit predicts worse than another one does, and not to their noise."""
+        was, now = self.squares(before, fast=fast), self.squares(after, fast=fast)
+        worse = now > np.maximum(was, self.chance(after, fast=fast)[0])
+        return [name for name, one in zip(self._fit.tests, worse, strict=True) if one]
+
     def explained(self, less: FittedModel, best: FittedModel, *, fast: bool) -> tuple[float, float]:
         """Share of the explainable by which two fits differ; mean square error of the first."""
         before, after = (float(self.squares(model, fast=fast).mean()) for model in (less, best))

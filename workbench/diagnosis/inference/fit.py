@@ -120,6 +120,15 @@ class Fit:
         }
         return other
 
+    def opened(self, effect: Effect, parameter: str, side: str) -> "Fit":
+        """The same with a parameter that may pass its bound, "least" or "greatest"."""
+        low, high = self.unknowns.bounds(effect, parameter)
+        other = copy(self)
+        other.unknowns = copy(self.unknowns)
+        reach = (-np.inf, high) if side == "least" else (low, np.inf)
+        other.unknowns.opened = {**self.unknowns.opened, (effect.name, parameter): reach}
+        return other
+
     def blocks_of(self, part: int) -> slice:
         """Blocks of a part of a single recording."""
         edges = part_edges(len(self._simulations.recordings[0].blocks), self.parts)

@@ -43,6 +43,11 @@ class FittedModel:
     linearised: LinearizedPoint
     misfit: float
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of its effects."""
+        return tuple(effect.name for effect in self.active)
+
 
 @dataclass(frozen=True, eq=False)
 class Step:

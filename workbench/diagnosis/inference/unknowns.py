@@ -38,6 +38,7 @@ class Unknowns:
     effects : by name.
     modes : of structures before sensors, by the name of their delay.
     presence : of effects.
+    opened : bounds in place of those of the model, by effect and parameter.
     """
 
     def __init__(
@@ -46,6 +47,7 @@ class Unknowns:
         self._simulations = simulations
         self._compare = simulations.system.comparison
         self.effects = {effect.name: effect for effect in effects}
+        self.opened: dict[Key, tuple[float, float]] = {}
         self.modes = {
             delay(signal.name): signal.mode
             for signal in simulations.system.reference_signals + simulations.system.outputs
@@ -92,7 +94,8 @@ class Unknowns:
 
     def bounds(self, effect: Effect, parameter: str) -> tuple[float, float]:
         """Least and greatest value of a parameter, SI."""
-        low, high = self._simulations.bounds[variables(effect, parameter)[0]]
+        declared = self._simulations.bounds[variables(effect, parameter)[0]]
+        low, high = self.opened.get((effect.name, parameter), declared)
         # An amplitude has no sign: its phase has.
         return (0.0, high) if parameter == "cosine" else (low, high)
 

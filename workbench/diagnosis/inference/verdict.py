@@ -1,7 +1,7 @@
 """From fitted effects to a verdict: what was found, how sure, and what cannot be told apart."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Literal
 
@@ -11,18 +11,39 @@ from scipy.stats import bootstrap
 from workbench.arrays import Matrix, Vector
 from workbench.diagnosis.effects.catalogue import Effect
 from workbench.diagnosis.inference.fit import Fit
+from workbench.diagnosis.inference.linearized import Point
 from workbench.diagnosis.inference.score_test import CandidateScore
-from workbench.diagnosis.inference.search import BEGUN, FittedModel, Step, extended, misfits
-from workbench.diagnosis.inference.selection import Selection, search, select
+from workbench.diagnosis.inference.search import (
+    BEGUN,
+    FittedModel,
+    Step,
+    beyond,
+    differentiable,
+    examine,
+    extended,
+    fitted,
+    misfits,
+    without,
+)
+from workbench.diagnosis.inference.selection import (
+    ForwardSelection,
+    Selection,
+    search,
+    select,
+)
 from workbench.diagnosis.inference.timing import LateSignals, by_themselves
 from workbench.errors import InputError
 from workbench.runtime.engine import Reporter
 from workbench.system.units import BAND, with_interval, with_unit
 
-Verdict = Literal["nothing", "found", "unexplained"]
+Verdict = Literal["nothing", "found", "partly explained", "unexplained"]
 
 _FORM, _COMPANY = 0.005, 0.1  # shares of a value, and of the size that matters
 _DRAWS = 2000  # of the bootstrap over stops
+# Share from which on a part has the right place, if not the right form: of squares, an offset in
+# place of a ramp takes 75 %, a line in place of a parabola 94 %.
+_MOST = 0.9
+_NEAREST = 3  # candidates that are told where none is accepted
 
 
 @dataclass(frozen=True)
@@ -31,8 +52,10 @@ class Interval:
 
     Attributes
     ----------
-    limit : the bound at which a fit stopped, "least" or "greatest": then it is no estimate, and
-        what is beyond may fit better.
+    low, high : ends; infinite to the side of a bound at which the fit stopped.
+    limit : that bound, "least" or "greatest": then the value is no estimate.
+    beyond : where a fit ends that may pass the bound and leaves clearly less; NaN if none does.
+    alone : whether that fit needs no other cause.
     """
 
     value: float
@@ -40,15 +63,30 @@ class Interval:
     high: float
     unit: str
     limit: str = ""
+    beyond: float = np.nan
+    alone: bool = False
 
     @property
     def text(self) -> str:
         """For people."""
         if not self.limit:
             return with_interval(self.value, self.low, self.high, self.unit)
-        beyond = "smaller" if self.limit == "least" else "larger"
         value = with_unit(self.value, self.unit)
-        return f"at its limit of {value}, which is no estimate: {beyond} may fit better"
+        return f"at its limit of {value}, which is no estimate: {self.better}"
+
+    @property
+    def better(self) -> str:
+        """What is known of values beyond the limit."""
+        if np.isfinite(self.beyond):
+            alone = ", alone" * self.alone
+            return f"{with_unit(self.beyond, self.unit)}, beyond it, fits better{alone}"
+        return f"{'smaller' if self.limit == 'least' else 'larger'} may fit better"
+
+    def to_dict(self) -> dict[str, float | str | None]:
+        """As plain numbers and texts; None of an end that is open."""
+        ends = {"value": self.value, "low": self.low, "high": self.high, "beyond": self.beyond}
+        numbers = {name: end if np.isfinite(end) else None for name, end in ends.items()}
+        return {**numbers, "unit": self.unit, "limit": self.limit, "text": self.text}
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,6 +129,28 @@ class Gain:
     recordings: Mapping[str, tuple[float, float]]
 
 
+@dataclass(frozen=True)
+class NearestCandidate:
+    """Effects that come nearest to what is missing, and why they are not accepted.
+
+    Attributes
+    ----------
+    effects : their names.
+    removed : share of the explainable that they remove on held-out recordings.
+    reasons : why they are no answer, in words.
+    """
+
+    effects: tuple[str, ...]
+    removed: float
+    reasons: tuple[str, ...]
+
+    @property
+    def text(self) -> str:
+        """For people."""
+        names = " and ".join(self.effects)
+        return f"{names} would remove {self.removed:.0%}, but {'; '.join(self.reasons)}"
+
+
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
     """All that was found out.
@@ -99,13 +159,15 @@ class Diagnosis:
     ----------
     verdict : see `Verdict`.
     interrupted : whether the search was ended before its end, so that there may be more causes.
-    causes : that which alone explains most first, of equals the usual one; empty unless found.
+    causes : that which alone explains most first, of equals the usual one; empty unless found, in
+        full or in part.
     gain : None when nothing was extended.
-    partial : effects that explain a part of what remains unexplained.
+    partial : effects that explain a part; empty unless something remains unexplained.
+    nearest : candidates that come nearest where none is accepted, the nearest first.
     late : signals that are late by themselves, as the system file does not say of any logger, and
         that explain clearly more; it is then unexplained.
     base, best : the nominal model and the last one, fitted.
-    rivals : `best`, and fits that these data do not tell from it; empty unless found.
+    rivals : `best`, and fits that these data do not tell from it; empty without causes.
     steps : how the causes were found.
     scores : of the candidates about the nominal model, best first.
     names, cosines : effects, and the similarity of their signatures in these data, (e, e).
@@ -117,6 +179,7 @@ class Diagnosis:
     causes: tuple[Cause, ...]
     gain: Gain | None
     partial: tuple[str, ...]
+    nearest: tuple[NearestCandidate, ...]
     late: LateSignals | None
     base: FittedModel
     best: FittedModel
@@ -131,6 +194,7 @@ class Diagnosis:
 def conclude(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnosis:
     """Diagnose a set of recordings."""
     chosen, astray = _selected(fit, catalogue, report)
+    chosen = _fewest(fit, catalogue, chosen, report)
     base, best = chosen.base, chosen.best
     clean = float(best.linearised.variance_factors.max()) < fit.decides.wrong
     verdict: Verdict = "found" if best.active else "nothing"
@@ -142,26 +206,41 @@ def conclude(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnos
         report("clocks of signals by themselves")
         late = by_themselves(fit, base, best, clean=clean)
         verdict = verdict if late is None else "unexplained"
+    gain, objections = None, list[str]()
+    if best.active and late is None:
+        report("held-out recordings")
+        gain = _gain(fit, chosen)
+        if not chosen.interrupted and (verdict == "unexplained" or len(best.active) > 1):
+            worse, left = _objections(fit, chosen, gain, whole=verdict == "found")
+            objections = [*worse, *left]
+            part = not worse and not astray and _removed(gain) > _MOST
+            if objections:
+                verdict = "partly explained" if part else "unexplained"
     causes: list[Cause] = []
     rivals: tuple[FittedModel, ...] = ()
-    gain = None
-    if verdict == "found":
-        report("held-out recordings")
-        fast = any(effect.order_locked for effect in best.active)
-        before, after = (chosen.validation.squares(model, fast=fast) for model in (base, best))
-        gain = _gain(fit.tests, before, after)
+    if verdict in ("found", "partly explained"):
         causes = [
             _cause(fit, chosen, effect) for effect in _strongest_first(fit, chosen, catalogue)
         ]
         twins = [fits.values() for fits in chosen.twins.values()]
         rivals = (best, *(fit for fits in twins for fit in fits))
+    else:
+        gain = None
     presence = fit.unknowns.presence
+    nearest: tuple[NearestCandidate, ...] = ()
+    if verdict == "unexplained" and late is None:
+        report("candidates that come nearest")
+        nearest = _nearest(fit, chosen, objections)
+    part_of = verdict == "partly explained" or best.names in [
+        candidate.effects for candidate in nearest
+    ]
     return Diagnosis(
         verdict=verdict,
         interrupted=chosen.interrupted,
         causes=tuple(causes),
         gain=gain,
-        partial=tuple(effect.name for effect in best.active) if not causes else (),
+        partial=best.names if part_of else (),
+        nearest=nearest,
         late=late,
         base=base,
         best=best,
@@ -172,6 +251,116 @@ def conclude(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnos
         cosines=chosen.cosines,
         not_visible={effect.name: why for effect in catalogue if (why := presence.unseen(effect))},
     )
+
+
+def _fewest(
+    fit: Fit, catalogue: Sequence[Effect], chosen: Selection, report: Reporter
+) -> Selection:
+    """One cause alone, where others only stand for what it has beyond its bound."""
+    best = chosen.best
+    if len(best.active) < 2 or chosen.interrupted:
+        return chosen
+    for effect in best.active:
+        if (limit := _limit(fit, best, effect, effect.label)) and (
+            _passed(fit, best, effect, effect.label, limit)[1]
+        ):
+            report(f"{effect.name} alone, which is at its bound")
+            start = fit.tried(_only(best, effect))
+            if start is None:
+                continue
+            alone, trial = examine(fit, fitted(fit, start, (effect,)), catalogue, report)
+            steps = list(chosen.steps)
+            found = ForwardSelection(alone, steps, trial, interrupted=True, begun=None)
+            return replace(select(fit, catalogue, found, report), interrupted=False)
+    return chosen
+
+
+def _only(best: FittedModel, effect: Effect) -> Point:
+    """The point with one of its effects."""
+    point = best.point
+    for other in best.active:
+        point = point if other is effect else without(point, other)
+    return point
+
+
+def _removed(gain: Gain) -> float:
+    """Share of the explainable that is gone on held-out recordings."""
+    before, after = gain.before**2 - 1.0, gain.after**2 - 1.0
+    return float(np.clip((before - after) / max(before, 1e-9), 0.0, 1.0))
+
+
+def _objections(
+    fit: Fit, chosen: Selection, gain: Gain, *, whole: bool
+) -> tuple[list[str], list[str]]:
+    """Why effects are no whole answer: recordings that they make worse, and what they leave.
+
+    Parameters
+    ----------
+    whole : whether they leave no more than a cause may, of what they were fitted to.
+    """
+    base, best, validation = chosen.base, chosen.best, chosen.validation
+    fast = any(effect.order_locked for effect in best.active)
+    worse = [
+        f"{name} is predicted worse ({gain.recordings[name][0]:.1f} to "
+        f"{gain.recordings[name][1]:.1f} times the noise)"
+        for name in validation.worsened(base, best, fast=fast)
+    ]
+    left = []
+    noise = gain.after**2 <= validation.chance(best, fast=fast)[1]
+    if not whole or not (noise or 1.0 - _removed(gain) <= fit.decides.left):
+        left.append(f"{gain.after:.1f} times the noise remains on held-out recordings")
+    return worse, left
+
+
+def _nearest(
+    fit: Fit, chosen: Selection, objections: Sequence[str]
+) -> tuple[NearestCandidate, ...]:
+    """What would remove most of what is missing on held-out recordings, and why it is no answer."""
+    base, best, validation = chosen.base, chosen.best, chosen.validation
+    fits = {
+        rival.names: rival
+        for step in chosen.steps
+        for rival in step.rivals
+        if len(rival.active) == 1
+    }
+    scores = chosen.steps[0].scores if chosen.steps else chosen.trial.scores()
+    if not best.active or chosen.steps:
+        others = dict[str, CandidateScore]()
+        for score in sorted(scores, key=lambda score: -score.gain):
+            if (score.effect.name,) not in fits and abs(score.size) >= score.effect.matters:
+                others.setdefault(score.effect.name, score)
+        tried = list(others.values())[:_NEAREST]
+        fits |= {
+            single.names: single
+            for single in fit.together(partial(extended, fit, base), tried)
+            if single is not None
+        }
+    if best.active:
+        fits[best.names] = best
+    nearest = []
+    for names, model in fits.items():
+        fast = any(effect.order_locked for effect in model.active)
+        removed = validation.explained(base, model, fast=fast)[0]
+        if removed > 0.0:
+            reasons = objections if model is best else _reasons(fit, chosen, model, fast=fast)
+            nearest.append(NearestCandidate(names, removed, tuple(reasons)))
+    return tuple(sorted(nearest, key=lambda candidate: -candidate.removed)[:_NEAREST])
+
+
+def _reasons(fit: Fit, chosen: Selection, fitted: FittedModel, *, fast: bool) -> list[str]:
+    """Why one effect is no answer."""
+    validation = chosen.validation
+    (effect,) = fitted.active
+    reasons = [
+        f"{parameter} is at its bound"
+        for _, parameter in fitted.point.sizes
+        if _limit(fit, fitted, effect, parameter)
+    ]
+    worse = validation.worsened(chosen.base, fitted, fast=fast)
+    reasons += [f"{' and '.join(worse)} would be predicted worse"] * bool(worse)
+    left = np.sqrt(validation.squares(fitted, fast=fast))
+    worst = fit.tests[int(np.argmax(left))]
+    return [*reasons, f"it leaves {left.max():.1f} times the noise in {worst}"]
 
 
 def _selected(
@@ -229,7 +418,11 @@ def _share(before: FittedModel, after: FittedModel) -> float:
     return float(1.0 - left.max() / max(was.max(), 1e-9))
 
 
-def _gain(names: Sequence[str], before: Vector, after: Vector) -> Gain:
+def _gain(fit: Fit, chosen: Selection) -> Gain:
+    fast = any(effect.order_locked for effect in chosen.best.active)
+    before, after = (
+        chosen.validation.squares(one, fast=fast) for one in (chosen.base, chosen.best)
+    )
     low, high = bootstrap(
         (after,),
         lambda squares, axis: np.sqrt(squares.mean(axis=axis)),
@@ -244,9 +437,39 @@ def _gain(names: Sequence[str], before: Vector, after: Vector) -> Gain:
         high=float(high),
         recordings={
             name: (float(np.sqrt(b)), float(np.sqrt(a)))
-            for name, b, a in zip(names, before, after, strict=True)
+            for name, b, a in zip(fit.tests, before, after, strict=True)
         },
     )
+
+
+def _limit(fit: Fit, best: FittedModel, effect: Effect, label: str) -> str:
+    """The bound at which a fit stopped, "least" or "greatest"; empty within them."""
+    value = best.point.sizes[effect.name, label]
+    low, high = fit.unknowns.bounds(effect, effect.size if label == effect.label else label)
+    return "least" if value <= low else "greatest" if value >= high else ""
+
+
+def _passed(
+    fit: Fit, best: FittedModel, effect: Effect, label: str, limit: str
+) -> tuple[float, bool]:
+    """Where a fit ends that may pass a bound, and whether it needs no other cause; NaN: no better.
+
+    Beside a cause that is held at its bound, others stand for the rest of it. A bound of zero is a
+    sign, which physics gives.
+    """
+    key = (effect.name, label)
+    if best.point.sizes[key] == 0.0:
+        return np.nan, False
+    other = fit.opened(effect, effect.size if label == effect.label else label, limit)
+    start = replace(best.linearised, settled=False)
+    wide = differentiable(partial(fitted, other, start, best.active))
+    if wide is None or beyond(best, wide) < fit.decides.fall:
+        return np.nan, False
+    if len(best.active) > 1 and (begun := other.tried(_only(best, effect))) is not None:
+        alone = differentiable(partial(fitted, other, begun, (effect,)))
+        if alone is not None and beyond(alone, wide) < fit.decides.form:
+            return float(alone.point.sizes[key]), True
+    return float(wide.point.sizes[key]), False
 
 
 def _cause(fit: Fit, chosen: Selection, effect: Effect) -> Cause:
@@ -261,9 +484,15 @@ def _cause(fit: Fit, chosen: Selection, effect: Effect) -> Cause:
         # Beside the noise: forms of laws that differ in detail, and immaterial companions.
         form = np.hypot(_FORM * value, _COMPANY * effect.matters * (key[1] == effect.label))
         reach = float(BAND * np.hypot(sigma[trial.joint.known.index(key)], form))
-        ends = max(value - reach, low), min(value + reach, high)
-        limit = "least" if value <= low else "greatest" if value >= high else ""
-        parameters[key[1]] = Interval(value, *ends, unknowns.unit(effect, parameter), limit)
+        limit = _limit(fit, best, effect, key[1])
+        # A value at a bound says nothing of the side beyond.
+        ends = (
+            -np.inf if limit == "least" else max(value - reach, low),
+            np.inf if limit == "greatest" else min(value + reach, high),
+        )
+        further = _passed(fit, best, effect, key[1], limit) if limit else (np.nan, False)
+        unit = unknowns.unit(effect, parameter)
+        parameters[key[1]] = Interval(value, *ends, unit, limit, *further)
     fast = effect.order_locked
     return Cause(
         effect=effect,

@@ -52,7 +52,9 @@ def needs_law(before: Outcome) -> bool:
 
 
 def _more(found: Diagnosis) -> bool:
-    """Whether beside the one cause that was found errors last: it explains most, and not all."""
+    """Whether errors last beside what was found: it explains most, and not all."""
+    if found.verdict == "partly explained":
+        return True
     lasting = float(found.best.linearised.variance_factors.max())
     return len(found.causes) == 1 and lasting >= Thresholds.wrong
 

@@ -79,9 +79,10 @@ class Proposal:
         )
 
     def _error_before(self, gain: Gain) -> float:
-        """Error on what is held out in turn without a law, but with the one cause it is beside."""
-        alone = self.before.diagnosis.gain
-        return alone.after if alone and len(self.before.diagnosis.causes) == 1 else gain.before
+        """Error on what is held out in turn without a law, but with the causes it is beside."""
+        before = self.before.diagnosis
+        beside = len(before.causes) == 1 or before.verdict == "partly explained"
+        return before.gain.after if before.gain and beside else gain.before
 
     @property
     def sentence(self) -> str:
@@ -198,10 +199,7 @@ class Proposal:
                     "class": cause.effect.name,
                     "slot": self.forms[cause.effect.name].law.place.slot.name,
                     "text": self.forms[cause.effect.name].text,
-                    "parameters": {
-                        name: {"value": p.value, "low": p.low, "high": p.high, "unit": p.unit}
-                        for name, p in cause.parameters.items()
-                    },
+                    "parameters": {name: p.to_dict() for name, p in cause.parameters.items()},
                     "confusable_with": list(cause.confusable_with),
                     "explained": cause.explained,
                 }

@@ -80,7 +80,7 @@ def diagnosed(
             },
             cause.confusable_with,
         )
-        for cause in diagnosis.causes
+        for cause in diagnosis.causes * (diagnosis.verdict == "found")
     )
     gain = diagnosis.gain
     before, after = (None, None) if gain is None else (gain.before, gain.after)

@@ -394,7 +394,7 @@ def _curves(effects: Mapping[str, Any]) -> "Figure":
 def _confusion(confusion: Mapping[str, Mapping[str, int]], names: Sequence[str]) -> "Figure":
     """Planted by named, each row in percent."""
     said = {name for row in confusion.values() for name in row}
-    order = ["nothing", *names, "unexplained", "failed"]
+    order = ["nothing", *names, "partly explained", "unexplained", "failed"]
     columns = [name for name in order if name in said or name in confusion]
     table = np.array(
         [
