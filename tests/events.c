@@ -1,12 +1,12 @@
 /* FMI 2.0 Model Exchange of a heated room, C der(T) = P - G (T - Ta). What switches the heating P is
- * chosen by WHAT: a thermostat with hysteresis (state events), a timetable (time events), or a relay
- * that switches a relay (two iterations at the start). MODE and FLAG are an Integer and a Boolean
+ * chosen by WHAT: a thermostat with hysteresis (state events), a timetable (time events), a relay
+ * that switches a relay (two iterations at the start), or a fuse (step events). MODE and FLAG are an Integer and a Boolean
  * parameter whose value references are those of T and its derivative. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include "fmi2FunctionTypes.h"
-enum { THERMOSTAT, TIMETABLE, RELAYS };
+enum { THERMOSTAT, TIMETABLE, RELAYS, FUSE };
 enum { T, DT, TA, G, DG, C, P, SIZE };
 typedef struct { double r[SIZE], time; int mode, flag, relay; } Room;
 static void reset(Room *m) {
@@ -29,6 +29,7 @@ fmi2Status fmi2Reset(fmi2Component c) { reset(c); return fmi2OK; }
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean a, fmi2Real b, fmi2Real t, fmi2Boolean d, fmi2Real e) { ((Room *)c)->time = t; return fmi2OK; }
 fmi2Status fmi2EnterInitializationMode(fmi2Component c) { return fmi2OK; }
 fmi2Status fmi2ExitInitializationMode(fmi2Component c) { return fmi2OK; }
+fmi2Status fmi2Terminate(fmi2Component c) { return fmi2OK; }
 fmi2Status fmi2EnterEventMode(fmi2Component c) { return fmi2OK; }
 fmi2Status fmi2EnterContinuousTimeMode(fmi2Component c) { return fmi2OK; }
 fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *e) {
@@ -44,8 +45,15 @@ fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *e) {
         m->r[P] = m->relay ? 1500.0 : 0.0;
         e->newDiscreteStatesNeeded = !m->relay, m->relay = 1;
     }
+    if (WHAT == FUSE) m->r[P] = m->relay || m->r[T] > 295.0 ? 0.0 : 1500.0, m->relay = m->r[P] == 0.0;
     return fmi2OK;
 }
+fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean n, fmi2Boolean *event, fmi2Boolean *end) {
+    const Room *m = c;
+    *event = WHAT == FUSE && !m->relay && m->r[T] > 295.0, *end = fmi2False;
+    return fmi2OK;
+}
+fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component c, fmi2Real x[], size_t n) { x[0] = 300.0; return fmi2OK; }
 fmi2Status fmi2SetTime(fmi2Component c, fmi2Real t) { ((Room *)c)->time = t; return fmi2OK; }
 fmi2Status fmi2SetContinuousStates(fmi2Component c, const fmi2Real x[], size_t n) { ((Room *)c)->r[T] = x[0]; return fmi2OK; }
 fmi2Status fmi2GetContinuousStates(fmi2Component c, fmi2Real x[], size_t n) { x[0] = ((Room *)c)->r[T]; return fmi2OK; }
@@ -68,7 +76,7 @@ fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference k[], size_t 
 fmi2Status fmi2SetBoolean(fmi2Component c, const fmi2ValueReference k[], size_t n, const fmi2Boolean v[]) { ((Room *)c)->flag = v[0]; return fmi2OK; }
 /* FMPy looks for all functions; these are never called. */
 #define NEVER(name) fmi2Status name(void) { return fmi2Error; }
-NEVER(fmi2SetDebugLogging) NEVER(fmi2Terminate) NEVER(fmi2GetInteger) NEVER(fmi2GetBoolean) NEVER(fmi2GetString)
+NEVER(fmi2SetDebugLogging) NEVER(fmi2GetInteger) NEVER(fmi2GetBoolean) NEVER(fmi2GetString)
 NEVER(fmi2SetString) NEVER(fmi2GetFMUstate) NEVER(fmi2SetFMUstate) NEVER(fmi2FreeFMUstate)
 NEVER(fmi2SerializedFMUstateSize) NEVER(fmi2SerializeFMUstate) NEVER(fmi2DeSerializeFMUstate)
-NEVER(fmi2GetDirectionalDerivative) NEVER(fmi2CompletedIntegratorStep) NEVER(fmi2GetNominalsOfContinuousStates)
+NEVER(fmi2GetDirectionalDerivative)

@@ -82,6 +82,19 @@ def test_a_name_that_stands_twice_is_refused(name: str, tmp_path: Path) -> None:
         FMU(with_entry(tmp_path / "evil.fmu", zipfile.ZipInfo(name)))
 
 
+@pytest.mark.filterwarnings("ignore:Duplicate name")
+def test_what_nothing_is_taken_from_may_stand_twice(tmp_path: Path) -> None:
+    """Exporters write folders and documentation twice."""
+    path = tmp_path / "twice.fmu"
+    with_entry(path, zipfile.ZipInfo("extra/"))
+    with zipfile.ZipFile(path, "a") as archive:
+        archive.writestr(zipfile.ZipInfo("extra/"), b"")
+        archive.writestr("extra/a.xml", b"")
+        archive.writestr("extra/a.xml", b"")
+    with FMU(path) as fmu:
+        fmu.start({})
+
+
 def test_a_file_that_is_a_folder_too_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="as a file and as a folder"):
         FMU(with_entry(tmp_path / "evil.fmu", zipfile.ZipInfo(f"{XML}/inside")))

@@ -60,3 +60,11 @@ def test_a_formula_that_was_used_goes_to_another_process() -> None:
     again = pickle.loads(pickle.dumps(used))
     assert (again, again.where) == (used, "a file")
     assert again({"a": 1.0, "b": 3.0}) == 1.5
+
+
+def test_a_name_of_any_spelling_stands_in_quotes() -> None:
+    formula = Expression("2*\"der(x)\" + 'pump flow'", "system.toml")
+    assert formula.names == {"der(x)", "'pump flow'"}
+    assert formula({"der(x)": 1.5, "'pump flow'": 1.0}) == 4.0
+    assert Expression.of("'pump flow'", "").names == {"'pump flow'"}
+    assert Expression.of("tank[1].level (m)", "").names == {"tank[1].level (m)"}

@@ -32,6 +32,7 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
     _add_build(jobs)
     _add_info(jobs)
     _add_check(jobs)
+    _add_compare(jobs)
     return fmu
 
 
@@ -110,9 +111,38 @@ def _add_check(jobs: Commands) -> None:
     checking.set_defaults(job="check")
 
 
+def _add_compare(jobs: Commands) -> None:
+    comparing = jobs.add_parser(
+        "compare",
+        help="compare the open loop of FMUs with FMPy",
+        description="Simulate FMUs over their default experiments, by the open loop and by FMPy "
+        "with CVode at a tolerance of 1e-8. Print a table of the largest differences, relative "
+        "to the range of the signal. 'right' is within 1e-4; 'refused' says why the workbench "
+        "does not run the FMU. Exit status: 0 all right or refused, 1 one is OFF.",
+        epilog="example:\n  python -m workbench fmu compare my_model.fmu other.fmu",
+    )
+    comparing.add_argument("fmus", type=Path, metavar="FILE", nargs="+", help="the FMUs")
+    add_isolated(comparing)
+    comparing.set_defaults(job="compare")
+
+
 def run(options: argparse.Namespace, output: Output) -> CommandResult:
-    """Build, describe or check FMUs."""
-    return {"build": _build, "info": _info, "check": _check}[options.job](options, output)
+    """Build, describe, check or compare FMUs."""
+    jobs = {"build": _build, "info": _info, "check": _check, "compare": _compare}
+    return jobs[options.job](options, output)
+
+
+def _compare(options: argparse.Namespace, output: Output) -> CommandResult:
+    from workbench.observers.fmpy_comparison import OFF, compare_with_fmpy, heading, row
+
+    comparisons = []
+    output.result(heading())
+    for path in options.fmus:
+        comparisons.append(compare_with_fmpy(path))
+        output.result(row(comparisons[-1]))
+    worst = any(comparison.verdict == OFF for comparison in comparisons)
+    listed = [asdict(comparison) for comparison in comparisons]
+    return CommandResult({"comparisons": listed}, {"time": "s"}, 1 if worst else 0)
 
 
 def _build(options: argparse.Namespace, output: Output) -> CommandResult:

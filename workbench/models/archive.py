@@ -23,6 +23,7 @@ _MOST_OF_DESCRIPTION = 64 << 20  # 0.4 kB a variable: 150 000 variables
 # be anything.
 _HIGHEST_RATIO, _LITTLE = 100, 16 << 20
 _FORBIDDEN = re.compile(r"[\x00-\x1f\\]|^/|^[A-Za-z]:|(^|/)\.{1,2}(/|$)|//")
+_UNREAD = ("documentation/", "extra/", "sources/")  # folders that nothing is taken from
 _PIECE = 1 << 20
 # The last one is of a compression that zipfile does not know, or of a password.
 _DAMAGE = (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError)
@@ -78,7 +79,7 @@ def _check(path: Path, entries: list[zipfile.ZipInfo]) -> None:
             raise _refusal(path, f"{shown}, which is encrypted", "files that can be read")
         if entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
             raise _refusal(path, f"{shown}, packed another way", "files packed by deflate")
-        if name.rstrip("/") in seen:
+        if name.rstrip("/") in seen and not entry.is_dir() and not name.startswith(_UNREAD):
             raise _refusal(path, f"the name {shown} twice", "each name once")
         seen.add(name.rstrip("/"))
         if entry.file_size > max(_LITTLE, _HIGHEST_RATIO * entry.compress_size):

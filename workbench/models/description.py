@@ -30,6 +30,7 @@ class Interface:
     directional_derivatives: bool
     needs_execution_tool: bool
     one_instance_per_process: bool
+    completed_steps: bool
 
 
 @dataclass(frozen=True)
@@ -280,7 +281,11 @@ def _description(
         text=description.description or "",
         tool=description.generationTool or "",
         token=description.guid,
-        interfaces={name: _interface(tag) for name, tag in offered.items() if tag is not None},
+        interfaces={
+            name: _interface(tag, description.fmiVersion)
+            for name, tag in offered.items()
+            if tag is not None
+        },
         platforms=tuple(sorted({p[1] for p in places if p[0] == "binaries" and len(p) > 2})),
         binaries={name: size for name, size in files.items() if name.startswith("binaries/")},
         variables=variables,
@@ -306,7 +311,7 @@ def _refuse_twice(names: Iterable[str]) -> None:
         seen.add(name)
 
 
-def _interface(element: ElementTree.Element) -> Interface:
+def _interface(element: ElementTree.Element, version: str) -> Interface:
     """Read capabilities from the XML, as FMPy 0.3.32 misses some of FMI 3.0."""
 
     def has(*names: str) -> bool:
@@ -325,6 +330,9 @@ def _interface(element: ElementTree.Element) -> Interface:
         ),
         needs_execution_tool=has("needsExecutionTool"),
         one_instance_per_process=has("canBeInstantiatedOnlyOncePerProcess"),
+        completed_steps=has("needsCompletedIntegratorStep")
+        if version == "3.0"
+        else not has("completedIntegratorStepNotNeeded"),
     )
 
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path, PurePosixPath
 from types import TracebackType
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
 from fmpy import fmi2, fmi3
@@ -42,6 +42,11 @@ _FUNCTIONS = {
     "derivatives": {"2.0": "fmi2GetDerivatives", "3.0": "fmi3GetContinuousStateDerivatives"},
     "set": {"2.0": "fmi2SetReal", "3.0": "fmi3SetFloat64"},
     "get": {"2.0": "fmi2GetReal", "3.0": "fmi3GetFloat64"},
+    "nominals": {
+        "2.0": "fmi2GetNominalsOfContinuousStates",
+        "3.0": "fmi3GetNominalsOfContinuousStates",
+    },
+    "complete_step": {"2.0": "fmi2CompletedIntegratorStep", "3.0": "fmi3CompletedIntegratorStep"},
     "indicators": {"2.0": "fmi2GetEventIndicators", "3.0": "fmi3GetEventIndicators"},
     "directional": {"2.0": "fmi2GetDirectionalDerivative", "3.0": "fmi3GetDirectionalDerivative"},
     "do_step": {"2.0": "fmi2DoStep", "3.0": "fmi3DoStep"},
@@ -77,6 +82,24 @@ _CLASSES = {
     (CO_SIMULATION, "2.0"): fmi2.FMU2Slave,
     (CO_SIMULATION, "3.0"): fmi3.FMU3Slave,
 }
+
+
+class EventError(FMUError):
+    """A model passes an event, at which the method does not stop."""
+
+
+class EventUpdate(NamedTuple):
+    """What an FMU says after an event.
+
+    Attributes
+    ----------
+    time : of the next time event [s], infinite where there is none.
+    states_changed, nominals_changed : of the continuous states.
+    """
+
+    time: float
+    states_changed: bool
+    nominals_changed: bool
 
 
 class FMUInstance:
@@ -221,30 +244,76 @@ class FMUInstance:
             else:
                 instance.enterInitializationMode(startTime=time)
             instance.exitInitializationMode()
-            return self._update_discrete_states() if self._interface == MODEL_EXCHANGE else math.inf
+            if self._interface == CO_SIMULATION:
+                return math.inf
+            return self._update_discrete_states().time
         except FMICallException as error:
             raise self.refusal(error.function, error.status) from None
 
-    def _update_discrete_states(self) -> float:
+    def handle_event(self, prepare: Callable[[], None]) -> EventUpdate:
+        """Enter Event Mode, set what changes there, and go on in continuous time.
+
+        Parameters
+        ----------
+        prepare : sets inputs that jump.
+
+        Raises
+        ------
+        FMUError
+            If the FMU refuses a call, or asks to end.
+        """
+        try:
+            self._instance.enterEventMode()
+            prepare()
+            return self._update_discrete_states()
+        except FMICallException as error:
+            raise self.refusal(error.function, error.status) from None
+
+    def _update_discrete_states(self) -> EventUpdate:
         """Iterate until the discrete states are stable, and go on in continuous time.
 
-        Returns the time of the next time event. Source: FMI 2.0.4, section 3.2.2; FMI 3.0, 3.2.1.
+        Source: FMI 2.0.4, section 3.2.2; FMI 3.0, 3.2.1.
         """
         instance = self._instance
         update = (
             instance.newDiscreteStates if self.version == "2.0" else instance.updateDiscreteStates
         )
-        name = self._description.path.name
+        nominals_changed = states_changed = False
         for _ in range(_MOST_ITERATIONS):
-            needed, end, _, _, defined, time = update()
+            needed, end, nominals, states, defined, time = update()
+            nominals_changed |= bool(nominals)
+            states_changed |= bool(states)
             if end:
-                raise FMUError(f"{name}: it asks to end the simulation: {self._logged()}")
+                raise self.end_error()
             if not needed:
                 instance.enterContinuousTimeMode()
-                return float(time) if defined else math.inf
+                next_time = float(time) if defined else math.inf
+                return EventUpdate(next_time, states_changed, nominals_changed)
         raise FMUError(
-            f"{name}: its discrete states are not stable after {_MOST_ITERATIONS} iterations"
+            f"{self._description.path.name}: its discrete states are not stable after "
+            f"{_MOST_ITERATIONS} iterations"
         )
+
+    def complete_step(self) -> bool:
+        """Say that a step of integration is over; returns whether it ends at a step event.
+
+        Raises
+        ------
+        FMUError
+            If the FMU refuses the call, or asks to end.
+        """
+        try:
+            event, end = self._instance.completedIntegratorStep()
+        except FMICallException as error:
+            raise self.refusal(error.function, error.status) from None
+        if end:
+            raise self.end_error()
+        return bool(event)
+
+    def end_error(self) -> FMUError:
+        """The error for an FMU that asks to end the simulation, with what it logged."""
+        name = self._description.path.name
+        return FMUError(f"{name}: it asks to end the simulation: {self._logged()}")
 
     def set_whole(self, variable: Variable, value: float) -> None:
         """Set a parameter whose type is not Real or Float64, from a number.
@@ -421,6 +490,7 @@ class FMU:
         ]
         self._rates = np.array([self._references[r] for r in self.description.rates], np.uint32)
         self.has_directional_derivatives = offered.directional_derivatives
+        self.needs_completed_steps = offered.completed_steps
         self._x = np.zeros(len(self.states))
         self._dx = np.zeros(len(self.states))
         self._z = np.zeros(self.description.event_indicators)
@@ -559,6 +629,11 @@ class FMU:
         if self.event_signs.size and self.interface == MODEL_EXCHANGE:
             self.event_signs[:] = self.event_indicators() > 0.0
 
+    @property
+    def has_events(self) -> bool:
+        """Whether it has event indicators, or named a time event at its start."""
+        return bool(self.event_signs.size or np.isfinite(self.next_event[0]))
+
     def check_event(self) -> None:
         """Refuse to go on if the FMU has passed an event since its start.
 
@@ -568,19 +643,53 @@ class FMU:
             Where an event indicator has another sign than at the start, or a time event is over.
         """
         signs = self.event_signs
-        if self.time[0] > self.next_event[0] or (
-            signs.size and ((self.event_indicators() > 0.0) != signs).any()
+        if (
+            self.time[0] > self.next_event[0]
+            or self.complete_step()
+            or (signs.size and ((self.event_indicators() > 0.0) != signs).any())
         ):
             raise self.event_error()
 
-    def event_error(self) -> FMUError:
+    def event_error(self) -> EventError:
         """The error for an event of the model, which estimators do not treat."""
-        return FMUError(
+        return EventError(
             f"{self.path.name}: an event of the model by {self.time[0]:.6g} s of its time, or in "
-            "the step after: an event indicator changes its sign, or a time event is due. "
-            "Estimators do not stop at events, so their results would be wrong from there on; "
-            "replace jumps of the model by smooth functions, or cut the recording before the event"
+            "the step after: an event indicator changes its sign, a time event is due, or the "
+            "model asks for Event Mode. Only the open loop goes through events; results of other "
+            "estimators would be wrong from there on. "
+            "Replace jumps of the model by smooth functions, or cut the recording before the event"
         )
+
+    def handle_event(
+        self, variables: Variables | None = None, values: Vector | None = None
+    ) -> EventUpdate:
+        """Update discrete states at the present point, with variables that jump there.
+
+        Raises
+        ------
+        FMUError
+            If the FMU asks to end, or its discrete states are not stable.
+        """
+
+        def prepare() -> None:
+            if variables is not None and values is not None:
+                self.set(variables, values)
+
+        update = self._loaded.handle_event(prepare)
+        self.next_event[0] = update.time
+        if self.event_signs.size:
+            self.event_signs[:] = self.event_indicators() > 0.0
+        return update
+
+    def complete_step(self) -> bool:
+        """Say that a step of integration is over; returns whether a step event is due."""
+        return self.needs_completed_steps and self._loaded.complete_step()
+
+    def nominals(self) -> Vector:
+        """Typical sizes of the states at the present point, (n,)."""
+        sizes = np.ones(len(self.states))
+        self._states("nominals", sizes)
+        return np.where(np.isfinite(sizes) & (sizes != 0.0), np.abs(sizes), 1.0)
 
     def event_indicators(self) -> Vector:
         """Values whose change of sign is a state event, (z,)."""

@@ -55,7 +55,7 @@ class Instance(NamedTuple):
     ----------
     address : of the FMU instance.
     set_states, derivatives, set_real, get_real, directional, set_time : addresses of the FMU's
-        functions; get_indicators, too.
+        functions; get_indicators, too, and complete_step, 0 where the FMU does not need it.
         FMI 2.0 takes no length of values in set_real and get_real; the register it would be in is
         not read.
     fmi : 2 or 3 with directional derivatives, 0 for differences.
@@ -63,6 +63,7 @@ class Instance(NamedTuple):
     time : (1,) that the FMU was set to last [s].
     indicators, event_signs : (z,) event indicators, and whether they were above 0 at the start.
     next_event : (1,) time of the next time event [s], infinite for none.
+    ended : (2,) whether the step ends at an event, and whether the FMU asks to end.
     x, dx : (n,) states and their derivatives.
     u, y : (m,) inputs, (l,) outputs.
     jacobian : (n + q, n + l) derivatives of [dx; y] (columns) by [x; last q inputs] (rows).
@@ -79,12 +80,14 @@ class Instance(NamedTuple):
     directional: int
     set_time: int
     get_indicators: int
+    complete_step: int
     fmi: int
     measured: int
     time: Vector
     indicators: Vector
     event_signs: NDArray[np.bool_]
     next_event: Vector
+    ended: NDArray[np.int32]
     x: Vector
     dx: Vector
     u: Vector
@@ -119,12 +122,14 @@ def instance(
         directional=fmu.function_address("directional"),
         set_time=fmu.function_address("time"),
         get_indicators=fmu.function_address("indicators"),
+        complete_step=fmu.function_address("complete_step") if fmu.needs_completed_steps else 0,
         fmi=int(fmu.version[0]) if fmu.has_directional_derivatives else 0,
         measured=m,
         time=fmu.time,
         indicators=np.zeros(fmu.event_signs.size),
         event_signs=fmu.event_signs,
         next_event=fmu.next_event,
+        ended=np.zeros(2, np.int32),
         x=np.zeros(n),
         dx=np.zeros(n),
         u=np.zeros(m + q),
@@ -233,7 +238,17 @@ def set_time(model, t):  # type: ignore[no-untyped-def]
 
 @inlined
 def check_state_events(model):  # type: ignore[no-untyped-def]
-    """EVENT if an event indicator has another sign than at the start of the FMU; else a status."""
+    """EVENT if the FMU, at the end of a step, is beyond a state event or at a step event.
+
+    A state event: an indicator has another sign than at the start. A step event: the FMU says so.
+    """
+    if model.complete_step != 0:
+        # The zero: states may be set back to before this point. FMI 3.0 writes one byte of each.
+        words = model.address, 0, model.ended, model.ended[1:]
+        if _call(model.complete_step, words) > 1:
+            return REFUSED
+        if model.ended[0] != 0 or model.ended[1] != 0:
+            return EVENT
     n = model.indicators.size
     if n == 0:
         return OK

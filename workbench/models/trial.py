@@ -242,6 +242,8 @@ def _task(description: Description, interface: str, folder: Path, limits: Limits
         if exchange and offered.directional_derivatives
         else [],
         "saves": offered.saves_state,
+        "indicators": description.event_indicators,
+        "completed": offered.completed_steps,
         "processor": limits.processor,
         "answer": limits.answer,
         "memory": limits.memory,

@@ -173,6 +173,7 @@ def _go(call: _Calls, task: dict[str, Any]) -> None:
     n, inputs = task["states"], task["inputs"]
     states, rates = (_DOUBLE * n)(), (_DOUBLE * n)()
     held, everything = (_DOUBLE * len(inputs))(), (_DOUBLE * len(task["reals"]))()
+    indicators, flags = (_DOUBLE * task["indicators"])(), (ctypes.c_int(), ctypes.c_int())
     call.reals("Get", inputs, held)
     for k in range(_ROUNDS):
         call.reals("Set", inputs, held)
@@ -183,6 +184,10 @@ def _go(call: _Calls, task: dict[str, Any]) -> None:
                 call("SetContinuousStates", states, _SIZE(n))
                 rate = "GetContinuousStateDerivatives" if call.three else "GetDerivatives"
                 call(rate, rates, _SIZE(n))
+            if task["indicators"]:
+                call("GetEventIndicators", indicators, _SIZE(task["indicators"]))
+            if task["completed"]:
+                call("CompletedIntegratorStep", ctypes.c_int(0), *map(ctypes.byref, flags))
         else:
             _step(call, 1e-3 * k)
         call.reals("Get", task["reals"], everything)

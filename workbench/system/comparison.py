@@ -53,7 +53,7 @@ def _measured(scope: Scope) -> tuple[Channel, ...]:
             signal.unit,
             signal.label,
             signal.shown,
-            Expression(signal.name, str(scope.file)),
+            Expression.of(signal.name, str(scope.file)),
         )
         for signal in (*scope.whole["outputs"], *scope.whole["reference_signals"])
     )

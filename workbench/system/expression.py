@@ -1,6 +1,7 @@
 """Arithmetic in a system file: signals made of measured ones and of a model's parameters."""
 
 import ast
+import json
 import operator
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -35,6 +36,8 @@ _FUNCTIONS: dict[str, np.ufunc] = {
 class Expression:
     """A formula over names, also `a.b` and `a[1]`; its values are floats or arrays of one shape.
 
+    A name that is no identifier stands in double quotes; Modelica's `'a b'` as it is.
+
     Parameters
     ----------
     text : numbers, names, + - * / **, brackets, abs, max, min, sqrt, sign.
@@ -56,6 +59,14 @@ class Expression:
 
     text: str
     where: str = field(compare=False)
+
+    @classmethod
+    def of(cls, name: str, where: str) -> "Expression":
+        """The formula that is a name alone, however it is spelt."""
+        try:
+            return cls(name, where)
+        except InputError:
+            return cls(json.dumps(name, ensure_ascii=False), where)
 
     def __post_init__(self) -> None:
         self.names  # noqa: B018  read once, so that a mistake shows where it stands
@@ -125,7 +136,7 @@ class Expression:
             case ast.Constant(value=int() | float() as number) if not isinstance(number, bool):
                 constant = np.float64(number)  # divided by zero it is infinite, as an array is
                 return lambda value_of: constant
-            case ast.Name() | ast.Attribute() | ast.Subscript():
+            case ast.Name() | ast.Attribute() | ast.Subscript() | ast.Constant(value=str()):
                 name = self._name(node)
                 return lambda value_of: value_of(name)
             case ast.UnaryOp(op=op, operand=operand) if type(op) in _OPERATORS:
@@ -142,6 +153,9 @@ class Expression:
         match node:
             case ast.Name(id=name):
                 return name
+            case ast.Constant(value=str() as name) if not name.isidentifier():
+                written = ast.get_source_segment(self.text, node) or ""
+                return written if written.startswith("'") else name
             case ast.Attribute(value=value, attr=name):
                 return f"{self._name(value)}.{name}"
             case ast.Subscript(value=value, slice=ast.Constant(value=int() as place)) if place > 0:

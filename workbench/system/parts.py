@@ -89,7 +89,13 @@ def _fmu(table: Table, name: str, scope: Scope) -> Path:
 class Model:
     """Model of a role."""
 
-    name: str = key("Modelica class, without the library's name", name="class")
+    modelica: str = key(
+        "Modelica class, without the library's name; diagnosis, exported observers, and a model "
+        "without an FMU need it",
+        name="class",
+        absent="",
+        otherwise="none",
+    )
     path: Path | None = key(
         "file beside the system file, FMI 2.0 or 3.0",
         name="fmu",
@@ -98,6 +104,29 @@ class Model:
         read=_fmu,
         schema={"type": "string", "minLength": 1},
     )
+
+    def check(self, table: Table, scope: Scope) -> None:
+        """Refuse a model of nothing."""
+        if not self.modelica and self.path is None:
+            raise table.wrong("class", "a Modelica class, or fmu = FILE")
+
+    @property
+    def name(self) -> str:
+        """Modelica class, without the library's name.
+
+        Raises
+        ------
+        InputError
+            If the system does not say it: what is asked for needs Modelica.
+        """
+        if not self.modelica:
+            raise InputError(
+                where="system file, [models]",
+                found=f"the FMU {self.path.name if self.path else ''}, and no 'class'",
+                expected="the Modelica class of this model, which is read for what you ask for",
+                remedy='write class = "NAME", with the library package.mo beside the system file',
+            )
+        return self.modelica
 
 
 @declared

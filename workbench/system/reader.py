@@ -44,6 +44,16 @@ def read_system(path: Path) -> System:
     return _read(file, path, {})
 
 
+def system_of(content: Mapping[str, Any], path: Path) -> System:
+    """Make a system of what would stand in its file, checked as `read_system` does.
+
+    Parameters
+    ----------
+    path : that refusals name.
+    """
+    return _read(Table(content, str(path)), path, {})
+
+
 def with_built(system: System, paths: Mapping[str, Path]) -> System:
     """The same system, read again, with FMUs that were built for some roles.
 

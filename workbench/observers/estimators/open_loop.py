@@ -6,12 +6,14 @@ import numpy as np
 
 from workbench.arrays import Matrix, Vector
 from workbench.models.fmu import FMU
+from workbench.models.hybrid import HybridSimulation
 from workbench.models.native import (
     compiled,
     evaluate,
     implicit,
     inlined,
     linearise,
+    raise_on_failure,
     set_states,
     solve,
 )
@@ -71,6 +73,7 @@ class OpenLoop(Estimator):
     def __init__(self, fmu: FMU, system: System, gains: Gains) -> None:
         super().__init__(fmu, system, gains)
         n, m = len(fmu.states), len(system.inputs) + 1
+        self._hybrid: HybridSimulation | None = None
         self._state = _State(np.zeros((n, n + 1)), np.zeros(m), np.zeros(m))
 
     def _arguments(self) -> tuple[Layout, Any]:
@@ -78,3 +81,22 @@ class OpenLoop(Estimator):
 
     def _begin(self, u: Vector, y: Vector) -> None:
         self._model.x[:] = self.fmu.get_states()
+        self._hybrid = None
+        if self.fmu.has_events:
+            held = np.array([signal.held for signal in self.system.inputs], np.bool_)
+            inputs = self.fmu.variables([signal.name for signal in self.system.inputs])
+            self._hybrid = HybridSimulation(self.fmu, inputs, held)
+            self._hybrid.begin(u)
+
+    def _run(self, steps: Vector, u: Matrix, y: Matrix) -> Matrix:
+        """Rows of estimates; a model with events goes through them as FMI says."""
+        if self._hybrid is None:
+            return super()._run(steps, u, y)
+        rows = np.full((steps.size, self._width), np.nan)
+        samples, _ = self._samples(steps, u, y)
+        model = self._model
+        for row, sample in zip(rows, samples, strict=True):
+            model.x[:] = self._hybrid.advance(float(sample[-1]), sample[:-1])
+            model.u[: model.measured] = sample[:-1]
+            raise_on_failure(report(model, self._layout, row), self.fmu)
+        return rows

@@ -414,7 +414,7 @@ def with_sensor(system: System, sensor: Signal) -> System:
         sensor.unit,
         sensor.label,
         sensor.shown,
-        Expression(sensor.name, f"{system.source}, [next.sensors.{sensor.name}]"),
+        Expression.of(sensor.name, f"{system.source}, [next.sensors.{sensor.name}]"),
     )
     compared = replace(system.comparison, channels=(*system.comparison.channels, channel))
     return replace(

@@ -1,0 +1,182 @@
+"""Simulation of a model with events, by the standard: what an open loop runs on.
+
+Steps of integration end at samples and at time events. After each, event indicators are read; a
+change of sign is located within the step, and the model goes through Event Mode there.
+Source: FMI 2.0.4, section 3.2; FMI 3.0, sections 2.5 and 3.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import Radau
+
+from workbench.arrays import Matrix, Vector
+from workbench.errors import FMUError
+from workbench.models.fmu import FMU, Variables, central_differences
+
+# Of a step, relative to the state and to its nominal value: far below what a sensor resolves.
+_TOLERANCE = 1e-8
+# Points within a step at which indicators are read, so that one that changes twice is found.
+_LOOKS = 4
+# Between two samples; a model that needs more comes to rest by ever more events (Zeno).
+_MOST_EVENTS = 10_000
+
+
+class HybridSimulation:
+    """A model that was started, driven by inputs from sample to sample.
+
+    Parameters
+    ----------
+    fmu : after its start, whose inputs have the values of the first sample.
+    inputs : what drives it, (m,).
+    held : (m,) whether an input stays until the next sample; others go there in a straight line.
+    """
+
+    def __init__(self, fmu: FMU, inputs: Variables, held: NDArray[np.bool_]) -> None:
+        self._fmu, self._inputs, self._held = fmu, inputs, held
+        self._t = float(fmu.time[0])
+        self._x = fmu.get_states()
+        self._nominal = fmu.nominals()
+        self._before = self._after = fmu.get(inputs).copy()  # at the ends of the interval
+        self._begin, self._end = self._t, np.inf
+        self._signs = np.sign(fmu.event_indicators())
+        self._step: float | None = None
+        self._events = 0
+
+    def begin(self, u: Vector) -> None:
+        """Take the inputs of the first sample, (m,)."""
+        self._jump(u)
+
+    def advance(self, t: float, u: Vector) -> Vector:
+        """Go on to the sample at t [s] with inputs u, (m,); returns the states there, (n,).
+
+        Raises
+        ------
+        FMUError
+            If the FMU refuses a call, asks to end, cannot be integrated, or its events pile up.
+        """
+        self._begin, self._end = self._t, t
+        self._after = np.where(self._held, self._before, u)
+        self._events = 0
+        while self._t < t:
+            self._go_on(t)
+            while self._fmu.next_event[0] <= self._t:
+                self._handle_event()
+        self._before = self._after
+        self._jump(u)
+        return self._x.copy()
+
+    def _jump(self, u: Vector) -> None:
+        """Let inputs jump to u, which is an event."""
+        if not np.array_equal(u, self._before):
+            self._before = self._after = u.copy()
+            self._place(self._t, self._x)
+            self._handle_event(u)
+
+    def _inputs_at(self, t: float) -> Vector:
+        share = (t - self._begin) / (self._end - self._begin) if self._end < np.inf else 0.0
+        return self._before + share * (self._after - self._before)
+
+    def _place(self, t: float, x: Vector) -> None:
+        """Put the FMU at a point."""
+        self._fmu.set_time(t)
+        if self._inputs.names:
+            self._fmu.set(self._inputs, self._inputs_at(t))
+        self._fmu.set_states(x)
+
+    def _go_on(self, end: float) -> None:
+        """Integrate to the sample, the next time event, or a state or step event before."""
+        end = min(end, float(self._fmu.next_event[0]))
+        path = self._path(end)
+        t_before = self._t
+        while self._t < end:
+            t, x_at = next(path)
+            at = self._first_event(t_before, t, x_at)
+            self._t, self._x = at or t, x_at(at or t)
+            self._place(self._t, self._x)
+            if self._fmu.complete_step() or at is not None:
+                self._handle_event()
+                return
+            t_before = t
+
+    def _path(self, end: float):  # type: ignore[no-untyped-def]
+        """Steps to the end: the time of each, and the states within it."""
+        if not self._x.size:
+            yield end, lambda t: self._x
+            return
+        first = self._step if self._step is None else min(self._step, end - self._t)
+        try:
+            solver = Radau(
+                self._rates,
+                self._t,
+                self._x,
+                end,
+                rtol=_TOLERANCE,
+                atol=_TOLERANCE * self._nominal,  # type: ignore[arg-type]  # SciPy takes vectors
+                jac=self._jacobian,
+                first_step=first,
+            )
+            while solver.status == "running":
+                if message := solver.step():
+                    raise self._error(f"cannot be integrated ({message})")
+                if solver.t < end:  # the last one is cut
+                    self._step = solver.h_abs
+                yield solver.t, solver.dense_output()
+        except (ValueError, np.linalg.LinAlgError) as error:  # of derivatives that are not finite
+            raise self._error(f"cannot be integrated ({error})") from None
+
+    def _rates(self, t: float, x: Vector) -> Vector:
+        self._place(t, x)
+        return self._fmu.derivatives()
+
+    def _jacobian(self, t: float, x: Vector) -> Matrix:
+        self._place(t, x)
+        if self._fmu.has_directional_derivatives:
+            return self._fmu.state_jacobian()
+        # Not SciPy's: its steps grow without bound for states that no derivative depends on.
+        steps = 1e-6 * np.maximum(np.abs(x), self._nominal)
+        return central_differences(lambda x: self._rates(t, x), x, steps)
+
+    def _first_event(self, begin: float, end: float, x_at):  # type: ignore[no-untyped-def]
+        """Time just after the first state event of a step [s], None where there is none.
+
+        An indicator changes strictly where it has the opposite sign, or leaves zero: models may
+        compare with `>` what FMI counts by `>= 0`, so that nothing switches at zero itself. One
+        that is zero at the end of the step, and was not, has changed as well.
+        """
+        signs = self._signs
+        if not signs.size:
+            return None
+
+        def changed(t: float, *, strictly: bool) -> bool:
+            self._place(t, x_at(t))
+            now = np.sign(self._fmu.event_indicators())
+            return bool(((now != signs) & ((now != 0.0) | (not strictly))).any())
+
+        low = begin
+        for high in map(float, np.linspace(begin, end, _LOOKS + 1)[1:]):
+            strictly = changed(high, strictly=True)
+            if strictly or (high == end and changed(high, strictly=False)):
+                break
+            low = high
+        else:
+            return None
+        while high - low > 4.0 * np.spacing(max(abs(low), abs(high))):
+            middle = 0.5 * (low + high)
+            low, high = (low, middle) if changed(middle, strictly=strictly) else (middle, high)
+        return high
+
+    def _handle_event(self, u: Vector | None = None) -> None:
+        """Go through Event Mode at the present point, where inputs may jump to u."""
+        self._events += 1
+        if self._events > _MOST_EVENTS:
+            raise self._error(f"has {_MOST_EVENTS} events between two samples")
+        update = self._fmu.handle_event(self._inputs, u)
+        if update.states_changed:
+            self._x = self._fmu.get_states()
+        if update.nominals_changed:
+            self._nominal = self._fmu.nominals()
+        self._signs = np.sign(self._fmu.event_indicators())
+        self._step = None
+
+    def _error(self, what: str) -> FMUError:
+        return FMUError(f"{self._fmu.path.name}: it {what} at {self._t:.9g} s of its time")

@@ -1,0 +1,215 @@
+"""The open loop of an FMU against FMPy with CVode: right, or refused in words."""
+
+import io
+from contextlib import redirect_stdout
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import fmpy
+import numpy as np
+
+from workbench.arrays import Matrix, Vector
+from workbench.errors import FMUError, InputError
+from workbench.models.description import (
+    MODEL_EXCHANGE,
+    Description,
+    Variable,
+    read_description,
+)
+from workbench.models.fmu import FMU
+from workbench.observers.estimators.open_loop import OpenLoop
+from workbench.observers.gains import Gains
+from workbench.system.reader import system_of
+from workbench.system.registry import open_model
+from workbench.system.system import System
+
+LIMIT = 1e-4  # of a signal's range: below what sensors tell
+_TOLERANCE = 1e-8  # of CVode
+# Intervals between samples: a prime, so that samples do not fall on events at round times.
+_INTERVALS = 487
+_DURATION = 10.0  # [s] where the FMU names none
+_TIMEOUT = 120.0  # [s] of FMPy
+RIGHT, OFF, REFUSED, NO_REFERENCE = "right", "OFF", "refused", "no reference"
+
+
+@dataclass(frozen=True)
+class FMUComparison:
+    """What a comparison found.
+
+    Attributes
+    ----------
+    file : name of the FMU's file.
+    fmi : version; empty where the file is no FMU.
+    verdict : RIGHT, OFF, REFUSED or NO_REFERENCE, where FMPy does not run the FMU.
+    difference : the largest, over the range of its signal; None where nothing was compared.
+    signal, time : where it is, [s].
+    reason : of what was not compared.
+    """
+
+    file: str
+    fmi: str
+    verdict: str
+    difference: float | None = None
+    signal: str = ""
+    time: float | None = None
+    reason: str = ""
+
+
+def compare_with_fmpy(path: Path) -> FMUComparison:
+    """Simulate an FMU over its default experiment, by the open loop and by FMPy, and compare.
+
+    Real inputs jump at a third and at two thirds; all other inputs keep their start values.
+    Outputs are compared, those of type Real or Float64, and states where there are none.
+    """
+    fmi = ""
+    try:
+        description = read_description(path)
+        fmi = description.version
+        with FMU(path):  # an unknown one is tried in a process of its own
+            pass
+        problem = _Problem(description)
+    except (InputError, FMUError) as error:
+        return FMUComparison(path.name, fmi, REFUSED, reason=_sentence(error, path))
+    try:
+        reference = problem.by_fmpy()
+    except Exception as error:  # FMPy raises bare Exception
+        reference, doubt = None, str(error)
+    else:
+        doubt = "it ends before the experiment does"
+    noise = None if reference is None else _sizes(reference) * LIMIT
+    try:
+        estimates = problem.by_workbench(noise)
+    except (InputError, FMUError) as error:
+        return FMUComparison(path.name, fmi, REFUSED, reason=_sentence(error, path))
+    if reference is None or len(reference) != len(estimates):
+        return FMUComparison(path.name, fmi, NO_REFERENCE, reason=f"FMPy: {doubt}")
+    errors = np.abs(estimates - reference) / _sizes(reference)
+    errors[~np.isfinite(estimates) & np.isfinite(reference)] = np.inf
+    row, column = np.unravel_index(np.nanargmax(errors), errors.shape)
+    difference = float(errors[row, column])
+    verdict = RIGHT if difference <= LIMIT else OFF
+    place = problem.outputs[column], float(problem.time[row])
+    return FMUComparison(path.name, fmi, verdict, difference, *place)
+
+
+def _sizes(signals: Matrix) -> Vector:
+    """Range of each signal; of one that rests its size, or 1."""
+    size = np.ptp(signals, axis=0)
+    size = np.where(size > 0.0, size, np.abs(signals).max(axis=0))
+    return np.where(size > 0.0, size, 1.0)
+
+
+def _sentence(error: Exception, path: Path) -> str:
+    """The message of a refusal, without the folder of the file."""
+    return str(error).replace(str(path.resolve()), path.name).replace(str(path), path.name)
+
+
+class _Problem:
+    """An experiment on an FMU."""
+
+    def __init__(self, description: Description) -> None:
+        self._description = description
+        self._begin = description.start or 0.0
+        stop = description.stop
+        if stop is None or stop <= self._begin:
+            stop = self._begin + _DURATION
+        self._step = (stop - self._begin) / _INTERVALS
+        self.time = self._begin + self._step * np.arange(_INTERVALS + 1)
+        self._inputs = [
+            v
+            for v in description.variables
+            if v.real and v.causality == "input" and v.variability == "continuous"
+        ]
+        outputs = [v.name for v in description.variables if v.real and v.causality == "output"]
+        self.outputs = outputs or list(description.states)
+        if not self.outputs:
+            raise InputError(
+                where=str(description.path),
+                found="no output and no state of type Real or Float64",
+                expected="a model with a signal that can be measured",
+                remedy="export the model with a real output",
+            )
+        self._u = np.column_stack(
+            [self._moved(v) for v in self._inputs] or [np.zeros((_INTERVALS + 1, 0))]
+        )
+
+    def _moved(self, variable: Variable) -> Vector:
+        """An input that jumps twice, by 0.3 and -0.5 of its nominal value."""
+        size = variable.nominal or 1.0
+        share = np.arange(_INTERVALS + 1) / _INTERVALS
+        return float(variable.start or 0.0) + size * (0.3 * (share > 1 / 3) - 0.5 * (share > 2 / 3))
+
+    def by_fmpy(self) -> Matrix:
+        """Outputs along the experiment, (n, l)."""
+        rows = []
+        for k, (t, u) in enumerate(zip(self.time, self._u, strict=True)):
+            if k and (u != self._u[k - 1]).any():  # two rows of one time: before and after a jump
+                rows.append((t, *self._u[k - 1]))
+            rows.append((t, *u))
+        types = [("time", float), *((v.name, float) for v in self._inputs)]
+        driven = np.array(rows, dtype=types)
+        with redirect_stdout(io.StringIO()):  # it prints of inputs that keep their start values
+            result = fmpy.simulate_fmu(
+                str(self._description.path),
+                validate=False,
+                fmi_type=MODEL_EXCHANGE.replace(" ", ""),
+                solver="CVode",
+                relative_tolerance=_TOLERANCE,
+                start_time=self._begin,
+                stop_time=float(self.time[-1]),
+                output_interval=self._step,
+                output=self.outputs,
+                input=driven if self._inputs else None,
+                record_events=False,
+                timeout=_TIMEOUT,
+            )
+        return np.column_stack([result[name] for name in self.outputs])
+
+    def by_workbench(self, noise: Vector | None) -> Matrix:
+        """The same by the open loop; `noise` (l,) of the sensors that its steps must not exceed."""
+        system = self._system(noise)
+        with open_model(system) as fmu:
+            loop = OpenLoop(fmu, system, Gains(OpenLoop.name, (), np.zeros(0), {}, ""))
+            unmeasured = np.full((self.time.size, len(self.outputs)), np.nan)
+            estimate = loop.run(
+                self._step * np.arange(self.time.size, dtype=float), self._u, unmeasured
+            )
+        columns = list(system.columns)
+        return np.asarray(estimate.values)[:, [columns.index(name) for name in self.outputs]]
+
+    def _system(self, noise: Vector | None) -> System:
+        """A machine whose sensors are the outputs, in the FMU's units."""
+        sizes = np.ones(len(self.outputs)) if noise is None else noise
+        content: dict[str, Any] = {
+            "title": self._description.name,
+            "sample_time": f"{self._step} s",
+            "shortest": "0 s",
+            "models": {"observer": {"fmu": str(self._description.path.resolve())}},
+            "outputs": {
+                name: _signal(noise=float(size), scale=float(size) / LIMIT)
+                for name, size in zip(self.outputs, sizes, strict=True)
+            },
+        }
+        if self._inputs:
+            content["inputs"] = {v.name: _signal(0.0, held=True) for v in self._inputs}
+        return system_of(content, self._description.path)
+
+
+def _signal(noise: float, scale: float = 1.0, **more: Any) -> dict[str, Any]:
+    return {"unit": "1", "noise": noise, "scale": scale, **more}
+
+
+def heading() -> str:
+    """The head of a table of comparisons, in Markdown."""
+    return "| FMU | FMI | largest difference | verdict |\n|---|---|---|---|"
+
+
+def row(comparison: FMUComparison) -> str:
+    """A comparison as a row of that table."""
+    size = ""
+    if comparison.difference is not None:
+        size = f"{comparison.difference:.1e} of `{comparison.signal}`"
+    reason = f": {comparison.reason}" if comparison.reason else ""
+    verdict = f"{comparison.verdict}{reason}".replace("|", "/").replace("\n", " ")
+    return f"| {comparison.file} | {comparison.fmi} | {size} | {verdict} |"
