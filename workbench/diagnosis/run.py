@@ -70,8 +70,8 @@ def diagnose(
             base, best = diagnosis.base, diagnosis.best
             asked = certainty and bool(diagnosis.causes) and not diagnosis.interrupted
             assessed = assess(fit, best, report) if asked else None
-            found = _Found(problem, engine, simulations, fit, diagnosis)
-            extension = found.extend(every_platform=every_platform)
+            answer = _Found(problem, engine, simulations, fit, diagnosis)
+            extension = answer.extend(every_platform=every_platform)
             errors = errors_of(simulations, base.linearised, best.linearised, held_out=False)
             starts = fit.unknowns.starts(best.point)
             if problem.held_out:
@@ -98,7 +98,7 @@ def diagnose(
                 set_aside={
                     recording.name: recording.set_aside for recording in simulations.recordings
                 },
-                observers=found.observers(extension),
+                observers=answer.observers(extension),
                 extension=extension,
                 errors=tuple(errors),
                 starts=_differing(system, extension, starts),
@@ -237,8 +237,8 @@ class _Found:
         system, cases, best = self.problem.system, self.simulations.cases, self.diagnosis.best
         report = self.engine.report
         turning = any(effect.order_locked for effect in best.active)
-        judged = all(system.objective.signal in case for case in cases)
-        if extension is None or turning or not judged:
+        scored = all(system.objective.signal in case for case in cases)
+        if extension is None or turning or not scored:
             return {}
         report("observers with both models")
         gains = {}

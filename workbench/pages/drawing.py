@@ -40,8 +40,8 @@ def packed(figure: CaseFigure) -> tuple[str, str]:
                     rows.append(codes)
                     ranges.append([low, high])
             curves.append(ranges)
-    told = json.dumps({"samples": figure.time.size, "curves": curves}, separators=(",", ":"))
-    return told, base64.b64encode(zlib.compress(_planes(rows), 9)).decode()
+    header = json.dumps({"samples": figure.time.size, "curves": curves}, separators=(",", ":"))
+    return header, base64.b64encode(zlib.compress(_planes(rows), 9)).decode()
 
 
 def _codes(values: Vector) -> tuple[NDArray[np.uint16], float, float]:
@@ -73,7 +73,7 @@ _HEAD, _FOOT = 24, 40  # room for a panel's title, for the time axis [px]
 
 def drawing(figure: CaseFigure) -> dict[str, Any]:
     """Geometry of a figure for the template, in pixels, and in the units of the panels inside."""
-    told, samples = packed(figure)
+    header, samples = packed(figure)
     whole = len(samples) <= _MOST
     begin, end = float(figure.time[0]), float(figure.time[-1])
     panels = []
@@ -104,7 +104,7 @@ def drawing(figure: CaseFigure) -> dict[str, Any]:
     return {
         "figure": figure,
         "size": (len(samples) if whole else 0) + _size(panels),  # [byte] about, on the page
-        "told": told,
+        "told": header,
         "samples": samples if whole else "",
         "left": _LEFT,
         "width": _WIDTH,

@@ -265,9 +265,9 @@ def _leaves(content: Any, path: str = "") -> Iterator[tuple[str, Any]]:
             yield from _leaves(entry, f"{path}.{key}" if path else key)
 
 
-def format_runs(found: list[RunRecord]) -> str:
+def format_runs(runs: list[RunRecord]) -> str:
     """What a folder holds, for people."""
-    return "\n\n".join("\n".join(_told(run)) for run in found)
+    return "\n\n".join("\n".join(_told(run)) for run in runs)
 
 
 def _told(ran: RunRecord) -> Iterator[str]:

@@ -13,15 +13,15 @@ def views(system: System) -> tuple[View, ...]:
     """Panels that the system declares; else all its signals, those of one unit together."""
     if system.panels:
         return system.panels
-    judged = system.objective.signal
+    reference = system.objective.signal
     outputs: dict[str, list[str]] = {}
     for output in system.outputs:
-        if output.name != judged:
+        if output.name != reference:
             outputs.setdefault(output.shown, []).append(output.name)
     return (
         *(_view(system, names) for names in outputs.values()),
         *(_view(system, [signal.name], 0.55) for signal in system.inputs),
-        _view(system, [judged], _JUDGED_HEIGHT),
+        _view(system, [reference], _JUDGED_HEIGHT),
         *(_view(system, [quantity.name], 0.8) for quantity in system.estimated),
     )
 

@@ -333,8 +333,8 @@ def _held(folder: Path, *, wait: bool) -> int | None:
         return None
     try:
         fcntl.flock(lock, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
-        found = os.fstat(lock)
-        if found.st_uid == os.getuid() and os.path.samestat(found, folder.lstat()):
+        status = os.fstat(lock)
+        if status.st_uid == os.getuid() and os.path.samestat(status, folder.lstat()):
             return lock
     except FileNotFoundError:
         pass

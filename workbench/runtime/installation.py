@@ -19,12 +19,12 @@ def fingerprint(modules: Sequence[str], packages: Sequence[str]) -> dict[str, st
     modules : whose sources count, packages with all that is in them.
     packages : whose versions count.
     """
-    found = {"python": platform.python_version()}
+    versions = {"python": platform.python_version()}
     for package in packages:
         try:
-            found[package] = version(package)
+            versions[package] = version(package)
         except PackageNotFoundError:
-            found[package] = "none"
+            versions[package] = "none"
     for module in modules:
         try:
             spec = find_spec(module)
@@ -37,8 +37,8 @@ def fingerprint(modules: Sequence[str], packages: Sequence[str]) -> dict[str, st
                 digest.update(file.read_bytes())
         if spec and spec.origin and not spec.submodule_search_locations:
             digest.update(Path(spec.origin).read_bytes())
-        found[f"code of {module}"] = digest.hexdigest()[:16] if spec else "none"
-    return found
+        versions[f"code of {module}"] = digest.hexdigest()[:16] if spec else "none"
+    return versions
 
 
 def difference(ours: dict[str, str], theirs: dict[str, str]) -> str:

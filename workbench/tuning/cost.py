@@ -56,8 +56,8 @@ class Recording(NamedTuple):
 
     def part(self, samples: slice) -> "Recording":
         """A piece of it."""
-        steps, u, y, judged, shares = (values[samples] for values in self.sampled)
-        return self._replace(steps=steps, u=u, y=y, judged=judged, shares=shares)
+        steps, u, y, reference, shares = (values[samples] for values in self.sampled)
+        return self._replace(steps=steps, u=u, y=y, judged=reference, shares=shares)
 
 
 def recordings(
@@ -98,8 +98,8 @@ def recording(case: Case, system: System) -> Recording:
             remedy="leave this case out of the tuning with --cases",
         )
     steps, shares = samples(case.time)
-    judged = np.column_stack([case[name] for name in names])
-    signals = case.u.copy(), case.y.copy(), judged
+    reference = np.column_stack([case[name] for name in names])
+    signals = case.u.copy(), case.y.copy(), reference
     return Recording(case.name, case.name, steps, *signals, shares, case.conditions)
 
 

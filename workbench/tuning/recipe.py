@@ -197,8 +197,8 @@ def pose(
             "judged_by": judge_by or "sensors",
         }
         content = model.path.read_bytes()
-    judged = recordings(cases, system, scale_errors)
-    job = Job(estimator, system, content, gains, judged)
+    recorded = recordings(cases, system, scale_errors)
+    job = Job(estimator, system, content, gains, recorded)
     return Problem(job, space, tuple(cases), meanings, provenance)
 
 
@@ -471,6 +471,6 @@ def with_reference(cases: Sequence[Case], system: System, estimator: str) -> lis
                 expected="an estimate to judge by",
                 remedy="leave this case out of the tuning with --cases",
             )
-        judged = [name for name in system.objective.weights if name not in case.outputs]
-        judged_cases.append(case.with_signals({name: run.signal(name) for name in judged}))
+        references = [name for name in system.objective.weights if name not in case.outputs]
+        judged_cases.append(case.with_signals({name: run.signal(name) for name in references}))
     return judged_cases

@@ -208,7 +208,7 @@ def _folds(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 
 def _unseen(summary: Mapping[str, Any]) -> Table:
-    judged = summary["judged"]
+    reference = summary["judged"]
     below = f", below {summary['bandwidth']:g} Hz" if summary["bandwidth"] else ""
 
     def error(share: float | None) -> Cell:
@@ -217,14 +217,14 @@ def _unseen(summary: Mapping[str, Any]) -> Table:
     return Table(
         "fold-table",
         "Gains tuned without some of the cases and judged on these, against the reasoned gains on "
-        f"the same. The error of {judged} is the worst of the cases, rms over mean{below}.",
+        f"the same. The error of {reference} is the worst of the cases, rms over mean{below}.",
         (
             "left out",
             Numbers("z, reasoned"),
             Numbers("z, tuned without them", sorted="descending"),
             Numbers("z of the cases tuned on"),
-            Numbers(f"error of {judged}, reasoned"),
-            Numbers(f"error of {judged}, tuned without them"),
+            Numbers(f"error of {reference}, reasoned"),
+            Numbers(f"error of {reference}, tuned without them"),
             "worst of them",
             "verdict",
         ),
@@ -370,9 +370,9 @@ def _terms(summary: Mapping[str, Any]) -> dict[str, str]:
         "the last digit fail on any other machine"
         for name, error in provenance["scale_errors"].items()
     )
-    judged = f"Each case as it is{scaled}."
+    treatment = f"Each case as it is{scaled}."
     if (judge := provenance["judged_by"]) != "sensors":
-        judged += (
+        treatment += (
             f" What no output of the model measures is judged by the {judge}, which knows the "
             "whole recording, not by a sensor."
         )
@@ -380,7 +380,7 @@ def _terms(summary: Mapping[str, Any]) -> dict[str, str]:
         "Objective z": "The largest z_k of all cases, equations (11) and (12) of Schwarz, "
         "Brembeck, Heckmann (2018): z_k is the mean over the whole recording of "
         f"{weighed} in SI units{below}.",
-        "Recordings that are judged": judged,
+        "Recordings that are judged": treatment,
     }
     observer = "L11" in summary["gains"]
     if observer and follows:

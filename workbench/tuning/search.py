@@ -80,8 +80,8 @@ def identity(job: Job, space: SearchSpace, cases: Sequence[int], plan: Plan) -> 
     what = [job.estimator, repr(job.system), job.follows, list(cases), plan.population, plan.seed]
     digest.update(json.dumps(what).encode())
     for recording in job.recordings:
-        told = sorted(recording.conditions.items())
-        digest.update(f"{recording.name} {told}".encode())
+        conditions = sorted(recording.conditions.items())
+        digest.update(f"{recording.name} {conditions}".encode())
         for values in recording.sampled:
             digest.update(np.ascontiguousarray(values).tobytes())
     for values in (job.gains.values, *vars(space).values()):

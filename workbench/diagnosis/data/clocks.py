@@ -74,14 +74,14 @@ def late_signals(system: System) -> dict[str, dict[str, float]]:
     A motion follows what leads it with the noise of each sample, which would be another if that
     were moved: where the clock of the reference is late, all others are early.
     """
-    first, found = reference(system), {}
+    first, directions = reference(system), {}
     for clock in (*clocks(system), *own_clocks(system)):
         others = [name for name in system.signals if name not in clock.late]
         moving = (
             dict.fromkeys(others, -1.0) if first in clock.late else dict.fromkeys(clock.late, 1.0)
         )
-        found[variables(clock, SKEW)[0]] = moving
-    return found
+        directions[variables(clock, SKEW)[0]] = moving
+    return directions
 
 
 def lateness(
@@ -107,8 +107,8 @@ def moved(time: Vector, values: Matrix, late: float) -> Matrix:
     right = np.clip(np.searchsorted(time, at), 1, time.size - 1)
     share = (at - time[right - 1]) / (time[right] - time[right - 1])
     share = share.reshape(-1, *(1,) * (values.ndim - 1))
-    found: Matrix = values[right - 1] + share * (values[right] - values[right - 1])
-    return found
+    between: Matrix = values[right - 1] + share * (values[right] - values[right - 1])
+    return between
 
 
 def in_time(samples: Samples, late: Mapping[str, float]) -> Samples:

@@ -112,7 +112,7 @@ class Samples:
     def _filters(self) -> dict[int, tuple[Vector, Vector]]:
         """Numerator and denominator of the modes, as digital filters; of those that show."""
         h = float(np.median(np.diff(self.time)))
-        found = {}
+        quantised = {}
         for column, mode in self.modes.items():
             omega = 2.0 * np.pi * mode.frequency
             if omega * h > 2.0:
@@ -122,8 +122,8 @@ class Samples:
             denominator = np.real(np.poly(z))
             # Matched poles; symmetric weights keep the delay, these the amplitude to 0.2 % below
             # three quarters of the mode's frequency.
-            found[column] = np.sum(denominator) * np.array([1.0, 10.0, 1.0]) / 12.0, denominator
-        return found
+            quantised[column] = np.sum(denominator) * np.array([1.0, 10.0, 1.0]) / 12.0, denominator
+        return quantised
 
     def behind_structure(self, column: int, values: Vector) -> Vector:
         """What a sensor reads of quantities, (n, ...): a mode of second order in between."""
@@ -183,12 +183,12 @@ class Samples:
 
 def compared(system: System, cases: Sequence[Case]) -> tuple[str, ...]:
     """Signals that are compared: outputs, and what is only there to judge by, if a case has it."""
-    judged = [
+    references = [
         signal.name
         for signal in system.reference_signals
         if any(signal.name in case for case in cases)
     ]
-    return (*(output.name for output in system.outputs), *judged)
+    return (*(output.name for output in system.outputs), *references)
 
 
 def channels(system: System, signals: Sequence[str]) -> tuple[Channel, ...]:
@@ -225,11 +225,13 @@ def prepare(
     own = tuple(name for name in signals if name in case)
     counted = count(case, system, (*case.inputs, *own), sound, restarting=restarting)
     clean, deviation, blocks = counted.clean, counted.deviation, counted.blocks
-    formed, told = channels(system, signals), channels(system, own)
+    formed, own_channels = channels(system, signals), channels(system, own)
     slopes = np.array([signal.formula.slopes(signals, model.fmu.defaults) for signal in formed])
-    own_slopes = np.array([signal.formula.slopes(own, model.fmu.defaults) for signal in told])
+    own_slopes = np.array(
+        [signal.formula.slopes(own, model.fmu.defaults) for signal in own_channels]
+    )
     gain, lead, ahead = _led(case, system, own, counted, model.motion)
-    silent = np.array([signal not in told for signal in formed])
+    silent = np.array([signal not in own_channels for signal in formed])
     scales = np.abs(slopes) @ [system.signals[name].scale for name in signals]
     white = whitening(system, counted, own, own_slopes, ahead)
     nothing = np.zeros(time.size)
@@ -271,8 +273,8 @@ def _beside_silent(white: NDArray[np.float64], silent: Mask, scales: Vector) -> 
     if not silent.any():
         return white
     beside = np.tile(np.diag(1.0 / (_WEIGHTLESS * scales)), (len(white), 1, 1))
-    told = np.flatnonzero(~silent)
-    beside[:, told[:, None], told] = white
+    channels_told = np.flatnonzero(~silent)
+    beside[:, channels_told[:, None], channels_told] = white
     return beside
 
 

@@ -68,8 +68,8 @@ def _ringing(means: Vector, late: float) -> Vector:
     """
     squares = np.zeros(means.size)
     squares[1:-1] = np.diff(means, 2) ** 2 / 6.0
-    found: Vector = uniform_filter1d(squares, _NEAR) + (late * np.gradient(means)) ** 2
-    return found
+    variance: Vector = uniform_filter1d(squares, _NEAR) + (late * np.gradient(means)) ** 2
+    return variance
 
 
 def _growing(channel: Vector, signal: Vector, counted: CountedSamples, least: float) -> Vector:

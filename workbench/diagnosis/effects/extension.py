@@ -41,11 +41,11 @@ def variables(effect: Effect, parameter: str) -> tuple[str, ...]:
 
 def sizes_by_component(effects: Iterable[Effect]) -> dict[str, list[str]]:
     """Variables of the FMU that are the sizes of a component: without them it is nominal."""
-    found: dict[str, list[str]] = {}
+    by_component: dict[str, list[str]] = {}
     for effect in (effect for effect in effects if not effect.late):
         for name in (name for size in effect.sizes for name in variables(effect, size)):
-            found.setdefault(name.rpartition(".")[0], []).append(name)
-    return found
+            by_component.setdefault(name.rpartition(".")[0], []).append(name)
+    return by_component
 
 
 def parameter_of(effect: Effect, variable: str) -> str:

@@ -29,8 +29,8 @@ def best_estimate(outcome: Outcome, recording: str) -> CaseResult | None:
     models = {"nominal_model": (system, case)}
     if extension is not None:
         models["extended_model"] = (with_model(system, OBSERVER, extension.fmu), in_time)
-    found = {name: smoothed(recorded, model) for name, (model, recorded) in models.items()}
-    runs = {name: run for name, run in found.items() if run is not None}
+    smoothed_runs = {name: smoothed(recorded, model) for name, (model, recorded) in models.items()}
+    runs = {name: run for name, run in smoothed_runs.items() if run is not None}
     scores = {name: score(in_time, run, system) for name, run in runs.items()}
     return CaseResult(system, in_time, runs, scores, None) if runs else None
 
@@ -38,16 +38,16 @@ def best_estimate(outcome: Outcome, recording: str) -> CaseResult | None:
 def bands(result: CaseResult) -> dict[str, dict[str, dict[str, Any]]]:
     """Numbers of what is hidden, by model and quantity; see `_band`."""
     system, window = result.system, judged_window(result.case, result.system)
-    judged = np.zeros(result.case.time.size, np.bool_)
-    judged[window if window.stop else slice(None)] = True
-    found: dict[str, dict[str, dict[str, Any]]] = {}
+    counted = np.zeros(result.case.time.size, np.bool_)
+    counted[window if window.stop else slice(None)] = True
+    bands: dict[str, dict[str, dict[str, Any]]] = {}
     for model, run in result.runs.items():
-        found[model] = {}
+        bands[model] = {}
         for name in hidden(system):
-            kept = judged & run.claimed.get(name, True) & np.isfinite(run.deviation(name))
+            kept = counted & run.claimed.get(name, True) & np.isfinite(run.deviation(name))
             if kept.any():
-                found[model][name] = _band(result, run, name, kept)
-    return found
+                bands[model][name] = _band(result, run, name, kept)
+    return bands
 
 
 def _band(result: CaseResult, run: Run, name: str, kept: Mask) -> dict[str, Any]:

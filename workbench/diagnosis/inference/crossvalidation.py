@@ -71,8 +71,8 @@ class CrossValidation:
 
     def _told(self, fitted: FittedModel) -> list[Mask]:
         """Channels that are told, of each recording or part."""
-        told = [residuals.blocks > 0 for residuals in fitted.linearised.residuals]
-        return told * self._fit.parts if self._fit.unknowns.count == 1 else told
+        counted = [residuals.blocks > 0 for residuals in fitted.linearised.residuals]
+        return counted * self._fit.parts if self._fit.unknowns.count == 1 else counted
 
     def _errors(self, fitted: FittedModel) -> list[Matrix]:
         if self._fit.unknowns.count == 1:
@@ -90,8 +90,8 @@ class CrossValidation:
         joint = self._fit.quadratics(self._fit.linearise(fitted.linearised, fitted.active))
         stops = joint.stops()
         total = add([*stops, joint.prior])
-        found = []
+        errors = []
         for stop, system in zip(stops, joint.systems, strict=True):
             z = minimum(Quadratic(total.N - stop.N, total.g - stop.g, total.c - stop.c, 0))
-            found.append(system.errors(z) * np.sqrt(fitted.linearised.variance_factors))
-        return found
+            errors.append(system.errors(z) * np.sqrt(fitted.linearised.variance_factors))
+        return errors

@@ -170,12 +170,12 @@ class Fit:
     @property
     def restarted(self) -> list[int]:
         """Recordings of which samples count where states are restarted, and a law is simplified."""
-        found = self._simulations.recordings
-        return [k for k, residual in enumerate(found) if residual.restarted.any()]
+        residuals = self._simulations.recordings
+        return [k for k, residual in enumerate(residuals) if residual.restarted.any()]
 
     def astray(self, lin: LinearizedPoint) -> list[int]:
         """Recordings in which errors last where states are restarted: another law holds there."""
-        found = []
+        kept = []
         for k, (recording, residuals) in enumerate(
             zip(self._simulations.recordings, lin.residuals, strict=True)
         ):
@@ -188,8 +188,8 @@ class Fit:
             if squares.mean(axis=0).max() > max(
                 self.decides.wrong, self.decides.fall_of(count) / count
             ):
-                found.append(k)
-        return found
+                kept.append(k)
+        return kept
 
     def count_restarted(self, numbers: Collection[int], *, counting: bool) -> None:
         """See `ResidualModel.count_restarted`; what was fitted before has to be fitted anew."""

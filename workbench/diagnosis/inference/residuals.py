@@ -96,31 +96,31 @@ def residuals(
     """Residuals of all recordings, with the levels of the nominal model as fitted."""
     values = fit.unknowns.values(before.point)
     system, known = simulations.system, _balances(simulations.system)
-    found = []
+    table = []
     for k, (case, recording) in enumerate(
         zip(simulations.cases, simulations.recordings, strict=True)
     ):
-        told = np.flatnonzero(~recording.silent)
-        inverse = np.linalg.inv(recording.whitening[:, told[:, None], told])
+        measured = np.flatnonzero(~recording.silent)
+        inverse = np.linalg.inv(recording.whitening[:, measured[:, None], measured])
         unwhitened: list[Matrix] = [
-            np.einsum("bij,bj->bi", inverse, lin.residuals[k].errors[:, told])
+            np.einsum("bij,bj->bi", inverse, lin.residuals[k].errors[:, measured])
             for lin in (before, after)
         ]
         formed = channels(system, recording.signals)
         fitted = {**simulations.nominal, **values[k]}
-        found.append(
+        table.append(
             Residuals(
                 name=case.name,
                 time=case.time,
                 balances=tuple(known(system, case, recording, fitted)) if known else (),
-                channels=tuple(formed[c] for c in told),
+                channels=tuple(formed[c] for c in measured),
                 block_time=case.time[recording.blocks.mean(axis=1).astype(int)],
                 before=unwhitened[0],
                 after=unwhitened[1],
                 sigma=np.sqrt(np.einsum("bij,bij->bi", inverse, inverse)),
             )
         )
-    return found
+    return table
 
 
 def _balances(system: System) -> Balances | None:
@@ -129,18 +129,20 @@ def _balances(system: System) -> Balances | None:
     return known
 
 
-def dependences(simulations: ResidualModel, found: Sequence[Residuals]) -> list[Dependence]:
+def dependences(simulations: ResidualModel, residuals: Sequence[Residuals]) -> list[Dependence]:
     """What prediction errors go with, strongest before first."""
     system = simulations.system
-    influences = [_influences(simulations, k) for k in range(len(found))]
+    influences = [_influences(simulations, k) for k in range(len(residuals))]
     turning = {
         influence.name for influence in system.comparison.influences if influence.way == "turn"
     }
     # What changes sign with the direction is wrong by its size, whatever the direction.
     signs = [sign(case, system) for case in simulations.cases]
-    pairs = list(zip(signs, found, strict=True))
+    pairs = list(zip(signs, residuals, strict=True))
     table = []
-    for channel in dict.fromkeys(channel for residual in found for channel in residual.channels):
+    for channel in dict.fromkeys(
+        channel for residual in residuals for channel in residual.channels
+    ):
         before, after, along = [], [], []
         for (mark, residual), own in zip(pairs, influences, strict=True):
             if channel in residual.channels:

@@ -39,7 +39,7 @@ def errors_of(
     simulations: ResidualModel, before: LinearizedPoint, after: LinearizedPoint, *, held_out: bool
 ) -> list[Errors]:
     """Errors of all recordings by two models."""
-    found = []
+    rows = []
     for k, recording in enumerate(simulations.recordings):
         sizes = [lin.residuals[k].sizes for lin in (before, after)]
         samples = int(recording.told.sum())
@@ -47,10 +47,10 @@ def errors_of(
             if recording.silent[c]:
                 continue
             rms, mean = ((float(sizes[0][i, c]), float(sizes[1][i, c])) for i in (0, 1))
-            found.append(
+            rows.append(
                 Errors(recording.name, channel.name, channel.unit, held_out, samples, rms, mean)
             )
-    return found
+    return rows
 
 
 def held_out_errors(

@@ -161,8 +161,8 @@ class ScoreTest:
 
     def scores(self) -> list[CandidateScore]:
         """All candidates, best first."""
-        found = [self._score(effect, shape) for effect, shape in self._candidates]
-        return sorted(found, key=lambda score: -score.score)
+        scores = [self._score(effect, shape) for effect, shape in self._candidates]
+        return sorted(scores, key=lambda score: -score.score)
 
     def _score(self, effect: Effect, shape: Mapping[str, float]) -> CandidateScore:
         at = [self.joint.shared.index((variant(effect, shape), name)) for name in effect.sizes]

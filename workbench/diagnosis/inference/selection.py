@@ -194,7 +194,7 @@ def _alike(
     similar : names of effects with a like signature.
     """
     alike = set(similar)
-    found: dict[str, FittedModel] = {}
+    models: dict[str, FittedModel] = {}
     for step in steps:
         winner = step.rivals[0]
         rivals = {rival.active[-1].name: rival for rival in step.rivals}
@@ -204,18 +204,18 @@ def _alike(
         named = winner.active[-1] is effect
         alike |= close if named else set(rivals)
         if named and winner.point is best.point:
-            found |= {name: rivals[name] for name in close}
+            models |= {name: rivals[name] for name in close}
             alike -= set(rivals)
     active = {effect.name for effect in best.active}
-    found = {name: model for name, model in found.items() if name not in active}
-    alike -= active | set(found)
+    models = {name: model for name, model in models.items() if name not in active}
+    alike -= active | set(models)
     others: dict[str, CandidateScore] = {}
     for score in (score for step in steps for score in step.scores):
         if score.effect.name in alike:
             others.setdefault(score.effect.name, score)
     fits = fit.together(partial(extended, fit, less), list(others.values()))
     tried = zip(others, fits, strict=True)
-    return found | {name: model for name, model in tried if model is not None}
+    return models | {name: model for name, model in tried if model is not None}
 
 
 def _close(fit: Fit, before: FittedModel, fitted: FittedModel, best: FittedModel) -> bool:

@@ -158,8 +158,8 @@ def estimated(
             engine.report("fitting free functions")
             job = partial(_estimate, simulations, anew(fit, about.point, about.active))
             tried = fit.together(job, list(zip(effects, able, strict=True)))
-    found = [smoothness for smoothness in tried if smoothness is not None]
-    return sorted(found, key=lambda smoothness: -smoothness.evidence)
+    fits = [smoothness for smoothness in tried if smoothness is not None]
+    return sorted(fits, key=lambda smoothness: -smoothness.evidence)
 
 
 def _effects(library: Library, prospects: Sequence[LawScore]) -> list[FreeFunction]:
@@ -212,7 +212,7 @@ def _fitted(
     """The likelier of all rounds: smoothness about a point may promise what bends away from it."""
     smoothness, best = prospect.smoothness, base
     keys = [(effect.name, name) for name in effect.sizes]
-    found: list[FittedLaw] = []
+    laws: list[FittedLaw] = []
     for _ in range(_ROUNDS):
         inverse: Matrix = np.asarray(np.linalg.inv(smoothness.covariance), np.float64)
         effect = replace(effect, inverse=inverse)
@@ -229,9 +229,9 @@ def _fitted(
         gained = base.linearised.deviance - best.linearised.deviance
         spread = np.linalg.slogdet(np.eye(len(keys)) + N @ smoothness.covariance)[1]
         posterior: Matrix = np.asarray(np.linalg.inv(N + effect.precision), np.float64)
-        found.append(FittedLaw(prospect, 0.5 * (gained - float(spread)), now, posterior))
+        laws.append(FittedLaw(prospect, 0.5 * (gained - float(spread)), now, posterior))
         smoothness = smoothest(N, g, most=prospect.most)
-    return max(found, key=lambda smoothness: smoothness.evidence)
+    return max(laws, key=lambda smoothness: smoothness.evidence)
 
 
 def _started(

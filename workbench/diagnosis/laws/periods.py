@@ -69,12 +69,12 @@ def _power(
     frequencies: Vector, errors: Sequence[Matrix], clocks: Sequence[Vector], rates: Sequence[Vector]
 ) -> Vector:
     """Sum of all periodograms, (f,)."""
-    found = np.zeros(frequencies.size)
+    spectrum = np.zeros(frequencies.size)
     for own, clock, rate in zip(errors, clocks, rates, strict=True):
         for first in range(0, frequencies.size, _AT_ONCE):
             some = frequencies[first : first + _AT_ONCE, None]
             wave = np.exp(2j * np.pi * some * clock) * (some * rate <= _RESOLVED)
             count = np.maximum(1, np.count_nonzero(wave, axis=1))
             power = 2.0 * np.square(np.abs(wave @ own)).sum(axis=1) / count
-            found[first : first + _AT_ONCE] += power
-    return found
+            spectrum[first : first + _AT_ONCE] += power
+    return spectrum

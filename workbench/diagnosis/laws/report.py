@@ -18,7 +18,11 @@ _SHOWN = 3
 
 
 def write_proposal(
-    found: Proposal, outcome: Outcome, provenance: Mapping[str, Any], diagnosis: Path, workers: int
+    proposal: Proposal,
+    outcome: Outcome,
+    provenance: Mapping[str, Any],
+    diagnosis: Path,
+    workers: int,
 ) -> Path:
     """Write what was proposed; returns the page of the diagnosis with it, or proposal.json.
 
@@ -31,28 +35,28 @@ def write_proposal(
     outcome : without the proposal, as it was written to the folder `diagnosis`.
     """
     out = diagnosis / PROPOSED
-    write_json(out / "proposal.json", {**found.to_dict(), "provenance": provenance})
-    write_whole(out / "laws.csv", found.to_frame().to_csv(index=False, float_format="%.6g"))
-    if found.estimates:
-        functions = found.functions()
+    write_json(out / "proposal.json", {**proposal.to_dict(), "provenance": provenance})
+    write_whole(out / "laws.csv", proposal.to_frame().to_csv(index=False, float_format="%.6g"))
+    if proposal.estimates:
+        functions = proposal.functions()
         write_whole(out / "functions.csv", functions.to_csv(index=False, float_format="%.6g"))
-        save_figure(functions_figure(found), [out / "functions.png", out / "functions.svg"])
-    if not found.laws or found.outcome is None:
-        told, text = out / "proposal.json", "No law that was proposed holds: what was tried"
+        save_figure(functions_figure(proposal), [out / "functions.png", out / "functions.svg"])
+    if not proposal.laws or proposal.outcome is None:
+        written, text = out / "proposal.json", "No law that was proposed holds: what was tried"
     else:
         back = {"../index.html": "The diagnosis without what is proposed here"}
-        told = write_diagnosis(found.outcome, provenance, out, workers, back)
+        written = write_diagnosis(proposal.outcome, provenance, out, workers, back)
         text = "Proposed, not known physics: the diagnosis with a law for what is missing"
-    relate_diagnosis(outcome, diagnosis, {told.relative_to(diagnosis).as_posix(): text})
-    return told
+    relate_diagnosis(outcome, diagnosis, {written.relative_to(diagnosis).as_posix(): text})
+    return written
 
 
-def functions_figure(found: Proposal) -> "Figure":
+def functions_figure(proposal: Proposal) -> "Figure":
     """Draw the likeliest functions with the 95 % bands of their shapes."""
-    shown = [estimate for estimate in found.estimates if estimate.law.influence is not None][
+    shown = [estimate for estimate in proposal.estimates if estimate.law.influence is not None][
         :_SHOWN
     ]
-    table = found.functions()
+    table = proposal.functions()
     with styled(4.2 * max(1, len(shown)), 3.0, font_size=8) as sheet:
         for axes, fitted in zip(
             sheet.subplots(1, max(1, len(shown)), squeeze=False)[0], shown, strict=False
@@ -72,7 +76,7 @@ def functions_figure(found: Proposal) -> "Figure":
             axes.axhline(0.0, color=LIGHT["raw"], linewidth=0.6)
             axes.set_xlabel(f"{law.influence.short} [{law.influence.unit or '?'}]")
             axes.set_ylabel(f"function [{law.carrier.unit or '?'}]")
-            tied = "tied" if fitted in found.tied else f"{fitted.evidence:.0f} nat"
+            tied = "tied" if fitted in proposal.tied else f"{fitted.evidence:.0f} nat"
             axes.set_title(
                 f"{law.carrier.text},\n{law.place.text} ({tied})", fontsize=7, loc="left"
             )

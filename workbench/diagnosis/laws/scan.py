@@ -128,9 +128,9 @@ class Scan:
                 span = _SPAN * system.comparison.lasting
                 every = [law for place in where for law in laws(place, self._recordings, span)]
                 engine.report(f"{len(every)} laws in {len(where)} places")
-                found = self._judged(simulations, values, every)
-                found += self._turning(simulations, values, where)
-        self.prospects = sorted(found, key=lambda prospect: -prospect.smoothness.evidence)
+                scores = self._judged(simulations, values, every)
+                scores += self._turning(simulations, values, where)
+        self.prospects = sorted(scores, key=lambda prospect: -prospect.smoothness.evidence)
 
     def _judged(
         self,
@@ -139,7 +139,7 @@ class Scan:
         every: Sequence[Law],
     ) -> list[LawScore]:
         lin = self.base.linearised
-        found: list[LawScore] = []
+        scores: list[LawScore] = []
         each = max(1, _AT_ONCE // COEFFICIENTS)
         for first in range(0, len(every), each):
             part = every[first : first + each]
@@ -161,9 +161,9 @@ class Scan:
                 joint = self._fit.quadratics(lin.extended(keys, more), keys)
                 largest = self._largest(law.place)
                 smoothness = smoothest(*eliminated(joint, keys), most=_most(law, largest))
-                found.append(LawScore(law, knots, smoothness, largest))
+                scores.append(LawScore(law, knots, smoothness, largest))
                 at += count
-        return found
+        return scores
 
     def _turning(
         self,
@@ -197,7 +197,7 @@ class Scan:
         ]
         courses = [np.hstack([wave[k] for wave in waves]) for k in range(len(self._recordings))]
         derivatives = simulations.responses(values, columns, courses)
-        found = []
+        scores = []
         for n, (law, period) in enumerate(every):
             keys = [(law.place.name, f"c{k}") for k in range(2 * len(derivatives))]
             more = [np.zeros((len(derivative), len(keys))) for derivative in derivatives]
@@ -208,8 +208,8 @@ class Scan:
             likeliest = smoothest(*eliminated(joint, keys), APART, _most(law, largest))
             evidence = likeliest.evidence - float(np.log(period.tried))
             likeliest = replace(likeliest, evidence=evidence)
-            found.append(LawScore(law, None, likeliest, largest))
-        return found
+            scores.append(LawScore(law, None, likeliest, largest))
+        return scores
 
     def _period(
         self, simulations: ResidualModel, place: Place, influence: LawInfluence
@@ -230,12 +230,12 @@ class Scan:
     def _waves(self, law: Law, period: Period) -> list[Matrix]:
         """Carrier times cosine and sine in each recording, (n, 2)."""
         assert law.influence is not None
-        found = []
+        columns = []
         for time, watched in self._recordings:
             angle = 2.0 * np.pi / period.length * law.influence.course(law.place, watched, time)
             carrier = law.carrier.course(law.place, watched)
-            found.append(carrier[:, None] * np.column_stack([np.cos(angle), np.sin(angle)]))
-        return found
+            columns.append(carrier[:, None] * np.column_stack([np.cos(angle), np.sin(angle)]))
+        return columns
 
     def _largest(self, place: Place) -> float:
         """Largest size of an output, without a law."""

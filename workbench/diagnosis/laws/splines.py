@@ -43,10 +43,10 @@ class Knots:
         """Basis functions at values (n,), (n, COEFFICIENTS)."""
         x = np.clip((values - self.low) / self.step, 0.0, COEFFICIENTS - 3)
         away = np.abs(x[:, None] - (np.arange(COEFFICIENTS) - 1.0))
-        found: Matrix = (
+        penalty: Matrix = (
             np.maximum(0.0, 2.0 - away) ** 3 - 4.0 * np.maximum(0.0, 1.0 - away) ** 3
         ) / 6.0
-        return found
+        return penalty
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,8 +69,8 @@ class Smoothness:
 def kernel(length: float, count: int = COEFFICIENTS) -> Matrix:
     """Correlation of coefficients, (count, count)."""
     at = np.arange(count)
-    found: Matrix = np.exp(-0.5 * ((at[:, None] - at) / length) ** 2) + _JITTER * np.eye(count)
-    return found
+    covariance: Matrix = np.exp(-0.5 * ((at[:, None] - at) / length) ** 2) + _JITTER * np.eye(count)
+    return covariance
 
 
 def smoothest(
@@ -99,9 +99,9 @@ def smoothest(
         squares = (vectors.T @ (root.T @ g)) ** 2
         for variance in np.minimum(_VARIANCES / max(values.max(), 1e-300), most**2):
             spread = 1.0 + variance * values
-            found = 0.5 * float((variance * squares / spread - np.log(spread)).sum())
-            if best is None or found > best[0]:
-                best = found, variance * K
+            evidence = 0.5 * float((variance * squares / spread - np.log(spread)).sum())
+            if best is None or evidence > best[0]:
+                best = evidence, variance * K
     assert best is not None
     posterior = np.linalg.inv(N + np.linalg.inv(best[1]))
     return Smoothness(best[0], best[1], -posterior @ g, posterior)

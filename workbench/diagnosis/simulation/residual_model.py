@@ -187,8 +187,8 @@ class ResidualModel:
         ----------
         points : values of the FMU's variables and of delays, one mapping for each recording.
         """
-        found = self._gathered({k: (Simulator.at, self._at[k], points[k]) for k in self._order})
-        return [found[k] for k in range(len(self.recordings))]
+        results = self._gathered({k: (Simulator.at, self._at[k], points[k]) for k in self._order})
+        return [results[k] for k in range(len(self.recordings))]
 
     def derivatives(
         self,
@@ -202,13 +202,13 @@ class ResidualModel:
         ----------
         sizes : see `Simulator.derivatives`.
         """
-        found = self._gathered(
+        results = self._gathered(
             {
                 k: (Simulator.derivatives, self._at[k], points[k], columns, None, sizes)
                 for k in self._order
             }
         )
-        return [found[k] for k in range(len(self.recordings))]
+        return [results[k] for k in range(len(self.recordings))]
 
     def responses(
         self,
@@ -217,20 +217,20 @@ class ResidualModel:
         courses: Sequence[Matrix],
     ) -> list[Matrix]:
         """As `derivatives`, of columns that act by factors `courses` of each recording, (n, p)."""
-        found = self._gathered(
+        results = self._gathered(
             {
                 k: (Simulator.derivatives, self._at[k], points[k], columns, courses[k])
                 for k in self._order
             }
         )
-        return [found[k] for k in range(len(self.recordings))]
+        return [results[k] for k in range(len(self.recordings))]
 
     def along(self, points: Sequence[Mapping[str, float]], watched: Sequence[str]) -> list[Matrix]:
         """Variables of the FMU at the samples of every recording, each (n, w); see `at`."""
-        found = self._gathered(
+        results = self._gathered(
             {k: (Simulator.along, self._at[k], points[k], watched) for k in self._order}
         )
-        return [found[k] for k in range(len(self.recordings))]
+        return [results[k] for k in range(len(self.recordings))]
 
     def together(self, job: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
         """Results of a job that asks for evidence, by item; no processor waits for one of them."""

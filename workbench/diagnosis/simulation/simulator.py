@@ -155,12 +155,12 @@ class Simulator:
             shares = None if courses is None else courses[:, part]
             absent = self._absent(values, varied, sizes or {})
             given = recording, self._known(values), varied, shares, absent
-            _, found = self._predictor.derivatives(*given)
-            by = self._whitened(number, self._late(number, found.errors, values))
+            _, along = self._predictor.derivatives(*given)
+            by = self._whitened(number, self._late(number, along.errors, values))
             jacobian[:-1, part] = by.reshape(-1, len(part))
             if self._rest is not None and courses is None:
                 place = self._rest.references
-                slopes = (fmu.jacobian(place, fmu.variables(fmu.states)) @ found.states)[0]
+                slopes = (fmu.jacobian(place, fmu.variables(fmu.states)) @ along.states)[0]
                 for q, column in enumerate(varied):
                     acting = [name for name in column.variables if name not in fmu.states]
                     slopes[q] += fmu.jacobian(place, fmu.variables(acting)).sum()
@@ -230,11 +230,11 @@ class Simulator:
             moved.extend(
                 shifted(name, share) for name, share in recording.restarts.uncertain.items()
             )
-        apart = [
+        alone = [
             shifted(name, by.share) * max(1.0, 2.0 * by.over / compare.block) ** 0.5
             for name, by in compare.wander.items()
         ]
-        return recording.loosened(moved, apart)
+        return recording.loosened(moved, alone)
 
     def _means(self, number: int, y: Matrix, values: Mapping[str, float]) -> Matrix:
         """Errors of the blocks, by channel (b, c), where restarts read `y` (n, c)."""

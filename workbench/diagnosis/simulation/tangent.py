@@ -133,7 +133,7 @@ def renew(model, tangent):  # type: ignore[no-untyped-def]
     """
     n, p = tangent.states.shape
     unknowns = n + tangent.errors.shape[1]
-    now, found = 1 - tangent.turn[0], 0
+    now, count = 1 - tangent.turn[0], 0
     tangent.turn[0] = now
     for j in tangent.used:
         if differentiate(model, j, unknowns):
@@ -142,11 +142,11 @@ def renew(model, tangent):  # type: ignore[no-untyped-def]
             for i in rows:
                 slope = model.jacobian[j, i]
                 if slope != 0.0:
-                    tangent.rows[now, found] = i
-                    tangent.by[now, found] = j
-                    tangent.slopes[now, found] = slope
-                    found += 1
-    tangent.entries[now] = found
+                    tangent.rows[now, count] = i
+                    tangent.by[now, count] = j
+                    tangent.slopes[now, count] = slope
+                    count += 1
+    tangent.entries[now] = count
     for q in range(p):
         first = tangent.edges[q]
         knowns, seeds = tangent.knowns[first:], tangent.seeds[first:]
