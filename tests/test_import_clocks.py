@@ -76,6 +76,8 @@ SYDNEY = ZoneInfo("Australia/Sydney")
         (datetime(2024, 3, 30, tzinfo=BERLIN), "%Y-%m-%d %H:%M:%S %Z", 900.0),
         (datetime(2024, 11, 2, tzinfo=NEW_YORK), "%Y-%m-%d %H:%M:%S %Z", 900.0),
         (datetime(2024, 10, 26, tzinfo=BERLIN), "%H:%M:%S", 900.0),
+        (datetime(2024, 10, 24, tzinfo=BERLIN), "%Y-%m-%d %H:%M", 7200.0),
+        (datetime(2024, 3, 28, tzinfo=BERLIN), "%Y-%m-%d %H:%M", 7200.0),
     ],
 )
 def test_local_times_go_on_through_changes_of_the_clock(
@@ -124,6 +126,20 @@ def test_a_zone_that_is_said_tells_the_hours_of_a_changing_clock(
         ("%d-%b-%y %H:%M:%S", "2024-03-01"),
         ("%Y%m%dT%H%M%S", "2024-03-01"),
         ("%Y%m%d%H%M%S", "2024-03-01"),
+        ("%y%m%d %H%M%S", "2024-03-01"),
+        ("%Y %m %d %H:%M:%S", "2024-03-01"),
+        ("%Y:%m:%d %H:%M:%S", "2024-03-01"),
+        ("%Y/%m/%d-%H:%M:%S", "2024-03-01"),
+        ("%Y-%m-%d_%H-%M-%S", "2024-03-01"),
+        ("%d.%m.%Y %H.%M.%S", "2024-03-01"),
+        ("%d.%m.%Y, %H:%M:%S Uhr", "2024-03-01"),
+        ("%d/%b/%Y:%H:%M:%S", "2024-03-01"),
+        ("%m/%d/%Y %p %I:%M:%S", "2024-03-01"),
+        ("%a %d.%m.%Y %H:%M", "2024-03-01"),
+        ("%a, %d %b %Y %H:%M:%S GMT", "2024-03-01"),
+        ("%Y-%jT%H:%M:%S", "2024-03-01"),
+        ("%Y-%m-%dT%H:%M:%S+00:00[Europe/London]", "2024-03-01"),
+        ("%Y-%m-%d %H:%M:%S IST", "2024-03-01"),
     ],
 )
 def test_dates_of_any_order_are_read_as_times_go_on(
@@ -133,6 +149,81 @@ def test_dates_of_any_order_are_read_as_times_go_on(
     found = clock(path, tank)
     assert_allclose(found.times, QUARTER * np.arange(300))
     assert iso(found.start).startswith(start)
+
+
+@pytest.mark.parametrize(
+    ("names", "form"),
+    [
+        ("Year;Month;Day;Hour;Minute;Second", "%Y;%m;%d;%H;%M;%S"),
+        ("Year;DOY;HHMM", "%Y;%j;%H%M"),
+        ("Date;Time", "%Y%m%d;%H%M%S"),
+        ("Date;Time", "%m/%d/%Y;%I:%M:%S %p"),
+        ("Time;Date", "%H:%M;%d/%m/%y"),
+    ],
+)
+def test_dates_and_times_stand_in_columns_of_their_own(
+    tmp_path: Path, tank: System, names: str, form: str
+) -> None:
+    stamps = local(datetime(2024, 3, 1, tzinfo=UTC), 300, form)
+    found = clock(table(tmp_path / "a.csv", stamps, names), tank)
+    assert_allclose(found.times, QUARTER * np.arange(300))
+    assert iso(found.start).startswith("2024-03-01")
+
+
+@pytest.mark.parametrize(
+    "form", ["{d} days {h:02d}:{m:02d}:00", "{d}.{h:02d}:{m:02d}:00", "P{d}DT{h}H{m}M"]
+)
+def test_durations_of_days_go_on(tmp_path: Path, tank: System, form: str) -> None:
+    stamps = [form.format(d=k // 96, h=k // 4 % 24, m=15 * (k % 4)) for k in range(300)]
+    assert_allclose(clock(table(tmp_path / "a.csv", stamps), tank).times, QUARTER * np.arange(300))
+
+
+def test_two_figures_are_minutes_and_seconds_if_that_is_nearer_to_usual_steps(
+    tmp_path: Path,
+) -> None:
+    """5 s apart as minutes and seconds, 300 s as hours and minutes; asked, and kept."""
+    write_system(tmp_path / "tank")
+    tank = load_system(tmp_path / "tank")  # a sample each 0.5 s
+    stamps = [f"{k // 12 % 60:02d}:{5 * (k % 12):02d}" for k in range(1000)]
+    path = table(tmp_path / "a.csv", stamps)
+    found = clock(path, tank)
+    assert_allclose(found.times, 5.0 * np.arange(1000))
+    assert not found.certain
+    said = clock(path, tank, "Time [min:s]")
+    assert_allclose(said.times, found.times)
+    assert (said.certain, said.stated) == (True, "min:s")
+
+
+def test_hours_to_12_go_on_from_12_to_1(tmp_path: Path, tank: System) -> None:
+    """As times of day they are told; beside dates half days are not known, and asked for."""
+    begin = datetime(2024, 3, 5, tzinfo=UTC)
+    path = table(tmp_path / "a.csv", local(begin, 200, "%I:%M:%S"))
+    found = clock(path, tank)
+    assert_allclose(found.times, QUARTER * np.arange(200))
+    assert "hours count to 12" in found.reason
+    dated = table(tmp_path / "b.csv", local(begin, 200, "%Y-%m-%d %I:%M:%S"))
+    with pytest.raises(InputError, match=r"found .* after"):
+        clock(dated, tank)
+
+
+def test_an_hour_that_may_be_missing_is_told(tmp_path: Path, tank: System) -> None:
+    """Without a date, and where samples are not even."""
+    begin = datetime(2024, 3, 30, tzinfo=BERLIN)
+    (word,) = clock(table(tmp_path / "a.csv", local(begin, 160, "%H:%M:%S")), tank).corrections
+    assert "an hour is missing after 01:45:00: a gap, or summer time begins" in word
+    dated = local(begin, 160, "%Y-%m-%d %H:%M")
+    seconds = [f"{stamp}:{13 * k % 37:02d}" for k, stamp in enumerate(dated)]
+    del seconds[103]  # beside the change at 02:00
+    (word,) = clock(table(tmp_path / "b.csv", seconds), tank).corrections
+    assert "an hour may be missing after 2024-03-31 01:" in word
+
+
+def test_a_zone_of_the_header_is_that_of_its_times(tmp_path: Path, tank: System) -> None:
+    begin = datetime(2024, 10, 26, 22, tzinfo=BERLIN)
+    stamps = local(begin, 100, "%d.%m.%Y %H:%M")
+    found = clock(table(tmp_path / "a.csv", stamps, "Time [Europe/Berlin]"), tank)
+    assert_allclose(found.times, QUARTER * np.arange(100))
+    assert iso(found.start) == "2024-10-26T20:00:00.000000"
 
 
 def test_days_that_follow_are_not_those_of_several_years(tmp_path: Path, tank: System) -> None:
@@ -186,6 +277,22 @@ def test_a_format_that_is_said_reads_what_is_no_date_elsewhere(
             "",
         ),
         ("t [s]", [f"{(80000 + 900 * k) % 86400}" for k in range(300)], ""),
+        ("t [h]", [f"{(80000 + 900 * k) % 86400 / 3600}" for k in range(300)], ""),
+        ("t [min]", [f"{900 * k % 3600 / 60}" for k in range(300)], ""),
+        ("tick [ms]", [f"{(900000 * k) % 2**24}" for k in range(300)], ""),
+        ("Time [d]", [f"{45352 + k / 96:.9f}" for k in range(300)], "2024-03-01"),
+        ("Julian date", [f"{2460370.5 + k / 96:.8f}" for k in range(300)], "2024-03-01"),
+        ("MJD", [f"{60370 + k / 96:.8f}" for k in range(300)], "2024-03-01"),
+        ("datenum", [f"{739312 + k / 96:.8f}" for k in range(300)], "2024-03-01"),
+        ("DOY", [f"{61 + k / 96:.8f}" for k in range(300)], ""),
+        ("Time", [f"{3792125800 + 900 * k}" for k in range(300)], "2024-03-01T08:16:40"),
+        ("Time", [f"{133537546000000000 + 9 * 10**9 * k}" for k in range(300)], "2024-03-01"),
+        ("ticks", [f"{638448778000000000 + 9 * 10**9 * k}" for k in range(300)], "2024-03-01"),
+        ("GPS time", [f"{1393316218 + 900 * k}" for k in range(300)], "2024-03-01T08:16:40"),
+        ("Time", local(datetime(2024, 3, 1, tzinfo=UTC), 300, "%H%M"), ""),
+        ("Time", local(datetime(2024, 3, 1, tzinfo=UTC), 300, "%H%M%S"), ""),
+        ("Time", local(datetime(2024, 3, 1, tzinfo=UTC), 300, "%y%m%d%H%M%S"), "2024-03-01"),
+        ("Time", local(datetime(2024, 3, 1, tzinfo=UTC), 300, "%Y%m%d%H%M"), "2024-03-01"),
     ],
 )
 def test_counts_are_seconds_from_their_first(
@@ -209,6 +316,66 @@ def test_clocks_that_contradict_each_other_are_refused_with_both(
         clock(path, tank)
     for time in ("Date", "Time [ms]"):
         assert_allclose(clock(path, tank, time).times, QUARTER * np.arange(60))
+
+
+@pytest.mark.parametrize(("rate", "refused"), [("1.111111 Hz", True), ("10 Hz", False)])
+def test_a_stated_rate_that_times_contradict_is_told(
+    tmp_path: Path, tank: System, rate: str, refused: bool
+) -> None:
+    """Times in ms that count as s are refused; a recorder may scan more often than it writes."""
+    path = table(tmp_path / "a.csv", [str(900 * k) for k in range(60)], "Time [s]")
+    path.write_text(f"Sample rate: {rate}\n" + path.read_text())
+    if refused:
+        with pytest.raises(
+            InputError, match=r"times every 900 s, and the file states .* 0.9 s, 1000"
+        ):
+            clock(path, tank)
+        assert_allclose(clock(path, tank, "Time [ms]").times[1], 0.9)
+    else:
+        assert (
+            "every 900 s, and the file states a sample every 0.1 s"
+            in clock(path, tank).corrections[0]
+        )
+
+
+def test_stamps_coarser_than_samples_tell_the_rate(tmp_path: Path, tank: System) -> None:
+    path = table(tmp_path / "a.csv", local(datetime(2024, 3, 5, tzinfo=UTC), 300, "%H:%M", 10.0))
+    with pytest.raises(InputError, match=r"coarser than samples.*--sample-rate '0.1017 Hz'"):
+        clock(path, tank)
+
+
+@pytest.mark.parametrize(
+    ("head", "name", "stamps", "date"),
+    [
+        (
+            "Start time: 2024-03-05 10:00:00",
+            "t [s]",
+            [str(900 * k) for k in range(60)],
+            "2024-03-05T10:00:00",
+        ),
+        (
+            "Startzeit;05.03.2024 10:00:00",
+            "t [s]",
+            [str(900 * k) for k in range(60)],
+            "2024-03-05T10:00:00",
+        ),
+        (
+            "Date;2024/03/05\nTime;10:00:00",
+            "t [s]",
+            [str(900 * k) for k in range(60)],
+            "2024-03-05T10:00:00",
+        ),
+        ("Date: 05.03.2024", "t", [f"10:{k:02d}:00" for k in range(60)], "2024-03-05T10:00:00"),
+        ("Calibrated: 05.03.2024 10:00:00", "t [s]", [str(900 * k) for k in range(60)], ""),
+    ],
+)
+def test_a_preamble_tells_the_date_of_a_recording(
+    tmp_path: Path, tank: System, head: str, name: str, stamps: list[str], date: str
+) -> None:
+    path = table(tmp_path / "a.csv", stamps, name)
+    path.write_text(f"{head}\n\n" + path.read_text())
+    recorded = read_recorded_file(path)
+    assert merge([recorded], propose([recorded], tank, {}), tank).date(0)[:19] == date
 
 
 def test_parts_of_a_second_beside_a_date_are_of_its_time(tmp_path: Path, tank: System) -> None:

@@ -19,6 +19,7 @@ from workbench.system.units import si_factor
 
 _FEW = 5  # samples that tell a value, whatever one or two of them read
 _CONTRADICTS = 300.0  # times the usual step: the unit of the time is another one
+_OTHER_UNITS = 60.0, 3600.0  # minutes and hours that are taken for seconds
 _ROUNDED = 1.0 + 1e-6  # times are written with some digits
 
 
@@ -173,6 +174,14 @@ def _sampling(time: Vector, system: System, origin: Origin) -> Iterator[_Finding
             f"a sample every {usual:.6g} s, {ratio:.4g} times as far apart as in usual recordings",
             f"times in seconds, about {system.sample_time:g} s apart",
             f"correct the unit of the time; if it is right, correct sample_time in {system.source}",
+        )
+    elif any(abs(ratio * factor - 1.0) < 1e-3 for factor in _OTHER_UNITS):
+        yield _Finding(
+            False,
+            origin.at(1, "time"),
+            f"a sample every {usual:.6g} s, 1/{1.0 / ratio:.4g} of what is usual",
+            f"times in seconds, about {system.sample_time:g} s apart",
+            "correct the unit of the time, if it is minutes or hours",
         )
     elif usual > limits.slowest * _ROUNDED:
         yield _Finding(

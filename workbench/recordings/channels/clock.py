@@ -1,34 +1,56 @@
 """When the samples of a group were taken."""
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from datetime import datetime
 from itertools import combinations
 
 import numpy as np
 
 from workbench.arrays import Vector
 from workbench.errors import InputError
-from workbench.recordings.channels.names import TIME, NamedChannel, is_time, listed
+from workbench.recordings.channels.names import TIME, NamedChannel, is_time, listed, words
 from workbench.recordings.formats import FileChannel, Group
 from workbench.recordings.formats.spelling import conversion
-from workbench.recordings.formats.stamps import is_said, read_stamps
+from workbench.recordings.formats.stamps import MINUTES, is_said, read_stamps
 from workbench.system.system import System
 
 # Units of time that recorders leave out, and how far from those of usual recordings steps may be in
 # the one that is meant. Where several are as likely, as seconds and minutes often are, none is.
 _UNSTATED = ("ns", "us", "ms", "s", "min", "h", "d")
 _LIKE = math.sqrt(1000.0)
-# Counters that go round: bits, and parts of a day, in counts, ms or us of the unit.
+# Counters that go round: bits in counts, ms or us of the unit; and parts of a day.
 _ROUNDS = tuple(
     sorted(
         {float(2**bits) * part for bits in (16, 24, 32) for part in (1.0, 1e-3, 1e-6)}
         | {float(rest) * part for rest in (60, 3600, 43200, 86400) for part in (1.0, 1e3, 1e6)}
+        | {12.0, 24.0, 1440.0}
     )
 )
 _UNIX = 8e8, 2.3e9  # [s] since 1970, that recordings are of: 1995 to 2042
-# Days of spreadsheets: that of the year 1970, and what they count from 1982 to 2064.
-_DAYS = {"Excel": (25569.0, 30000.0, 60000.0), "MATLAB": (719529.0, 724000.0, 754000.0)}
+# Counts from other dates: seconds from there to 1970, seconds of a count, and counts from 1995 on.
+_EPOCHS = {
+    "s since 1904, as LabVIEW counts": (2082844800.0, 1.0),
+    "100 ns since 1601, as Windows counts": (11644473600.0, 1e-7),
+    "100 ns since the year 1, as .NET counts": (62135596800.0, 1e-7),
+}
+_GPS = 315964800.0 - 18.0  # [s] from 1970 to the zero of GPS, less leap seconds since 2017
+# Days: that of the year 1970, and what they count in recordings.
+_DAYS = {
+    "Excel": (25569.0, 30000.0, 50000.0),
+    "modified Julian days": (40587.0, 50000.0, 66000.0),
+    "MATLAB": (719529.0, 724000.0, 754000.0),
+    "Julian days": (2440587.5, 2445000.0, 2475000.0),
+}
+# Figures of dates and times, as of Unix' date: 1015, 101500, 240305101500, 202403051015.
+_PACKED = ("%H%M", "%H%M%S", "%y%m%d%H%M", "%y%m%d%H%M%S", "%Y%m%d%H%M", "%Y%m%d%H%M%S")
+_DAY = 86400.0  # s
+_MIDNIGHT = 0.5  # of a day, by which times go back at its end
+_UNITS_APART = (60.0, 3600.0, 86400.0, 1e3, 1e6, 1e9)
+_DAYS_OF_YEAR = frozenset(("doy", "yday", "jday"))
+_TWO_PARTS = re.compile(r"\d{1,4}:\d\d")
 _FACTOR = 1.5  # by which two clocks of one recording do not differ
 
 
@@ -47,6 +69,7 @@ class Clock:
     corrections : how they were made to go on, in words.
     stated : how the user says that dates are to be read.
     zoned : whether `start` is in UTC; else in some local time.
+    dated : when the recording began, where the times do not tell it but the file [s since 1970].
     """
 
     channel: str
@@ -59,6 +82,7 @@ class Clock:
     corrections: tuple[str, ...] = ()
     stated: str = ""
     zoned: bool = False
+    dated: float = math.nan
 
 
 def read_clock(
@@ -76,6 +100,17 @@ def read_clock(
     InputError
         If there is no time, none that goes on, or two that contradict each other.
     """
+    clock = _read_clock(group, named, step, system, where)
+    if not math.isfinite(group.begun) or math.isfinite(clock.start):
+        return clock
+    shown = next((c.shown for c in group.channels if c.name == clock.channel), math.nan)
+    day = group.begun - group.begun % _DAY
+    return replace(clock, dated=day + shown if math.isfinite(shown) else group.begun)
+
+
+def _read_clock(
+    group: Group, named: NamedChannel | None, step: float | None, system: System, where: str
+) -> Clock:
     count = np.arange(group.channels[0].values.size, dtype=np.float64)
     if step is not None:
         return Clock("", count * step, math.nan, "s", f"every {step:g} s, as given", True, True)
@@ -94,7 +129,7 @@ def read_clock(
     clocks = [clock for channel in channels if (clock := _candidate(channel, group, system))]
     if going := [clock for clock in clocks if clock.certain and _increases(clock.times)]:
         _refuse_contradiction(going, where)
-        return going[0]
+        return _beside_stated(going[0], group.step, where)
     for channel in channels:
         if channel.doubt:
             raise InputError(
@@ -136,6 +171,30 @@ def _refuse_contradiction(clocks: Sequence[Clock], where: str) -> None:
             )
 
 
+def _beside_stated(clock: Clock, step: float, where: str) -> Clock:
+    """The clock, with what a file states of its steps where that is another one.
+
+    Raises
+    ------
+    InputError
+        If they are as far apart as two units of time are.
+    """
+    usual = float(np.median(np.diff(clock.times[np.isfinite(clock.times)])))
+    ratio = max(usual, step) / min(usual, step)
+    if not ratio > _FACTOR:
+        return clock
+    said = f"times every {usual:.6g} s, and the file states a sample every {step:.6g} s"
+    if any(abs(ratio / apart - 1.0) < 0.02 for apart in _UNITS_APART):
+        raise InputError(
+            where=f"{where}, '{clock.channel}'",
+            found=f"{said}, {ratio:.4g} times apart",
+            expected="one time between samples",
+            remedy=f"say which is right, --column '{TIME}={clock.channel} [UNIT]', or "
+            f"--sample-rate '{1.0 / step:.6g} Hz'",
+        )
+    return replace(clock, corrections=(*clock.corrections, f"{said}; the times are taken"))
+
+
 def _no_time(group: Group, system: System, where: str) -> InputError:
     """What a group has in place of times."""
     problem, name = f"no time among {listed([channel.name for channel in group.channels])}", "NAME"
@@ -166,7 +225,7 @@ def _no_time(group: Group, system: System, where: str) -> InputError:
 def _named(channel: FileChannel, named: NamedChannel, system: System, where: str) -> Clock:
     """The channel that the user says is the time, in the unit or the format that is said."""
     if channel.texts:
-        return _named_stamps(channel, named.unit, where)
+        return _named_stamps(channel, named.unit, system, where)
     # Durations are in seconds, whatever the name of their column says.
     own = channel.unit if channel.stamp else named.unit or channel.unit
     if not own and (since := _since(channel, system)) is not None:
@@ -187,12 +246,13 @@ def _named(channel: FileChannel, named: NamedChannel, system: System, where: str
     return replace(clock, start=start, certain=bool(own))
 
 
-def _named_stamps(channel: FileChannel, unit: str, where: str) -> Clock:
+def _named_stamps(channel: FileChannel, unit: str, system: System, where: str) -> Clock:
     """Dates and times of day, as the user says that they are written."""
     how = unit if is_said(unit) else ""
     read = read_stamps(channel.name, channel.texts, how) if how else channel
     if read is not None and not read.doubt and np.isfinite(read.values).any():
-        return replace(_stamped(read), stated=how)
+        clock = replace(_stamped(read), stated=how)
+        return clock if how else _minutes_or_hours(clock, channel, system)
     text = next(filter(None, channel.texts), "")
     none = f"which are none of [{how}]" if how else "no date that is known"
     raise InputError(
@@ -220,13 +280,18 @@ def _stamped(channel: FileChannel) -> Clock:
 def _candidate(channel: FileChannel, group: Group, system: System) -> Clock | None:
     """A channel that may be the time, by its name, its unit and its place."""
     if channel.stamp:
-        return None if channel.doubt else _stamped(channel)
+        return None if channel.doubt else _minutes_or_hours(_stamped(channel), channel, system)
     scale = conversion(channel.unit, "s") if channel.unit else None
+    days = channel.unit == "d" and is_time(channel.name)
+    if days and (since := _since(channel, system)) is not None:
+        return since
     if scale is not None and (is_time(channel.name) or channel is group.channels[0]):
         return _counting(channel, channel.unit, scale.factor, "name and unit")
     if not channel.unit and is_time(channel.name):
         if (since := _since(channel, system)) is not None:
             return since
+        if (packed := _packed(channel)) is not None:
+            return packed
         likely = _unstated(channel.values, system)
         scale = conversion(likely[0], "s") if len(likely) == 1 else None
         if scale is not None:
@@ -235,9 +300,64 @@ def _candidate(channel: FileChannel, group: Group, system: System) -> Clock | No
     return None
 
 
+def _minutes_or_hours(clock: Clock, channel: FileChannel, system: System) -> Clock:
+    """Times such as 10:15 in hours and minutes, or in minutes and seconds if that is more usual."""
+    texts = [text for text in channel.texts if text]
+    if not texts or not all(map(_TWO_PARTS.fullmatch, texts)):
+        return clock
+    other = read_stamps(channel.name, channel.texts, MINUTES)
+    steps = np.diff(clock.times[np.isfinite(clock.times)])
+    usual = float(np.median(steps)) if steps.size else math.nan
+    # Sixty times as far apart: the reading that is nearer to usual steps.
+    if other is None or not usual / system.sample_time > math.sqrt(60.0):
+        return clock
+    reason = f"minutes and seconds, as samples are {usual / 60.0:.4g} s apart then"
+    return replace(
+        _stamped(other), certain=False, reason=reason, unit=MINUTES, channel=channel.name
+    )
+
+
+def _packed(channel: FileChannel) -> Clock | None:
+    """Times in figures such as 101500, where they go on evenly as such, and not as numbers."""
+    held = channel.values[np.isfinite(channel.values)]
+    if held.size < 3 or (held < 0.0).any() or (held >= 1e14).any():
+        return None
+    whole, parts = np.floor(channel.values), channel.values % 1.0
+    known = np.isfinite(channel.values)
+    uneven = _unevenness(held)
+    for form in _PACKED:
+        digits = {"%H%M": 4, "%H%M%S": 6}.get(form, 2 * len(form) // 2 + ("%Y" in form) * 2)
+        if held.max() >= 10.0**digits or (len(form) > 6 and held.min() < 10.0 ** (digits - 2)):
+            continue
+        try:
+            moments = [datetime.strptime(f"{int(v):0{digits}d}", form) for v in whole[known]]
+        except ValueError:
+            continue
+        times = np.full(channel.values.size, math.nan)
+        seconds = np.array([(moment - moments[0]).total_seconds() for moment in moments])
+        alone = "%d" not in form
+        if alone:
+            seconds += _DAY * np.concatenate(
+                [[0.0], np.cumsum(np.diff(seconds) < -_MIDNIGHT * _DAY)]
+            )
+        times[known] = seconds + (parts[known] - parts[known][0])
+        if not _increases(times) or _unevenness(times[known]) >= uneven:
+            continue
+        start = math.nan if alone else (moments[0] - datetime(1970, 1, 1)).total_seconds()
+        name = re.sub("%", "", form)
+        return Clock(channel.name, times, start, "s", f"figures of time, {name}", True)
+    return None
+
+
+def _unevenness(times: Vector) -> float:
+    """How far the longest step is above the usual one; infinite where one goes back."""
+    steps = np.diff(times)
+    return math.inf if (steps <= 0.0).any() else float(steps.max() / np.median(steps))
+
+
 def _counting(channel: FileChannel, unit: str, factor: float, reason: str) -> Clock:
     """Times that are numbers; a counter that goes round goes on."""
-    values, words = _unwrapped(channel.values)
+    values, rounds = _unwrapped(channel.values)
     start = math.nan
     first = next((float(value) for value in values if math.isfinite(value)), math.nan)
     if _UNIX[0] <= first * factor <= _UNIX[1] and is_time(channel.name):
@@ -249,9 +369,9 @@ def _counting(channel: FileChannel, unit: str, factor: float, reason: str) -> Cl
         times=times,
         start=start,
         unit=unit,
-        reason="; ".join((reason, *words)),
+        reason="; ".join((reason, *rounds)),
         certain=True,
-        corrections=words,
+        corrections=rounds,
         zoned=math.isfinite(start),
     )
 
@@ -264,19 +384,22 @@ def _unwrapped(values: Vector) -> tuple[Vector, tuple[str, ...]]:
     if not back.size or back.size > 0.5 * steps.size:
         return values, ()
     usual = float(np.median(ahead))
-    fitting = [
-        period
+    apart = {
+        period: float(np.abs(steps[back] + period - usual).max()) / usual
         for period in _ROUNDS
-        if period > 2.0 * usual and (np.abs(steps[back] + period - usual) <= 0.5 * usual).all()
-    ]
-    if len(fitting) != 1:
+        if period > 2.0 * usual
+    }
+    best, *others = sorted(apart, key=lambda period: apart[period])[:2] or [math.nan]
+    # Of periods that are near each other, one must fit clearly better.
+    rival = min((apart[period] for period in others), default=math.inf)
+    if not apart.get(best, math.inf) <= 0.5 or rival <= max(2.0 * apart[best], 0.05):
         return values, ()
     rounds = np.zeros(known.size)
-    rounds[back + 1] = fitting[0]
+    rounds[back + 1] = best
     whole = values.copy()
     whole[known] += np.cumsum(rounds)
     times = "once" if back.size == 1 else f"{back.size} times"
-    return whole, (f"the counter goes round at {fitting[0]:.10g}, {times}",)
+    return whole, (f"the counter goes round at {best:.10g}, {times}",)
 
 
 def _since(channel: FileChannel, system: System) -> Clock | None:
@@ -291,14 +414,30 @@ def _since(channel: FileChannel, system: System) -> Clock | None:
     for unit, factor in (("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)):
         if _UNIX[0] <= held.min() * factor and held.max() * factor <= _UNIX[1]:
             clock = _counting(channel, unit, factor, f"{unit} since 1970")
+            if "gps" in words(channel.name):
+                clock = replace(clock, start=clock.start + _GPS, reason="s of GPS")
+    for reason, (zero, factor) in _EPOCHS.items():
+        if _UNIX[0] <= held.min() * factor - zero and held.max() * factor - zero <= _UNIX[1]:
+            times = (channel.values - held[0]) * factor
+            start = float(held[0]) * factor - zero
+            clock = Clock(channel.name, times, start, "s", reason, True)
     likely = _unstated(channel.values, system)
     for name, (zero, least, most) in _DAYS.items():
         whole = bool((held == np.round(held)).all())
         if least <= held.min() and held.max() <= most and not whole and "s" not in likely:
             # Doubles hold such days to microseconds; files mostly to a tenth of a second.
-            times = np.round((channel.values - held[0]) * 86400.0, 6)
-            start = (float(held[0]) - zero) * 86400.0
-            clock = Clock(channel.name, times, start, "d", f"days as {name} counts them", True)
+            times = np.round((channel.values - held[0]) * _DAY, 6)
+            start = round((float(held[0]) - zero) * _DAY, 3)
+            clock = Clock(
+                channel.name,
+                times,
+                start,
+                "d",
+                f"days as {name} counts them" if name in ("Excel", "MATLAB") else name,
+                True,
+            )
+    if _DAYS_OF_YEAR.intersection(words(channel.name)) and held.max() <= 367.0:
+        clock = Clock(channel.name, channel.values * _DAY, math.nan, "d", "days of a year", True)
     if clock is None:
         return None
     steps = np.abs(np.diff(clock.times[np.isfinite(clock.times)]))
@@ -336,12 +475,17 @@ def _going_on(clock: Clock, where: str) -> Clock:
         return clock
     held = clock.times[np.isfinite(clock.times)]
     late = int(np.argmin(np.diff(held) > 0)) if held.size > 1 else -1
-    fault = f"{held[late + 1]:.9g} s after {held[late]:.9g} s" if late >= 0 else "no times"
+    found = f"{held[late + 1]:.9g} s after {held[late]:.9g} s" if late >= 0 else "no times"
     count = int((np.diff(held) <= 0).sum()) if held.size > 1 else 0
+    found += f" in sample {late + 2}" + (f", and {count - 1} more" if count > 1 else "")
+    remedy = "if samples are evenly spaced say how, --sample-rate '200 Hz'; else export more digits"
+    if held.size > 1 and count >= 0.3 * held.size and not (np.diff(held) < 0).any():
+        rate = (held.size - 1) / (held[-1] - held[0]) if held[-1] > held[0] else math.nan
+        found += ": stamps are coarser than samples"
+        remedy = f"say the rate, about --sample-rate '{rate:.4g} Hz', or export more digits"
     raise InputError(
         where=f"{where}, '{clock.channel}'" if clock.channel else where,
-        found=f"{fault} in sample {late + 2}" + (f", and {count - 1} more" if count > 1 else ""),
+        found=found,
         expected="times that go on",
-        remedy="if samples are evenly spaced say how, --sample-rate '200 Hz'; else export more "
-        "digits",
+        remedy=remedy,
     )

@@ -119,7 +119,12 @@ def merge(
         )
     signals = {name: values[known] for name, values in signals.items()}
     begun = [c.start for c in proposal.clocks.values() if math.isfinite(c.start)]
-    zero = min(begun, default=math.nan)
+    stated = [
+        clock.dated - float(clock.times[np.isfinite(clock.times)][0])
+        for clock in proposal.clocks.values()
+        if math.isfinite(clock.dated)
+    ]
+    zero = min(begun or stated, default=math.nan)
     damaged = [f"{file.path}: {doubt}" for file in files for doubt in file.doubts]
     mended = [
         f"{files[file].path}, '{clock.channel}': {text}"
@@ -127,7 +132,7 @@ def merge(
         for text in clock.corrections
     ]
     doubts = *damaged, *proposal.contradictions, *mended, *_mixed(files, proposal)
-    zoned = all(c.zoned for c in proposal.clocks.values() if math.isfinite(c.start))
+    zoned = bool(begun) and all(c.zoned for c in proposal.clocks.values() if math.isfinite(c.start))
     return MergedRecording(time[known], signals, zero, tuple(notes), doubts, zoned)
 
 

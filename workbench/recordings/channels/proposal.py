@@ -23,6 +23,7 @@ from workbench.recordings.channels.matching import (
 from workbench.recordings.channels.names import TIME, NamedChannel, listed
 from workbench.recordings.formats import RecordedFile
 from workbench.recordings.formats.spelling import conversion, is_unit
+from workbench.recordings.formats.stamps import is_said
 from workbench.system.parts import Signal
 from workbench.system.system import System
 
@@ -318,7 +319,11 @@ def _contradictions(
         stated = {channel.name: channel.unit for channel in files[i].groups[j].channels}.get(
             clock.channel
         )
-        if stated and conversion(clock.unit, "s") != conversion(stated, "s"):
+        if (
+            stated
+            and not is_said(clock.unit)
+            and conversion(clock.unit, "s") != conversion(stated, "s")
+        ):
             yield _contradiction(files[i], clock.channel, clock.unit, stated)
 
 

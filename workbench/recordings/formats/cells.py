@@ -4,7 +4,8 @@ import math
 import re
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from datetime import datetime, timedelta
 
 import numpy as np
 
@@ -24,6 +25,7 @@ from workbench.recordings.formats.stamps import (
     has_day,
     has_day_alone,
     has_fraction,
+    is_said,
     is_stamp,
     read_stamps,
 )
@@ -57,6 +59,24 @@ _PARTS = {
     **dict.fromkeys(("us", "\u00b5s", "usec", "microseconds", "mikrosekunden", "micros"), 6),
     **dict.fromkeys(("ns", "nsec", "nanoseconds"), 9),
 }
+# Columns that hold parts of a date, by their names in small letters.
+_PARTS_OF_TIME = {
+    **dict.fromkeys(("year", "yr", "yyyy", "jahr"), "year"),
+    **dict.fromkeys(("month", "mon", "mm", "monat"), "month"),
+    **dict.fromkeys(("day", "dd", "tag"), "day"),
+    **dict.fromkeys(("doy", "yday", "jday", "day of year", "julian day", "day_rtm"), "yday"),
+    **dict.fromkeys(("hour", "hours", "hr", "hh", "stunde"), "hour"),
+    **dict.fromkeys(("minute", "minutes", "min", "mi", "mn"), "minute"),
+    **dict.fromkeys(("second", "seconds", "sec", "ss", "sekunde"), "second"),
+    **dict.fromkeys(("hhmm", "hhmmss", "hour_minute_rtm", "time", "zeit", "uhrzeit"), "clock"),
+    **dict.fromkeys(("date", "datum", "yyyymmdd"), "date"),
+}
+_FIGURES = re.compile(r"\d+([.,]\d*)?")
+_DATE_IN_FIGURES = re.compile(r"(19|20)\d\d(0[1-9]|1[0-2])(0[1-9]|[12]\d|3[01])")
+# Lines of a preamble that say when a recording began, and those that say something else.
+_BEGAN = re.compile(r"start|beg[iu]n|trigger|^\W*(date|datum|t0)\b", re.IGNORECASE)
+_NOT_BEGAN = re.compile(r"end|stop|export|print|druck|[ck]alib|version|software", re.IGNORECASE)
+_WORD = re.compile(r"[\d./:-][\d./:T\s-]{6,}[\d](\.\d+)?(\s*[AP]M\b)?|[\d./:-]{8,}", re.IGNORECASE)
 _WHOLE_SECONDS = re.compile(r".*\d:\d\d:\d\d")
 
 
@@ -223,10 +243,11 @@ def read_group(
     numbers: dict[int, list[str]] = {}
     notes: list[str] = []
     labels = [_label(table, i) for i in range(len(columns))]
-    labels, columns = _with_parts(*_joined(labels, columns))
+    labels, columns = _with_parts(*_joined(*_assembled(labels, columns)))
     left: list[FileChannel] = []
     for i, cells in enumerate(columns):
-        if _mostly(cells, is_stamp) and (channel := read_stamps(labels[i][0], cells)) is not None:
+        how = labels[i][1] if is_said(labels[i][1]) else ""
+        if _mostly(cells, is_stamp) and (channel := read_stamps(labels[i][0], cells, how)):
             stamps.append(channel)
             notes += [f"'{labels[i][0]}' holds {channel.doubt}"] * bool(channel.doubt)
         elif _mostly(cells, is_number):
@@ -256,9 +277,82 @@ def read_group(
         channels.append(FileChannel(*labels[i], values, censored=tuple(beyond)))
     step, doubt = stated_step(table.head)
     within = (name,) if name else ()
-    group = Group(name, (*stamps, *channels), step=step, step_doubt=doubt, within=within)
-    group = replace(group, left=tuple(left))
+    group = Group(
+        name,
+        (*stamps, *channels),
+        step=step,
+        step_doubt=doubt,
+        within=within,
+        left=tuple(left),
+        begun=stated_begin(table.head),
+    )
     return group, reading, notes
+
+
+def _assembled(
+    labels: list[tuple[str, str]], columns: list[list[str]]
+) -> tuple[list[tuple[str, str]], list[list[str]]]:
+    """The same columns, with those of years, days, hours, or dates and times in figures, as one.
+
+    A date is that of a year with month and day, or with the day of the year; a time of day is of
+    hours, minutes and seconds, or of figures such as 1015 and 101500.
+    """
+    at: dict[str, int] = {}
+    for i, (name, _) in enumerate(labels):
+        part = _PARTS_OF_TIME.get(name.casefold())
+        if part and part not in at and all(_FIGURES.fullmatch(cell) for cell in columns[i] if cell):
+            at[part] = i
+    dates = (
+        at.keys() & {"date"}
+        or at.keys() >= {"year", "month", "day"}
+        or at.keys() >= {"year", "yday"}
+    )
+    times = at.keys() & {"clock", "hour"}
+    if not dates or not times:
+        return labels, columns
+    if "date" in at:
+        held = [cell for cell in columns[at["date"]] if cell]
+        if not all(_DATE_IN_FIGURES.fullmatch(cell) for cell in held):
+            return labels, columns
+        days = columns[at["date"]]
+        used = ["date"]
+    elif "month" in at and "day" in at:
+        used = ["year", "month", "day"]
+        rows = zip(*(columns[at[part]] for part in used), strict=True)
+        days = [f"{y}{m:0>2}{d:0>2}" if y and m and d else "" for y, m, d in rows]
+    else:
+        used = ["year", "yday"]
+        rows = zip(*(columns[at[part]] for part in used), strict=True)
+        days = [_of_year(y, d) for y, d in rows]
+    if "clock" in at:
+        used.append("clock")
+        width = 4 if max(map(len, columns[at["clock"]])) <= 4 else 6
+        clocks = [f"{cell:0>{width}}{'00' * (width == 4)}" for cell in columns[at["clock"]]]
+    else:
+        own = [part for part in ("hour", "minute", "second") if part in at]
+        used += own
+        rows = zip(*(columns[at[part]] for part in own), strict=True)
+        clocks = ["".join(_two_figures(cell) for cell in row).ljust(6, "0") for row in rows]
+    joined = [f"{day}T{clock}" if day else "" for day, clock in zip(days, clocks, strict=True)]
+    if not _mostly(joined, is_stamp):
+        return labels, columns
+    left = [i for i in range(len(columns)) if i not in {at[part] for part in used}]
+    label = " ".join(labels[at[part]][0] for part in used), ""
+    return [label, *(labels[i] for i in left)], [joined, *(columns[i] for i in left)]
+
+
+def _two_figures(cell: str) -> str:
+    """Hours, minutes or seconds with two figures before their decimals."""
+    whole, mark, decimals = cell.replace(",", ".").partition(".")
+    return f"{whole:0>2}{mark}{decimals}" if decimals.strip("0") else f"{whole:0>2}"
+
+
+def _of_year(year: str, day: str) -> str:
+    """A date of the day of a year, in figures."""
+    if not year or not day:
+        return ""
+    moment = datetime(int(float(year)), 1, 1) + timedelta(days=int(float(day)) - 1)
+    return f"{moment:%Y%m%d}"
 
 
 def _joined(
@@ -353,6 +447,35 @@ def stated_step(head: Sequence[str]) -> tuple[float, str]:
     if all(math.isclose(step, other) for other in others):
         return step, ""
     return math.nan, f"a preamble that states {' and '.join(steps)}"
+
+
+def stated_begin(head: Sequence[str]) -> float:
+    """When a recording began, as a preamble states it [s since 1970]; NaN where it does not.
+
+    Parameters
+    ----------
+    head : lines above a table.
+    """
+    for line in head:
+        if not _BEGAN.search(line) or _NOT_BEGAN.search(line):
+            continue
+        for match in _WORD.finditer(line):
+            text = match[0].strip(" -.:")
+            stamp = read_stamps("", [text, text]) if has_day([text]) else None
+            if stamp is not None and math.isfinite(stamp.start) and not stamp.doubt:
+                return stamp.start + (_clock_beside(head) if has_day_alone([text]) else 0.0)
+    return math.nan
+
+
+def _clock_beside(head: Sequence[str]) -> float:
+    """A time of day that a line of a preamble states by itself [s]; 0 without one."""
+    for line in head:
+        if re.match(r"\W*(start ?|begin ?)?(time|zeit|uhrzeit)\b", line, re.IGNORECASE):
+            for match in _WORD.finditer(line):
+                stamp = read_stamps("", [match[0].strip()]) if is_stamp(match[0].strip()) else None
+                if stamp is not None and math.isfinite(stamp.shown):
+                    return stamp.shown
+    return 0.0
 
 
 def _number(text: str) -> tuple[float, str]:

@@ -56,6 +56,8 @@ class Group:
     step : time between two samples that the file states [s]; NaN: it states none.
     step_doubt : why what the file states of it cannot be taken, in words; empty: nothing is.
     left : texts beside the channels, which a user may say are times.
+    begun : when the recording began, as the file says beside its times [s since 1970]; NaN: it does
+        not say.
     within : names of what holds it in the file, outermost first: a sheet, nested structures.
     """
 
@@ -66,6 +68,7 @@ class Group:
     step_doubt: str = ""
     within: tuple[str, ...] = ()
     left: tuple[FileChannel, ...] = ()
+    begun: float = math.nan
 
     def renamed(self, name: str) -> "Group":
         """The same group with another name."""

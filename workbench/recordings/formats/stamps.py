@@ -10,6 +10,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 from datetime import UTC, date, datetime, timedelta
+from itertools import pairwise
 from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
 import numpy as np
@@ -17,25 +18,42 @@ import numpy as np
 from workbench.arrays import Vector
 from workbench.recordings.formats.contents import FileChannel
 
-_CLOCK = (
-    r"(?P<h>\d{1,2}):(?P<m>\d\d)(:(?P<s>\d\d)((?P<dot>[.,:])(?P<f>\d{1,12}))?)?"
-    r"(\s*(?P<half>[AaPp])\.?[Mm]\.?)?"
+_HALF = r"(?P<half>[AaPp])\.?[Mm]\.?"
+_PARTS_OF_DAY = r"(?P<h>\d{1,2}):(?P<m>\d\d)(:(?P<s>\d\d)((?P<dot>[.,:])(?P<f>\d{1,12}))?)?"
+_CLOCK = rf"{_PARTS_OF_DAY}(\s*{_HALF})?"
+# Behind a date, hours and minutes may be parted by other signs, and stand alone with AM or PM.
+_CLOCK_OF_DATE = (
+    rf"({_HALF.replace('half', 'early')}\s+)?"
+    + r"(?P<h>\d{1,2})([:.h-](?P<m>\d\d)([:.-](?P<s>\d\d)((?P<dot>[.,:])(?P<f>\d{1,12}))?)?"
+    rf"(\s*{_HALF})?|\s*{_HALF.replace('half', 'late')})"
 )
-_ZONE = r"\s*(?P<zone>(UTC|GMT)?[+-]\d\d?(:?\d\d)?|[A-Z][A-Za-z]+/[A-Za-z_/]+|[A-Za-z]{3,5}|[zZ])?"
-_MONTHS = {  # English and German, by the letters that tell
-    **{"jan": 1, "feb": 2, "mar": 3, "mär": 3, "apr": 4, "may": 5, "mai": 5, "jun": 6, "jul": 7},
-    **{"aug": 8, "sep": 9, "oct": 10, "okt": 10, "nov": 11, "dec": 12, "dez": 12},
+_ZONE = (
+    r"(\s*(Uhr|h)\b)?"
+    r"\s*(?P<zone>(UTC|GMT)?[+-]\d\d?(:?\d\d)?|[A-Z][A-Za-z]+/[A-Za-z_/]+|[A-Za-z]{2,5}|[zZ])?"
+    r"(\[[A-Za-z_/+-]+\])?"
+)
+_MONTHS = {  # English, German, French, Spanish, Italian and Dutch, by the letters that tell
+    **{"jan": 1, "ene": 1, "gen": 1, "feb": 2, "fév": 2, "fev": 2, "mar": 3, "mär": 3, "mrt": 3},
+    **{"maa": 3, "apr": 4, "avr": 4, "abr": 4, "may": 5, "mai": 5, "mag": 5, "mei": 5, "jun": 6},
+    **{"juin": 6, "giu": 6, "jul": 7, "juil": 7, "lug": 7, "aug": 8, "aoû": 8, "aou": 8, "ago": 8},
+    **{"sep": 9, "set": 9, "oct": 10, "okt": 10, "ott": 10, "nov": 11},
+    **{"dec": 12, "dez": 12, "déc": 12, "dic": 12},
 }
-_CALLED = rf"(?P<called>{'|'.join(_MONTHS)})[^\W\d]{{0,6}}"
+_CALLED = rf"(?P<called>{'|'.join(_MONTHS)})[^\W\d]{{0,8}}"
+_WEEKDAYS = (
+    "mon|tue|wed|thu|fri|sat|sun|mo|di|mi|do|fr|sa|so|lun|mar|mer|jeu|ven|sam|dim|mié|jue|vie|sáb"
+)
+_WEEKDAY = rf"((?:{_WEEKDAYS})[^\W\d]{{0,8}}\.?,?\s+)?"
 _DAY = re.compile(
-    r"((?P<year>\d{4})[-/.](?P<month>\d{1,2})[-/.](?P<day>\d{1,2})"
+    rf"{_WEEKDAY}((?P<year>\d{{4}})(?P<by>[-/.:_\s])(?P<month>\d{{1,2}})(?P=by)(?P<day>\d{{1,2}})"
+    r"|(?P<ordinal_year>\d{4})[-/.](?P<ordinal>\d{3})"
     rf"|(?P<of>\d{{1,2}})[-/.\s]{{1,2}}{_CALLED}\.?[-/\s](?P<in>\d{{4}}|\d\d)"
     r"|(?P<one>\d{1,2})(?P<mark>[-/.])(?P<two>\d{1,2})[-/.](?P<last>\d{4}|\d\d))"
-    rf"([T\s]+{_CLOCK}{_ZONE})?",
+    rf"(([T,;_\s-]+|:){_CLOCK_OF_DATE}{_ZONE})?",
     re.IGNORECASE,
 )
 _CALLED_FIRST = re.compile(  # Mar 5, 2024 10:00; Tue Mar  5 10:00:00 2024
-    rf"([A-Za-z]{{3,9}},?\s+)?{_CALLED}\.?\s+(?P<of>\d{{1,2}})(,?\s+(?P<in>\d{{4}})\s+{_CLOCK}{_ZONE}"
+    rf"([A-Za-z]{{3,9}},?\s+)?{_CALLED}\.?\s+(?P<of>\d{{1,2}})(,?\s+(?P<in>\d{{4}}),?\s+{_CLOCK}{_ZONE}"
     rf"|\s+{_CLOCK.replace('(?P<', '(?P<c')}\s+(?P<cin>\d{{4}}))",
     re.IGNORECASE,
 )
@@ -43,8 +61,22 @@ _COMPACT = re.compile(  # 20240305T101500.25
     r"(?P<year>(19|20)\d\d)(?P<month>0[1-9]|1[0-2])(?P<day>0[1-9]|[12]\d|3[01])[T_\s-]?"
     rf"(?P<h>[01]\d|2[0-3])(?P<m>[0-5]\d)(?P<s>[0-5]\d)([.,](?P<f>\d{{1,12}}))?{_ZONE}"
 )
-_OF_DAY = re.compile(_CLOCK + _ZONE)
+_COMPACT_SHORT = re.compile(  # 240305 101500
+    r"(?P<one>\d\d)(?P<mark>)(?P<two>\d\d)(?P<last>\d\d)[T_\s-]"
+    r"(?P<h>[01]\d|2[0-3])(?P<m>[0-5]\d)(?P<s>[0-5]\d)([.,](?P<f>\d{1,12}))?"
+)
+# Durations of days go on with d, days or a point: 1d 10:00:00, 1 days 10:00:00, 1.10:00:00.
+_OF_DAY = re.compile(
+    rf"((?P<days>\d+)(\s*d(ays?)?,?\s+|\s+Tage?,?\s+|\.(?=\d\d:)))?{_CLOCK}{_ZONE}"
+)
 _OF_HOUR = re.compile(r"(?P<m>\d{1,2}):(?P<s>\d\d)[.,](?P<f>\d{1,12})")  # as spreadsheets save it
+_OF_MINUTES = re.compile(r"(?P<m>\d{1,4}):(?P<s>\d\d)")  # where it is said that they are minutes
+_DURATION = re.compile(  # PT1H15M, 1h 15m 0s
+    r"(?=P|.*\d\s*[hm].*\d)P?((?P<days>\d+)\s*d\s*)?T?((?P<h>\d+)\s*h\s*)?((?P<m>\d+)\s*m(in)?\s*)?"
+    r"((?P<s>\d+)([.,](?P<f>\d{1,12}))?\s*s(ec)?)?",
+    re.IGNORECASE,
+)
+_TIMES_ALONE = (_OF_DAY, _OF_HOUR, _OF_MINUTES, _DURATION)
 _EPOCH = date(1970, 1, 1).toordinal()
 _START = datetime(1970, 1, 1)
 _HOUR = 3600
@@ -62,6 +94,9 @@ _CHANGING = (
     *("Europe/Berlin", "Europe/London", "Europe/Athens", "America/New_York"),
     *("Australia/Sydney", "Pacific/Auckland", "America/Santiago"),
 )
+# Letters of several zones: alone they only say that times are local.
+_AMBIGUOUS = frozenset(("CST", "IST", "BST", "AST", "SST"))
+MINUTES, HOURS = "min:s", "h:min"  # what 10:15 may be
 _EVEN = 3.0  # median steps, above which one step is a jump
 
 
@@ -71,15 +106,16 @@ def is_stamp(cell: str) -> bool:
 
 
 def _match(text: str) -> re.Match[str] | None:
-    patterns = (_DAY, _OF_DAY, _OF_HOUR, _COMPACT, _CALLED_FIRST)
-    stamp = next((match for pattern in patterns if (match := pattern.fullmatch(text))), None)
-    return stamp if stamp is None or _zone_known(stamp.groupdict().get("zone")) else None
+    patterns = (_DAY, _OF_DAY, _OF_HOUR, _COMPACT, _COMPACT_SHORT, _CALLED_FIRST, _DURATION)
+    found = next((match for pattern in patterns if (match := pattern.fullmatch(text))), None)
+    return found if found is None or _zone_known(found.groupdict().get("zone")) else None
 
 
 def _zone_known(zone: str | None) -> bool:
+    """Whether letters behind a time may be a zone: those of none that is known are capitals."""
     if not zone or zone[-1].isdigit() or zone.upper() in _AHEAD:
         return True
-    return "/" in zone and _zone(zone) is not None
+    return _zone(zone) is not None if "/" in zone else zone.isupper()
 
 
 def _zone(name: str) -> ZoneInfo | None:
@@ -97,17 +133,21 @@ def read_stamps(name: str, cells: Sequence[str], how: str = "") -> FileChannel |
 
     Parameters
     ----------
-    how : what the user says of them: DMY, MDY or YMD, or a format such as %d/%m/%y %H:%M; and a
-        zone such as Europe/Berlin. Empty: nothing.
+    how : what the user or the header says of them: DMY, MDY or YMD, or a format such as
+        %d/%m/%y %H:%M; and a zone such as Europe/Berlin; "min:s" of what is no time of day. Empty:
+        nothing.
     """
     texts = [cell.strip() for cell in cells]
     order, stated, zone = _said(how)
+    if stated in (MINUTES, HOURS):
+        pattern = _OF_MINUTES if stated == MINUTES else _OF_DAY
+        return _of_day(name, texts, pattern) if any(map(pattern.fullmatch, texts)) else None
     if stated:
         return _formatted(name, texts, stated, zone)
     first = next((match for text in texts if (match := _match(text))), None)
     if first is None:
         return None
-    if first.re in (_OF_DAY, _OF_HOUR):
+    if first.re in _TIMES_ALONE:
         return _of_day(name, texts, first.re)
     return _dated(name, texts, first.re, order, zone)
 
@@ -115,8 +155,8 @@ def read_stamps(name: str, cells: Sequence[str], how: str = "") -> FileChannel |
 def is_said(how: str) -> bool:
     """Whether a text says how dates are to be read.
 
-    >>> is_said("DMY Europe/Berlin"), is_said("%H:%M"), is_said("ms")
-    (True, True, False)
+    >>> is_said("DMY Europe/Berlin"), is_said("%H:%M"), is_said("min:s"), is_said("ms")
+    (True, True, True, False)
     """
     order, stated, zone = _said(how)
     return bool(order or stated or zone)
@@ -130,7 +170,8 @@ def _said(how: str) -> tuple[str, str, ZoneInfo | None]:
     words = [word for word in words if zone is None or word not in named]
     text = " ".join(words)
     letters = "".join(dict.fromkeys(re.sub(r"[^a-z]", "", text.casefold().split(" ")[0])))
-    return (letters if letters in ORDERS else ""), (text if "%" in text else ""), zone
+    stated = text if "%" in text or text in (MINUTES, HOURS) else ""
+    return (letters if letters in ORDERS else ""), stated, zone
 
 
 def has_day(cells: Sequence[str]) -> bool:
@@ -153,27 +194,43 @@ def has_fraction(cells: Sequence[str]) -> bool:
 def _first_day(cells: Sequence[str]) -> re.Match[str] | None:
     matches = (_match(cell.strip()) for cell in cells)
     first = next((match for match in matches if match), None)
-    return None if first is None or first.re in (_OF_DAY, _OF_HOUR) else first
+    return None if first is None or first.re in _TIMES_ALONE else first
 
 
 def _of_day(name: str, texts: Sequence[str], pattern: re.Pattern[str]) -> FileChannel:
     """Times without dates."""
-    period = _HOUR if pattern is _OF_HOUR else 24 * _HOUR
     matches = [pattern.fullmatch(text) for text in texts]
     known = np.array([match is not None for match in matches])
     whole = np.array([_clock(match) if match else 0 for match in matches])
     times = whole + _fractions(matches) - np.array([_offset(match) for match in matches])
+    period, words = 24 * _HOUR, list[str]()
+    if pattern in (_OF_HOUR, _OF_MINUTES):
+        period = _HOUR
+    elif _twelve_hours(matches):
+        period = 12 * _HOUR
+        times = times % period
+        words = ["hours count to 12, without AM or PM; times go on from 12 to 1"]
     # A step back by more than half a period is the next day, or the next hour.
     back = np.diff(times[known]) < -period / 2
     times[known] += np.concatenate([[0], np.cumsum(back)]) * period
-    corrections: tuple[str, ...] = ()
     if pattern is _OF_DAY and not any(match and match["zone"] for match in matches):
-        times[known], corrections = _mended(times[known], dated=False)
+        times[known], mended = _mended(times[known], dated=False)
+        words += mended
     shown = float(times[known][0])
     values = _from_first(times, known)
     return FileChannel(
-        name, "s", values, stamp=True, shown=shown, corrections=corrections, texts=tuple(texts)
+        name, "s", values, stamp=True, shown=shown, corrections=tuple(words), texts=tuple(texts)
     )
+
+
+def _twelve_hours(matches: Sequence[re.Match[str] | None]) -> bool:
+    """Whether hours go from 12 to 1, and none says which half of a day it is of."""
+    held = [match.groupdict() for match in matches if match]
+    hours = [int(own["h"]) for own in held if own.get("h")]
+    if any(own.get("half") or own.get("days") for own in held):
+        return False
+    within = bool(hours) and min(hours) >= 1 and max(hours) <= 12
+    return within and any(a == 12 and b == 1 for a, b in pairwise(hours))
 
 
 def _formatted(
@@ -203,9 +260,11 @@ def _dated(
     matches = [pattern.fullmatch(text) for text in texts]
     known = np.array([match is not None for match in matches])
     parts = _fractions(matches)
-    shift = np.array([_offset(match) for match in matches])
-    zones = {match["zone"] for match in matches if match and match["zone"]}
-    if len(zones) == 1 and "/" in (own := zones.pop()):
+    zones = {str(match["zone"]) for match in matches if match and match.groupdict().get("zone")}
+    letters = {own.upper() for own in zones if own.isalpha()}
+    local = len(zones) == 1 and bool(letters & _AMBIGUOUS or letters - _AHEAD.keys())
+    shift = np.array([0.0 if local else _offset(match) for match in matches])
+    if len(zones) == 1 and "/" in (own := next(iter(zones))):
         zone = _zone(own)
     readings: dict[str, FileChannel] = {}
     for reading in _readings(matches) if not order else [order]:
@@ -214,7 +273,7 @@ def _dated(
         except ValueError:  # a 31st of February
             continue
         whole = days + np.array([_clock(match) if match else 0 for match in matches])
-        zoned = bool(zones) or any(match and match.groupdict().get("zone") for match in matches)
+        zoned = bool(zones) and not local
         channel = _channel(name, texts, known, (whole, parts, shift), zone, zoned=zoned)
         readings[reading] = channel
     return _chosen(name, texts, readings, matches)
@@ -267,7 +326,10 @@ def _readings(matches: Sequence[re.Match[str] | None]) -> list[str]:
     if not kinds:
         return ["ymd"]
     years = {digits for _, digits in kinds}
-    if {mark for mark, _ in kinds} == {"."}:
+    marks = {mark for mark, _ in kinds}
+    if marks == {""}:
+        return ["ymd", "dmy", "mdy"]
+    if marks == {"."}:
         return ["dmy"] if years == {4} else ["dmy", "ymd"]
     return ["dmy", "mdy"] if years == {4} else ["dmy", "mdy", "ymd"]
 
@@ -295,7 +357,8 @@ def _chosen(
     if all(np.array_equal(channel.values, other.values, equal_nan=True) for other in others):
         # The day is not known, the times are; points are German, the day first.
         points = all(match is None or match["mark"] == "." for match in matches)
-        sure = points and _moment(channel.start).year >= 2010
+        compact = all(match is None or match["mark"] == "" for match in matches)  # as YYMMDD
+        sure = (points or compact) and _moment(channel.start).year >= 2010
         return channel if sure else replace(channel, start=math.nan)
     words = [
         f"{_moment(c.start):%Y-%m-%d} to {_moment(c.start + np.nanmax(c.values)):%Y-%m-%d} "
@@ -304,6 +367,10 @@ def _chosen(
     ]
     first = next(text for text, match in zip(texts, matches, strict=True) if match)
     doubt = f"dates such as '{first}' that go on in two ways, {' or '.join(words)}"
+    if _twelve_hours(matches):
+        doubt = f"times such as '{first}', whose hours count to 12 without AM or PM"
+    elif not going:
+        doubt = f"dates such as '{first}' that go back in each order of day, month and year"
     none = np.full(len(texts), math.nan)
     return FileChannel(name, "s", none, stamp=True, doubt=doubt, texts=tuple(texts))
 
@@ -357,24 +424,40 @@ def _mended(times: Vector, *, dated: bool) -> tuple[Vector, tuple[str, ...]]:
     steps = np.diff(times)
     ahead = steps[steps > 0.0]
     usual = float(np.median(ahead)) if ahead.size else 0.0
-    if not 0.0 < usual <= _HOUR:
+    if not 0.0 < usual <= 12 * _HOUR:
         return times, ()
     twice = steps + _HOUR
     back = np.flatnonzero((steps <= 0.0) & (twice > 0.0) & (twice <= _EVEN * usual))
-    long = np.flatnonzero(np.abs(steps - _HOUR - usual) <= 0.1 * usual)
+    if usual > _HOUR:  # a step that is an hour too short is one ahead
+        back = np.flatnonzero(np.abs(twice - usual) <= 0.1 * _HOUR)
+    long = np.flatnonzero(np.abs(steps - _HOUR - usual) <= 0.1 * min(usual, _HOUR))
+    words = []
     if dated:
+        near = np.flatnonzero((steps > _HOUR) & (steps < _HOUR + _EVEN * usual))
+        begins = [k for k in near if _changes(times[k], times[k + 1], _HOUR)]
+        words = [
+            f"an hour may be missing after {_moment(times[k]):%Y-%m-%d %H:%M:%S}, where summer "
+            "time begins in some zones; say the zone, such as [Europe/Berlin], or [UTC]"
+            for k in begins
+            if k not in long
+        ]
         back = back[[_changes(times[k], times[k + 1], -_HOUR) for k in back]] if back.size else back
-        long = long[[_changes(times[k], times[k + 1], _HOUR) for k in long]] if long.size else long
+        long = np.array([k for k in begins if k in long], dtype=np.int64)
     else:
         of_day = times % (24 * _HOUR)
         back = back[(of_day[back] <= 4 * _HOUR) & (of_day[back] >= _HOUR)][:1]
-        back, long = back[np.abs(twice[back] - usual) <= 0.1 * usual], long[:0]
-    if not back.size and not long.size:
-        return times, ()
+        back = back[np.abs(twice[back] - usual) <= 0.1 * usual]
+        night = (of_day[long] <= 3 * _HOUR) & (of_day[long + 1] >= 2 * _HOUR)
+        words = [
+            f"an hour is missing after {_moment(times[k]):%H:%M:%S}: a gap, or summer time begins, "
+            "which only a date tells; times after it are as they are written"
+            for k in long[night]
+            if usual <= _HOUR
+        ]
+        long = long[:0]
     shift = np.zeros(times.size)
     shift[back + 1] += _HOUR
     shift[long + 1] -= _HOUR
-    words = []
     for k in sorted([*back.tolist(), *long.tolist()]):
         at = f"{_moment(times[k]):%Y-%m-%d %H:%M:%S}" if dated else f"{_moment(times[k]):%H:%M:%S}"
         if k in back:
@@ -400,6 +483,12 @@ def _changes(before: float, after: float, by: int) -> bool:
     return False
 
 
+_PARTS_OF_DATE = (
+    *("year", "month", "day", "of", "called", "in", "one", "two", "last", "cin"),
+    *("ordinal_year", "ordinal"),
+)
+
+
 def _days(matches: Sequence[re.Match[str] | None], order: str) -> np.ndarray:
     """Seconds since 1970 at the begin of each day, (n,)."""
     known: dict[tuple[str, ...], int] = {}
@@ -408,7 +497,7 @@ def _days(matches: Sequence[re.Match[str] | None], order: str) -> np.ndarray:
         if match is None:
             continue
         own = match.groupdict()
-        names = ("year", "month", "day", "of", "called", "in", "one", "two", "last", "cin")
+        names = _PARTS_OF_DATE
         key = tuple(own.get(name) or "" for name in names)
         if key not in known:
             known[key] = (_day(key, order).toordinal() - _EPOCH) * 24 * _HOUR
@@ -417,7 +506,9 @@ def _days(matches: Sequence[re.Match[str] | None], order: str) -> np.ndarray:
 
 
 def _day(parts: tuple[str, ...], order: str) -> date:
-    year, month, day, of, called, in_year, *numbers, of_year = parts
+    year, month, day, of, called, in_year, *numbers, of_year, ordinal_year, ordinal = parts
+    if ordinal:
+        return date(int(ordinal_year), 1, 1) + timedelta(days=int(ordinal) - 1)
     if called:
         return date(_full(in_year or of_year), _MONTHS[called.casefold()], int(of))
     if year:
@@ -449,8 +540,10 @@ def _clock(match: re.Match[str]) -> int:
     parts = match.groupdict()
     c = "c" if parts.get("ch") else ""
     hour = int(parts.get(f"{c}h") or 0)
-    if half := parts.get(f"{c}half"):
+    half = parts.get(f"{c}half") or parts.get("early") or parts.get("late")
+    if half:
         hour = hour % 12 + (12 if half in "Pp" else 0)
+    hour += 24 * int(parts.get("days") or 0)
     return hour * _HOUR + int(parts.get(f"{c}m") or 0) * 60 + int(parts.get(f"{c}s") or 0)
 
 
