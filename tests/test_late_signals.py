@@ -1,16 +1,27 @@
 """Signals that are late by themselves: which are named, and which are none."""
 
-from collections.abc import Mapping
+import itertools
+from collections.abc import Iterator, Mapping
+from functools import cache
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
+from scipy.integrate import solve_ivp
 
+from workbench.diagnosis import Outcome, Problem, catalogue, diagnose
 from workbench.diagnosis.inference import timing
 from workbench.diagnosis.inference.quadratic import Quadratic
 from workbench.diagnosis.inference.thresholds import thresholds
 from workbench.diagnosis.inference.timing import LateSignals, by_themselves
+from workbench.models.modelica import read_library
+from workbench.runtime.engine import Engine
+from workbench.system.registry import load_system
+
+from .heater import cases
 
 SAMPLE = 1e-3  # [s]
 
@@ -87,3 +98,162 @@ def test_signals_that_are_late_by_different_times_are_listed(
 
 def test_clocks_that_are_right_are_no_cause(monkeypatch: pytest.MonkeyPatch) -> None:
     assert said({"u": -6e-6, "w": 9e-5}, monkeypatch) is None
+
+
+# --- a motor, written from its equations and simulated by SciPy ---
+
+MOTOR = """within ;
+package Motor "A motor that turns an inertia"
+  import Effects;
+
+  model LateSpeed "a speed that is read late"
+    extends Effects.Signals.Delay(window=2e-3, delay(min=-0.1, max=0.1));
+    annotation (__Workbench(effect(
+      size="delay", matters=5e-4, slots={"speedSensor"}, separation="a second sensor")));
+  end LateSpeed;
+
+  model Rubbing "viscous friction"
+    extends Effects.RotationalFriction.Viscous(damping(max=1e-2));
+    annotation (__Workbench(effect(
+      size="damping", matters=3e-6, slots={"friction"}, separation="coasting")));
+  end Rubbing;
+
+  model Observer "Motor and inertia"
+    parameter Real R(unit="Ohm", min=0.1) = 1.5 "Resistance";
+    parameter Real L(unit="H") = 8e-3 "Inductance";
+    parameter Real k(unit="V.s/rad") = 0.08 "Motor constant";
+    parameter Real J(unit="kg.m2") = 2e-4 "Inertia";
+    parameter Real tau(unit="N.m") = 0.0 "Load";
+    input Real u(unit="V") "Voltage";
+    input Real dtau(unit="N.m") "Correction of tau";
+    output Real i(unit="A", start=0.0, fixed=true, nominal=5.0) "Current";
+    output Real w(unit="rad/s", start=0.0, fixed=true, nominal=100.0) "Speed";
+    output Real wRead(unit="rad/s") = speedSensor.y "Speed as read";
+    replaceable Effects.Friction.Frictionless friction(v=w, load=0.0)
+      constrainedby Effects.Interfaces.Friction(v=w, load=0.0) "Bearings";
+    replaceable Effects.Signals.Unchanged speedSensor(u=w)
+      constrainedby Effects.Interfaces.Signal(u=w) "From the speed to what is read";
+  equation
+    L*der(i) = u - R*i - k*w;
+    J*der(w) = k*i - friction.f - (tau + dtau);
+  end Observer;
+  annotation (uses(Effects(version="1.0")));
+end Motor;
+"""
+MOTOR_FILE = """
+title = "A motor that turns an inertia"
+sample_time = "1 ms"
+
+[models]
+observer = { class = "Observer" }
+
+[inputs.u]
+unit = "V"
+noise = "0 V"
+scale = "10 V"
+held = true
+
+[outputs.i]
+unit = "A"
+noise = "0.02 A"
+scale = "5 A"
+
+[outputs.w]
+unit = "rad/s"
+noise = "0.4 rad/s"
+scale = "100 rad/s"
+reading = "wRead"
+
+[estimated.tau]
+correction = "dtau"
+unit = "N.m"
+range = ["-0.1 N.m", "0.1 N.m"]
+walk = "2e-3 N.m"
+
+[diagnosis]
+block = "10 ms"
+lasting = "0.2 s"
+
+[diagnosis.tolerances]
+R = 0.005
+"""
+
+
+@cache
+def turned(seed: int) -> tuple[np.ndarray, ...]:
+    """Voltage, current and speed at each millisecond of three seconds, without noise."""
+    rng = np.random.default_rng(seed)
+    x, courses = np.zeros(2), []
+    spans = [300, *rng.integers(60, 400, 30)]
+    for span, voltage in zip(spans, (0.0, *rng.uniform(-12.0, 12.0, 30)), strict=True):
+
+        def rates(_: float, x: np.ndarray, voltage: float = voltage) -> list[float]:
+            return [(voltage - 1.5 * x[0] - 0.08 * x[1]) / 8e-3, 0.08 * x[0] / 2e-4]
+
+        at = np.arange(span + 1) * 1e-3
+        run = solve_ivp(rates, (0.0, at[-1]), x, t_eval=at, rtol=1e-9, atol=1e-10)
+        courses.append(np.vstack([np.full(span, voltage), run.y[:, :-1]]))
+        x = run.y[:, -1]
+    return tuple(np.concatenate(courses, axis=1)[:, :3000])
+
+
+def recorded(late: Mapping[str, int], seed: int) -> pd.DataFrame:
+    """A recording of the motor, signals late by so many milliseconds, held before."""
+    names, rng = ("u", "i", "w"), np.random.default_rng(100 + seed)
+    held = {
+        name: np.concatenate([np.full(late.get(name, 0), values[0]), values])[: values.size]
+        for name, values in zip(names, turned(seed), strict=True)
+    }
+    noise = {"u": 0.0, "i": 0.02, "w": 0.4}
+    units = {"u": "V", "i": "A", "w": "rad/s"}
+    time = {"time [s]": np.arange(3000) * 1e-3}
+    return pd.DataFrame(
+        time
+        | {f"{n} [{units[n]}]": v + noise[n] * rng.standard_normal(v.size) for n, v in held.items()}
+    )
+
+
+def diagnosis(late: Mapping[str, int], folder: Path, loggers: str = "") -> Outcome:
+    motor = folder / "motor"
+    motor.mkdir()
+    (motor / "package.mo").write_text(MOTOR)
+    (motor / "system.toml").write_text(MOTOR_FILE + loggers)
+    of = load_system(motor)
+    library = read_library(of.library)
+    recordings = cases(of, [recorded(late, seed) for seed in range(3)])
+    return diagnose(Problem(of, recordings, library, catalogue(of, library)), Engine(out=folder))
+
+
+def late_by() -> Iterator[Any]:
+    """Each signal by each time; all but the hardest are long."""
+    for signal, ms in itertools.product(("u", "i", "w"), (1, 2, 4, 8, 16)):
+        marks = () if (signal, ms) in {("i", 16), ("w", 16)} else (pytest.mark.long,)
+        yield pytest.param(signal, ms, marks=marks)
+
+
+@pytest.mark.parametrize(("signal", "ms"), [*late_by()])
+def test_one_late_signal_is_named_and_its_advice_leads_to_the_cause(
+    signal: str, ms: int, tmp_path: Path
+) -> None:
+    """By a fraction of the motor's time constant, 5 ms, and by three of them.
+
+    Without a logger its clock or, of the speed, its delay is named; with one the clock is a cause.
+    """
+    for name in ("as it was", "as advised"):
+        (tmp_path / name).mkdir()
+    outcome = diagnosis({signal: ms}, tmp_path / "as it was")
+    late = outcome.diagnosis.late
+    assert late is not None
+    assert outcome.to_dict()["late"]["signals"] == (signal,)
+    assert late.skew == pytest.approx(1e-3 * ms, abs=1e-4)  # a tenth of a sample
+    assert f'add own = ["{signal}"] to [loggers]' in outcome.sentence
+    advised = diagnosis({signal: ms}, tmp_path / "as advised", f'[loggers]\nown = ["{signal}"]\n')
+    (cause,) = advised.diagnosis.causes
+    assert cause.effect.name == "LoggerTimeSkew[own]"
+    skew = cause.parameters["skew"]
+    assert skew.low <= 1e-3 * ms <= skew.high
+
+
+def test_signals_in_time_are_not_late(tmp_path: Path) -> None:
+    outcome = diagnosis({}, tmp_path, '[loggers]\nown = ["w"]\n')
+    assert (outcome.diagnosis.verdict, outcome.diagnosis.late) == ("nothing", None)

@@ -168,7 +168,7 @@ class Outcome:
     def _unexplained(self) -> str:
         partial, late = self.diagnosis.partial, self.diagnosis.late
         if late is not None:
-            return f"Something is missing that clocks explain: {_late(late)}."
+            return _late(late)
         part = f", though {' and '.join(partial)} would explain a part" * bool(partial)
         return f"Something is missing that no effect of the catalogue explains{part}{self._goes}."
 
@@ -364,12 +364,20 @@ def _late(late: LateSignals) -> str:
     """Signals that are late, and what to do, for people."""
     if len({*late.skews.values()}) > 1:
         each = ", ".join(f"{name} by {1e3 * skew:.3g} ms" for name, skew in late.skews.items())
-        return f"signals are late by different times ({each}); say in [loggers] which share one"
-    reach = BAND * late.sigma
-    size = with_interval(late.skew, late.skew - reach, late.skew + reach, "s")
+        return (
+            f"Signals are late by different times: {each}. Say in [loggers] which signals share a "
+            "logger, and diagnose again."
+        )
+    size, reach = abs(late.skew), BAND * late.sigma
+    by = with_interval(size, size - reach, size + reach, "s")
+    way = "late" if late.skew > 0.0 else "early"
     signals = " and ".join(late.signals)
+    verb, has = ("is", "it") if len(late.signals) == 1 else ("are", "them")
+    named = ", ".join(f'"{name}"' for name in late.signals)
     return (
-        f"{signals} late by {size} against the others, which no logger of the system file has alone"
+        f"{signals} {verb} {way} by {by} against the other signals, and no logger of the system "
+        f"file has {has} alone. If a logger of its own records {has}, add own = [{named}] to "
+        "[loggers] and diagnose again; then this is a cause with its size."
     )
 
 

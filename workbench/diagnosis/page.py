@@ -236,9 +236,9 @@ def _causes(summary: Mapping[str, Any]) -> list[Block]:
     elif summary["late"]:
         blocks.append(
             Markup(
-                "None that is sure: clocks of signals, which the system file does not have so, "
-                "explain clearly more{}. Say in <code>[loggers]</code> which signals share a "
-                "logger, and ask again."
+                "None that is sure: clocks of signals explain clearly more{}, and the system file "
+                "has no such logger. Say in <code>[loggers]</code> which signals share a logger, "
+                "and diagnose again."
             ).format(f" than {partial}" if partial else "")
         )
     elif verdict == "unexplained":

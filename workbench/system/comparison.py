@@ -158,6 +158,7 @@ class Influence:
 
 
 _BLOCK, _LASTING = 5, 20  # samples of a block, and blocks of a lasting error, unless said otherwise
+_LEAST_SKEW = 0.1  # of a sample time
 _LEFT = 0.03  # of a detailed model: laws that differ in form agree to some 3 %
 
 
@@ -197,6 +198,13 @@ class Comparison:
         above=0.0,
         below=1.0,
         expected="a share between 0 and 1",
+    )
+    least_skew: float = key(
+        "by which a signal is late at least, to be late",
+        "s",
+        # Within it, a clock is a matter of how inputs are held between samples.
+        lambda scope: _LEAST_SKEW * scope.whole["sample_time"],
+        otherwise=f"{_LEAST_SKEW} samples",
     )
     begins: Threshold | None = key("input that is applied, by how much above its rest", absent=None)
     rest: Rest | None = key("readings before that", absent=None)

@@ -5,10 +5,11 @@ an output is read as late as its logger reads it, and a motion that is led follo
 at that time.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
 from workbench.arrays import Matrix, Vector
@@ -20,9 +21,8 @@ from workbench.recordings.case import Case
 from workbench.system.system import OBSERVER, System
 
 KIND, OWN, SKEW = "LoggerTimeSkew", "TimeSkew", "skew"
-# Of a sample time: a logger that scans five channels one after another has them as far apart.
-_MATTERS = 0.2
-LEAST_SKEW = 0.1  # of a sample time: within it, a clock is a matter of how inputs are held
+# Of the least time that matters: a logger that scans five channels has neighbours as far apart.
+_MATTERS = 2.0
 
 
 def catalogue(system: System, library: Library) -> tuple[Effect, ...]:
@@ -61,7 +61,7 @@ def _clock(system: System, kind: str, name: str, signals: tuple[str, ...]) -> Ef
         model=kind,
         slots=(),
         size=SKEW,
-        matters=_MATTERS * system.sample_time,
+        matters=_MATTERS * system.comparison.least_skew,
         text=f"a logger of {' and '.join(signals)} whose clock is late",
         separation="one signal that both loggers record",
         late=signals,
@@ -101,6 +101,40 @@ def lateness(
     return late
 
 
+def greatest_skew(system: System) -> float:
+    """By how much a clock is late at most [s]: an error that lasts no longer is timing's."""
+    return max(system.comparison.lasting, system.comparison.block)
+
+
+def apparent_lags(
+    measured: Sequence[Matrix], predicted: Sequence[Matrix], most: int
+) -> NDArray[np.intp]:
+    """Samples by which measured signals lag behind what is predicted of them, (c,).
+
+    For each signal the lag L that leaves least of y(t) = a + b yhat(t - L), fitted in each
+    recording: whatever the scale and the zero of a sensor. 0 where the best is not inside.
+
+    Parameters
+    ----------
+    measured, predicted : (n, c) of each recording.
+    most : samples, of a lag.
+    """
+    reach = min(most, *(len(values) // 4 for values in measured))
+    lags = np.arange(-reach, reach + 1)
+    left = np.zeros((lags.size, measured[0].shape[1]))
+    for y, by_model in zip(measured, predicted, strict=True):
+        inner = slice(reach, len(y) - reach)
+        aim = y[inner] - y[inner].mean(axis=0)
+        for j, lag in enumerate(lags):
+            course = by_model[inner.start - lag : inner.stop - lag]
+            course = course - course.mean(axis=0)
+            power = np.maximum((course**2).sum(axis=0), np.finfo(float).tiny)
+            left[j] += (aim**2).sum(axis=0) - (aim * course).sum(axis=0) ** 2 / power
+    best = np.argmin(left, axis=0)
+    inside = (best > 0) & (best < lags.size - 1)
+    return np.where(inside, best - reach, 0)
+
+
 def moved(time: Vector, values: Matrix, late: float) -> Matrix:
     """Values (n, ...) of a time `late` [s] before each sample; before the first they rest."""
     at = np.clip(time - late, time[0], time[-1])
@@ -134,6 +168,27 @@ def in_time(samples: Samples, late: Mapping[str, float]) -> Samples:
             slow = uniform_filter1d(y[:, j], window, mode="nearest")
             y[:, j] += moved(time, slow, -late[name]) - slow
     return replace(samples, u=u, y=y)
+
+
+def mirrored(samples: Samples, errors: Matrix, late: Mapping[str, float]) -> Matrix:
+    """Errors (n, c), those beside them in place of what no input or prediction reaches.
+
+    By another clock, a recording is read before it begins or after it ends. As many errors stand
+    there as before, as large as noise is, so that chi-squared favours no clock.
+
+    Parameters
+    ----------
+    late : by signal [s].
+    """
+    time, errors = samples.time, errors.copy()
+    ends = time[-1] - max([0.0, *(late.get(name, 0.0) for name in samples.inputs)])
+    for j, name in enumerate(samples.signals):
+        by = late.get(name, 0.0)
+        first, end = np.searchsorted(time, [time[0] + by, ends + by + 1e-9])
+        first, end = min(int(first), time.size // 2), max(int(end), time.size // 2)
+        errors[:first, j] = errors[first : 2 * first, j][::-1]
+        errors[end:, j] = errors[2 * end - time.size : end, j][::-1]
+    return errors
 
 
 def case_in_time(case: Case, system: System, sizes: Mapping[tuple[str, str], float]) -> Case:

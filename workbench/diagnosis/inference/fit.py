@@ -13,7 +13,7 @@ from types import MappingProxyType
 import numpy as np
 
 from workbench.arrays import Vector
-from workbench.diagnosis.data.clocks import LEAST_SKEW, own_clocks, reference
+from workbench.diagnosis.data.clocks import apparent_lags, greatest_skew, own_clocks, reference
 from workbench.diagnosis.effects.catalogue import Effect, variant
 from workbench.diagnosis.effects.extension import sizes_by_component, variables
 from workbench.diagnosis.inference.linearized import (
@@ -100,15 +100,33 @@ class Fit:
     @property
     def least_skew(self) -> float:
         """What the clock of a signal is late by at least to be late [s]."""
-        return LEAST_SKEW * self._simulations.system.sample_time
+        return self._compare.least_skew
+
+    @property
+    def recorded(self) -> tuple[str, ...]:
+        """Names of the inputs and signals that recordings have."""
+        first = self._simulations.recordings[0]
+        return (*first.inputs, *first.signals)
 
     @property
     def own_clocks(self) -> tuple[Effect, ...]:
         """A clock of each recorded signal but the reference, whatever the loggers."""
-        recording, system = self._simulations.recordings[0], self._simulations.system
-        return tuple(
-            c for c in own_clocks(system) if {*c.late} <= {*recording.inputs, *recording.signals}
+        clocks = own_clocks(self._simulations.system)
+        return tuple(clock for clock in clocks if {*clock.late} <= {*self.recorded})
+
+    def apparent_skews(self, point: Point) -> dict[Key, float]:
+        """Lateness of `own_clocks` as it shows without derivatives [s], for a fit to begin with."""
+        recordings = self._simulations.recordings
+        sample = float(np.median(np.diff(recordings[0].time)))
+        lags = apparent_lags(
+            [recording.y for recording in recordings],
+            self._simulations.predicted(self.unknowns.values(point)),
+            round(greatest_skew(self._simulations.system) / sample),
         )
+        late = dict(zip(recordings[0].signals, sample * lags, strict=True))
+        # All outputs lag behind inputs, which have no lag of their own here.
+        first = late.get(self.reference, 0.0)
+        return {(c.name, c.size): float(late.get(c.late[0], 0.0) - first) for c in self.own_clocks}
 
     def beside(self, effects: Sequence[Effect]) -> "Fit":
         """The same with more effects that may be asked for."""

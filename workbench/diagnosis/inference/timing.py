@@ -12,8 +12,11 @@ import numpy as np
 
 from workbench.diagnosis.effects.catalogue import Effect
 from workbench.diagnosis.inference.fit import Fit
-from workbench.diagnosis.inference.quadratic import covariance, minimum
+from workbench.diagnosis.inference.quadratic import Key, covariance, minimum
 from workbench.diagnosis.inference.search import FittedModel, beyond, fitted
+from workbench.system.units import BAND
+
+_ROUNDED = 1e-6  # of chi-squared
 
 
 @dataclass(frozen=True)
@@ -31,6 +34,13 @@ class LateSignals:
     skew: float
     sigma: float
     skews: Mapping[str, float]
+
+    def skew_of(self, signals: Sequence[str], recorded: Sequence[str]) -> float:
+        """How late a clock of some of the recorded signals is [s]; 0 where others are late."""
+        of, late = {*signals} & {*recorded}, {*self.signals}
+        if of == late:
+            return self.skew
+        return -self.skew if of == {*recorded} - late else 0.0
 
 
 def by_themselves(
@@ -51,18 +61,31 @@ def by_themselves(
     needed = fit.decides.needed if len(best.active) < 2 else 0.0
     if clean and len(best.active) < 2 and _fall(other, clocks, best) < needed:
         return None
+    starts: dict[Key, float] = {}
     while True:
         if not clocks:
             return None
-        sizes = {(clock.name, clock.size): 0.0 for clock in clocks}
-        model = fitted(other, other.at(replace(base.point, sizes=sizes)), tuple(clocks))
+        model = _fitted(other, base, clocks, starts)
         explains = float(model.linearised.variance_factors.max()) < fit.decides.wrong
+        if not explains and not starts and not clean:
+            # By more than a machine's shortest time, derivatives point elsewhere.
+            starts = fit.apparent_skews(base.point)
+            continue
         if not explains or beyond(best, model) < needed:
             return None
         late = [clock for clock in clocks if abs(model.point.sizes[clock.name, clock.size]) > least]
         if late == clocks:
             return _together(other, clocks, model, least)
         clocks = late
+
+
+def _fitted(
+    fit: Fit, base: FittedModel, clocks: Sequence[Effect], starts: Mapping[Key, float]
+) -> FittedModel:
+    """The nominal model with clocks, begun at where they start, or else in time."""
+    keys = [(clock.name, clock.size) for clock in clocks]
+    point = replace(base.point, sizes={key: starts.get(key, 0.0) for key in keys})
+    return fitted(fit, fit.at(point), tuple(clocks))
 
 
 def _fall(fit: Fit, clocks: Sequence[Effect], best: FittedModel) -> float:
@@ -97,10 +120,15 @@ def _together(fit: Fit, clocks: Sequence[Effect], fitted: FittedModel, least: fl
             left = skews - skew * along
             away = float(np.abs(left).max())
             tried.append((float(left @ N @ left), away, skew, information, chosen))
-        behind, away, skew, information, chosen = min(tried)
+        # That one of two is early is that the other is late, but for rounding; sensors are late.
+        best = min(tried)[0] * (1.0 + _ROUNDED) + _ROUNDED
+        behind, away, skew, information, chosen = min(
+            tried, key=lambda clocks: (clocks[0] > best, clocks[2] < 0.0, clocks)
+        )
         if behind < fit.decides.form or away < least:
             signals = tuple(names[j] for j in chosen)
-            sigma = float(1.0 / np.sqrt(information))
+            # Between samples, time is a matter of form: within the least that matters.
+            sigma = float(np.hypot(1.0 / np.sqrt(information), least / BAND))
             return LateSignals(signals, skew, sigma, dict.fromkeys(signals, skew))
     each = dict(zip(names[1:], map(float, skews), strict=True))
     return LateSignals(tuple(each), 0.0, 0.0, each)

@@ -22,6 +22,7 @@ from workbench.diagnosis.inference.search import (
     examine,
     extended,
     fitted,
+    forward_selection,
     misfits,
     without,
 )
@@ -195,17 +196,16 @@ def conclude(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnos
     """Diagnose a set of recordings."""
     chosen, astray = _selected(fit, catalogue, report)
     chosen = _fewest(fit, catalogue, chosen, report)
-    base, best = chosen.base, chosen.best
-    clean = float(best.linearised.variance_factors.max()) < fit.decides.wrong
-    verdict: Verdict = "found" if best.active else "nothing"
-    explained = _share(base, best) > 1.0 - fit.decides.left
-    if astray or (not clean and not (best.active and (chosen.interrupted or explained))):
-        verdict = "unexplained"
+    verdict = "unexplained" if astray else _verdict(fit, chosen)
     late = None
     if verdict != "nothing" and not astray and not chosen.interrupted:
         report("clocks of signals by themselves")
-        late = by_themselves(fit, base, best, clean=clean)
-        verdict = verdict if late is None else "unexplained"
+        late = by_themselves(fit, chosen.base, chosen.best, clean=_clean(fit, chosen))
+        if late is not None and (begun := _with_clock(fit, catalogue, chosen, late)) is not None:
+            report(f"with {begun.active[0].name}, where the fits above did not get")
+            chosen, late = _selected_with(fit, catalogue, chosen, begun, report), None
+        verdict = _verdict(fit, chosen) if late is None else "unexplained"
+    base, best = chosen.base, chosen.best
     gain, objections = None, list[str]()
     if best.active and late is None:
         report("held-out recordings")
@@ -251,6 +251,45 @@ def conclude(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnos
         cosines=chosen.cosines,
         not_visible={effect.name: why for effect in catalogue if (why := presence.unseen(effect))},
     )
+
+
+def _clean(fit: Fit, chosen: Selection) -> bool:
+    """Whether what was found leaves nothing that lasts."""
+    return float(chosen.best.linearised.variance_factors.max()) < fit.decides.wrong
+
+
+def _verdict(fit: Fit, chosen: Selection) -> Verdict:
+    best = chosen.best
+    explained = _share(chosen.base, best) > 1.0 - fit.decides.left
+    if not _clean(fit, chosen) and not (best.active and (chosen.interrupted or explained)):
+        return "unexplained"
+    return "found" if best.active else "nothing"
+
+
+def _with_clock(
+    fit: Fit, catalogue: Sequence[Effect], chosen: Selection, late: LateSignals
+) -> FittedModel | None:
+    """The nominal model with the clock of the declared logger whose signals are late, if any is.
+
+    By more than a machine's shortest time, no derivative about the nominal model points there.
+    """
+    for clock in (effect for effect in catalogue if effect.late and late.skew):
+        skew = late.skew_of(clock.late, fit.recorded)
+        if skew and clock not in chosen.best.active:
+            point = replace(chosen.base.point, sizes={(clock.name, clock.size): skew})
+            return fitted(fit, fit.at(point), (clock,))
+    return None
+
+
+def _selected_with(
+    fit: Fit, catalogue: Sequence[Effect], chosen: Selection, begun: FittedModel, report: Reporter
+) -> Selection:
+    """What recordings need beside what a search begins with."""
+    scores = tuple(chosen.trial.scores())
+    steps = [Step(chosen.base, scores, (begun,))]
+    best, trial, interrupted = forward_selection(fit, catalogue, begun, steps, (), report)
+    sought = ForwardSelection(best, steps, trial, interrupted, None)
+    return select(fit, catalogue, sought, report)
 
 
 def _fewest(

@@ -14,7 +14,7 @@ from typing import Any, Self, TypeVar
 import numpy as np
 
 from workbench.arrays import Matrix
-from workbench.diagnosis.data.clocks import late_signals
+from workbench.diagnosis.data.clocks import greatest_skew, late_signals
 from workbench.diagnosis.data.motion import ModelSource, OpenModel, opened
 from workbench.diagnosis.data.samples import Samples, compared, prepare
 from workbench.diagnosis.inference.thresholds import SOUND, Soundness
@@ -115,8 +115,7 @@ class ResidualModel:
         }
         for name in late_signals(self.system):
             self.units[name] = "s"
-            # A small change: a block is short against all that the machine does.
-            self.bounds[name] = (-self.system.comparison.block, self.system.comparison.block)
+            self.bounds[name] = (-greatest_skew(self.system), greatest_skew(self.system))
 
     def _simulator(self, given: SimulatorSetup) -> Simulator:
         """One in this process, with the FMU that is open."""
@@ -231,6 +230,13 @@ class ResidualModel:
             {k: (Simulator.along, self._at[k], points[k], watched) for k in self._order}
         )
         return [results[k] for k in range(len(self.recordings))]
+
+    def predicted(self, points: Sequence[Mapping[str, float]]) -> list[Matrix]:
+        """Signals of every recording as the model has them, each (n, c); see `at`."""
+        found = self._gathered(
+            {k: (Simulator.predicted, self._at[k], points[k]) for k in self._order}
+        )
+        return [found[k] for k in range(len(self.recordings))]
 
     def together(self, job: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
         """Results of a job that asks for evidence, by item; no processor waits for one of them."""

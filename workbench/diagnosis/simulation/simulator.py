@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from workbench.arrays import Matrix, Vector
-from workbench.diagnosis.data.clocks import in_time, late_signals, lateness, moved
+from workbench.diagnosis.data.clocks import in_time, late_signals, lateness, mirrored, moved
 from workbench.diagnosis.data.samples import Samples
 from workbench.diagnosis.inference.thresholds import Thresholds
 from workbench.diagnosis.simulation.prediction import Predictor, Variation
@@ -104,6 +104,10 @@ class Simulator:
         recording = self._in_time(number, values)
         predictor = Predictor(self._fmu, self._system, recording.signals, self._parts, watched)
         return predictor.along(recording, self._known(values))
+
+    def predicted(self, number: int, values: Mapping[str, float]) -> Matrix:
+        """Signals of one recording as the model has them, (n, c)."""
+        return self._recordings[number].y - self._simulated(number, values)[0]
 
     def begin(self, number: int) -> dict[str, float]:
         """Start values of states that a recording's outputs show."""
@@ -263,8 +267,9 @@ class Simulator:
 
     def _read(self, number: int, errors: Matrix, values: Mapping[str, float]) -> Matrix:
         """Errors of samples (n, c) with sensors behind structures, as late as `values` say."""
-        measured = self._recordings[number].y
-        return measured - self._late(number, measured - errors, values)
+        recording, late = self._recordings[number], lateness(self._clocks, values)
+        read_ = recording.y - self._late(number, recording.y - errors, values)
+        return mirrored(recording, read_, late) if late else read_
 
     def _late(self, number: int, signals: Matrix, values: Mapping[str, float]) -> Matrix:
         """What sensors read of signals (n, c, ...), behind structures and late."""
