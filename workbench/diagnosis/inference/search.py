@@ -7,8 +7,8 @@ from typing import TypeVar
 
 import numpy as np
 
-from workbench.arrays import Vector
-from workbench.diagnosis.effects.catalogue import Effect
+from workbench.arrays import Matrix, Vector
+from workbench.diagnosis.effects.catalogue import Effect, variant
 from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.linearized import LinearizedPoint, Point
 from workbench.diagnosis.inference.score_test import (
@@ -25,6 +25,7 @@ from workbench.runtime.engine import Reporter
 Result = TypeVar("Result")
 
 BEGUN = 3  # rounds after which a rival that is far behind is given up
+_SIZES = tuple(10.0 ** (0.5 * k) for k in range(9))  # times what matters, where derivatives fail
 _VARIANTS, _HALVINGS = 4, 2  # of shapes, and of the size, that a fit begins with
 ROUNDS = 12  # of Gauss-Newton, most
 
@@ -109,6 +110,8 @@ def _step(
     """One more effect, or none if the data do not ask for it; of equals the usual one."""
     scores = tuple(score for score in trial.scores() if score.effect in catalogue)
     rivals = _rivals(scores, best, fit.decides) if len(best.active) < fit.decides.most else []
+    if len(best.active) < fit.decides.most:
+        rivals += _misjudged(fit, best, scores, [variants[0].effect for variants in rivals])
     if not rivals:
         return None
     report(f"fitting {', '.join(variants[0].effect.name for variants in rivals)}")
@@ -118,6 +121,86 @@ def _step(
     equals = [other for other in fits if beyond(other, fits[0]) < fit.decides.tied]
     first = min(equals, key=lambda equal: catalogue.index(equal.active[-1]))
     return Step(best, scores, (first, *(fit for fit in fits if fit is not first)))
+
+
+def _misjudged(
+    fit: Fit,
+    best: FittedModel,
+    scores: Sequence[CandidateScore],
+    judged: Collection[Effect],
+) -> list[list[CandidateScore]]:
+    """Effects of which the linearised score says nothing, each where its fit should begin.
+
+    While errors are large, derivatives at the point may hold nowhere near the size that is asked
+    for. Each effect is simulated at the size that would change predictions as much as they are
+    wrong: where errors are others there than linearised, only a fit tells.
+
+    Parameters
+    ----------
+    judged : effects that are fitted anyway.
+    """
+    if best.linearised.variance_factors.max() <= fit.decides.wrong:
+        return []
+    first: dict[str, CandidateScore] = {}
+    for score in sorted(scores, key=lambda score: -score.gain):
+        if score.effect not in judged and not score.effect.order_locked:
+            first.setdefault(score.effect.name, score)
+    starts = fit.together(partial(_simulated_start, fit, best), list(first.values()))
+    return [[start] for start in starts if start is not None]
+
+
+def _simulated_start(fit: Fit, best: FittedModel, score: CandidateScore) -> CandidateScore | None:
+    """The size at which errors are least of those that are tried; None where derivatives hold."""
+    lin, effect = best.linearised, score.effect
+    low, high = fit.unknowns.bounds(effect, effect.size)
+    at = lin.keys.index((variant(effect, score.shape), effect.size))
+    weight = 1.0 / np.sqrt(lin.spread)
+
+    def weighed(errors: Sequence[Matrix]) -> float:
+        return float(np.sqrt(sum(np.square(own * weight).sum() for own in errors)))
+
+    now = [recording.errors for recording in lin.residuals]
+    slopes = [
+        float(fit.unknowns.presence.at(effect, k))
+        * recording.jacobian[:-1, at].reshape(recording.errors.shape)
+        for k, recording in enumerate(lin.residuals)
+    ]
+    slope = weighed(slopes)
+    if slope == 0.0:
+        return None
+    ways = [way for way in (1.0, -1.0) if low < way * effect.matters < high]
+    if len(ways) == 2 and score.size:
+        ways = [float(np.sign(score.size))]
+    held = True
+    for way in ways:
+        size = float(np.clip(way * weighed(now) / slope, low, high))
+        simulated = fit.tried(joined(best.point, replace(score, size=size)))
+        linear = [own + size * change for own, change in zip(now, slopes, strict=True)]
+        held = (
+            held
+            and simulated is not None
+            and weighed(
+                [
+                    recording.errors - expected
+                    for recording, expected in zip(simulated.residuals, linear, strict=True)
+                ]
+            )
+            < fit.decides.near * abs(size) * slope
+        )
+    if held:
+        return None
+    tried = [
+        float(np.clip(way * effect.matters * step, low, high)) for way in ways for step in _SIZES
+    ]
+    deviances = {
+        size: point.deviance
+        for size in dict.fromkeys([*tried, score.size])
+        if (point := fit.tried(joined(best.point, replace(score, size=size)))) is not None
+    }
+    if not deviances:
+        return None
+    size = min(deviances, key=lambda size: deviances[size])
+    return replace(score, size=size) if deviances[size] < lin.deviance else None
 
 
 def _gains(fit: Fit, before: FittedModel, after: FittedModel) -> bool:

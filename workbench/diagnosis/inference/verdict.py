@@ -346,7 +346,9 @@ def _objections(
     ]
     left = []
     noise = gain.after**2 <= validation.chance(best, fast=fast)[1]
-    if not whole or not (noise or 1.0 - _removed(gain) <= fit.decides.left):
+    # Beside the others, each must explain what a right cause does of what it is to explain.
+    shares = [validation.explained(less, best, fast=fast)[0] for less in chosen.less.values()]
+    if not whole or not (noise or min(shares) >= 1.0 - fit.decides.left):
         left.append(f"{gain.after:.1f} times the noise remains on held-out recordings")
     return worse, left
 
