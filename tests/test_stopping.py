@@ -17,11 +17,11 @@ from workbench.models.fmu import CoSimulation
 from workbench.recordings.case import Case
 from workbench.recordings.datasets import write_cases
 from workbench.studies.distance import Distance, Effort
-from workbench.studies.distance.forecast import Forecaster, Question, dimension, forecasting
+from workbench.studies.distance.forecast import Forecaster, Question, dimension, open_forecaster
 from workbench.studies.distance.past import MachineLevels
 from workbench.studies.distance.plain import quantile
 from workbench.studies.distance.rare_events import Tail
-from workbench.studies.distance.recorded import Stop, asked_stop, recorded
+from workbench.studies.distance.recorded import Stop, asked_stop, read_stop
 from workbench.studies.distance.standard import (
     StopConditions,
     equivalent_rate,
@@ -54,7 +54,7 @@ def stopping(train: System) -> Stopping:
 
 @pytest.fixture(scope="module")
 def forecaster(train: System) -> Iterator[Forecaster]:
-    with forecasting(train) as one:
+    with open_forecaster(train) as one:
         yield one
 
 
@@ -198,7 +198,7 @@ def test_a_distribution_is_that_of_its_parts(
     logs = np.log(forecaster.distances(replace(asked, left=0.0), steps))
     parts = np.square((logs[1:] - logs[0]) / 0.5).sum()
     points = np.random.default_rng(1).standard_normal((400, count))
-    drawn = np.log(forecaster.drawn(asked, points)[0])
+    drawn = np.log(forecaster.sample(asked, points)[0])
     # Student's t of five: variance 5/3. Four hundred give a deviation to 3.5 %: three of that.
     assert_allclose(drawn[0].std(), np.sqrt(parts + 0.01**2 * 5.0 / 3.0), rtol=0.11)
     assert drawn[1].std() < drawn[0].std()
@@ -295,7 +295,7 @@ def made(train: System, *, rest: bool = True) -> Case:
 def test_a_recording_tells_its_command_its_distance_and_what_was_asked(
     train: System, stopping: Stopping
 ) -> None:
-    found = recorded(made(train), train, stopping)
+    found = read_stop(made(train), train, stopping)
     # Half the rise is met between two samples in a line, which is 3 ms off a bent curve.
     assert_allclose(found.command, 20.02, atol=0.01)
     assert_allclose(found.distance, 30.0 * 0.65 + 450.0, rtol=1e-3)
@@ -309,10 +309,10 @@ def test_a_recording_tells_its_command_its_distance_and_what_was_asked(
 @pytest.mark.filterwarnings("ignore::UserWarning")
 def test_a_recording_without_a_stop_is_refused(train: System, stopping: Stopping) -> None:
     with pytest.raises(InputError, match="a recording until standstill"):
-        recorded(made(train, rest=False), train, stopping)
+        read_stop(made(train, rest=False), train, stopping)
     coasting = made(train).with_signals({"pB1": np.zeros(600)})
     with pytest.raises(InputError, match="nothing that rises"):
-        recorded(coasting, train, stopping)
+        read_stop(coasting, train, stopping)
 
 
 @pytest.mark.parametrize(
@@ -425,7 +425,7 @@ def test_bands_hold_forty_stops_of_months(train: System, tmp_path: Path) -> None
     )
     truth = json.loads((RECORDINGS / "history" / "truth.json").read_text())["cases"]
     held = []
-    for one in found.claimed:
+    for one in found.valid:
         low, high = one.forecast.band
         held.append(low < truth[one.recorded.stop.name]["stop_distance"] < high)
         assert one.forecast.width < 1.3

@@ -1,4 +1,4 @@
-"""Distribution of a stop that was not made: Monte Carlo over the model.
+"""Distribution of an untested stop: Monte Carlo over the model.
 
 What past stops know of the machine's levels, how far it differs from stop to stop, and what the
 model left of the distances of past stops are drawn together.
@@ -24,7 +24,7 @@ from workbench.system.registry import open_model
 from workbench.system.stopping import Difference, Stopping
 from workbench.system.system import System
 
-_TRIED = 8  # draws, which are all much alike in what a step leaves
+_STEPPED = 8  # draws that choose the step: all are much alike in what a step leaves
 _SAME = 1e-4  # of a distance: what it is measured to, ten centimetres in a kilometre
 
 
@@ -71,10 +71,10 @@ class Forecaster:
 
     def stop(self, stop: Stop, values: Mapping[str, float]) -> StopResult:
         """Stop with values of parameters, SI, and nothing that differs."""
-        return self._stops.run(self._drive(stop), {**self._begun(stop), **values})
+        return self._stops.run(self._drive(stop), {**self._start(stop), **values})
 
-    def drawn(self, question: Question, points: Matrix) -> tuple[Matrix, float]:
-        """Distances, those of a machine that is known, and the share that nothing claims.
+    def sample(self, question: Question, points: Matrix) -> tuple[Matrix, float]:
+        """Draw distances, and the share of them outside the validity range.
 
         Parameters
         ----------
@@ -83,7 +83,7 @@ class Forecaster:
         Returns
         -------
         distances : (2, n) as asked, and with all that is known but by nature [m].
-        outside : share of the first that is beyond what the model claims.
+        outside : share of the first that is outside the validity range.
         """
         names = [output.name for output in self._system.outputs]
         distances, outside = [], []
@@ -97,16 +97,16 @@ class Forecaster:
 
     def distances(self, question: Question, points: Matrix) -> Vector:
         """Distances for points (n, d), (n,) [m]."""
-        every, distances = self._samples(question), []
+        stride, distances = self._stride(question), []
         for drive, values, factor in self._draws(question, points):
             try:
-                result = self._stops.run(drive, values, every)
-            except FMUError:  # this one does not bear what serves the others
+                result = self._stops.run(drive, values, stride)
+            except FMUError:  # this draw fails at a step that serves the others
                 result = self._stops.run(drive, values)
             distances.append(result.distance * factor)
         return np.array(distances)
 
-    def plainly(self, question: Question, samples: int, seed: Sequence[int]) -> Vector:
+    def sample_plainly(self, question: Question, samples: int, seed: Sequence[int]) -> Vector:
         """Minus the logarithm of so many distances [m], (n,), each drawn by itself."""
         count = dimension(question, self._system, self._stopping)
         points = np.random.default_rng(seed).standard_normal((samples, count))
@@ -122,37 +122,37 @@ class Forecaster:
         run : see `descend`.
         spent : processor time of it all [s].
         """
-        begin, drawn = time.process_time(), replace(question, left=0.0)
+        begin, bare = time.process_time(), replace(question, left=0.0)
 
         def shortness(points: Matrix) -> Vector:
-            return -np.log(self.distances(drawn, points))
+            return -np.log(self.distances(bare, points))
 
         count = dimension(question, self._system, self._stopping)
         return descend(shortness, count, decades, samples, seed), time.process_time() - begin
 
-    def _samples(self, question: Question) -> int:
-        """Samples to a step: doubled while the distances of some draws stay the same.
+    def _stride(self, question: Question) -> int:
+        """Samples to a step: doubled while the distances of a few draws stay the same.
 
         A sample is as long as sensors need, which are far quicker than a machine that stops.
         """
         if self._stepped is None or self._stepped[0] is not question:
             count = dimension(question, self._system, self._stopping)
-            points = np.random.default_rng(0).standard_normal((_TRIED, count))
+            points = np.random.default_rng(0).standard_normal((_STEPPED, count))
             most = self._stopping.longest / self._system.sample_time
-            every, finest = 1, self._tried(question, points, 1)
-            while 2 * every <= most:
-                off = np.log(self._tried(question, points, 2 * every) / finest)
-                if not np.abs(off).max() < _SAME:
+            stride, finest = 1, self._stepped_distances(question, points, 1)
+            while 2 * stride <= most:
+                coarse = self._stepped_distances(question, points, 2 * stride)
+                if not np.abs(np.log(coarse / finest)).max() < _SAME:
                     break
-                every *= 2
-            self._stepped = question, every
+                stride *= 2
+            self._stepped = question, stride
         return self._stepped[1]
 
-    def _tried(self, question: Question, points: Matrix, every: int) -> Vector:
-        """Distances by the model, NaN if it does not bear such a step."""
+    def _stepped_distances(self, question: Question, points: Matrix, stride: int) -> Vector:
+        """Distances at a step, NaN if the model cannot take it."""
         try:
             results = [
-                self._stops.run(drive, values, every)
+                self._stops.run(drive, values, stride)
                 for drive, values, _ in self._draws(question, points)
             ]
         except FMUError:
@@ -168,10 +168,10 @@ class Forecaster:
         first, second = len(known.keys), len(known.keys) + len(tolerances)
         at = places(known.keys, system, stop.conditions)
         levels = known.mean + points[:, :first] @ known.root().T
-        factors = np.exp(question.left * _heavy(points[:, -1], question.freedom))
-        begun, drive = self._begun(stop), self._drive(stop)
+        factors = np.exp(question.left * _student(points[:, -1], question.freedom))
+        start, drive = self._start(stop), self._drive(stop)
         for point, level, factor in zip(points, levels, factors, strict=True):
-            values = begun | {name: level[j] for name, j in at.items()}
+            values = start | {name: level[j] for name, j in at.items()}
             for (name, spread), u in zip(tolerances.items(), point[first:second], strict=True):
                 values[name] = self._usual(name, values) * (1.0 + spread * u)
             differing = replace(drive, to=drive.to.copy(), along=drive.along.copy())
@@ -179,9 +179,9 @@ class Forecaster:
                 self._move(difference, float(u), values, differing)
             yield differing, values, float(factor)
 
-    def _begun(self, stop: Stop) -> dict[str, float]:
+    def _start(self, stop: Stop) -> dict[str, float]:
         """States at the command, and parameters that conditions set."""
-        start = {name: float(one(stop.asked)) for name, one in self._stopping.start.items()}
+        start = {name: float(value(stop.asked)) for name, value in self._stopping.start.items()}
         return {**self._system.set_by(stop.conditions), **start}
 
     def _usual(self, name: str, values: Mapping[str, float]) -> float:
@@ -192,12 +192,12 @@ class Forecaster:
         length = max([2, *(values.size for values in stop.along.values())])
         along = np.zeros((len(driven), length))
         to = np.zeros(len(driven))
-        for j, one in enumerate(driven):
-            if one.name in stop.along:
-                values = stop.along[one.name]
+        for j, signal in enumerate(driven):
+            if signal.name in stop.along:
+                values = stop.along[signal.name]
                 along[j] = np.pad(values, (0, length - values.size), "edge")
             else:
-                to[j] = one.formula(stop.asked)
+                to[j] = signal.formula(stop.asked)
         delays, lags = np.array([[signal.delay, signal.lag] for signal in driven]).T
         return DrivingInputs(to, np.ascontiguousarray(delays), np.ascontiguousarray(lags), along)
 
@@ -225,14 +225,14 @@ def dimension(question: Question, system: System, stopping: Stopping) -> int:
     return len(question.known.keys) + differ + 1
 
 
-def _heavy(u: Vector, freedom: int) -> Vector:
+def _student(u: Vector, freedom: int) -> Vector:
     """Values of Student's t that are as likely as those of a standard normal variable, (n,)."""
     far: Vector = np.copysign(t.isf(norm.sf(np.abs(u)), freedom), u)
     return far
 
 
 @contextmanager
-def forecasting(system: System) -> Iterator[Forecaster]:
+def open_forecaster(system: System) -> Iterator[Forecaster]:
     """Open a forecaster of a system that says how it stops."""
     with open_model(system) as fmu:
         yield Forecaster(fmu, system, stopping_of(system))

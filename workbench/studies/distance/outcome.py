@@ -4,6 +4,7 @@ import math
 from dataclasses import asdict, dataclass
 from html import escape
 from typing import TYPE_CHECKING, Any, Self
+from warnings import warn
 
 import numpy as np
 import pandas as pd
@@ -44,7 +45,7 @@ class Forecast:
     ----------
     distances : (n,) drawn, least first [m].
     certain : (n,) the same if the machine and its model were known [m].
-    outside : share that is beyond what the model claims.
+    outside : share outside the validity range of the model.
     """
 
     distances: Vector
@@ -85,7 +86,7 @@ class NominalStop:
 
 @dataclass(frozen=True, eq=False)
 class PastStop:
-    """A stop that was made, and what the others say of it.
+    """A stop that was made, and what the others predict of it.
 
     Attributes
     ----------
@@ -160,6 +161,21 @@ class Safety:
             levels.append(level)
         return cls(tuple(levels), nominal.rate, tail.evaluations, spent)
 
+    def lines(self) -> list[str]:
+        """Table of the levels, for people."""
+        lines = [
+            f"deceleration over the nominal one, {self.nominal:.3f} m/s2, that all but one stop in "
+            f"so many reach; {self.stops} stops drawn, {1e3 * self.spent:.2g} ms each:",
+            "  one in     ratio    95 %               variation   by plain sampling",
+        ]
+        for level in self.levels:
+            lines.append(
+                f"  1e{level.decade:<6} {level.ratio:7.4f}    {level.low:.4f} to {level.high:.4f}"
+                f"   {level.variation:8.3f}    {level.plain_stops:.1e} stops, "
+                f"{level.plain_hours:.1e} h"
+            )
+        return lines
+
 
 @dataclass(frozen=True, eq=False)
 class Distance:
@@ -185,9 +201,15 @@ class Distance:
     interrupted: bool
 
     @property
-    def claimed(self) -> list[PastStop]:
-        """Past stops that the model claims."""
+    def valid(self) -> list[PastStop]:
+        """Past stops within the validity range of the model."""
         return [stop for stop in self.past if not stop.recorded.outside]
+
+    @property
+    def claimed(self) -> list[PastStop]:
+        """Deprecated name of `valid`."""
+        warn("claimed is now called valid", DeprecationWarning, stacklevel=2)
+        return self.valid
 
     @property
     def response(self) -> float:
@@ -207,13 +229,13 @@ class Distance:
         speed = min(nominal.speeds, key=lambda v: abs(v - asked[SPEED]))
         if abs(speed - asked[SPEED]) > nominal.within * speed:
             return None
-        made = StopConditions(
+        conditions = StopConditions(
             mass=float(nominal.mass(asked)),
             rotating=float(nominal.rotating(self.system.values)),
             resistance=stop.resistance,
         )
         rate = equivalent_rate(asked[SPEED], stopping.response, stop.distance)
-        rate = nominal_rate(rate, made, nominal.reference)
+        rate = nominal_rate(rate, conditions, nominal.reference)
         distance = stopping_distance(speed, stopping.response, rate)
         constants = None
         if stopping.rating is not None:
@@ -225,7 +247,7 @@ class Distance:
     @property
     def warnings(self) -> list[str]:
         """What the data do not carry."""
-        count = len(self.claimed)
+        count = len(self.valid)
         warnings = []
         if self.safety is not None:
             warnings.append(
@@ -233,18 +255,18 @@ class Distance:
                 "from tolerances and from the forms of their distributions, which no stop has shown"
             )
         for asked in stopping_of(self.system).asked:
-            seen = [stop.recorded.stop.asked[asked.name] for stop in self.claimed]
+            seen = [stop.recorded.stop.asked[asked.name] for stop in self.valid]
             near = _SEEN * (max(seen) - min(seen))
             value = self.stop.asked[asked.name]
             if not min(seen) - near <= value <= max(seen) + near:
-                low, high, here = (_shown(one, asked) for one in (min(seen), max(seen), value))
+                low, high, here = (_shown(v, asked) for v in (min(seen), max(seen), value))
                 warnings.append(
                     f"{asked.label} {here} is beyond that of past stops, {low} to {high}"
                 )
-        for name, said in self.stop.conditions.items():
-            if not any(stop.recorded.stop.conditions[name] == said for stop in self.claimed):
-                label = self.system.condition(name).label
-                warnings.append(f"no past stop that the model claims was made with {label} {said}")
+        for name, condition in self.stop.conditions.items():
+            if not any(stop.recorded.stop.conditions[name] == condition for stop in self.valid):
+                label = f"{self.system.condition(name).label} {condition}"
+                warnings.append(f"no past stop that the model claims was made with {label}")
         if self.ahead.outside > 0.0:
             reasons = ", ".join(exclusion.reason for exclusion in stopping_of(self.system).outside)
             warnings.append(
@@ -258,40 +280,40 @@ class Distance:
         """The answer in one sentence."""
         low, high = self.ahead.band
         middle = self.ahead.quantile(0.5)
-        speed = next(
-            quantity for quantity in stopping_of(self.system).asked if quantity.name == SPEED
-        )
-        told = [f"{self.system.condition(k).label} {v}" for k, v in self.stop.conditions.items()]
-        begins = ", ".join([f"From {_shown(self.stop.asked[SPEED], speed)}", *told])
+        speed = next(q for q in stopping_of(self.system).asked if q.name == SPEED)
+        start = ", ".join([_shown(self.stop.asked[SPEED], speed), *self._conditions])
         return (
-            f"{begins}: {middle:.1f} m, 95 %: {low:.1f} to {high:.1f} m; deceleration "
+            f"From {start}: {middle:.1f} m, 95 %: {low:.1f} to {high:.1f} m; deceleration "
             f"{self.rate(middle):.3f} m/s2 after {self.response:.2f} s."
         )
+
+    @property
+    def _conditions(self) -> list[str]:
+        return [f"{self.system.condition(k).label} {v}" for k, v in self.stop.conditions.items()]
 
     def summary(self) -> str:
         """The answer, what it rests on, and what it does not carry, for people."""
         lines = [self.sentence]
-        said = [
+        quantities = [
             f"{quantity.label} {_shown(self.stop.asked[quantity.name], quantity)}"
             for quantity in stopping_of(self.system).asked
         ]
-        said += [f"{self.system.condition(k).label} {v}" for k, v in self.stop.conditions.items()]
-        lines.append(f"asked for: {', '.join(said)}")
-        held = sum(stop.held for stop in self.claimed)
-        widths = [stop.forecast.width for stop in self.claimed]
+        lines.append(f"asked for: {', '.join([*quantities, *self._conditions])}")
+        held = sum(stop.held for stop in self.valid)
+        widths = [stop.forecast.width for stop in self.valid]
         lines.append(
-            f"{held} of {len(self.claimed)} past stops are in the 95 % band that the others "
+            f"{held} of {len(self.valid)} past stops are in the 95 % band that the others "
             f"predict, which is {np.median(widths):.2f} times as wide (at most {max(widths):.2f}) "
             "as if the machine were known"
         )
-        away = len(self.past) - len(self.claimed)
+        away = len(self.past) - len(self.valid)
         if away:
             reasons = sorted({r for stop in self.past for r in stop.recorded.outside})
             lines.append(f"{away} are beyond what the model claims: {', '.join(reasons)}")
         if self.safety is not None:
-            lines += ["", *_told(self.safety)]
+            lines += ["", *self.safety.lines()]
         if self.plain is not None:
-            lines += self.plain.told()
+            lines += self.plain.lines()
         lines += [f"warning: {warning}" for warning in self.warnings]
         return "\n".join(lines)
 
@@ -300,30 +322,30 @@ class Distance:
         rating = stopping_of(self.system).rating
         rows = []
         for stop in self.past:
-            made, fixed = stop.recorded, self.corrected(stop.recorded)
+            recorded, corrected = stop.recorded, self.corrected(stop.recorded)
             low, high = stop.forecast.band
-            rate = equivalent_rate(made.stop.asked[SPEED], self.response, made.distance)
+            speed = recorded.stop.asked[SPEED]
             rows.append(
                 {
-                    "stop": made.stop.name,
-                    "command [s]": made.command,
-                    "speed [m/s]": made.stop.asked[SPEED],
-                    "distance [m]": made.distance,
-                    "deceleration [m/s2]": rate,
+                    "stop": recorded.stop.name,
+                    "command [s]": recorded.command,
+                    "speed [m/s]": speed,
+                    "distance [m]": recorded.distance,
+                    "deceleration [m/s2]": equivalent_rate(speed, self.response, recorded.distance),
                     "model [m]": stop.model,
                     "predicted [m]": stop.forecast.quantile(0.5),
                     "low [m]": low,
                     "high [m]": high,
                     "width": stop.forecast.width,
                     "held": stop.held,
-                    "outside": ", ".join(made.outside),
-                    "nominal_speed [m/s]": np.nan if fixed is None else fixed.speed,
-                    "nominal_deceleration [m/s2]": np.nan if fixed is None else fixed.rate,
-                    "nominal_distance [m]": np.nan if fixed is None else fixed.distance,
+                    "outside": ", ".join(recorded.outside),
+                    "nominal_speed [m/s]": corrected.speed if corrected else np.nan,
+                    "nominal_deceleration [m/s2]": corrected.rate if corrected else np.nan,
+                    "nominal_distance [m]": corrected.distance if corrected else np.nan,
                 }
             )
             if rating is not None:
-                percent = None if fixed is None else fixed.rating
+                percent = corrected.rating if corrected else None
                 rows[-1]["rating [%]"] = np.nan if percent is None else percent
         return pd.DataFrame(rows)
 
@@ -356,7 +378,7 @@ class Distance:
             else [asdict(level) for level in self.safety.levels],
             "plain": None if self.plain is None else asdict(self.plain),
             "stops": frame.astype(object).where(frame.notna(), None).to_dict("records"),
-            "held": {"of": len(self.claimed), "stops": sum(stop.held for stop in self.claimed)},
+            "held": {"of": len(self.valid), "stops": sum(stop.held for stop in self.valid)},
             "warnings": self.warnings,
             "interrupted": self.interrupted,
         }
@@ -374,21 +396,6 @@ def _shown(value: float, asked: AskedQuantity) -> str:
     """A quantity for people."""
     unit = f" {asked.shown}" * (asked.shown != "1")
     return f"{value / si_factor(asked.shown, asked.unit, asked.name):.4g}{unit}"
-
-
-def _told(safety: Safety) -> list[str]:
-    """Lines on the safety level."""
-    lines = [
-        f"deceleration over the nominal one, {safety.nominal:.3f} m/s2, that all but one stop in "
-        f"so many reach; {safety.stops} stops drawn, {1e3 * safety.spent:.2g} ms each:",
-        "  one in     ratio    95 %               variation   by plain sampling",
-    ]
-    for level in safety.levels:
-        lines.append(
-            f"  1e{level.decade:<6} {level.ratio:7.4f}    {level.low:.4f} to {level.high:.4f}"
-            f"   {level.variation:8.3f}    {level.plain_stops:.1e} stops, {level.plain_hours:.1e} h"
-        )
-    return lines
 
 
 def distance_figure(result: Distance) -> "Figure":
@@ -421,17 +428,13 @@ def _draw_past(axes: "Axes", past: tuple[PastStop, ...]) -> None:
     """Each stop and its band, over the middle of what the others predict."""
     middle = np.array([stop.forecast.quantile(0.5) for stop in past])
     low, high = np.array([stop.forecast.band for stop in past]).T / middle
-    made = np.array([stop.recorded.distance for stop in past]) / middle
-    inside = np.array([not stop.recorded.outside for stop in past])
+    measured = np.array([stop.recorded.distance for stop in past]) / middle
+    valid = np.array([not stop.recorded.outside for stop in past])
     place = np.arange(len(past))
     axes.vlines(place, low, high, color=LIGHT["2"], linewidth=4.0, alpha=0.35, label="95 %")
-    axes.plot(place[inside], made[inside], "o", color=LIGHT["measured"], markersize=4)
-    axes.plot(
-        *(place[~inside], made[~inside], "x"),
-        color=LIGHT["1"],
-        markersize=5,
-        label="beyond what the model claims",
-    )
+    axes.plot(place[valid], measured[valid], "o", color=LIGHT["measured"], markersize=4)
+    (outside,) = axes.plot(place[~valid], measured[~valid], "x", color=LIGHT["1"], markersize=5)
+    outside.set_label("beyond what the model claims")
     axes.legend(fontsize=7, frameon=False)
     axes.set(title="past stops, each over what the others predict", ylabel="distance, of predicted")
     names = [stop.recorded.stop.name for stop in past] if len(past) <= MOST_NAMED else []
@@ -441,14 +444,8 @@ def _draw_past(axes: "Axes", past: tuple[PastStop, ...]) -> None:
 def _draw_levels(axes: "Axes", safety: Safety) -> None:
     decades = np.array([level.decade for level in safety.levels])
     ratio, low, high = np.array([(level.ratio, level.low, level.high) for level in safety.levels]).T
-    axes.errorbar(
-        *(decades, ratio),
-        yerr=np.maximum(0.0, [ratio - low, high - ratio]),
-        color=LIGHT["2"],
-        marker="o",
-        markersize=4,
-        capsize=3,
-    )
+    reach = np.maximum(0.0, [ratio - low, high - ratio])
+    axes.errorbar(decades, ratio, reach, color=LIGHT["2"], marker="o", markersize=4, capsize=3)
     axes.set(
         title=f"deceleration over the nominal one, {safety.nominal:.3f} m/s2, that all but one "
         "stop in so many reach",

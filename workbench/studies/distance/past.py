@@ -1,4 +1,4 @@
-"""What past stops say about the next one: the levels of a machine, how sure they are, the rest.
+"""What past stops say of the next: nuisance parameters of the machine, and how sure they are.
 
 The fit is that of the diagnosis without effects; nothing is estimated a second time.
 """
@@ -70,7 +70,7 @@ class PastFit:
         return MachineLevels(self.joint.shared, self.mean + step, covariance(total.N))
 
 
-def fitted(system: System, cases: Sequence[Case], engine: Engine) -> PastFit:
+def fit_past_stops(system: System, cases: Sequence[Case], engine: Engine) -> PastFit:
     """Fit levels, and what differs between recordings, to past stops.
 
     Raises

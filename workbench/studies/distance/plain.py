@@ -49,7 +49,7 @@ class PlainSampling:
             levels.append(PlainLevel(decade, *map(nominal.ratio, ends)))
         return cls(shortness.size, tuple(levels))
 
-    def told(self) -> list[str]:
+    def lines(self) -> list[str]:
         """Lines for people."""
         return [f"the same by {self.samples} plain samples, 95 %:"] + [
             f"  1e{level.decade:<6} {level.ratio:7.4f}    {level.low:.4f} to {level.high:.4f}"

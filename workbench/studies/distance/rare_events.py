@@ -135,8 +135,8 @@ def descend(
     >>> def first(u):
     ...     return u[:, 0]
     >>> tail = Tail(tuple(descend(first, 5, 9, 1000, seed) for seed in range(8)))
-    >>> found = tail.quantile(9)
-    >>> found.low < -5.998 < found.high
+    >>> quantile = tail.quantile(9)
+    >>> quantile.low < -5.998 < quantile.high
     True
     """
     rng = np.random.default_rng(seed)
@@ -144,19 +144,19 @@ def descend(
     points = rng.standard_normal((samples, dimension))
     values = evaluate(points)
     weight, step, evaluations = 1.0 / samples, _STEP, samples
-    found, weights = [], []
+    decade_values, weights = [], []
     for _ in range(decades - 1):
         order = np.argsort(values, kind="stable")
-        found.append(values[order[kept:]])
+        decade_values.append(values[order[kept:]])
         weights.append(np.full(samples - kept, weight))
         begin, bound = order[:kept], float(np.mean(values[order[kept - 1 : kept + 1]]))
         points, values, step = _chains(evaluate, points[begin], values[begin], bound, step, rng)
         weight, evaluations = _SHARE * weight, evaluations + samples - kept
-    found.append(values)
+    decade_values.append(values)
     weights.append(np.full(samples, weight))
-    every, held = np.concatenate(found), np.concatenate(weights)
-    order = np.argsort(every, kind="stable")
-    return Descent(every[order], held[order], evaluations)
+    drawn, probability = np.concatenate(decade_values), np.concatenate(weights)
+    order = np.argsort(drawn, kind="stable")
+    return Descent(drawn[order], probability[order], evaluations)
 
 
 def _chains(
@@ -167,19 +167,20 @@ def _chains(
     step: float,
     rng: np.random.Generator,
 ) -> tuple[Matrix, Vector, float]:
-    """Samples beyond a bound from some of them, ten from each, one step of all chains at a time.
+    """Samples beyond a bound from those that lead on, ten from each; all chains step together.
 
     A step keeps the normal distribution whatever its size, so that only the bound refuses it; the
     size follows the share that is accepted.
     """
-    found, known = [points], [values]
+    chain_points, chain_values = [points], [values]
     for k in range(1, round(1.0 / _SHARE)):
-        turned = math.sqrt(1.0 - step**2) * points + step * rng.standard_normal(points.shape)
-        there = evaluate(turned)
-        taken = there <= bound
-        points = np.where(taken[:, None], turned, points)
-        values = np.where(taken, there, values)
-        found.append(points)
-        known.append(values)
-        step = min(0.999, step * math.exp((float(taken.mean()) - _ACCEPTED) / math.sqrt(k)))
-    return np.concatenate(found), np.concatenate(known), step
+        # u' = sqrt(1 - step^2) u + step w with w normal is normal as u is.
+        proposed = math.sqrt(1.0 - step**2) * points + step * rng.standard_normal(points.shape)
+        proposed_values = evaluate(proposed)
+        accepted = proposed_values <= bound
+        points = np.where(accepted[:, None], proposed, points)
+        values = np.where(accepted, proposed_values, values)
+        chain_points.append(points)
+        chain_values.append(values)
+        step = min(0.999, step * math.exp((float(accepted.mean()) - _ACCEPTED) / math.sqrt(k)))
+    return np.concatenate(chain_points), np.concatenate(chain_values), step

@@ -1,4 +1,4 @@
-"""What a recording tells of its stop: when it was commanded, what was asked, how far it went."""
+"""The stop in a recording: when it was commanded, what was asked, how far it went."""
 
 import math
 from collections.abc import Mapping
@@ -14,7 +14,6 @@ from workbench.errors import InputError
 from workbench.recordings.case import Case, Value, read_conditions
 from workbench.studies.distance.simulation import GRID
 from workbench.system.comparison import Exclusion
-from workbench.system.parts import Condition
 from workbench.system.stopping import COMMAND, DrivenInput, Stopping
 from workbench.system.system import System
 from workbench.system.tables import Table
@@ -25,7 +24,7 @@ _HALF = math.log(2.0)  # lags in which the half is reached
 
 @dataclass(frozen=True, eq=False)
 class Stop:
-    """A stop, recorded or thought of.
+    """A stop, recorded or asked for.
 
     Attributes
     ----------
@@ -49,7 +48,7 @@ class RecordedStop:
     command : in the recording [s].
     distance : from the command to standstill, by its own sensors [m].
     resistance : of gradients and curves over weight, after the response, mean [1].
-    outside : reasons why the model does not claim it.
+    outside : reasons why it is outside the validity range of the model.
     """
 
     stop: Stop
@@ -59,7 +58,7 @@ class RecordedStop:
     outside: tuple[str, ...]
 
 
-def recorded(case: Case, system: System, stopping: Stopping) -> RecordedStop:
+def read_stop(case: Case, system: System, stopping: Stopping) -> RecordedStop:
     """Read the stop out of a recording.
 
     Raises
@@ -84,6 +83,13 @@ def recorded(case: Case, system: System, stopping: Stopping) -> RecordedStop:
         asked[quantity.name] = float(
             values[0] if quantity.place == COMMAND else np.median(values[risen])
         )
+    h = float(np.median(np.diff(time)))
+    resistance = 0.0
+    if stopping.nominal is not None:  # mean over the way after the response
+        values = system.evaluate(stopping.nominal.resistance, case.signals)
+        after = way >= np.interp(at[0] + stopping.response, at, way)
+        lengths = np.gradient(way[after])
+        resistance = float(np.interp(at[after], time, values) @ lengths / lengths.sum())
     grid = np.arange(0.0, way[-1] + GRID, GRID)
     along = {
         signal.name: np.interp(grid, way, np.interp(at, time, case[signal.name]))
@@ -94,21 +100,21 @@ def recorded(case: Case, system: System, stopping: Stopping) -> RecordedStop:
         stop=Stop(case.name, asked, case.conditions, along),
         command=command,
         distance=distance,
-        resistance=_resistance(case, system, stopping, at, way),
+        resistance=resistance,
         outside=tuple(
             exclusion.reason
             for exclusion in stopping.outside
-            if _met(exclusion, case.signals, system, time, _step(case))[moving].any()
+            if _excluded(exclusion, case.signals, system, time, h)[moving].any()
         ),
     )
 
 
-def asked_stop(said: Mapping[str, Any], system: System, stopping: Stopping) -> Stop:
-    """A stop as people ask for it; what they do not say is usual.
+def asked_stop(asked: Mapping[str, Any], system: System, stopping: Stopping) -> Stop:
+    """Read a stop as people ask for it; what they do not say is usual.
 
     Parameters
     ----------
-    said : quantities with units, words of conditions, by name.
+    asked : quantities with units, words of conditions, by name.
 
     Raises
     ------
@@ -116,39 +122,35 @@ def asked_stop(said: Mapping[str, Any], system: System, stopping: Stopping) -> S
         If something is no quantity that is asked for and no condition, or is not as expected.
     """
     where = "what is asked for"
-    kinds = {quantity.name: quantity for quantity in stopping.asked}
-    table = Table(said, where)
-    table.refuse_unknown([*kinds, *(condition.name for condition in system.conditions)])
-    asked = {name: table.number(name, kind.unit, kind.usual) for name, kind in kinds.items()}
-    told = {
-        condition.name: said.get(condition.name, _usual(condition))
-        for condition in system.conditions
-        if condition.name in said or condition.choices
-    }
-    return Stop("asked for", asked, read_conditions(Table(told, where), system), {})
-
-
-def _usual(condition: Condition) -> Any:
-    return [condition.choices[0]] * condition.count if condition.count else condition.choices[0]
+    quantities = {quantity.name: quantity for quantity in stopping.asked}
+    table = Table(asked, where)
+    table.refuse_unknown([*quantities, *(condition.name for condition in system.conditions)])
+    values = {name: table.number(name, q.unit, q.usual) for name, q in quantities.items()}
+    conditions = {}
+    for condition in system.conditions:
+        if condition.name in asked:
+            conditions[condition.name] = asked[condition.name]
+        elif condition.choices:
+            usual = condition.choices[0]
+            conditions[condition.name] = [usual] * condition.count if condition.count else usual
+    return Stop("asked for", values, read_conditions(Table(conditions, where), system), {})
 
 
 def beyond(outputs: Mapping[str, Vector], system: System, stopping: Stopping) -> bool:
-    """Whether readings of a model's outputs, (n,) each, are beyond what it claims."""
+    """Whether readings of a model's outputs, (n,) each, are outside its validity range."""
     h = system.sample_time
     time: Vector = h * np.arange(float(next(iter(outputs.values())).size))
-    return any(_met(exclusion, outputs, system, time, h).any() for exclusion in stopping.outside)
+    return any(
+        _excluded(exclusion, outputs, system, time, h).any() for exclusion in stopping.outside
+    )
 
 
-def _met(
+def _excluded(
     exclusion: Exclusion, signals: Mapping[str, Vector], system: System, time: Vector, h: float
 ) -> NDArray[np.bool_]:
-    """Where a reason holds; at rest a ratio is none, which no reason holds for."""
+    """Where a reason holds; at rest a ratio is undefined, and no reason holds."""
     with np.errstate(divide="ignore", invalid="ignore"):
         return excluded_by(exclusion, signals, system, time, h, 1)
-
-
-def _step(case: Case) -> float:
-    return float(np.median(np.diff(case.time)))
 
 
 def _command(case: Case, rising: DrivenInput) -> float:
@@ -181,14 +183,3 @@ def _at_rest(case: Case, speed: Vector, command: float, stopping: Stopping) -> i
             remedy="leave this recording out",
         )
     return int(np.argmax(slow))
-
-
-def _resistance(case: Case, system: System, stopping: Stopping, at: Vector, way: Vector) -> float:
-    """Mean over the way after the response of gradients and curves, over weight."""
-    if stopping.nominal is None:
-        return 0.0
-    values = system.evaluate(stopping.nominal.resistance, case.signals)
-    after = way >= np.interp(at[0] + stopping.response, at, way)
-    here = np.interp(at[after], case.time, values)
-    lengths = np.gradient(way[after])
-    return float(here @ lengths / lengths.sum())

@@ -111,15 +111,15 @@ def _past(past: Sequence[PastStop]) -> Dots:
     for stop in past:
         middle = stop.forecast.quantile(0.5)
         low, high = (end / middle for end in stop.forecast.band)
-        made = stop.recorded.distance / middle
+        measured = stop.recorded.distance / middle
         style = _AWAY if stop.recorded.outside else _MADE
-        rows.append((stop.recorded.stop.name, (Dot(made, style, low, high),)))
-        ends += [low, high, made]
-    claimed = [stop for stop in past if not stop.recorded.outside]
-    held = sum(stop.held for stop in claimed)
+        rows.append((stop.recorded.stop.name, (Dot(measured, style, low, high),)))
+        ends += [low, high, measured]
+    valid = [stop for stop in past if not stop.recorded.outside]
+    held = sum(stop.held for stop in valid)
     finding = (
-        f"{held} of {len(claimed)} past stops are where the others predict them with 95 %"
-        + "; red ones are beyond what the model claims" * (len(claimed) < len(past))
+        f"{held} of {len(valid)} past stops are where the others predict them with 95 %"
+        + "; red ones are beyond what the model claims" * (len(valid) < len(past))
         + "."
     )
     axis = "measured distance over the predicted one"

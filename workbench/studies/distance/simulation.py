@@ -56,7 +56,7 @@ class StopResult:
 
 
 @compiled
-def _driven(drive, t, way, u):  # type: ignore[no-untyped-def]
+def _set_inputs(drive, t, way, u):  # type: ignore[no-untyped-def]
     """Write the inputs at a time after the command and a place to u."""
     to, delay, lag, along = drive
     at = max(way, 0.0) / GRID
@@ -74,12 +74,17 @@ def _driven(drive, t, way, u):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _stop(model, x0, drive, state, rest, h, most, y, found, work):  # type: ignore[no-untyped-def]
-    """Fill `y` (n, l), as far as it goes, and `found` (distance, time, steps); returns a status."""
+def _stop(model, x0, drive, limits, y, result, work):  # type: ignore[no-untyped-def]
+    """Fill `y` (n, l), as far as it goes, and `result` (distance, time, steps); returns a status.
+
+    `limits` are the index of the speed, that at rest [m/s], a step [s] and the most steps. The way
+    is the integral of the speed by trapezia, s += h (v_k + v_{k+1}) / 2.
+    """
+    state, rest, h, most = limits
     for i in range(x0.size):
         model.x[i] = x0[i]
     restart(work)
-    _driven(drive, 0.0, 0.0, model.u)
+    _set_inputs(drive, 0.0, 0.0, model.u)
     if place(model):
         return 1
     way, speed = 0.0, model.x[state]
@@ -89,7 +94,7 @@ def _stop(model, x0, drive, state, rest, h, most, y, found, work):  # type: igno
                 return 1
             for i in range(y.shape[1]):
                 y[k, i] = model.y[i]
-        _driven(drive, (k + 1) * h, way + h * speed, work.to)
+        _set_inputs(drive, (k + 1) * h, way + h * speed, work.to)
         status = advance(model, work, h)
         if status:
             return status
@@ -99,21 +104,20 @@ def _stop(model, x0, drive, state, rest, h, most, y, found, work):  # type: igno
         # A constant rate from step to step; the last part, from a small speed, too.
         if speed <= rest:
             rate = (before - speed) / h
-            found[0] = way + before * before / (2.0 * rate)
-            found[1] = k * h + before / rate
-            found[2] = k + 1
+            result[0] = way + before * before / (2.0 * rate)
+            result[1] = k * h + before / rate
+            result[2] = k + 1
             return 0
         way += 0.5 * h * (before + speed)
     return _MOVING
 
 
 class StopSimulation:
-    """A model that stops, again and again.
+    """Simulate stops of a model.
 
     Parameters
     ----------
     fmu : with the states, inputs and outputs of the system; it must outlive this.
-    longest : [s] of a stop.
     """
 
     def __init__(self, fmu: FMU, system: System, stopping: Stopping) -> None:
@@ -125,17 +129,17 @@ class StopSimulation:
         self._h = system.sample_time
         self._y = np.zeros((round(stopping.longest / self._h), len(outputs)))
         self._state = fmu.states.index(stopping.state)
-        self._found = np.zeros(3)
+        self._result = np.zeros(3)
         # All states: how stiff one is changes on the way to standstill.
         self._work = steps(fmu, np.arange(len(fmu.states)), len(inputs))
 
-    def run(self, drive: DrivingInputs, values: Mapping[str, float], every: int = 1) -> StopResult:
+    def run(self, drive: DrivingInputs, values: Mapping[str, float], stride: int = 1) -> StopResult:
         """Stop once.
 
         Parameters
         ----------
         values : of parameters and states at the command, by name, SI; others keep their defaults.
-        every : samples to a step; outputs are read where it is one.
+        stride : samples to a step; outputs are read where it is one.
 
         Raises
         ------
@@ -144,13 +148,11 @@ class StopSimulation:
         """
         self._fmu.start(values)
         self._model.u[:] = 0.0
-        y = self._y if every == 1 else self._y[:0]
-        status = _stop(
-            *(self._model, self._fmu.get_states()),
-            *((drive.to, drive.delay, drive.lag, drive.along), self._state),
-            *(self._stopping.rest, every * self._h, len(self._y) // every),
-            *(y, self._found, self._work),
-        )
+        y = self._y if stride == 1 else self._y[:0]
+        inputs = drive.to, drive.delay, drive.lag, drive.along
+        limits = self._state, self._stopping.rest, stride * self._h, len(self._y) // stride
+        x0 = self._fmu.get_states()
+        status = _stop(self._model, x0, inputs, limits, y, self._result, self._work)
         if status == _MOVING:
             raise FMUError(
                 f"{self._fmu.path.name}: not at rest after {self._stopping.longest:g} s; "
@@ -158,5 +160,5 @@ class StopSimulation:
             )
         raise_on_failure(status, self._fmu)
         assert status == OK
-        distance, time, count = self._found
+        distance, time, count = self._result
         return StopResult(float(distance), float(time), y[: int(count)].copy())
