@@ -96,42 +96,37 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
     if options.diagnose:
         require_compiler()
     with locked_folder(options.out):
-        watched = monitor(
-            system,
-            history,
-            Engine(options.workers, output.progress, options.out),
-            rate=options.false_alarms,
-            read=read_recorded,
-        )
+        engine = Engine(options.workers, output.progress, options.out)
+        result = monitor(system, history, engine, rate=options.false_alarms, read=read_recorded)
         provenance = provenance_of(system, history)
-        page = write_monitoring(watched, provenance, options.out)
-        output.result(watched.summary())
+        page = write_monitoring(result, provenance, options.out)
+        output.result(result.summary())
         output.result(f"to read: {page}, data and figure beside it")
-        if watched.interrupted:
+        if result.interrupted:
             output.progress("interrupted: what was estimated is kept; run it again to go on")
-        result = read_result(options.out / "summary.json")
-        if options.diagnose and watched.changes and not watched.interrupted:
-            result["cause"] = _cause(options, output, watched, provenance)
-    return CommandResult(result, {"work": "J"}, 130 * watched.interrupted, page)
+        summary = read_result(options.out / "summary.json")
+        if options.diagnose and result.changes and not result.interrupted:
+            summary["cause"] = _diagnose_change(options, output, result, provenance)
+    return CommandResult(summary, {"work": "J"}, 130 * result.interrupted, page)
 
 
-def _cause(
+def _diagnose_change(
     options: argparse.Namespace,
     output: Output,
-    watched: MonitoringResult,
+    result: MonitoringResult,
     provenance: dict[str, Any],
 ) -> dict[str, Any]:
-    """Diagnose what has changed; returns the summary of the diagnosis."""
+    """Diagnose the recordings after the change; returns the summary of the diagnosis."""
     from workbench.diagnosis import Problem, catalogue, diagnose
     from workbench.diagnosis.report import write_diagnosis
     from workbench.models.modelica import read_library
     from workbench.recordings.datasets import read_recorded
     from workbench.studies.monitoring.cause import known_from_before, recordings_after
 
-    system, out = known_from_before(watched), options.out / "cause"
+    system, out = known_from_before(result), options.out / "cause"
     library = read_library(system.library)
     effects = catalogue(system, library)
-    names = recordings_after(watched)
+    names = recordings_after(result)
     output.stage(f"cause of the change, from {', '.join(names)}")
     cases = [read_recorded(Path(options.history) / name, system) for name in names]
     engine = Engine(options.workers, output.stage, out)

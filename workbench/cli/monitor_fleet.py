@@ -19,7 +19,7 @@ from workbench.runtime.engine import Engine
 from workbench.runtime.files import locked_folder, write_json, write_whole
 from workbench.runtime.pool import Pool
 from workbench.studies.monitoring import MonitoringResult
-from workbench.studies.monitoring.fleet import Fleet, MachineResult, serving, watch_fleet
+from workbench.studies.monitoring.fleet import Fleet, MachineResult, open_fleet, watch_fleet
 from workbench.studies.monitoring.report import write_monitoring
 from workbench.system.registry import load_system
 from workbench.system.system import OBSERVER, System
@@ -53,12 +53,16 @@ def run_fleet(options: argparse.Namespace, output: Output) -> CommandResult:
     if "://" in options.history:
         require("fsspec", "cluster", "which reads URLs", f"command line, {options.history}")
     provenance = provenance_of(system, Path(options.history))
-    write = partial(_written, provenance)
+    write = partial(_write_machine, provenance)
     fleet = Fleet(system, options.history, options.false_alarms, read_recorded, write)
     count = len(fleet.machines())  # wrong places are refused before workers start
     with locked_folder(options.out):
         begin = time.perf_counter()
-        pool = _pool(options, fleet, count)
+        pool: Pool[Fleet] | DaskPool[Fleet]
+        if options.cluster is None:
+            pool = Pool(min(options.workers, count), open_fleet, fleet)
+        else:
+            pool = open_cluster(options.cluster, open_fleet, fleet, _LIMIT, system)
         try:
             engine = Engine(options.workers, output.progress, options.out)
             machines, interrupted = watch_fleet(fleet, engine, pool)
@@ -70,26 +74,16 @@ def run_fleet(options: argparse.Namespace, output: Output) -> CommandResult:
         write_whole(options.out / "fleet.csv", table.to_csv(index=False))
     output.result(summary["answer"]["sentence"])
     for machine in machines:
-        if machine.alarms or machine.refusal:
-            outcome = (
-                f"{machine.alarms} alarms"
-                if not machine.refusal
-                else f"no result: {machine.refusal}"
-            )
-            output.result(f"  {machine.machine}: {outcome}")
+        if machine.refusal:
+            output.result(f"  {machine.machine}: no result: {machine.refusal}")
+        elif machine.alarms:
+            output.result(f"  {machine.machine}: {machine.alarms} alarms")
     output.result(f"to read: {options.out / 'fleet.csv'}, a folder for each machine beside it")
     return CommandResult(summary, {"seconds": "s"}, 130 * interrupted)
 
 
-def _written(provenance: dict[str, Any], watched: MonitoringResult, out: Path) -> None:
-    """Write what was found of a machine, in a worker."""
-    write_monitoring(watched, provenance, out)
-
-
-def _pool(options: argparse.Namespace, fleet: Fleet, count: int) -> "Pool[Fleet] | DaskPool[Fleet]":
-    if options.cluster is None:
-        return Pool(min(options.workers, count), serving, fleet)
-    return open_cluster(options.cluster, serving, fleet, _LIMIT, fleet.system)
+def _write_machine(provenance: dict[str, Any], result: MonitoringResult, out: Path) -> None:
+    write_monitoring(result, provenance, out)  # in a worker
 
 
 def _summary(
@@ -111,10 +105,7 @@ def _summary(
         "recordings": recordings,
         "seconds": seconds,
         "machines": [
-            {
-                name: getattr(machine, name)
-                for name in ("machine", "recordings", "alarms", "refusal")
-            }
+            {name: value for name, value in vars(machine).items() if name != "files"}
             for machine in machines
         ],
         "interrupted": interrupted,

@@ -1,4 +1,4 @@
-"""Condition monitoring: one machine over many recordings, what has changed since when.
+"""Condition monitoring: what has changed on a machine, since when, over many recordings.
 
 folder -> recordings that are new -> estimates -> state on the disk -> watch -> changes
 """
@@ -8,7 +8,6 @@ from collections.abc import Callable
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
 
 from workbench.errors import InputError
 from workbench.recordings.case import Case, read_case
@@ -22,12 +21,12 @@ from workbench.studies.monitoring.estimate import (
     open_estimator,
     watched,
 )
-from workbench.studies.monitoring.outcome import MonitoringResult, concluded
+from workbench.studies.monitoring.outcome import MonitoringResult, conclude
 from workbench.studies.monitoring.state import (
     RecordingFolder,
     RecordingResult,
     State,
-    opened,
+    open_state,
     recording_folders,
 )
 from workbench.studies.monitoring.watch import Track
@@ -59,10 +58,10 @@ def monitor(
     rate: float = RATE,
     read: Reader = read_case,
 ) -> MonitoringResult:
-    """Estimate what is new in a folder of recordings, and say what has changed in all of them.
+    """Estimate the new recordings of a folder, and say what has changed in all of them.
 
-    A recording that came before is not estimated again, one that is there twice counts once, one
-    that cannot be used is listed with its reason. Whatever came first, the order is that of dates.
+    A recording that the state knows is not estimated again, one that is there twice counts once,
+    one that cannot be used is listed with its reason. The order is that of dates.
 
     Parameters
     ----------
@@ -83,35 +82,31 @@ def monitor(
             expected="quantities in [estimated] that no condition sets",
             remedy="name some parameters of the model there, with corrections",
         )
-    with opened(engine.out / STATE, _identity(system)) as state:
+    with open_model(system, OBSERVER) as model:
+        identity = {
+            "workbench": version("wheelset-workbench"),
+            "system": hashlib.sha256(system.source.read_bytes()).hexdigest(),
+            "model": model.sha256,
+        }
+    with open_state(engine.out / STATE, identity) as state:
         new = state.missing(recording_folders(folder))
         interrupted = _estimate(system, new, state, engine, read)
         results = state.all()
         if interrupted and not any(result.estimate for result in results):
             raise KeyboardInterrupt  # there is nothing to conclude from
-        return concluded(system, results, rate, folder, interrupted=interrupted)
-
-
-def _identity(system: System) -> dict[str, Any]:
-    """What estimates depend on beside the recordings."""
-    with open_model(system, OBSERVER) as model:
-        return {
-            "workbench": version("wheelset-workbench"),
-            "system": hashlib.sha256(system.source.read_bytes()).hexdigest(),
-            "model": model.sha256,
-        }
+        return conclude(system, results, rate, folder, interrupted=interrupted)
 
 
 def _estimate(
     system: System, new: list[RecordingFolder], state: State, engine: Engine, read: Reader
 ) -> bool:
-    """Estimate what is new; returns whether Ctrl-C ended it. What is done by then is kept."""
+    """Estimate new recordings; returns whether Ctrl-C ended it. Estimates until then are kept."""
     if not new:
         return False
     progress = StepReporter(engine.report, len(new))
     with Pool(min(engine.workers, len(new)), open_estimator, system) as pool:
         try:
-            results = pool.completed(partial(_told, read), new)
+            results = pool.completed(partial(_estimate_folder, read), new)
             for number, result in results:
                 state.add(result)
                 progress.step(new[number].name)
@@ -120,16 +115,16 @@ def _estimate(
     return False
 
 
-def _told(
-    read: Reader, appraiser: RecordingEstimator, delivery: RecordingFolder
+def _estimate_folder(
+    read: Reader, estimator: RecordingEstimator, recording: RecordingFolder
 ) -> RecordingResult:
-    """What comes of one delivery, in a worker."""
+    """Estimate a recording, in a worker."""
     date, estimate, refusal = "", None, ""
     try:
-        case = read(delivery.path, appraiser.system)
-        date, estimate = case.date, appraiser(case)
+        case = read(recording.path, estimator.system)
+        date, estimate = case.date, estimator(case)
     except InputError as error:
         refusal = str(error)
     except Exception as error:  # one recording must not cost the others; it is listed
-        refusal = f"{delivery.path}: found what no reader expects ({error!r})"
-    return RecordingResult(delivery.name, delivery.content, date, estimate, refusal)
+        refusal = f"{recording.path}: found what no reader expects ({error!r})"
+    return RecordingResult(recording.name, recording.content, date, estimate, refusal)

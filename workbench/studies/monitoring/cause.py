@@ -1,10 +1,9 @@
 """The cause of a change: a diagnosis of recordings after it, of a machine known from those before.
 
-What tolerances leave open between machines, the recordings before the change have told of this one:
+Tolerances leave open how a machine differs from others; the recordings before the change show it:
 its levels are theirs, as sure as their scatter makes them. What differs from them needs a cause.
 """
 
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -27,7 +26,7 @@ def recordings_after(result: MonitoringResult) -> list[str]:
 
 
 def known_from_before(result: MonitoringResult) -> System:
-    """The system with levels of this machine, as recordings before the first change told them.
+    """The system with levels of this machine, as recordings before the first change show them.
 
     Of quantities that are alike, only what differs between them; what is common to all is left as
     it was.
@@ -39,32 +38,25 @@ def known_from_before(result: MonitoringResult) -> System:
         level = levels.get(track.name)
         nominal = result.system.values.get(track.name)
         values, deviations = track.values[: first + 1], track.deviations[: first + 1]
-        told = np.isfinite(values)
-        if level is None or nominal is None or told.sum() < 2:
+        estimated = np.isfinite(values)
+        if level is None or nominal is None or estimated.sum() < 2:
             continue
-        weight = 1.0 / deviations[told] ** 2
-        mean = float(weight @ values[told] / weight.sum())
-        known = float(np.sqrt(track.scatter / weight.sum()))
+        weight = 1.0 / deviations[estimated] ** 2
+        mean = float(weight @ values[estimated] / weight.sum())
+        deviation = float(np.sqrt(track.scatter / weight.sum()))
         if track.against:  # the mean of the others is not that of all
-            share = 1.0 - 1.0 / _alike(result, track.name)
-            mean, known = nominal + share * mean, share * known
+            array = track.name.partition("[")[0]
+            alike = sum(t.against and t.name.partition("[")[0] == array for t in result.tracks)
+            share = 1.0 - 1.0 / alike
+            mean, deviation = nominal + share * mean, share * deviation
         given[track.name] = mean
         # From one recording to the next it scatters on, in those after the change as well.
-        known = float(np.hypot(known, np.median(deviations[told]) * np.sqrt(track.scatter / _MOST)))
-        levels[track.name] = replace(level, spread=min(level.spread, known / abs(mean)))
-    return _with_levels(result.system, given, levels)
-
-
-def _alike(result: MonitoringResult, name: str) -> int:
-    """How many entries the array of a quantity has."""
-    array = name.partition("[")[0]
-    return sum(track.against and track.name.partition("[")[0] == array for track in result.tracks)
-
-
-def _with_levels(system: System, given: Mapping[str, float], levels: Mapping[str, Level]) -> System:
+        usual = np.median(deviations[estimated]) * np.sqrt(track.scatter / _MOST)
+        deviation = float(np.hypot(deviation, usual))
+        levels[track.name] = replace(level, spread=min(level.spread, deviation / abs(mean)))
     return replace(
-        system,
-        given={**system.given, **given},
-        values={**system.values, **given},
-        comparison=replace(system.comparison, levels=levels),
+        result.system,
+        given={**result.system.given, **given},
+        values={**result.system.values, **given},
+        comparison=replace(result.system.comparison, levels=levels),
     )

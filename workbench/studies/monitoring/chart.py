@@ -106,10 +106,10 @@ class Scatter:
         return float(stdtrit(self.freedom, float(ndtr(LARGEST))) * np.sqrt(self.variance))
 
     def add(self, square: float) -> None:
-        """One more estimate off its past, squared, in units of its stated variance.
+        """Add how far an estimate is off its past, squared, in units of its stated variance.
 
-        One far off counts as the largest that chance makes: a quantity that moves is not to hide
-        the move of another, nor its own.
+        An estimate far off counts as the largest that chance makes: a quantity that moves is not to
+        hide the move of another, nor its own.
         """
         if square > LARGEST**2 * self.variance:  # never so without a past
             square = min(square, self.largest**2)
@@ -154,7 +154,7 @@ class Chart:
     numbers, values, variances : of recordings, their estimates, and stated variances.
     kept : estimates as they count in the level: a wild one no more than chance makes.
     up, down : sums.
-    changes : that were found.
+    changes : in their order.
     """
 
     scatter: Scatter
@@ -201,7 +201,7 @@ class Chart:
         return float(np.copysign(ndtri(tail), off)), float(off**2)
 
     def add(self, number: int, value: float, variance: float, surprise: float) -> None:
-        """Take one more estimate, and what it is off by in standard deviations."""
+        """Add an estimate, and how far it is off its past in standard deviations."""
         if np.isfinite(surprise):
             counted = float(np.clip(surprise, -LARGEST, LARGEST))
             self.up = max(0.0, self.up + counted - ALLOWANCE)

@@ -1,4 +1,4 @@
-"""One recording becomes one value of each estimated quantity, with its covariance."""
+"""Estimate constant quantities from one recording: a value of each, with its covariance."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from workbench.arrays import Matrix, Vector
-from workbench.diagnosis.data.counting import CountedSamples, count
+from workbench.diagnosis.data.counting import count
 from workbench.diagnosis.data.samples import compared
 from workbench.diagnosis.inference.thresholds import SOUND
 from workbench.errors import InputError
@@ -100,9 +100,9 @@ class RecordingEstimator:
             filter fails.
         """
         names = (*case.inputs, *compared(self._constant, [case]))
-        counted = count(case, self._constant, names, SOUND, restarting=False)
-        end = int(np.flatnonzero(counted.usable)[-1]) + 1
-        clean = case.with_signals(counted.clean)
+        samples = count(case, self._constant, names, SOUND, restarting=False)
+        end = int(np.flatnonzero(samples.usable)[-1]) + 1
+        clean = case.with_signals(samples.clean)
         estimator = self._filter(_parameters(case, self._constant))
         run = replay(clean.part(slice(0, end)), estimator)
         if run.ending is not Ending.OK:
@@ -115,11 +115,13 @@ class RecordingEstimator:
         estimated = [quantity.name for quantity in self._constant.estimated]
         own = [estimated.index(quantity.name) for quantity in watched(self._constant)]
         values = {name: float(run.signal(name)[-1]) for name in estimated}
+        system, known = self._constant, {**self._constant.values, **values}
+        powers = [system.evaluate(wear.formula, clean.signals, known) for wear in system.work]
         return RecordingEstimate(
             values=np.array([values[estimated[column]] for column in own]),
             covariance=estimator.covariance[np.ix_(own, own)],
-            work=self._work(clean, values),
-            counted=_seconds(counted, case.time),
+            work=np.array([np.trapezoid(power, clean.time) for power in powers]),
+            counted=float(samples.usable.sum() * np.median(np.diff(case.time))),
         )
 
     def _filter(self, parameters: Mapping[str, float]) -> ExtendedKalmanFilter:
@@ -131,17 +133,10 @@ class RecordingEstimator:
             self._filters[key] = ExtendedKalmanFilter(model, self._constant, gains)
         return self._filters[key]
 
-    def _work(self, case: Case, values: Mapping[str, float]) -> Vector:
-        """Work of friction along a recording, with what it says of the quantities, (w,) [J]."""
-        system = self._constant
-        known = {**system.values, **values}
-        powers = [system.evaluate(wear.formula, case.signals, known) for wear in system.work]
-        return np.array([np.trapezoid(power, case.time) for power in powers])
-
 
 @contextmanager
 def open_estimator(system: System) -> Iterator[RecordingEstimator]:
-    """Open the system's model, and appraise with it."""
+    """Open the system's model, and estimate with it."""
     with open_model(system) as model:  # which closes its variants
         yield RecordingEstimator(system, model)
 
@@ -159,10 +154,5 @@ def _parameters(case: Case, system: System) -> dict[str, float]:
                 remedy=f"write {condition.name} into case.toml, if anybody knows",
             )
     estimated = {quantity.name for quantity in system.estimated}
-    found = system.set_by(case.conditions)
-    return {name: value for name, value in found.items() if name not in estimated}
-
-
-def _seconds(counted: CountedSamples, time: Vector) -> float:
-    """Time of the samples that count [s]."""
-    return float(counted.usable.sum() * np.median(np.diff(time)))
+    values = system.set_by(case.conditions)
+    return {name: value for name, value in values.items() if name not in estimated}

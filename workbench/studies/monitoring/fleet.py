@@ -28,8 +28,7 @@ class Fleet:
     ----------
     location : folder that holds one for each machine, or its URL, which fsspec reads.
     rate : alarms per recording that a sound machine may raise.
-    read : makes a case of a folder; write : writes what was found into a folder. Functions of
-        modules.
+    read : makes a case of a folder; write : writes a result into a folder. Functions of modules.
     """
 
     system: System
@@ -75,8 +74,8 @@ class Fleet:
             )
         return names
 
-    def fetched(self, machine: str, to: Path) -> Path:
-        """Folder of a machine's recordings, copied where they are not on this machine."""
+    def fetch(self, machine: str, to: Path) -> Path:
+        """Folder of a machine's recordings; copies those that are not on this computer."""
         if (remote := self._remote) is None:
             return Path(self.location) / machine
         system, path = remote
@@ -116,8 +115,8 @@ class FleetWorkers(Protocol):
 
 
 @contextmanager
-def serving(fleet: Fleet) -> Iterator[Fleet]:
-    """Prepare a worker: it needs no more than what it is told."""
+def open_fleet(fleet: Fleet) -> Iterator[Fleet]:
+    """Prepare a worker: it needs no more than the fleet."""
     yield fleet
 
 
@@ -128,13 +127,13 @@ def watch_machine(fleet: Fleet, machine: str, state: bytes) -> MachineResult:
     ----------
     state : that an earlier run left; empty: none.
     """
-    with tempfile.TemporaryDirectory() as scratch:
-        out = Path(scratch) / "out"
+    with tempfile.TemporaryDirectory() as temporary:
+        out = Path(temporary) / "out"
         out.mkdir()
         if state:
             (out / STATE).write_bytes(state)
         try:
-            folder = fleet.fetched(machine, Path(scratch) / "recordings")
+            folder = fleet.fetch(machine, Path(temporary) / "recordings")
             engine = Engine(out=out)
             result = monitor(fleet.system, folder, engine, rate=fleet.rate, read=fleet.read)
             fleet.write(result, out)
@@ -174,11 +173,11 @@ def watch_fleet(
             state = before.read_bytes() if before.is_file() else b""
             tasks.append(pool.submit(watch_machine, name, state))
         for task in as_completed(tasks):
-            machine = task.result()
-            for file, content in machine.files.items():
-                write_whole(engine.out / machine.machine / file, content)
-            results.append(machine)
-            progress.step(machine.machine)
+            result = task.result()
+            for file, content in result.files.items():
+                write_whole(engine.out / result.machine / file, content)
+            results.append(result)
+            progress.step(result.machine)
     except KeyboardInterrupt:
         interrupted = True
     finally:

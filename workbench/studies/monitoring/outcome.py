@@ -1,6 +1,6 @@
 """What has changed on a machine, as a value: a sentence, numbers, tables, a figure."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
@@ -56,24 +56,22 @@ class MonitoringResult:
     def changes(self) -> list[tuple[Track, LevelChange]]:
         """All that were told, in their order."""
         changes = [(track, change) for track in self.tracks for change in track.changes]
-        return sorted(changes, key=lambda one: one[1].raised)
+        return sorted(changes, key=lambda entry: entry[1].raised)
 
     @property
     def sentences(self) -> list[str]:
         """What has changed, one sentence for each quantity."""
-        said = []
+        sentences = []
         for track in self.tracks:
             if track.changes:
                 first, last = track.changes[0], track.changes[-1]
-                size = track.level[0] - first.before[0]
-                known = float(np.hypot(track.level[1], first.before[1]))
                 alarms = len(track.changes)
                 until = f", {alarms} alarms until {self.names[last.raised]}" * (alarms > 1)
-                said.append(
-                    f"{_called(track)}: {self._size(track, size, known)} since "
+                sentences.append(
+                    f"{track.label} ({_named(track)}): {self._size(track)} since "
                     f"{self.names[first.last]}; told at {self.names[first.raised]}{until}"
                 )
-        return said
+        return sentences
 
     def summary(self) -> str:
         """What has changed, for people."""
@@ -93,21 +91,20 @@ class MonitoringResult:
 
     def to_frame(self) -> pd.DataFrame:
         """Estimates of all recordings, one row each for recording and quantity."""
-        return pd.DataFrame(list(self._rows()))
-
-    def _rows(self) -> Iterator[dict[str, Any]]:
-        for k, (name, date) in enumerate(zip(self.names, self.dates, strict=True)):
-            for track in self.tracks:
-                scale = float(np.sqrt(max(1.0, np.nan_to_num(track.scatter, nan=1.0))))
-                yield {
-                    "recording": name,
-                    "date": date,
-                    "quantity": _named(track),
-                    "unit": track.unit,
-                    "estimate": track.values[k],
-                    "standard_error": scale * track.deviations[k],
-                    "off_its_past": track.surprises[k],
-                }
+        rows = [
+            {
+                "recording": name,
+                "date": date,
+                "quantity": _named(track),
+                "unit": track.unit,
+                "estimate": track.values[k],
+                "standard_error": track.scale * track.deviations[k],
+                "off_its_past": track.surprises[k],
+            }
+            for k, (name, date) in enumerate(zip(self.names, self.dates, strict=True))
+            for track in self.tracks
+        ]
+        return pd.DataFrame(rows)
 
     def alarms(self) -> pd.DataFrame:
         """All alarms, in their order."""
@@ -117,7 +114,7 @@ class MonitoringResult:
         return pd.DataFrame(rows, columns=columns.split())
 
     def _alarm(self, track: Track, change: LevelChange) -> dict[str, Any]:
-        size, known = change.size
+        size, deviation = change.size
         nominal = abs(self.system.values.get(track.name, 0.0))
         return {
             "told_at": self.names[change.raised],
@@ -130,7 +127,7 @@ class MonitoringResult:
             "before": change.before[0],
             "after": change.after[0],
             "change": size,
-            "standard_error": known,
+            "standard_error": deviation,
             "share_of_nominal": size / nominal if nominal else np.nan,
             "since_the_first": change.after[0] - track.changes[0].before[0],
         }
@@ -154,9 +151,9 @@ class MonitoringResult:
             "last": self.names[-1],
             "rate": self.rate,
             "threshold": self.threshold,
-            "alarms": _plain(self.alarms().to_dict("records")),
+            "alarms": [_without_nan(alarm) for alarm in self.alarms().to_dict("records")],
             "quantities": {
-                _named(track): _plain(
+                _named(track): _without_nan(
                     {
                         "label": track.label,
                         "unit": track.unit,
@@ -170,13 +167,13 @@ class MonitoringResult:
                 )
                 for track in self.tracks
             },
-            "work": self._wear(),
+            "work": self._work_sums(),
             "refused": dict(self.refused),
             "again": dict(self.again),
             "interrupted": self.interrupted,
         }
 
-    def _wear(self) -> dict[str, dict[str, float | str]]:
+    def _work_sums(self) -> dict[str, dict[str, float | str]]:
         """Work of friction in all recordings, and over the mean of all that wears."""
         sums = self.work.sum(axis=0)
         mean = float(sums.mean()) if sums.size else 0.0
@@ -189,9 +186,11 @@ class MonitoringResult:
             for wear, total in zip(self.system.work, sums, strict=True)
         }
 
-    def _size(self, track: Track, size: float, known: float) -> str:
-        """A change with its 95 % range, and its share of the nominal value."""
-        low, high = size - BAND * known, size + BAND * known
+    def _size(self, track: Track) -> str:
+        """Change since the first level with its 95 % range, and its share of the nominal value."""
+        before, now = track.changes[0].before, track.level
+        size, reach = now[0] - before[0], BAND * float(np.hypot(now[1], before[1]))
+        low, high = size - reach, size + reach
         text = f"{size:+.3g} ({low:.3g} to {high:.3g}) {track.unit}".removesuffix(" 1")
         nominal = abs(self.system.values.get(track.name, 0.0))
         return f"{text}, {size / nominal:+.1%} of nominal" if nominal else text
@@ -207,7 +206,7 @@ class MonitoringResult:
         return f"<p>{escape(self.summary())}</p>{self.alarms().to_html(index=False)}"
 
 
-def concluded(
+def conclude(
     system: System,
     results: Sequence[RecordingResult],
     rate: float,
@@ -225,18 +224,15 @@ def concluded(
     InputError
         If none can be used.
     """
-    usable = {result.name: result for result in results if result.estimate is not None}
     last = {result.name: result for result in results}
-    refused = {name: one.refusal for name, one in sorted(last.items()) if one.refusal}
-    first: dict[str, str] = {}
+    refused = {name: last[name].refusal for name in sorted(last) if last[name].refusal}
+    usable = {result.name: result for result in results if result.estimate is not None}
+    first: dict[str, str] = {}  # name by content
     for name in sorted(usable):
         first.setdefault(usable[name].content, name)
-    again = {
-        name: first[one.content]
-        for name, one in sorted(usable.items())
-        if name != first[one.content]
-    }
-    counted = [one for name, one in sorted(usable.items()) if name not in again]
+    repeats = {name: first[usable[name].content] for name in sorted(usable)}
+    again = {name: other for name, other in repeats.items() if name != other}
+    counted = [usable[name] for name in repeats if name not in again]
     if not counted:
         why = next(iter(refused.values()), "none was estimated yet")
         raise InputError(
@@ -247,7 +243,7 @@ def concluded(
         )
     dated = all(result.date for result in counted)
     if dated:
-        counted.sort(key=lambda one: one.date)
+        counted.sort(key=lambda result: result.date)
     estimates = [result.estimate for result in counted if result.estimate is not None]
     values = np.array([estimate.values for estimate in estimates])
     covariances = [estimate.covariance for estimate in estimates]
@@ -269,18 +265,12 @@ def concluded(
 
 
 def _named(track: Track) -> str:
-    """A quantity as it is watched."""
     return f"{track.name} against the others" if track.against else track.name
 
 
-def _called(track: Track) -> str:
-    return f"{track.label} ({_named(track)})"
-
-
-def _plain(value: Any) -> Any:
-    """The same with nothing where there is no number."""
-    if isinstance(value, Mapping):
-        return {key: _plain(one) for key, one in value.items()}
-    if isinstance(value, list):
-        return [_plain(entry) for entry in value]
-    return None if isinstance(value, float) and not np.isfinite(value) else value
+def _without_nan(values: Mapping[Any, Any]) -> dict[Any, Any]:
+    """The same with None for each number that is not finite."""
+    return {
+        key: None if isinstance(value, float) and not np.isfinite(value) else value
+        for key, value in values.items()
+    }

@@ -50,7 +50,7 @@ _TERMS = {
 def write_monitoring_page(result: MonitoringResult, summary: Mapping[str, Any], out: Path) -> Path:
     """Write the page into the folder; returns its path."""
     tracks = [track for track in result.tracks if np.isfinite(track.values).any()]
-    tracks.sort(key=_first_told)
+    tracks.sort(key=_order)
     figures = [_figure(track, result) for track in tracks] if len(result.names) > 1 else []
     changed = sum(bool(track.changes) for track in tracks)
     drawn = zoomable(figures, summary, out)
@@ -65,24 +65,18 @@ def write_monitoring_page(result: MonitoringResult, summary: Mapping[str, Any], 
     if summary["work"]:
         parts.append(Part("work", "Work of friction", [_work(summary["work"])]))
     parts.append(Part("definitions", "Definitions", [Definitions(_TERMS)]))
+    warnings = ["Interrupted: the same command goes on from here."] * result.interrupted
+    warnings += [f"Not used: {name}: {why}" for name, why in result.refused.items()]
+    warnings += [f"There twice: {name} is {other}." for name, other in result.again.items()]
     title = f"One machine over its recordings, {result.names[0]} to {result.names[-1]}"
-    return Page(title, parts, warnings=_warnings(result)).write(summary, out / "index.html")
+    return Page(title, parts, warnings=warnings).write(summary, out / "index.html")
 
 
-def _first_told(track: Track) -> tuple[float, float]:
-    """Order of tracks: changed ones as they were told, then those that were most off their past."""
-    told = track.changes[0].raised if track.changes else np.inf
+def _order(track: Track) -> tuple[float, float]:
+    """Changed tracks first, as their alarms came; then those that were most off their past."""
+    raised = track.changes[0].raised if track.changes else np.inf
     surprises = np.abs(track.surprises[np.isfinite(track.surprises)])
-    return float(told), -float(surprises.max(initial=0.0))
-
-
-def _warnings(result: MonitoringResult) -> list[str]:
-    said = []
-    if result.interrupted:
-        said.append("Interrupted: the same command goes on from here.")
-    said += [f"Not used: {name}: {why}" for name, why in result.refused.items()]
-    said += [f"There twice: {name} is {other}." for name, other in result.again.items()]
-    return said
+    return float(raised), -float(surprises.max(initial=0.0))
 
 
 def _strips(tracks: Sequence[Track], result: MonitoringResult) -> list[Strip]:
@@ -115,20 +109,25 @@ def _moved(track: Track, result: MonitoringResult) -> str:
 def _figure(track: Track, result: MonitoringResult) -> CaseFigure:
     """Estimates of a quantity and its levels, over the recordings."""
     count = len(result.names)
-    scale = float(np.sqrt(max(1.0, np.nan_to_num(track.scatter, nan=1.0))))
     sound, changed = _levels(track, count)
-    reach = BAND * scale * track.deviations
+    reach = BAND * track.scale * track.deviations
     curves = (Curve(_POINT, track.values, reach), Curve(_LEVEL, sound), Curve(_CHANGED, changed))
     low = float(np.nanmin(track.values - reach))
     high = float(np.nanmax(track.values + reach))
     room = 0.05 * (high - low) or 1.0
     label = capital(f"{track.label} {track.name}".replace("  ", " "))
     title = f"{label} [{track.unit}]".removesuffix(" [1]")
-    last = track.changes[-1] if track.changes else None
+    finding, last = "It has not changed.", None
+    if track.changes:
+        first, last = track.changes[0], track.changes[-1]
+        finding = (
+            f"Changed by {_moved(track, result)} after {result.names[first.last]}, told at "
+            f"{result.names[first.raised]}."
+        )
     return CaseFigure(
         name=label + " against the others" * track.against,
         title=f"{np.isfinite(track.values).sum()} of {count} recordings tell it",
-        finding=_said(track, result),
+        finding=finding,
         time=np.arange(1.0, count + 1.0),
         window=None if last is None else (last.earliest + 1.0, min(last.latest + 2.0, count)),
         legend=((_POINT, "estimate"), (_LEVEL, "level"), (_CHANGED, "level after a change")),
@@ -148,16 +147,6 @@ def _levels(track: Track, count: int) -> tuple[Vector, Vector]:
     return sound, changed
 
 
-def _said(track: Track, result: MonitoringResult) -> str:
-    if not track.changes:
-        return "It has not changed."
-    first = track.changes[0]
-    return (
-        f"Changed by {_moved(track, result)} after {result.names[first.last]}, told at "
-        f"{result.names[first.raised]}."
-    )
-
-
 def _alarms(alarms: Sequence[Mapping[str, Any]]) -> Table:
     columns = (
         *("told at", "quantity", "changed after", "with 95 %, after"),
@@ -166,12 +155,13 @@ def _alarms(alarms: Sequence[Mapping[str, Any]]) -> Table:
     )
     rows = []
     for alarm in alarms:
-        size, sure, share = alarm["change"], alarm["standard_error"], alarm["share_of_nominal"]
+        size, reach = alarm["change"], BAND * alarm["standard_error"]
+        share = alarm["share_of_nominal"]
         between = dict.fromkeys((alarm["earliest"], alarm["latest"]))
         row = (
             *(str(alarm["told_at"]), alarm["quantity"], alarm["changed_after"]),
             " to ".join(between),
-            *(number(value, "+.3g") for value in (size, size - BAND * sure, size + BAND * sure)),
+            *(number(value, "+.3g") for value in (size, size - reach, size + reach)),
             number(None if share is None else 100.0 * share, "+.1f"),
             alarm["unit"],
         )
@@ -302,15 +292,14 @@ def _draw(axes: "Axes", track: Track, result: MonitoringResult) -> None:
 
 def monitoring_answer(summary: Mapping[str, Any]) -> Answer:
     """The answer of `monitor`."""
-    said, count = summary["sentences"], recordings(summary["recordings"])
+    count = recordings(summary["recordings"])
     headline = {"alarms": Measure(len(summary["alarms"]), "1", "lower")}
     details = {}
     for name, quantity in summary["quantities"].items():
-        level, sure = quantity["level"], quantity["standard_error"]
-        ends = (None, None)
-        if level is not None and sure is not None:
-            ends = (level - BAND * sure, level + BAND * sure)
-        details[f"level of {name}"] = Measure(level, quantity["unit"], "", *ends)
-    return Answer(
-        "; ".join(said) + "." if said else f"Nothing changed in {count}.", headline, details
-    )
+        level, error, low, high = quantity["level"], quantity["standard_error"], None, None
+        if level is not None and error is not None:
+            low, high = level - BAND * error, level + BAND * error
+        details[f"level of {name}"] = Measure(level, quantity["unit"], "", low, high)
+    changes = "; ".join(summary["sentences"])
+    sentence = f"{changes}." if changes else f"Nothing changed in {count}."
+    return Answer(sentence, headline, details)

@@ -1,7 +1,7 @@
-"""What is known of a machine's recordings, in a file that a killed run leaves whole.
+"""Estimates of a machine's recordings, in a file that a killed run leaves whole.
 
-Each recording is one transaction. What is concluded is no state: it follows from all recordings in
-the order of their dates, whichever came first.
+Each recording is one transaction. Conclusions are no state: they follow from all recordings in the
+order of their dates, whichever came first.
 """
 
 import hashlib
@@ -48,7 +48,7 @@ def recording_folders(folder: Path) -> list[RecordingFolder]:
             key=lambda path: path.name,
         )
         if paths:
-            return [RecordingFolder(path.name, _content(path), path) for path in paths]
+            return [RecordingFolder(path.name, _hash_of_files(path), path) for path in paths]
         reason = "a folder without folders"
     except OSError as error:
         reason = f"what cannot be read ({error.strerror or error})"
@@ -60,8 +60,8 @@ def recording_folders(folder: Path) -> list[RecordingFolder]:
     )
 
 
-def _content(folder: Path) -> str:
-    """SHA-256 of the files in a folder."""
+def _hash_of_files(folder: Path) -> str:
+    """SHA-256 of the files in a folder and their names."""
     digest = hashlib.sha256()
     for path in sorted(path for path in folder.rglob("*") if path.is_file()):
         own = hashlib.sha256(path.read_bytes()).hexdigest()
@@ -80,7 +80,7 @@ CREATE TABLE IF NOT EXISTS deliveries (
 
 @dataclass(frozen=True, eq=False)
 class RecordingResult:
-    """What came of one delivery: an estimate, or why there is none."""
+    """What came of one recording: an estimate, or why there is none."""
 
     name: str
     content: str
@@ -90,22 +90,21 @@ class RecordingResult:
 
 
 class State:
-    """The file of one machine; see `opened`."""
+    """The file of one machine; see `open_state`."""
 
     def __init__(self, connection: sqlite3.Connection) -> None:
         self._connection = connection
 
     def missing(self, folders: list[RecordingFolder]) -> list[RecordingFolder]:
         """Those that are not known by name and content."""
-        rows = self._connection.execute("SELECT name, content FROM deliveries")
-        known = set(rows)
-        return [
-            recording for recording in folders if (recording.name, recording.content) not in known
-        ]
+        known = set(self._connection.execute("SELECT name, content FROM deliveries"))
+        return [folder for folder in folders if (folder.name, folder.content) not in known]
 
     def add(self, result: RecordingResult) -> None:
-        """Keep what came of a delivery; it is on the disk when this returns."""
-        estimate = None if result.estimate is None else json.dumps(_plain(result.estimate))
+        """Keep the result of a recording; it is on the disk when this returns."""
+        estimate = None
+        if result.estimate is not None:
+            estimate = json.dumps(vars(result.estimate), default=np.ndarray.tolist)
         with self._connection:
             self._connection.execute(
                 "INSERT OR IGNORE INTO deliveries (name, content, date, estimate, refusal) "
@@ -114,18 +113,28 @@ class State:
             )
 
     def all(self) -> list[RecordingResult]:
-        """All deliveries, as they came."""
+        """Results of all recordings, as they came."""
         rows = self._connection.execute(
             "SELECT name, content, date, estimate, refusal FROM deliveries ORDER BY number"
         )
-        return [
-            RecordingResult(name, content, date, _estimate(text) if text else None, refusal)
-            for name, content, date, text, refusal in rows
-        ]
+        results = []
+        for name, sha256, date, text, refusal in rows:
+            estimate = None
+            if text:
+                content = json.loads(text)
+                q = len(content["values"])
+                estimate = RecordingEstimate(
+                    values=np.array(content["values"]),
+                    covariance=np.reshape(content["covariance"], (q, q)),
+                    work=np.array(content["work"]),
+                    counted=content["counted"],
+                )
+            results.append(RecordingResult(name, sha256, date, estimate, refusal))
+        return results
 
 
 @contextmanager
-def opened(path: Path, identity: Mapping[str, Any]) -> Iterator[State]:
+def open_state(path: Path, identity: Mapping[str, Any]) -> Iterator[State]:
     """Open the file of a machine, or make it.
 
     Parameters
@@ -161,23 +170,3 @@ def opened(path: Path, identity: Mapping[str, Any]) -> Iterator[State]:
             expected="what an earlier run left, or room for a new one",
             remedy="make room; or remove it, and all recordings are estimated anew",
         ) from None
-
-
-def _plain(estimate: RecordingEstimate) -> dict[str, Any]:
-    return {
-        "values": estimate.values.tolist(),
-        "covariance": estimate.covariance.tolist(),
-        "work": estimate.work.tolist(),
-        "counted": estimate.counted,
-    }
-
-
-def _estimate(text: str) -> RecordingEstimate:
-    content = json.loads(text)
-    q = len(content["values"])
-    return RecordingEstimate(
-        np.array(content["values"]),
-        np.reshape(content["covariance"], (q, q)),
-        np.array(content["work"]),
-        content["counted"],
-    )

@@ -17,7 +17,7 @@ from workbench.studies.monitoring.estimate import reach
 from workbench.system.parts import EstimatedQuantity
 
 _FEWEST = 3  # of an array: of two, nothing tells which has moved
-_TOLD = 0.5  # of what was not known before, as a variance, that a recording must take away
+_OBSERVED = 0.5  # share of the variance before a recording that it must take away
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +31,7 @@ class Track:
     label : for people.
     against : whether it is taken relative to the others of its array.
     values, deviations : (n,) estimates of the recordings, and standard deviations as stated: by the
-        noise of the sensors and the usual scatter; NaN where a recording does not tell it.
+        noise of the sensors and the usual scatter; NaN where a recording does not show it.
     surprises : (n,) standard deviations off its past, NaN without one.
     changes : of its level.
     level : mean since the last change, and its standard deviation.
@@ -50,6 +50,11 @@ class Track:
     level: tuple[float, float]
     trend: tuple[float, float]
     scatter: float
+
+    @property
+    def scale(self) -> float:
+        """Of stated deviations: the scatter about the past, where that is more than stated."""
+        return float(np.sqrt(max(1.0, np.nan_to_num(self.scatter, nan=1.0))))
 
 
 @dataclass(eq=False)
@@ -96,9 +101,9 @@ class _Group:
 
     def take(self, number: int, values: Vector, covariance: Matrix, level: float) -> None:
         """Take the estimates of one recording, (m,) and (m, m)."""
-        told = np.diag(self.directions @ covariance @ self.directions.T)
-        spread = told + np.square(self.directions) @ self.usual
-        shown = told < (1.0 - _TOLD) * self.known
+        noise = np.diag(self.directions @ covariance @ self.directions.T)
+        spread = noise + np.square(self.directions) @ self.usual
+        shown = noise < (1.0 - _OBSERVED) * self.known
         watched, surprises, squares = self._compared(values, spread, shown)
         self.rows.append((watched, np.where(shown, np.sqrt(spread), np.nan), surprises))
         for k in np.flatnonzero(np.isfinite(squares)):
@@ -114,57 +119,57 @@ class _Group:
     def _compared(
         self, values: Vector, spread: Vector, shown: NDArray[np.bool_]
     ) -> tuple[Vector, Vector, Vector]:
-        """What is watched, how far it is off, and that squared, (k,) each.
+        """Estimates by direction, how far they are off their past, and that squared, (k,) each.
 
-        What has moved and was told is no news of the others, nor is more of a wild entry than
-        chance makes.
+        An entry that has moved, once told, is no news of the others, nor is more of a wild entry
+        than chance makes.
         """
         m, away = len(self.members), self.moved.copy()
         for _ in range(1 + m // 2):  # of more than half, nobody could tell which are wild
             watched = self.directions @ (values - away)
             if self.against:
                 watched[:-1] += away
-            off = [
-                chart.surprise(*column) if there else (np.nan, np.nan)
-                for chart, there, *column in zip(self.charts, shown, watched, spread, strict=True)
-            ]
-            surprises, squares = np.array(off).T
-            left = np.where(away == self.moved, np.abs(surprises[:m]), np.nan)
-            if not self.against or not np.nanmax(left, initial=0.0) > LARGEST:
+            surprises, squares = np.array(
+                [
+                    self.charts[k].surprise(watched[k], spread[k]) if shown[k] else (np.nan, np.nan)
+                    for k in range(len(self.charts))
+                ]
+            ).T
+            wild = np.where(away == self.moved, np.abs(surprises[:m]), np.nan)
+            if not self.against or not np.nanmax(wild, initial=0.0) > LARGEST:
                 break
-            k = int(np.nanargmax(left))
+            k = int(np.nanargmax(wild))
             bound = self.charts[k].bounded(watched[k], spread[k], surprises[k])
             away[k] += watched[k] - bound
         return np.where(shown, watched, np.nan), surprises, squares
 
     def tracks(self) -> list[Track]:
-        """What was watched."""
+        """Each direction over all recordings."""
         values, deviations, surprises = (
             np.array(column).T for column in zip(*self.rows, strict=True)
         )
         names = [(member.name, member.label, self.against) for member in self.members]
-        names += [
-            (self.name, f"mean of {self.members[0].label} and the like", False)
-        ] * self.against
+        if self.against:
+            names.append((self.name, f"mean of {self.members[0].label} and the like", False))
         return [
             Track(
-                name,
-                self.members[0].unit,
-                label,
-                against,
-                *(values[k], deviations[k], surprises[k]),
-                tuple(chart.changes),
-                chart.level,
-                chart.trend,
-                chart.scatter.variance,
+                name=name,
+                unit=self.members[0].unit,
+                label=label,
+                against=against,
+                values=values[k],
+                deviations=deviations[k],
+                surprises=surprises[k],
+                changes=tuple(self.charts[k].changes),
+                level=self.charts[k].level,
+                trend=self.charts[k].trend,
+                scatter=self.charts[k].scatter.variance,
             )
-            for k, ((name, label, against), chart) in enumerate(
-                zip(names, self.charts, strict=True)
-            )
+            for k, (name, label, against) in enumerate(names)
         ]
 
 
-def grouped(estimated: Sequence[EstimatedQuantity]) -> list[_Group]:
+def grouped_quantities(estimated: Sequence[EstimatedQuantity]) -> list[_Group]:
     """Entries of one array together, where there are enough; all others alone."""
     arrays: dict[str, list[int]] = {}
     for column, quantity in enumerate(estimated):
@@ -196,7 +201,7 @@ def watch(
     tracks : of what is watched.
     level : threshold of the sums; rates of quantities add (Bonferroni).
     """
-    groups = grouped(estimated)
+    groups = grouped_quantities(estimated)
     level = threshold(rate / sum(len(group.charts) for group in groups))
     for number, (row, covariance) in enumerate(zip(values, covariances, strict=True)):
         for group in groups:
