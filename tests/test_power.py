@@ -41,8 +41,8 @@ from workbench.studies.power import (
     share,
     summarise,
 )
+from workbench.studies.power.campaign import SURE, clear, predict_campaign
 from workbench.studies.power.diagnosing import build_everything, library_effects
-from workbench.studies.power.planned import SURE, clear, predict_campaign
 from workbench.studies.power.planting import Group, Kind
 from workbench.studies.power.report import campaign_check, draw_chances, format_power, write_power
 from workbench.studies.power.run import PowerStudy

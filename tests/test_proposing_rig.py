@@ -10,7 +10,7 @@ from workbench.diagnosis.problem import Problem
 from workbench.machines.wheelset.rig import CONSTANT_PADS, SCENARIOS, plant
 from workbench.models.modelica import read_library
 from workbench.recordings.case import Case, read_case
-from workbench.studies.power.function_error import function_error
+from workbench.studies.power.left_out import function_error
 from workbench.system.system import OBSERVER, System
 
 from .recordings import record

@@ -25,10 +25,16 @@ from workbench.studies.power import (
     open_virtual_rig,
 )
 from workbench.studies.power.diagnosing import build_everything, diagnose_set, library_effects
-from workbench.studies.power.planting import plan_sheet_errors, some
+from workbench.studies.power.planting import draw_sets, plan_sheet_errors
 from workbench.studies.power.report import sheet_check, thresholds_check
 from workbench.studies.power.run import PowerStudy, Setup
-from workbench.studies.power.sensitivity import FACTORS, ThresholdSensitivity, changed, values, vary
+from workbench.studies.power.sensitivity import (
+    FACTORS,
+    ThresholdSensitivity,
+    scaled,
+    threshold_values,
+    vary,
+)
 from workbench.studies.power.statistics import named_wrong, summarise_sheet
 from workbench.system.comparison import RATE
 from workbench.system.registry import load_system
@@ -57,7 +63,7 @@ def test_thresholds_are_the_quantiles_of_their_statistics(rate: float, candidate
 
 @given(rates, st.floats(1.01, 4.0), counts)
 def test_fewer_false_alarms_ask_for_more(rate: float, times: float, candidates: int) -> None:
-    rare, usual = (values(thresholds(candidates, one)) for one in (rate, times * rate))
+    rare, usual = (threshold_values(thresholds(candidates, one)) for one in (rate, times * rate))
     for name in DERIVED:
         assert rare[name] > usual[name], name
     assert {n: v for n, v in rare.items() if n not in DERIVED} == {
@@ -85,10 +91,10 @@ def test_the_largest_of_all_candidates_is_significant_at_the_stated_rate() -> No
 
 
 @pytest.mark.parametrize("factor", FACTORS)
-@pytest.mark.parametrize("name", values(thresholds(28)))
+@pytest.mark.parametrize("name", threshold_values(thresholds(28)))
 def test_one_threshold_is_changed_and_no_other(name: str, factor: float) -> None:
-    usual = values(thresholds(28))
-    found = values(changed(thresholds(28), name, factor))
+    usual = threshold_values(thresholds(28))
+    found = threshold_values(scaled(thresholds(28), name, factor))
     # What is counted stays a whole number.
     assert found.pop(name) == pytest.approx(factor * usual[name], abs=0.5 * (name == "rivals"))
     assert found == {other: value for other, value in usual.items() if other != name}
@@ -109,7 +115,7 @@ def test_what_is_clear_is_said_by_half_and_by_twice_of_a_threshold(tmp_path: Pat
     build_everything(SYSTEM, EFFECTS, setup.everything)
     planting = Planting("single", 12, 8.0, {"fx_gain": 0.016}, ("FxGain",))
     found = vary(setup, planting, ["fall"])
-    cases = setup.recorded(planting, rig.simulate(planting.seed, planting.gains))
+    cases = setup.record(planting, rig.simulate(planting.seed, planting.gains))
     plain = diagnose_set(SYSTEM, EFFECTS, setup.everything, cases)
     assert found.said == (plain.verdict, *(cause.effect.name for cause in plain.causes))
     assert (found.said[0], found.changed) == ("found", ())
@@ -121,7 +127,7 @@ def test_sets_are_of_all_kinds_alike() -> None:
         for kind, count in (("clean", 9), ("single", 90), ("pair", 2))
         for seed in range(count)
     ]
-    kinds = [one.kind for one in some(groups, 9, 1)]
+    kinds = [one.kind for one in draw_sets(groups, 9, 1)]
     assert [kinds.count(kind) for kind in ("clean", "single", "pair")] == [4, 3, 2] or [
         kinds.count(kind) for kind in ("clean", "single", "pair")
     ] == [3, 4, 2]

@@ -29,7 +29,7 @@ from workbench.runtime.engine import Engine
 from workbench.runtime.files import locked_folder
 
 if TYPE_CHECKING:
-    from workbench.studies.power import Plantable, PowerStudy, SetVerdict, VirtualRig
+    from workbench.studies.power import Plantable, PowerStudy, VirtualRig
     from workbench.studies.power.planting import Group
     from workbench.studies.power.report import Check
 
@@ -176,14 +176,13 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
         output.progress(f"sets of {len(rig.recordings)} recordings")
         if options.check is None:
             return _usual(options, output, study, _planned(options, study))
-        checks = {
-            "thresholds": _thresholds,
-            "sheet_error": _sheet_error,
-            "leave_out_effect": _left_out,
-            "plan": _plan_campaign,
-            "follow": _followed,
-        }
-        return checks[options.check](options, output, study)
+        engine = Engine(options.workers, output.stage)
+        check, interrupted = _CHECKS[options.check](options, study, engine)
+        provenance = _provenance(options, study, interrupted)
+        path = check.write(provenance, options.out / check.name)
+        output.result(check.text)
+        output.result(f"data: {path.parent}")
+        return _result(path, interrupted)
 
 
 def _chosen(names: Sequence[str], rig: VirtualRig) -> tuple[Plantable, ...]:
@@ -221,8 +220,8 @@ def _planned(options: argparse.Namespace, study: PowerStudy) -> list[Group]:
 
     repertoire = Repertoire(_chosen(options.effects, study.rig), tuple(study.effects))
     sizes = sorted(set(options.sizes))
-    counts = (options.clean, sizes, options.repeats, options.pairs)
-    if not (groups := plan(repertoire, *counts, options.seed)):
+    groups = plan(repertoire, options.clean, sizes, options.repeats, options.pairs, options.seed)
+    if not groups:
         raise InputError(
             where="command line, --clean, --repeats and --pairs",
             found="no set at all",
@@ -235,100 +234,95 @@ def _planned(options: argparse.Namespace, study: PowerStudy) -> list[Group]:
 def _usual(
     options: argparse.Namespace, output: Output, study: PowerStudy, groups: Sequence[Group]
 ) -> CommandResult:
-    from workbench.studies.power import Repertoire, summarise
+    from workbench.studies.power import Repertoire, diagnose_sets, summarise
     from workbench.studies.power.report import format_power, write_power
 
-    results, interrupted = _diagnosed(options, output, groups, study, options.out)
+    engine = Engine(options.workers, output.stage, options.out)
+    results, interrupted = diagnose_sets(
+        groups, study, engine, seed=options.seed, resume=options.resume
+    )
     summary = summarise(results, Repertoire(study.rig.plantables, tuple(study.effects)))
     write_power(summary, study.effects, _provenance(options, study, interrupted), options.out)
     output.result(format_power(summary))
-    output.result(f"to read: {options.out / 'index.html'}, data and figures beside it")
-    done = _written(options.out / "power.json", interrupted)
-    return replace(done, page=options.out / "index.html")
+    page = options.out / "index.html"
+    output.result(f"to read: {page}, data and figures beside it")
+    return replace(_result(options.out / "power.json", interrupted), page=page)
 
 
-def _sheet_error(options: argparse.Namespace, output: Output, study: PowerStudy) -> CommandResult:
+def _check_sheet_errors(
+    options: argparse.Namespace, study: PowerStudy, engine: Engine
+) -> tuple[Check, bool]:
+    from workbench.studies.power import diagnose_sets
     from workbench.studies.power.planting import plan_sheet_errors
     from workbench.studies.power.report import sheet_check
     from workbench.studies.power.statistics import summarise_sheet
 
-    out = options.out / "sheet_error"
     groups = plan_sheet_errors(study.rig.sheet_errors, options.repeats, options.seed)
-    results, interrupted = _diagnosed(options, output, groups, study, out)
-    return _checked(options, output, study, sheet_check(summarise_sheet(results)), interrupted)
+    engine = replace(engine, out=options.out / "sheet_error")
+    results, interrupted = diagnose_sets(
+        groups, study, engine, seed=options.seed, resume=options.resume
+    )
+    return sheet_check(summarise_sheet(results)), interrupted
 
 
-def _left_out(options: argparse.Namespace, output: Output, study: PowerStudy) -> CommandResult:
+def _check_left_out(
+    options: argparse.Namespace, study: PowerStudy, engine: Engine
+) -> tuple[Check, bool]:
     from workbench.studies.power.left_out import propose_left_out
     from workbench.studies.power.report import left_out_check
 
     largest = argparse.Namespace(**vars(options) | {"sizes": [max(options.sizes)], "pairs": 0})
-    engine = Engine(options.workers, output.stage)
     rows, interrupted = propose_left_out(_planned(largest, study), study, engine)
-    return _checked(options, output, study, left_out_check(rows), interrupted)
+    return left_out_check(rows), interrupted
 
 
-def _thresholds(options: argparse.Namespace, output: Output, study: PowerStudy) -> CommandResult:
+def _check_thresholds(
+    options: argparse.Namespace, study: PowerStudy, engine: Engine
+) -> tuple[Check, bool]:
     from workbench.diagnosis.inference.thresholds import of_system
-    from workbench.studies.power.planting import some
+    from workbench.studies.power.planting import draw_sets
     from workbench.studies.power.report import thresholds_check
-    from workbench.studies.power.sensitivity import values, vary_sets
+    from workbench.studies.power.sensitivity import threshold_values, vary_sets
 
-    sets = some(_planned(options, study), options.sets, options.seed)
-    results, interrupted = vary_sets(sets, study, Engine(options.workers, output.stage))
-    usual = values(of_system(study.system.comparison, len(study.effects)))
-    return _checked(options, output, study, thresholds_check(results, usual), interrupted)
+    sets = draw_sets(_planned(options, study), options.sets, options.seed)
+    results, interrupted = vary_sets(sets, study, engine)
+    usual = threshold_values(of_system(study.system.comparison, len(study.effects)))
+    return thresholds_check(results, usual), interrupted
 
 
-def _plan_campaign(options: argparse.Namespace, output: Output, study: PowerStudy) -> CommandResult:
-    from workbench.studies.power.planned import predict_campaign
+def _check_campaign(
+    options: argparse.Namespace, study: PowerStudy, engine: Engine
+) -> tuple[Check, bool]:
+    from workbench.studies.power.campaign import predict_campaign
     from workbench.studies.power.report import campaign_check, draw_chances
 
     sizes, wanted = sorted(set(options.sizes)), _chosen(options.effects, study.rig)
-    output.stage("one set without any effect is made and diagnosed")
+    engine.report("one set without any effect is made and diagnosed")
     rows = predict_campaign(study, wanted, sizes, options.seed)
     draw_chances(rows, sizes, options.out / "plan")
-    return _checked(options, output, study, campaign_check(rows, sizes), interrupted=False)
+    return campaign_check(rows, sizes), False
 
 
-def _followed(options: argparse.Namespace, output: Output, study: PowerStudy) -> CommandResult:
+def _check_proposals(
+    options: argparse.Namespace, study: PowerStudy, engine: Engine
+) -> tuple[Check, bool]:
     from workbench.studies.power.following import follow_proposals
     from workbench.studies.power.report import following_check
 
     alone = argparse.Namespace(**vars(options) | {"clean": 0, "pairs": 0})
-    engine = Engine(options.workers, output.stage)
     rows, interrupted = follow_proposals(_planned(alone, study), study, engine)
-    return _checked(options, output, study, following_check(rows), interrupted)
+    return following_check(rows), interrupted
 
 
-def _checked(
-    options: argparse.Namespace,
-    output: Output,
-    study: PowerStudy,
-    check: Check,
-    interrupted: bool,
-) -> CommandResult:
-    """Write what a check found into a folder of its own, and say it."""
-    provenance = _provenance(options, study, interrupted)
-    path = check.write(provenance, options.out / check.name)
-    output.result(check.text)
-    output.result(f"data: {path.parent}")
-    return _written(path, interrupted)
+_CHECKS = {
+    "thresholds": _check_thresholds,
+    "sheet_error": _check_sheet_errors,
+    "leave_out_effect": _check_left_out,
+    "plan": _check_campaign,
+    "follow": _check_proposals,
+}
 
 
-def _written(path: Path, interrupted: bool) -> CommandResult:
-    """What was written; sizes are in the unit that stands beside them, or of `matters`."""
+def _result(path: Path, interrupted: bool) -> CommandResult:
+    """Result in a file; sizes are in the unit that stands beside them, or of `matters`."""
     return CommandResult(read_result(path), {"seconds": "s"}, 130 if interrupted else 0)
-
-
-def _diagnosed(
-    options: argparse.Namespace,
-    output: Output,
-    groups: Sequence[Group],
-    study: PowerStudy,
-    out: Path,
-) -> tuple[list[SetVerdict], bool]:
-    from workbench.studies.power import diagnose_sets
-
-    engine = Engine(options.workers, output.stage, out)
-    return diagnose_sets(groups, study, engine, seed=options.seed, resume=options.resume)

@@ -20,7 +20,7 @@ from workbench.recordings.case import UNKNOWN
 from workbench.studies.distance.outcome import SafetyLevel
 from workbench.studies.distance.plain import PlainLevel
 from workbench.studies.power import following, left_out
-from workbench.studies.power.planned import EffectChance
+from workbench.studies.power.campaign import EffectChance
 from workbench.studies.power.sensitivity import VerdictChange
 from workbench.system.installed import installed_plugins
 from workbench.system.parts import Condition, StepTracking

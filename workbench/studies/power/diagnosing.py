@@ -53,11 +53,10 @@ def diagnose_set(
 def rivals_of_set(
     system: System, effects: Sequence[Effect], everything: Path, cases: Sequence[Case]
 ) -> tuple[Diagnosis, Rivals | None]:
-    """Diagnose one set, and keep what it leaves undecided; None where no cause is found."""
-    with _fit(system, effects, everything, cases) as (simulations, fit):
+    """Diagnose one set, and keep its remaining candidates; None where no cause is found."""
+    with _fit(system, effects, everything, cases) as (model, fit):
         result = conclude(fit, effects, silent)
-        left = gathered(simulations, fit, result.base, result.rivals) if result.rivals else None
-        return result, left
+        return result, gathered(model, fit, result.base, result.rivals) if result.rivals else None
 
 
 def distances_in_set(
@@ -68,7 +67,7 @@ def distances_in_set(
     true: str,
     others: Sequence[str],
 ) -> tuple[Diagnosis, dict[str, float]]:
-    """Diagnose one set, and tell how far effects stay from the true one, each fitted alone.
+    """Diagnose one set, and measure how far effects stay from the true one, each fitted alone.
 
     What an experiment promises is the least chi-squared of a wrong model, in units of what the
     right one leaves wrong in each channel. The fit of a diagnosis is another one, which lets a

@@ -1,4 +1,4 @@
-"""Whether the recording that is proposed next parts what a set leaves together."""
+"""Whether the recording that is proposed next discriminates what a set leaves together."""
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import as_completed
@@ -84,33 +84,39 @@ def follow_proposals(
                 try:
                     rows[k] = task.result()
                 except WorkerError as error:
-                    rows[k] = _begun(sets[k]) | {"error": repr(error)}
-                progress.step(_said(rows[k]))
+                    rows[k] = _empty_row(sets[k]) | {"error": repr(error)}
+                row, made = rows[k], rows[k]["proposed"]
+                group = " or ".join(row["group"]) or row["verdict"]
+                then = (
+                    "" if made is None else f" -> {' or '.join(made['named']) or made['verdict']}"
+                )
+                progress.step(f"{row['planted']}: {group}{then}{row['error']}")
         except KeyboardInterrupt:
             return [rows[k] for k in sorted(rows)], True
     return [rows[k] for k in sorted(rows)], False
 
 
 def summarise_following(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Shares, see `SHARES`, of groups that hold the planted effect."""
+    """Count shares, see `SHARES`, of groups that hold the planted effect."""
     groups = [row for row in rows if row["proposed"] is not None]
-    made = [group["proposed"] for group in groups]
-    drawn_ = [recording for row in groups for recording in row["drawn"]]
-    away = [separation for recording in (*made, *drawn_) for separation in recording["separations"]]
+    proposed = [group["proposed"] for group in groups]
+    drawn = [recording for group in groups for recording in group["drawn"]]
+    sensed = [group["sensed"] for group in groups if group["sensed"] is not None]
+    separations = [s for recording in (*proposed, *drawn) for s in recording["separations"]]
     return {
-        "proposed": share(recording["parts"] for recording in made),
-        "drawn": share(one["parts"] for one in drawn_),
-        "sensed": share(one["parts"] for row in groups if (one := row["sensed"]) is not None),
-        "answered": share((row["sensed"] or row["proposed"])["parts"] for row in groups),
-        "foreseen": share(recording["parts"] for recording in made if recording["foreseen"]),
-        "never": share(recording["parts"] for recording in made if not recording["foreseen"]),
-        "separations": share(map(_as_predicted, away)),
+        "proposed": share(recording["parts"] for recording in proposed),
+        "drawn": share(recording["parts"] for recording in drawn),
+        "sensed": share(recording["parts"] for recording in sensed),
+        "answered": share((group["sensed"] or group["proposed"])["parts"] for group in groups),
+        "foreseen": share(recording["parts"] for recording in proposed if recording["foreseen"]),
+        "never": share(recording["parts"] for recording in proposed if not recording["foreseen"]),
+        "separations": share(map(_as_predicted, separations)),
     }
 
 
-def _as_predicted(one: Mapping[str, Any]) -> bool:
+def _as_predicted(separation: Mapping[str, Any]) -> bool:
     """Whether a separation is within a fifth, or what noise moves its square by: twice itself."""
-    predicted, shown = one["predicted"], one["shown"]
+    predicted, shown = separation["predicted"], separation["shown"]
     if shown is None:
         return False
     near = ((1.0 + _NEAR) ** 2 - 1.0) * predicted**2
@@ -118,7 +124,7 @@ def _as_predicted(one: Mapping[str, Any]) -> bool:
     return bool(abs(shown * abs(shown) - predicted * abs(predicted)) <= max(near, noise))
 
 
-def _begun(planting: Planting) -> dict[str, Any]:
+def _empty_row(planting: Planting) -> dict[str, Any]:
     return {
         "rig": planting.options,
         "planted": planting.effects[0],
@@ -134,68 +140,61 @@ def _begun(planting: Planting) -> dict[str, Any]:
     }
 
 
-def _said(row: dict[str, Any]) -> str:
-    group = " or ".join(row["group"]) or row["verdict"]
-    made = row["proposed"]
-    then = "" if made is None else f" -> {' or '.join(made['named']) or made['verdict']}"
-    return f"{row['planted']}: {group}{then}{row['error']}"
-
-
 def _row(setup: Setup, planting: Planting) -> dict[str, Any]:
-    """What is said of a set, what is proposed, and what is said then."""
-    row = _begun(planting)
+    """Diagnose a set, make the recording that is proposed, and diagnose all of it."""
+    row = _empty_row(planting)
     try:
-        _fill(row, setup, planting)
+        _follow(row, setup, planting)
     except Exception as error:  # one set must not end a run of hours; it is counted
         row["error"] = repr(error)
     return row
 
 
-def _fill(row: dict[str, Any], setup: Setup, planting: Planting) -> None:
+def _follow(row: dict[str, Any], setup: Setup, planting: Planting) -> None:
     (planted,) = planting.effects
-    cases = setup.recorded(planting, setup.rig.simulate(planting.seed, planting.gains))
+    cases = setup.record(planting, setup.rig.simulate(planting.seed, planting.gains))
     diagnosis, rivals = rivals_of_set(setup.system, setup.effects, setup.everything, cases)
     row["verdict"], row["group"] = diagnosis.verdict, _named(diagnosis)
     if rivals is None or len(rivals.models) == 1:
         return
     experiments = setup.system.experiments
-    asked = next_stop(setup.system, rivals, ALONE)
-    row["sentence"], row["sensors"] = asked.sentence, list(asked.sensors)
-    if planted not in asked.names:
+    proposal = next_stop(setup.system, rivals, ALONE)
+    row["sentence"], row["sensors"] = proposal.sentence, list(proposal.sensors)
+    if planted not in proposal.names:
         return
     assert experiments is not None  # or nothing were proposed
     rng = np.random.default_rng(planting.seed)
     plan = [draw_experiment(experiments, rng) for _ in range(_DRAWN)]
-    rest = (setup, planting, rivals, cases)
-    row["proposed"] = _made(asked.tried[0], *rest)
+
+    def make(experiment: RankedExperiment, fitted: Setup = setup) -> dict[str, Any]:
+        return _diagnose_with(experiment, fitted, planting, rivals, cases)
+
+    row["proposed"] = make(proposal.tried[0])
     if not row["proposed"]["foreseen"]:
-        at = asked.names.index(planted)
+        at = proposal.names.index(planted)
         for sensor in experiments.sensors:
-            sensed = asked.sensors.get(sensor.label)
+            sensed = proposal.sensors.get(sensor.label)
             if sensed is not None and (at,) in sensed.prediction.groups:
                 fitted = replace(setup, system=with_sensor(setup.system, sensor))
-                row["sensed"] = {"sensor": sensor.label, **_made(sensed, fitted, *rest[1:])}
+                row["sensed"] = {"sensor": sensor.label, **make(sensed, fitted)}
                 break
-    row["drawn"] = [
-        _made(experiment, *rest)
-        for experiment in predict_experiments(setup.system, rivals, plan, 1)
-    ]
+    row["drawn"] = list(map(make, predict_experiments(setup.system, rivals, plan, 1)))
 
 
-def _made(
+def _diagnose_with(
     experiment: RankedExperiment,
     setup: Setup,
     planting: Planting,
     rivals: Rivals,
     cases: Sequence[Case],
 ) -> dict[str, Any]:
-    """What is said of all recordings with one more, and what was foreseen."""
+    """Make an experiment, diagnose all recordings with it, and compare with its prediction."""
     assert isinstance(setup.rig, FollowingRig)
     (planted,) = planting.effects
     names = [" with ".join(model.effects) for model in rivals.models]
     at = names.index(planted)
     rig = setup.rig.following(experiment.to_dict(), setup.system)
-    more = replace(setup, rig=rig).recorded(planting, rig.simulate(planting.seed, planting.gains))
+    more = replace(setup, rig=rig).record(planting, rig.simulate(planting.seed, planting.gains))
     others = [name for name in names if name != planted]
     recordings = [*cases, *more]
     diagnosis, shown = distances_in_set(

@@ -39,7 +39,7 @@ class NamedCause:
 
 @dataclass(frozen=True)
 class SetVerdict:
-    """What was said of one set of recordings.
+    """Verdict on one set of recordings.
 
     Attributes
     ----------
@@ -63,14 +63,14 @@ class SetVerdict:
 
     @property
     def first(self) -> str:
-        """What is said first: the strongest cause, or the verdict."""
+        """The strongest cause, or the verdict without one."""
         return self.causes[0].effect if self.causes else self.verdict
 
 
-def diagnosed(
+def verdict_of(
     planting: Planting, diagnosis: Diagnosis, repertoire: Repertoire, seconds: float
 ) -> SetVerdict:
-    """Keep what statistics need of a diagnosis."""
+    """Keep of a diagnosis what statistics need."""
     causes = tuple(
         NamedCause(
             cause.effect.name,
@@ -84,23 +84,17 @@ def diagnosed(
     )
     gain = diagnosis.gain
     before, after = (None, None) if gain is None else (gain.before, gain.after)
-    clearness = _clearness(planting, diagnosis, repertoire)
+    clearness = None
+    if planting.kind == "single":
+        ((name, size),) = planting.gains.items()
+        planted = repertoire.plantable(name)
+        for score in diagnosis.scores:
+            if score.effect.name == planted.effect and dict(score.shape) == dict(planted.shapes):
+                clearness = float(abs(size) / score.sigma)
+                break
     return SetVerdict(
         planting, diagnosis.verdict, causes, before, after, seconds, clearness=clearness
     )
-
-
-def _clearness(planting: Planting, diagnosis: Diagnosis, repertoire: Repertoire) -> float | None:
-    if planting.kind != "single":
-        return None
-    ((name, gain),) = planting.gains.items()
-    planted = repertoire.plantable(name)
-    sigmas = [
-        score.sigma
-        for score in diagnosis.scores
-        if score.effect.name == planted.effect and dict(score.shape) == dict(planted.shapes)
-    ]
-    return float(abs(gain) / sigmas[0]) if sigmas else None
 
 
 class Journal:
@@ -134,11 +128,8 @@ class Journal:
             if resume:
                 self._parse(text, identity)
             write_whole(previous_path(path), text)
-        lines = [
-            with_checksum(identity),
-            *(with_checksum(asdict(result)) for result in self.results),
-        ]
-        write_whole(path, "".join(f"{line}\n" for line in lines))
+        contents = [identity, *map(asdict, self.results)]
+        write_whole(path, "".join(f"{with_checksum(content)}\n" for content in contents))
 
     def append(self, result: SetVerdict) -> None:
         """Add a verdict; it is on the disk when this returns."""
@@ -168,7 +159,7 @@ class Journal:
             )
         for number, line in enumerate(lines, start=2):
             try:
-                result = _result(check_checksum(line))
+                result = _read_verdict(check_checksum(line))
                 if any(earlier.planting == result.planting for earlier in self.results):
                     raise ValueError("a second verdict on a set")
                 self.results.append(result)
@@ -176,7 +167,7 @@ class Journal:
                 self.damaged.append(number)
 
 
-def _result(content: dict[str, Any]) -> SetVerdict:
+def _read_verdict(content: dict[str, Any]) -> SetVerdict:
     causes = tuple(
         NamedCause(
             cause["effect"],
@@ -185,6 +176,6 @@ def _result(content: dict[str, Any]) -> SetVerdict:
         )
         for cause in content["causes"]
     )
-    planted = content["planting"]
-    planting = Planting(**{**planted, "effects": tuple(planted["effects"])})
+    planting = content["planting"]
+    planting = Planting(**{**planting, "effects": tuple(planting["effects"])})
     return SetVerdict(**{**content, "planting": planting, "causes": causes})

@@ -1,4 +1,4 @@
-"""What is proposed for a cause that the catalogue lacks: each effect left out in turn."""
+"""Laws that are proposed for a cause that the catalogue lacks: each effect left out in turn."""
 
 import tempfile
 from collections.abc import Mapping, Sequence
@@ -6,12 +6,22 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from workbench.diagnosis import Problem, diagnose
+import numpy as np
+
+from workbench.arrays import Vector
+from workbench.diagnosis import Outcome, Problem, diagnose, given_values
+from workbench.diagnosis.data.motion import ModelSource
+from workbench.diagnosis.effects.catalogue import Effect
+from workbench.diagnosis.effects.extension import ExtendedModel, build
+from workbench.diagnosis.inference.fit import Fit
+from workbench.diagnosis.inference.search import FittedModel
 from workbench.diagnosis.laws import Proposal, needs_law, propose
+from workbench.diagnosis.laws.scan import watching
+from workbench.diagnosis.laws.writing import extended_library
+from workbench.diagnosis.simulation.residual_model import ResidualModel
 from workbench.recordings.case import read_cases
 from workbench.runtime.engine import Engine
 from workbench.runtime.progress import StepReporter
-from workbench.studies.power.function_error import function_error
 from workbench.studies.power.planting import Group, Planting
 from workbench.studies.power.run import PowerStudy
 from workbench.studies.power.statistics import share
@@ -30,23 +40,22 @@ SHARES = {
 
 
 def summarise_left_out(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Shares, see `SHARES`; what other effects or clocks explain as well asks for no law."""
+    """Count shares, see `SHARES`; a set that other effects or clocks explain asks for no law."""
     asked = [row for row in rows if row["asked"] and row["slot_right"] is not None]
     known = [row for row in asked if row["laws"] and row["after_with_it"] is not None]
     clean = [row for row in rows if row["slot_right"] is None and not row["left_out"]]
     return {
         "right_slot": share(row["slot_right"] for row in asked),
         "outside": share(row["slot_right"] for row in asked if not row["left_out"]),
-        "gain": share(map(_gains, known)),
+        "gain": share(
+            row["before"] - row["after"] >= _WORTH * (row["before"] - row["after_with_it"])
+            for row in known
+        ),
         "function": share(
             row["function_error"] <= _NEAR for row in known if row["function_error"] is not None
         ),
         "clean": share(bool(row["laws"]) for row in clean),
     }
-
-
-def _gains(row: Mapping[str, Any]) -> bool:
-    return bool(row["before"] - row["after"] >= _WORTH * (row["before"] - row["after_with_it"]))
 
 
 def propose_left_out(
@@ -69,8 +78,8 @@ def propose_left_out(
     try:
         for planting in sets:
             rows.append(_row(planting, study, engine.workers))
-            said = ", ".join(rows[-1]["laws"]) or f"{rows[-1]['verdict']}, nothing proposed"
-            progress.step(f"{planting.options}: {said}")
+            laws = ", ".join(rows[-1]["laws"]) or f"{rows[-1]['verdict']}, nothing proposed"
+            progress.step(f"{planting.options}: {laws}")
     except KeyboardInterrupt:
         return rows, True
     return rows, False
@@ -103,8 +112,8 @@ def _row(planting: Planting, study: PowerStudy, workers: int) -> dict[str, Any]:
         "error": "",
     }
     try:
-        with tempfile.TemporaryDirectory() as scratch:
-            recordings, out, new = (Path(scratch) / name for name in ("recordings", "out", "new"))
+        with tempfile.TemporaryDirectory() as folder:
+            recordings, out, new = (Path(folder) / name for name in ("recordings", "out", "new"))
             simulated = rig.simulate(planting.seed, planting.gains)
             rig.write(simulated, planting.gains, recordings)
             cases = read_cases([recordings], system)
@@ -118,7 +127,7 @@ def _row(planting: Planting, study: PowerStudy, workers: int) -> dict[str, Any]:
             row["asked"] = needs_law(before)
             if row["asked"]:
                 proposal = propose(before, problem, engine)
-                row |= _told(proposal)
+                row |= _laws_and_gain(proposal)
                 if planted and proposal.laws:
                     known = diagnose(replace(problem, effects=effects), engine)
                     gain = known.diagnosis.gain
@@ -135,7 +144,7 @@ def _row(planting: Planting, study: PowerStudy, workers: int) -> dict[str, Any]:
     return row
 
 
-def _told(proposal: Proposal) -> dict[str, Any]:
+def _laws_and_gain(proposal: Proposal) -> dict[str, Any]:
     """What is proposed; its slots are also those of laws that are as good."""
     laws = [form.law for form in proposal.forms.values()] if proposal.laws else []
     gain = proposal.outcome.diagnosis.gain if laws and proposal.outcome is not None else None
@@ -145,3 +154,56 @@ def _told(proposal: Proposal) -> dict[str, Any]:
         "before": None if gain is None else gain.before,
         "after": None if gain is None else gain.after,
     }
+
+
+def function_error(
+    problem: Problem, known: Outcome, proposal: Proposal, effect: Effect
+) -> float | None:
+    """Error of the first proposed law, over the range of what the true cause does.
+
+    Both are outputs of their slot, along recordings that neither was fitted to, as each was fitted
+    with the levels beside it.
+
+    Parameters
+    ----------
+    problem : whose recordings were not fitted.
+    known : of the diagnosis with the true cause in its catalogue.
+    effect : that cause, of the library.
+
+    Returns
+    -------
+    error : root mean square over range; None where the law acts elsewhere, the true cause was not
+        found, or phases are free in each recording.
+    """
+    if not proposal.laws or proposal.outcome is None:
+        return None
+    law = proposal.forms[proposal.laws[0].effect.name].law
+    true, proposed = known.diagnosis.best, proposal.outcome.diagnosis.best
+    effects = list({e.name: e for e in (*true.active, *proposed.active)}.values())
+    elsewhere = law.place.slot.name not in effect.slots or effect not in true.active
+    if elsewhere or any(active.order_locked for active in effects):
+        return None
+    with tempfile.TemporaryDirectory() as folder:
+        written = [proposal.forms[cause.effect.name].written for cause in proposal.laws]
+        extended = extended_library(problem.library, written, Path(folder))
+        path = Path(folder) / "Both.fmu"
+        about = "With the law and the true cause"
+        text = ExtendedModel(extended, problem.base, "Both", effects, about).source()
+        output = f"{law.place.slot.name}.{law.place.output.name}"
+        build(extended, "Both", watching(text, [output]), path, every_platform=False)
+        both = ModelSource(path, problem.system, given_values(path, problem.system))
+        with ResidualModel(both, problem.cases) as simulations:
+            fit = Fit(simulations, effects)
+            without, right, law_output = (
+                _slot_output(simulations, fit, model)
+                for model in (known.diagnosis.base, true, proposed)
+            )
+    return float(np.sqrt(np.mean((law_output - right) ** 2)) / np.ptp(right - without))
+
+
+def _slot_output(simulations: ResidualModel, fit: Fit, fitted: FittedModel) -> Vector:
+    """Output of the slot along all recordings, as a model was fitted, without random effects."""
+    usual = np.zeros((fit.unknowns.count, fitted.point.deviations.shape[1]))
+    point = replace(fitted.point, deviations=usual)
+    tables = simulations.along(fit.unknowns.values(point), ["watched0"])
+    return np.concatenate([table[:, 0] for table in tables])

@@ -1,4 +1,4 @@
-"""What is planted, how much of it, and in which order: the plan of the Monte Carlo."""
+"""Which effects are injected, how large, and in which order: the plan of the Monte Carlo."""
 
 import math
 import zlib
@@ -143,7 +143,7 @@ class Repertoire:
 
     def label(self, effect: str) -> str:
         """Name of the size of an effect of the library in results."""
-        return next(one.label for one in self.effects if one.name == effect)
+        return next(findable.label for findable in self.effects if findable.name == effect)
 
     @property
     def hidden(self) -> frozenset[str]:
@@ -217,7 +217,7 @@ def plan(
     ]
     # All kinds advance alike, so that a run that is cut short has something of each.
     ranked = [((i + 0.5) / len(kind), group) for kind in kinds for i, group in enumerate(kind)]
-    return [group for _, group in sorted(ranked, key=lambda one: one[0])]
+    return [group for _, group in sorted(ranked, key=lambda entry: entry[0])]
 
 
 def plan_sheet_errors(errors: Sequence[SheetError], repeats: int, seed: int) -> list[Group]:
@@ -230,14 +230,14 @@ def plan_sheet_errors(errors: Sequence[SheetError], repeats: int, seed: int) -> 
     return groups
 
 
-def some(groups: Sequence[Group], count: int, seed: int) -> list[Planting]:
-    """So many sets of a plan, of all kinds alike, drawn from those of a kind."""
+def draw_sets(groups: Sequence[Group], count: int, seed: int) -> list[Planting]:
+    """Draw sets of a plan, of all kinds alike."""
     order = np.random.default_rng(seed).permutation(len(groups))
     kinds: dict[Kind, list[Planting]] = {}
     for i in order:
         kinds.setdefault(groups[i][0].kind, []).append(groups[i][0])
-    ranked = [(i, one) for kind in kinds.values() for i, one in enumerate(kind)]
-    return [one for _, one in sorted(ranked, key=lambda pair: pair[0])[:count]]
+    ranked = [(i, planting) for kind in kinds.values() for i, planting in enumerate(kind)]
+    return [planting for _, planting in sorted(ranked, key=lambda entry: entry[0])[:count]]
 
 
 def _each(

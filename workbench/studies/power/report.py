@@ -23,9 +23,10 @@ from workbench.pages.parts import (
     number,
     term,
 )
+from workbench.pages.views import capital
 from workbench.runtime.files import write_json
 from workbench.studies.power import CLEAR, VISIBLE, Findable, following, left_out
-from workbench.studies.power.planned import SURE, EffectChance
+from workbench.studies.power.campaign import SURE, EffectChance
 from workbench.studies.power.sensitivity import FACTORS, ThresholdSensitivity
 from workbench.system.units import with_unit
 
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Check:
-    """What a check of the diagnosis found, for a file and for people.
+    """Result of a check of the diagnosis, for a file and for people.
 
     Attributes
     ----------
@@ -57,7 +58,7 @@ class Check:
 
 
 def thresholds_check(results: Sequence[ThresholdSensitivity], usual: Mapping[str, float]) -> Check:
-    """What other thresholds change, and those that change nothing.
+    """Report which verdicts half and twice of each threshold change.
 
     Parameters
     ----------
@@ -96,7 +97,7 @@ def thresholds_check(results: Sequence[ThresholdSensitivity], usual: Mapping[str
 
 
 def sheet_check(rows: Sequence[Mapping[str, Any]]) -> Check:
-    """What was said of machines that differ from their sheet, and the number of wrong names."""
+    """Report verdicts on machines that differ from their sheet, and the number of wrong names."""
     lines = [f"{'wrong in the sheet':<26} {'verdict':<12} causes"]
     for row in rows:
         error = " ".join(f"{name}={gain:+g}" for name, gain in row["wrong"].items())
@@ -113,16 +114,16 @@ def sheet_check(rows: Sequence[Mapping[str, Any]]) -> Check:
 
 
 def left_out_check(rows: Sequence[Mapping[str, Any]]) -> Check:
-    """What was proposed for causes that were left out, and how often it acts where they did."""
+    """Report laws proposed for causes that were left out, and how often they act in their slot."""
     lines = []
     for row in rows:
-        what = ", ".join(row["left_out"]) or row["rig"]
+        cause = ", ".join(row["left_out"]) or row["rig"]
         mark = {True: "right slot", False: "NOT THE SLOT", None: "no cause"}[row["slot_right"]]
         named = f", {' and '.join(row['named'])}" * bool(row["named"])
         late = f", {' and '.join(row['late'])} late" * bool(row["late"])
         nothing = f"nothing proposed ({row['verdict']}{named}{late})"
-        said = "; ".join(row["laws"]) or row["error"] or nothing
-        lines.append(f"{what:<30} {mark if row['asked'] else '':<16} {said}")
+        laws = "; ".join(row["laws"]) or row["error"] or nothing
+        lines.append(f"{cause:<30} {mark if row['asked'] else '':<16} {laws}")
     summary = left_out.summarise_left_out(rows)
     right = summary["right_slot"]
     sentence = (
@@ -136,19 +137,18 @@ def left_out_check(rows: Sequence[Mapping[str, Any]]) -> Check:
 
 
 def following_check(rows: Sequence[Mapping[str, Any]]) -> Check:
-    """What was left together, what was said once the proposed recording was made, all shares."""
+    """Report groups, verdicts after the proposed recording was made, and all shares."""
     lines = []
     for row in rows:
-        made = row["proposed"]
-        said = " or ".join(row["group"]) or row["error"] or row["verdict"]
-        if made is not None:
+        text = " or ".join(row["group"]) or row["error"] or row["verdict"]
+        if (made := row["proposed"]) is not None:
             then = " or ".join(made["named"]) or made["verdict"]
             drawn = ["parts" if other["parts"] else "does not" for other in row["drawn"]]
-            said += f" -> {then} (one that is drawn: {', '.join(drawn)}): {made['experiment']}"
+            text += f" -> {then} (one that is drawn: {', '.join(drawn)}): {made['experiment']}"
         if (sensed := row["sensed"]) is not None:
             then = " or ".join(sensed["named"]) or sensed["verdict"]
-            said += f"; with a sensor of {sensed['sensor']}: {then}"
-        lines.append(f"{row['planted']:<30} x{row['multiple']:<4g} {said}")
+            text += f"; with a sensor of {sensed['sensor']}: {then}"
+        lines.append(f"{row['planted']:<30} x{row['multiple']:<4g} {text}")
     summary = following.summarise_following(rows)
     proposed, others = summary["proposed"], summary["drawn"]
     sentence = (
@@ -182,7 +182,7 @@ def _shares(summary: Mapping[str, Any], texts: Mapping[str, str]) -> list[str]:
 
 
 def campaign_check(rows: Sequence[EffectChance], sizes: Sequence[float]) -> Check:
-    """Chances that planned recordings show effects, by size.
+    """Report chances that planned recordings show effects, by size.
 
     Parameters
     ----------
@@ -208,13 +208,7 @@ def campaign_check(rows: Sequence[EffectChance], sizes: Sequence[float]) -> Chec
 
 
 def draw_chances(rows: Sequence[EffectChance], sizes: Sequence[float], out: Path) -> None:
-    """Draw the chances of a campaign to plan.png and plan.svg."""
-    with in_style():
-        save_figure(_chances(rows, sizes), [out / "plan.png", out / "plan.svg"])
-
-
-def _chances(rows: Sequence[EffectChance], sizes: Sequence[float]) -> "Figure":
-    """Chance that an effect is named [%], by effect and size."""
+    """Draw the chances that effects are named, by effect and size, to plan.png and plan.svg."""
     table = np.array(
         [[100.0 * c for _, c in row.chances] or [0.0] * len(sizes) for row in rows]
     ).reshape(len(rows), len(sizes))
@@ -226,7 +220,8 @@ def _chances(rows: Sequence[EffectChance], sizes: Sequence[float]) -> "Figure":
         axes.set_yticks(range(len(rows)), [row.effect for row in rows])
         axes.set_xlabel("size over the least that matters")
         sheet.suptitle("Chance that the planned recordings show it [%]")
-    return sheet
+    with in_style():
+        save_figure(sheet, [out / "plan.png", out / "plan.svg"])
 
 
 _STYLE = "2"
@@ -245,7 +240,7 @@ def write_power_page(summary: Mapping[str, Any], out: Path) -> Path:
     if summary["failed"]:
         warnings.append(f"{len(summary['failed'])} diagnoses failed; they count as not right.")
     parts = [
-        Part("shown", "How often it is right", [_INTERVAL, _share_dots(summary)]),
+        Part("shown", "How often it is right", [_INTERVAL, _share_dots(summary["answer"])]),
         Part("definitions", "Definitions", [Definitions(_TERMS)]),
     ]
     if summary["effects"]:
@@ -257,19 +252,16 @@ def write_power_page(summary: Mapping[str, Any], out: Path) -> Path:
     return page.write(summary, out / "index.html")
 
 
-def _share_dots(summary: Mapping[str, Any]) -> Dots:
+def _share_dots(answer: Mapping[str, Any]) -> Dots:
     """The headline as dots with their intervals."""
-    rows = []
-    for name, measure in summary["answer"]["headline"].items():
-        known = measure["value"] is not None
-        dot = (Dot(measure["value"], _STYLE, measure["low"], measure["high"]),) if known else ()
-        rows.append((name, dot))
-    told = [
-        f"{name} {measure['value']:.0f} %"
-        for name, measure in summary["answer"]["headline"].items()
-        if measure["value"] is not None
-    ]
-    finding = "Shares of sets with their 95 % intervals: " + (", ".join(told) or "none") + "."
+    rows, shares = [], []
+    for name, measure in answer["headline"].items():
+        dots: tuple[Dot, ...] = ()
+        if measure["value"] is not None:
+            dots = (Dot(measure["value"], _STYLE, measure["low"], measure["high"]),)
+            shares.append(f"{name} {measure['value']:.0f} %")
+        rows.append((name, dots))
+    finding = "Shares of sets with their 95 % intervals: " + (", ".join(shares) or "none") + "."
     return Dots(finding, "share of sets [%]", tuple(rows), high=100.0)
 
 
@@ -312,15 +304,15 @@ def _share(share: Mapping[str, Any] | None) -> Cell:
 
 def _confusion_rows(summary: Mapping[str, Any]) -> Table:
     """Planted by named."""
-    said = dict.fromkeys(name for row in summary["confusion"].values() for name in row)
+    names = dict.fromkeys(name for row in summary["confusion"].values() for name in row)
     rows = []
     for planted, row in summary["confusion"].items():
         of = sum(row.values())
-        counts = (row.get(name, 0) for name in said)
+        counts = (row.get(name, 0) for name in names)
         cells = (number(float(count), ".0f", count / of if of else 0.0) for count in counts)
         rows.append((planted, *cells))
     caption = f"Sets by what was planted (rows, from size {VISIBLE:g} on) and what was named first."
-    columns = ("planted", *(Numbers(name) for name in said))
+    columns = ("planted", *(Numbers(name) for name in names))
     return Table("confusion-table", caption, columns, rows)
 
 
@@ -334,8 +326,6 @@ _TERMS = {
 }
 
 _COLUMNS = 5  # of power curves
-
-
 _LINE, _MARK = LIGHT["2"], LIGHT["0"]
 
 
@@ -351,10 +341,9 @@ def write_power(
     ----------
     effects : of the library, in whose order they stand.
     """
-    content = {"provenance": provenance, **summary}
-    told = with_answer(power_answer(summary), content)
-    write_json(out / "power.json", told)
-    write_power_page(told, out)
+    content = with_answer(power_answer(summary), {"provenance": provenance, **summary})
+    write_json(out / "power.json", content)
+    write_power_page(content, out)
     names = [effect.name for effect in effects]
     measured = summary["effects"]
     figures = {"confusion": _confusion(summary["confusion"], names)} if summary["sets"] else {}
@@ -393,9 +382,9 @@ def _curves(effects: Mapping[str, Any]) -> "Figure":
 
 def _confusion(confusion: Mapping[str, Mapping[str, int]], names: Sequence[str]) -> "Figure":
     """Planted by named, each row in percent."""
-    said = {name for row in confusion.values() for name in row}
+    named = {name for row in confusion.values() for name in row}
     order = ["nothing", *names, "partly explained", "unexplained", "failed"]
-    columns = [name for name in order if name in said or name in confusion]
+    columns = [name for name in order if name in named or name in confusion]
     table = np.array(
         [
             [100.0 * row.get(name, 0) / max(sum(row.values()), 1) for name in columns]
@@ -460,12 +449,12 @@ def format_power(summary: Mapping[str, Any]) -> str:
         row += "".join(f"{_count(effect['right_first'].get(f'{size:g}')):>8}" for size in sizes)
         lines.append(row + f"{_count(effect['coverage']):>11}" + "  hidden" * effect["hidden"])
     for name, unknown in outside.items():
-        said = (
-            f"x {size}: " + ", ".join(f"{n} {verdict}" for verdict, n in verdicts.items())
-            for size, verdicts in unknown["verdicts"].items()
+        verdicts = (
+            f"x {size}: " + ", ".join(f"{n} {verdict}" for verdict, n in counts.items())
+            for size, counts in unknown["verdicts"].items()
         )
         size = with_unit(unknown["size"], unknown["unit"])
-        lines.append(f"{name:<30}{size:>18}  {'; '.join(said)}")
+        lines.append(f"{name:<30}{size:>18}  {'; '.join(verdicts)}")
     return "\n".join(lines)
 
 
@@ -508,5 +497,4 @@ def power_answer(summary: Mapping[str, Any]) -> Answer:
         words.append(
             f"its 95 % intervals hold the truth in {share_with_interval(hold, 'intervals')}"
         )
-    said = "; ".join(words) or "too few sets for a share"
-    return Answer(f"{said[:1].upper()}{said[1:]}.", headline, details)
+    return Answer(f"{capital('; '.join(words) or 'too few sets for a share')}.", headline, details)

@@ -19,7 +19,7 @@ from workbench.runtime.engine import Engine
 from workbench.runtime.pool import Pool
 from workbench.runtime.progress import StepReporter
 from workbench.studies.power.diagnosing import build_everything, diagnose_set
-from workbench.studies.power.journal import Journal, SetVerdict, diagnosed
+from workbench.studies.power.journal import Journal, SetVerdict, verdict_of
 from workbench.studies.power.planting import Group, Planting, Repertoire
 from workbench.studies.power.virtual_rig import VirtualRig
 from workbench.system.system import System
@@ -43,8 +43,8 @@ class Setup:
     everything: Path
     effects: tuple[Effect, ...]
 
-    def recorded(self, planting: Planting, simulated: Any) -> list[Case]:
-        """What the rig's sensors make of what happened, read back from files."""
+    def record(self, planting: Planting, simulated: Any) -> list[Case]:
+        """Write what the rig's sensors make of a simulation, and read it back."""
         with tempfile.TemporaryDirectory() as folder:
             self.rig.write(simulated, planting.gains, Path(folder))
             return read_cases([Path(folder)], self.system)
@@ -76,9 +76,9 @@ class PowerStudy:
 
     @contextmanager
     def setup(self) -> Iterator[Setup]:
-        """How sets are made and diagnosed, by an FMU that is there as long as this is open."""
-        with tempfile.TemporaryDirectory(prefix="power-", ignore_cleanup_errors=True) as scratch:
-            everything = Path(scratch) / "AllEffects.fmu"
+        """Build the FMU with all effects, which is there as long as this is open."""
+        with tempfile.TemporaryDirectory(prefix="power-", ignore_cleanup_errors=True) as folder:
+            everything = Path(folder) / "AllEffects.fmu"
             build_everything(self.system, self.effects, everything)
             yield Setup(self.system, self.rig, everything, tuple(self.effects))
 
@@ -129,11 +129,16 @@ def _run(groups: Sequence[Group], setup: Setup, journal: Journal, engine: Engine
     progress = StepReporter(engine.report, sum(map(len, groups)))
 
     def collect(task: Future[list[SetVerdict]]) -> None:
-        for result in _results(task, open_tasks.pop(task)):
+        group = open_tasks.pop(task)
+        try:
+            verdicts = task.result()
+        except WorkerError as error:  # a crash must not end a run of hours; it is counted
+            verdicts = [_failure(planting, error) for planting in group]
+        for result in verdicts:
             journal.append(result)
             name = " ".join(f"{n}={gain:g}" for n, gain in result.planting.gains.items())
-            said = ", ".join(cause.effect for cause in result.causes) or result.verdict
-            progress.step(f"{name or 'clean':<40} {said}")
+            causes = ", ".join(cause.effect for cause in result.causes) or result.verdict
+            progress.step(f"{name or 'clean':<40} {causes}")
 
     # Isolated: Ctrl-C is to leave alone what is under way, and a crash is to cost one group.
     with Pool(engine.workers, nullcontext, setup, isolated=True) as pool:
@@ -150,14 +155,8 @@ def _run(groups: Sequence[Group], setup: Setup, journal: Journal, engine: Engine
     return False
 
 
-def _results(task: "Future[list[SetVerdict]]", group: Group) -> list[SetVerdict]:
-    """What became of a group; a crash must not end a run of hours, and is counted."""
-    try:
-        return task.result()
-    except WorkerError as error:
-        return [
-            SetVerdict(planting, "failed", (), None, None, 0.0, repr(error)) for planting in group
-        ]
+def _failure(planting: Planting, error: Exception, seconds: float = 0.0) -> SetVerdict:
+    return SetVerdict(planting, "failed", (), None, None, seconds, repr(error))
 
 
 def _evaluate(setup: Setup, group: Group) -> list[SetVerdict]:
@@ -169,14 +168,13 @@ def _evaluate(setup: Setup, group: Group) -> list[SetVerdict]:
         try:
             if simulated is None:
                 simulated = setup.rig.simulate(planting.seed, planting.gains)
-            cases = setup.recorded(planting, simulated)
+            cases = setup.record(planting, simulated)
             result = diagnose_set(setup.system, setup.effects, setup.everything, cases)
         except Exception as error:  # one set must not end a run of hours; it is counted
-            seconds = time.perf_counter() - begin
-            results.append(SetVerdict(planting, "failed", (), None, None, seconds, repr(error)))
+            results.append(_failure(planting, error, time.perf_counter() - begin))
         else:
             seconds = time.perf_counter() - begin
-            results.append(diagnosed(planting, result, setup.repertoire, seconds))
+            results.append(verdict_of(planting, result, setup.repertoire, seconds))
     return results
 
 

@@ -1,7 +1,7 @@
-"""Which thresholds of the diagnosis matter: half and twice of each, on the same recordings."""
+"""How verdicts depend on thresholds of the diagnosis: half and twice of each, same recordings."""
 
 import dataclasses
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import as_completed
 from contextlib import nullcontext
 from dataclasses import dataclass
@@ -62,16 +62,16 @@ class ThresholdSensitivity:
     changed: tuple[VerdictChange, ...]
 
 
-def values(thresholds: Thresholds) -> dict[str, float]:
+def threshold_values(thresholds: Thresholds) -> dict[str, float]:
     """Each threshold by its name."""
     by_name = dataclasses.asdict(thresholds)
     samples = by_name.pop(_SAMPLES)
     return {**by_name, **samples}
 
 
-def changed(thresholds: Thresholds, name: str, factor: float) -> Thresholds:
-    """The same with one threshold times a factor; what is counted stays a whole number, above 0."""
-    old = values(thresholds)[name]
+def scaled(thresholds: Thresholds, name: str, factor: float) -> Thresholds:
+    """Multiply one threshold by a factor; a count stays a whole number, above 0."""
+    old = threshold_values(thresholds)[name]
     new = max(1, round(factor * old)) if isinstance(old, int) else factor * old
     change: dict[str, Any] = {name: new}
     if name in {field.name for field in dataclasses.fields(Soundness)}:
@@ -79,8 +79,8 @@ def changed(thresholds: Thresholds, name: str, factor: float) -> Thresholds:
     return dataclasses.replace(thresholds, **change)
 
 
-class Remembering(ResidualModel):
-    """What is simulated once: most thresholds lead a diagnosis along the same points."""
+class CachedResidualModel(ResidualModel):
+    """Simulates each point once: most thresholds lead a diagnosis along the same points."""
 
     def __init__(
         self, path: Path, system: System, cases: Sequence[Case], samples: Soundness
@@ -107,9 +107,9 @@ class Remembering(ResidualModel):
         keys = [(point, column.variables, _key([column.setting])) for column in columns]
         new = [i for i, key in enumerate(keys) if key not in self._columns]
         if new:
-            made = super().derivatives(points, [columns[i] for i in new], sizes)
+            computed = super().derivatives(points, [columns[i] for i in new], sizes)
             for j, i in enumerate(new):
-                self._columns[keys[i]] = [matrix[:, j : j + 1] for matrix in made]
+                self._columns[keys[i]] = [matrix[:, j : j + 1] for matrix in computed]
         matrices = [self._columns[key] for key in keys]
         return [np.hstack([matrix[k] for matrix in matrices]) for k in range(len(self.cases))]
 
@@ -120,43 +120,42 @@ def _key(points: Sequence[Mapping[str, float]]) -> tuple[frozenset[tuple[str, fl
 
 def vary(setup: Setup, planting: Planting, names: Sequence[str]) -> ThresholdSensitivity:
     """Make one set of recordings, and diagnose it by half and twice of each threshold named."""
-    cases = setup.recorded(planting, setup.rig.simulate(planting.seed, planting.gains))
+    cases = setup.record(planting, setup.rig.simulate(planting.seed, planting.gains))
     usual = of_system(setup.system.comparison, len(setup.effects))
-    variants = {
-        (name, factor): changed(usual, name, factor) for name in names for factor in FACTORS
-    }
-    said = _said(setup, cases, usual.samples, [usual, *variants.values()])
-    for samples in {variant.samples for variant in variants.values()} - {usual.samples}:
-        said |= _said(setup, cases, samples, variants.values())
+    variants = {(name, factor): scaled(usual, name, factor) for name in names for factor in FACTORS}
+    by_samples: dict[Soundness, list[Thresholds]] = {}
+    for thresholds in (usual, *variants.values()):
+        by_samples.setdefault(thresholds.samples, []).append(thresholds)
+    verdicts: dict[Thresholds, tuple[str, ...]] = {}
+    for samples, alike in by_samples.items():
+        verdicts |= _verdicts(setup, cases, samples, alike)
     return ThresholdSensitivity(
         planting,
-        said[usual],
+        verdicts[usual],
         tuple(
-            VerdictChange(name, factor, values(variant)[name], said[variant])
+            VerdictChange(name, factor, threshold_values(variant)[name], verdicts[variant])
             for (name, factor), variant in variants.items()
-            if said[variant][:2] != said[usual][:2]
+            if verdicts[variant][:2] != verdicts[usual][:2]
         ),
     )
 
 
-def _said(
-    setup: Setup, cases: Sequence[Case], samples: Soundness, some: Iterable[Thresholds]
+def _verdicts(
+    setup: Setup, cases: Sequence[Case], samples: Soundness, variants: Sequence[Thresholds]
 ) -> dict[Thresholds, tuple[str, ...]]:
-    """Verdict and causes by each of some thresholds that take the same samples."""
-    said: dict[Thresholds, tuple[str, ...]] = {}
-    mine = [thresholds for thresholds in some if thresholds.samples == samples]
+    """Verdict and causes by each of thresholds that take the same samples."""
+    verdicts: dict[Thresholds, tuple[str, ...]] = {}
     try:
-        with Remembering(setup.everything, setup.system, cases, samples) as simulations:
-            for variant in mine:
-                fit = Fit(simulations, setup.effects, variant)
-                diagnosis = conclude(fit, setup.effects, silent)
-                said[variant] = (
-                    diagnosis.verdict,
-                    *(cause.effect.name for cause in diagnosis.causes),
+        with CachedResidualModel(setup.everything, setup.system, cases, samples) as simulations:
+            for variant in variants:
+                diagnosis = conclude(
+                    Fit(simulations, setup.effects, variant), setup.effects, silent
                 )
+                causes = (cause.effect.name for cause in diagnosis.causes)
+                verdicts[variant] = diagnosis.verdict, *causes
     except InputError:  # too few samples are left
-        return dict.fromkeys(mine, ("refused",))
-    return said
+        return dict.fromkeys(variants, ("refused",))
+    return verdicts
 
 
 def vary_sets(
@@ -180,7 +179,7 @@ def vary_sets(
     """
     results: list[ThresholdSensitivity] = []
     progress = StepReporter(engine.report, len(plantings))
-    names = list(values(of_system(study.system.comparison, len(study.effects))))
+    names = list(threshold_values(of_system(study.system.comparison, len(study.effects))))
     with (
         study.setup() as setup,
         Pool(engine.workers, nullcontext, setup, isolated=True) as pool,
@@ -189,13 +188,13 @@ def vary_sets(
         try:
             for task in as_completed(tasks):
                 try:
-                    varied = task.result()
+                    result = task.result()
                 except WorkerError as error:
-                    said = f"failed: {error}"
+                    text = f"failed: {error}"
                 else:
-                    results.append(varied)
-                    said = f"{', '.join(varied.said)}; {len(varied.changed)} changes"
-                progress.step(f"{tasks[task].options}: {said}")
+                    results.append(result)
+                    text = f"{', '.join(result.said)}; {len(result.changed)} changes"
+                progress.step(f"{tasks[task].options}: {text}")
         except KeyboardInterrupt:
             engine.report("interrupted")
             return results, True

@@ -20,8 +20,8 @@ def share(outcomes: Iterable[bool]) -> dict[str, Any]:
     The interval is that of C. J. Clopper and E. S. Pearson (1934), Biometrika 26, 404-413: it
     covers in at least 95 %, however few trials there are.
 
-    >>> found = share([False] * 10)
-    >>> found["share"], found["low"], round(found["high"], 4)
+    >>> none = share([False] * 10)
+    >>> none["share"], none["low"], round(none["high"], 4)
     (0.0, 0.0, 0.3085)
     """
     values = list(outcomes)
@@ -40,7 +40,7 @@ def named_right(result: SetVerdict) -> bool:
 
 
 def above_noise(result: SetVerdict) -> bool:
-    """Whether anything was seen, or could have been: the planted size is clear of its scatter.
+    """Whether a finding was possible: something was found, or the size is clear of its scatter.
 
     The scatter is the least that any estimate from these stops has, by the noise of their sensors,
     the tolerances of the plant and all other effects at sizes that do not matter.
@@ -58,9 +58,9 @@ def named_all(result: SetVerdict) -> bool:
 
 
 def intervals_cover(result: SetVerdict, repertoire: Repertoire) -> list[bool]:
-    """For each interval of the planted effect, if it was named first: whether it holds the truth.
+    """Whether each interval of the planted effect, if it was named first, holds the truth.
 
-    A size within the interval of its twin is no claim, and is not judged.
+    Intervals of a twin that is named in its place claim nothing, and are left out.
     """
     ((name, gain),) = result.planting.gains.items()
     plantable = repertoire.plantable(name)
@@ -90,6 +90,11 @@ def summarise(results: Sequence[SetVerdict], repertoire: Repertoire) -> dict[str
         if plantable.effect and plantable.effect not in repertoire.hidden
         for result in _large(by_name.get(plantable.name, []))
     ]
+    confusion = {"none": kinds["clean"]} | {
+        plantable.effect or plantable.name: _large(by_name[plantable.name])
+        for plantable in repertoire.plantables
+        if plantable.name in by_name
+    }
     return {
         "sets": len(results),
         "failed": [
@@ -109,8 +114,7 @@ def summarise(results: Sequence[SetVerdict], repertoire: Repertoire) -> dict[str
         "effects": _by_effect(by_name, repertoire),
         "outside": _outside(by_name, repertoire),
         "confusion": {
-            row: dict(Counter(result.first for result in some))
-            for row, some in _confused(kinds["clean"], by_name, repertoire).items()
+            row: dict(Counter(result.first for result in sets)) for row, sets in confusion.items()
         },
         "wrong": [
             {"rig": result.planting.options, "said": [cause.effect for cause in result.causes]}
@@ -126,7 +130,7 @@ def _coverage(results: Iterable[SetVerdict], repertoire: Repertoire) -> dict[str
 
 
 def _by_effect(by_name: dict[str, list[SetVerdict]], repertoire: Repertoire) -> dict[str, Any]:
-    """What was said of each effect of the library that was planted."""
+    """Shares of each planted effect of the library."""
     return {
         plantable.effect: {
             "rig": plantable.name,
@@ -134,8 +138,8 @@ def _by_effect(by_name: dict[str, list[SetVerdict]], repertoire: Repertoire) -> 
             "unit": plantable.unit,
             "hidden": plantable.effect in repertoire.hidden,
             "right_first": {
-                size: share(map(named_right, some))
-                for size, some in _by_size(by_name[plantable.name]).items()
+                size: share(map(named_right, sets))
+                for size, sets in _by_size(by_name[plantable.name]).items()
             },
             "coverage": _coverage(by_name[plantable.name], repertoire),
         }
@@ -145,31 +149,19 @@ def _by_effect(by_name: dict[str, list[SetVerdict]], repertoire: Repertoire) -> 
 
 
 def _outside(by_name: dict[str, list[SetVerdict]], repertoire: Repertoire) -> dict[str, Any]:
-    """What was said of each effect that the library does not have."""
+    """Verdicts on each planted effect that the library does not have."""
     return {
         plantable.name: {
             "size": repertoire.size(plantable),
             "unit": plantable.unit,
             "verdicts": {
-                size: dict(Counter(result.verdict for result in some))
-                for size, some in _by_size(by_name[plantable.name]).items()
+                size: dict(Counter(result.verdict for result in sets))
+                for size, sets in _by_size(by_name[plantable.name]).items()
             },
         }
         for plantable in repertoire.plantables
         if not plantable.effect and plantable.name in by_name
     }
-
-
-def _confused(
-    clean: list[SetVerdict], by_name: dict[str, list[SetVerdict]], repertoire: Repertoire
-) -> dict[str, list[SetVerdict]]:
-    """Sets of each row of the confusion matrix."""
-    rows = {
-        plantable.effect or plantable.name: _large(by_name[plantable.name])
-        for plantable in repertoire.plantables
-        if plantable.name in by_name
-    }
-    return {"none": clean, **rows}
 
 
 def _pairs(pairs: Sequence[SetVerdict], by_name: dict[str, list[SetVerdict]]) -> dict[str, Any]:
@@ -207,7 +199,7 @@ def named_wrong(result: SetVerdict) -> bool:
 
 
 def summarise_sheet(results: Sequence[SetVerdict]) -> list[dict[str, Any]]:
-    """What was said of each set, as it is written to sheet_error.json."""
+    """Verdict on each set, as it is written to sheet_error.json."""
     return [
         {
             "rig": result.planting.options,

@@ -1,4 +1,4 @@
-"""What a campaign of recordings would show, before one of them is made."""
+"""Chances that a campaign of recordings shows effects, before a recording is made."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -56,7 +56,7 @@ def predict_campaign(
     """
     with study.setup() as setup:
         clean = Planting("clean", seed, 0.0, {}, ())
-        cases = setup.recorded(clean, study.rig.simulate(seed, {}))
+        cases = setup.record(clean, study.rig.simulate(seed, {}))
         diagnosis = diagnose_set(setup.system, setup.effects, setup.everything, cases)
     decides = of_system(study.system.comparison, len(study.effects))
     known = {effect.name: effect for effect in study.effects}
@@ -74,7 +74,7 @@ def _effect_chance(
     sizes: Sequence[float],
     decides: Thresholds,
 ) -> EffectChance:
-    asked = [factor * effect.matters for factor in sizes]
+    absolute = [factor * effect.matters for factor in sizes]
     for score in diagnosis.scores:
         if score.effect.name == effect.name and dict(score.shape) == dict(planted.shapes):
             unknowns = 1 + len(score.phases) * effect.order_locked
@@ -83,7 +83,7 @@ def _effect_chance(
                 unit=planted.unit,
                 matters=effect.matters,
                 sigma=score.sigma,
-                chances=tuple((s, chance(s / score.sigma, unknowns, decides)) for s in asked),
+                chances=tuple((s, chance(s / score.sigma, unknowns, decides)) for s in absolute),
                 least=max(effect.matters, score.sigma * clear(unknowns, decides)),
             )
     return EffectChance(effect.name, planted.unit, effect.matters, None, (), None)
