@@ -17,7 +17,7 @@ from pathlib import Path
 from distributed import LocalCluster
 
 from workbench.__main__ import main as workbench
-from workbench.machines.train.stops import USUAL, Faults, draw_train, make, write_stop
+from workbench.machines.train.stops import USUAL, Faults, draw_train, simulate_stop, write_stop
 from workbench.recordings.datasets import write_cases
 
 
@@ -27,7 +27,9 @@ def write_fleet(folder: Path, trains: int, days: int) -> None:
     (dry, *_) = USUAL
     with tempfile.TemporaryDirectory() as recorded:
         for day in range(1, days + 1):
-            write_stop(make(dry, day, train, sound), day, sound, Path(recorded, f"{day:03}"))
+            write_stop(
+                simulate_stop(dry, day, train, sound), day, sound, Path(recorded, f"{day:03}")
+            )
         write_cases("train", Path(recorded), folder / "001")
     for number in range(2, trains + 1):
         shutil.copytree(folder / "001", folder / f"{number:03}")

@@ -14,7 +14,7 @@ from workbench.arrays import Matrix, Vector
 from workbench.errors import InputError
 from workbench.machines.train.planting import virtual_rig
 from workbench.machines.train.rig import points
-from workbench.machines.train.stops import Made
+from workbench.machines.train.stops import SimulatedStop
 from workbench.models.fmu import FMU
 from workbench.observers import estimators_of
 from workbench.observers.estimators.kalman import ExtendedKalmanFilter
@@ -120,7 +120,9 @@ def test_innovations_are_those_of_what_was_measured(still: System, level: FMU) -
 
 
 @pytest.mark.parametrize("name", ["ekf", "ukf", "mhe", "smoother", "imm"])
-def test_an_aid_that_is_never_there_changes_nothing(name: str, stop: tuple[Case, Made]) -> None:
+def test_an_aid_that_is_never_there_changes_nothing(
+    name: str, stop: tuple[Case, SimulatedStop]
+) -> None:
     short = stop[0].part(slice(0, 120))
     runs = [
         observe(system, case, name)
@@ -206,7 +208,9 @@ def test_what_a_recorder_lacks_of_an_aid_holds_up_nothing_else(
 # --- conditions that estimators are told ---
 
 
-def test_what_the_crew_says_is_a_model_with_those_parameters(stop: tuple[Case, Made]) -> None:
+def test_what_the_crew_says_is_a_model_with_those_parameters(
+    stop: tuple[Case, SimulatedStop],
+) -> None:
     case, _ = stop
     kind, part = ExtendedKalmanFilter, slice(0, 150)
     wet = {"muWR": 0.275, "polach.kA": 0.3, "polach.kS": 0.1, "polach.B": 0.2}
@@ -227,7 +231,7 @@ def test_what_the_crew_says_is_a_model_with_those_parameters(stop: tuple[Case, M
     assert np.abs(values[1] - values[0]).max() > 0.01
 
 
-def test_who_finds_a_condition_is_not_told(stop: tuple[Case, Made]) -> None:
+def test_who_finds_a_condition_is_not_told(stop: tuple[Case, SimulatedStop]) -> None:
     case, _ = stop
     kind, part = estimators_of(TRAIN)["imm"], slice(0, 20)
     with open_model(TRAIN) as model:
@@ -244,12 +248,12 @@ def test_who_finds_a_condition_is_not_told(stop: tuple[Case, Made]) -> None:
 
 
 @pytest.fixture(scope="module")
-def stop(tmp_path_factory: pytest.TempPathFactory) -> tuple[Case, Made]:
-    (one,) = ridden("01_120_service_dry", 1, tmp_path_factory.mktemp("stop"))
+def stop(tmp_path_factory: pytest.TempPathFactory) -> tuple[Case, SimulatedStop]:
+    (one,) = simulated("01_120_service_dry", 1, tmp_path_factory.mktemp("stop"))
     return one
 
 
-def ridden(name: str, seed: int, folder: Path) -> list[tuple[Case, Made]]:
+def simulated(name: str, seed: int, folder: Path) -> list[tuple[Case, SimulatedStop]]:
     """A stop of a virtual train, and what happened."""
     rig = virtual_rig([name], None)
     ((made, number),) = rig.simulate(seed, {})
@@ -267,7 +271,7 @@ def test_satellites_tell_the_speed_at_ten_hertz_but_not_in_tunnels(tmp_path: Pat
         (case,) = read_cases([tmp_path / str(seed)], TRAIN)
         missing = np.isnan(case["vGNSS"])
         gaps.append(np.flatnonzero(np.diff(missing.astype(int))).size if missing.any() else 0)
-        v = np.interp(case.time, made.ridden.time, made.ridden.v)
+        v = np.interp(case.time, made.result.time, made.result.v)
         errors.append((case["vGNSS"] - v)[~missing & (v > 1.0)])
     assert 0 < np.count_nonzero(gaps) < 12  # one stop in eight: 4 or more in a thousandth, 12 never
     assert max(gaps) <= 2  # one tunnel: it begins and ends
@@ -282,8 +286,8 @@ def test_satellites_tell_radii_that_axles_alone_do_not(tmp_path: Path) -> None:
     common: dict[str, list[float]] = {"with": [], "without": []}
     apart: dict[str, list[Vector]] = {"with": [], "without": []}
     for seed in range(6):
-        ((case, made),) = ridden("02_160_service_dry", seed, tmp_path / str(seed))
-        true = 0.46 + made.fixed.radius
+        ((case, made),) = simulated("02_160_service_dry", seed, tmp_path / str(seed))
+        true = 0.46 + made.tolerances.radius
         at = int(np.searchsorted(case.time, made.command))
         for label, system in (("with", TRAIN), ("without", replace(TRAIN, intermittent=()))):
             run = observe(
@@ -305,9 +309,9 @@ def test_mass_and_gradient_are_estimated_within_their_bands(tmp_path: Path) -> N
     bands: dict[str, list[float]] = {"mass": [], "gradient": []}
     for name in ("01_120_service_dry", "02_160_service_dry", "04_120_service_wet"):
         for seed in range(10, 16):
-            ((case, made),) = ridden(name, seed, tmp_path / f"{name}{seed}")
+            ((case, made),) = simulated(name, seed, tmp_path / f"{name}{seed}")
             run = observe(TRAIN, case, "ekf")
-            at = (case.time > made.command + 3.0) & (case.time < made.ridden.standstill - 4.0)
+            at = (case.time > made.command + 3.0) & (case.time < made.result.standstill - 4.0)
             for k in (1, 2):
                 apart = run.signal(f"mass[{k}]") - made.mass[k - 1] / made.weighed[k - 1]
                 within["mass"].append(covered(apart, run.deviation(f"mass[{k}]"), at))
@@ -330,9 +334,9 @@ def covered(apart: Vector, sigma: Vector, at: Vector) -> float:
     return float(np.mean(np.abs(apart[at]) < 1.96 * sigma[at]))
 
 
-def gradient_error(case: Case, made: Made) -> Vector:
+def gradient_error(case: Case, made: SimulatedStop) -> Vector:
     """True mean gradient under the train less that of its track file, (n,)."""
-    s = np.interp(case.time, made.ridden.time, made.ridden.s)
+    s = np.interp(case.time, made.result.time, made.result.s)
     true = [np.interp(s - place, points(), made.gradient) for place in (10.75, 37.15)]
     filed = [case["slope1"], case["slope2"]]
     found: Vector = np.average(true, axis=0, weights=made.mass) - np.average(

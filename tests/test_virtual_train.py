@@ -207,11 +207,11 @@ def test_force_and_adhesion_of_each_axle_are_estimated(
             read_case.name: read_case for read_case in read_cases([tmp_path / str(seed)], SYSTEM)
         }
         for made, _ in simulated:
-            case, ridden = cases[made.stop.name], made.ridden
+            case, result = cases[made.stop.name], made.result
             run = observe(SYSTEM, case, "ekf").to_frame()
-            at = (case.time > made.command + 3.0) & (case.time < ridden.standstill - 4.0)
-            row = np.searchsorted(ridden.time, case.time[at])
-            force, load = ridden.force[row], ridden.load[row]
+            at = (case.time > made.command + 3.0) & (case.time < result.standstill - 4.0)
+            row = np.searchsorted(result.time, case.time[at])
+            force, load = result.force[row], result.load[row]
             for name, unit, true in (("axleForce", "N", force), ("utilised", "1", force / load)):
                 found, sigma = (
                     np.array([run[f"{kind}{name}[{i}] [{unit}]"] for i in range(1, 9)]).T[at]

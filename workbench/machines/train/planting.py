@@ -12,7 +12,14 @@ import numpy as np
 
 from workbench.errors import InputError, unknown_name
 from workbench.machines.train.rig import AXLES, BOGIES, VEHICLES, AskedStop
-from workbench.machines.train.stops import USUAL, Faults, Made, draw_train, make, write_stop
+from workbench.machines.train.stops import (
+    USUAL,
+    Faults,
+    SimulatedStop,
+    draw_train,
+    simulate_stop,
+    write_stop,
+)
 from workbench.recordings.datasets import write_cases
 from workbench.studies.power.planting import Plantable, SheetError
 
@@ -70,14 +77,17 @@ class PlantedTrain:
             "rig": hashlib.sha256(b"".join(file.read_bytes() for file in code)).hexdigest(),
         }
 
-    def simulate(self, seed: int, gains: Mapping[str, float]) -> list[tuple[Made, int]]:
+    def simulate(self, seed: int, gains: Mapping[str, float]) -> list[tuple[SimulatedStop, int]]:
         """What happens in the stops of one train; each with the seed of its noise."""
         faults = _faults(gains)
-        fixed = draw_train(seed, faults.tolerances)
-        return [(make(stop, seed, fixed, faults), seed) for stop in self.stops]
+        tolerances = draw_train(seed, faults.tolerances)
+        return [(simulate_stop(stop, seed, tolerances, faults), seed) for stop in self.stops]
 
     def write(
-        self, simulated: Sequence[tuple[Made, int]], gains: Mapping[str, float], folder: Path
+        self,
+        simulated: Sequence[tuple[SimulatedStop, int]],
+        gains: Mapping[str, float],
+        folder: Path,
     ) -> None:
         """Write what the train's computer records, read as that of any train."""
         with tempfile.TemporaryDirectory() as recorded:

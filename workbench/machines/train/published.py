@@ -20,7 +20,7 @@ _CASE = "case.toml"
 _STEP = 0.1  # of a case [s]
 _PRESSURES = ("pB1", "pB2", "pB3", "pB4")
 _SPEEDS = tuple(f"omega{axle}" for axle in range(1, 9))
-_AID = "vGNSS"  # new at 10 Hz, then held
+_INTERMITTENT = "vGNSS"  # new at 10 Hz, then held
 _NONE: Mapping[str, str] = {}
 _MIDDLES = (10.75, 37.15)  # of the vehicles, behind the first axle [m]
 _CURVE = 0.6  # resistance over weight, times the radius [m]
@@ -43,7 +43,7 @@ def _recording(folder: Path) -> PublishedRecording:
     conditions = document.table("conditions")
     measured = folder / document.table("measurement").take("file", str)
     signals = dict.fromkeys(_PRESSURES, "Pa") | dict.fromkeys(_SPEEDS, "rad/s") | {"a": "m/s2"}
-    read = _columns(measured, {"time": "s", **signals, "s": "m"}, {_AID: "m/s"})
+    read = _columns(measured, {"time": "s", **signals, "s": "m"}, {_INTERMITTENT: "m/s"})
     steps = np.diff(read["time"])
     if not (steps.size and (steps > 0.0).all()):
         raise InputError(
@@ -53,12 +53,13 @@ def _recording(folder: Path) -> PublishedRecording:
             remedy="take the recording from the train again",
         )
     size = max(1, round(_STEP / float(np.median(steps))))
-    aid = read.pop(_AID, None)
+    intermittent = read.pop(_INTERMITTENT, None)
     means = {name: _means(values, size) for name, values in read.items()}
     columns = {"time [s]": means["time"]}
     columns |= {f"{name} [{unit}]": means[name] for name, unit in signals.items()}
-    if aid is not None:
-        columns[f"{_AID} [m/s]"] = _held(read["time"], aid, means["time"])
+    if intermittent is not None:
+        values = _interpolated(read["time"], intermittent, means["time"])
+        columns[f"{_INTERMITTENT} [m/s]"] = values
     masses = np.array([conditions.number(f"mass{k}", "kg") for k in (1, 2)])
     slopes, curves = _along(folder / document.table("track").take("file", str), means["s"])
     for k, (mass, slope) in enumerate(zip(masses, slopes, strict=True), 1):
@@ -82,11 +83,11 @@ def _recording(folder: Path) -> PublishedRecording:
 
 
 def _columns(
-    file: Path, needed: Mapping[str, str], aids: Mapping[str, str] = _NONE
+    file: Path, needed: Mapping[str, str], optional: Mapping[str, str] = _NONE
 ) -> dict[str, Vector]:
-    """Columns of a file, by name, in these units; aids may be missing, in fields or wholly."""
-    columns = read_columns(file, list(needed), list(aids), list(aids))
-    units = {name: unit for name, unit in {**needed, **aids}.items() if name in columns}
+    """Columns of a file, by name, in these units; optional ones may lack fields, or all."""
+    columns = read_columns(file, list(needed), list(optional), list(optional))
+    units = {name: unit for name, unit in {**needed, **optional}.items() if name in columns}
     where = f"{file}, line 1, column"
     return {
         name: columns[name].values * si_factor(columns[name].unit, unit, f"{where} '{name}'")
@@ -100,14 +101,14 @@ def _means(values: Vector, size: int) -> Vector:
     return means
 
 
-def _held(time: Vector, values: Vector, at: Vector) -> Vector:
+def _interpolated(time: Vector, values: Vector, at: Vector) -> Vector:
     """A signal that is new every 0.1 s and then held, (k,), in lines between its samples.
 
     A line from or to a sample that is missing is missing.
     """
     new = np.flatnonzero(np.diff(np.floor(time / _STEP + 1e-6), prepend=-1.0) > 0.0)
-    held: Vector = np.interp(at, time[new], values[new], right=np.nan)
-    return held
+    values_at: Vector = np.interp(at, time[new], values[new], right=np.nan)
+    return values_at
 
 
 def _along(file: Path, position: Vector) -> tuple[Matrix, Matrix]:

@@ -1,4 +1,4 @@
-"""Sets of stops that somebody recorded and says what is wrong in: judged as those of the rig."""
+"""Sets of recorded stops with known faults, diagnosed as those of the virtual train."""
 
 import hashlib
 import json
@@ -76,7 +76,7 @@ def recorded_sets(folders: Sequence[Path]) -> RecordedTrain:
     InputError
         If there is none in a folder, or a truth is not understood.
     """
-    every: list[Path] = []
+    all_sets: list[Path] = []
     for folder in folders:
         inner = [folder, *sorted(path for path in folder.glob("*") if path.is_dir())]
         sets = [path for path in inner if (path / _TRUTH).is_file()]
@@ -87,8 +87,8 @@ def recorded_sets(folders: Sequence[Path]) -> RecordedTrain:
                 expected="folders of stops, each with what is wrong in them",
                 remedy="name the folder that holds them",
             )
-        every += sets
-    rig = RecordedTrain(tuple(every))
+        all_sets += sets
+    rig = RecordedTrain(tuple(all_sets))
     _ = rig.groups  # a truth that is not understood is refused here
     return rig
 
@@ -97,7 +97,11 @@ def _planting(number: int, folder: Path) -> Planting:
     path, known = folder / _TRUTH, {plantable.name: plantable for plantable in PLANTABLE}
     try:
         effects = json.loads(read_text(path, "name another folder"))["effects"]
-        gains = dict(_gain(name, fault) for name, fault in effects.items())
+        gains = {}
+        for name, fault in effects.items():
+            own, unit = _KNOWN[name]
+            place = f"[{int(fault['at'])}]" if "at" in fault else ""
+            gains[own + place] = unit * float(fault["size"])
         planted = [known[name] for name in gains]
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise InputError(
@@ -112,10 +116,3 @@ def _planting(number: int, folder: Path) -> Planting:
     )
     kind, names = kinds[min(len(gains), 2)], tuple(plantable.effect for plantable in planted)
     return Planting(kind, number, multiple, gains, names)
-
-
-def _gain(name: str, fault: Mapping[str, float]) -> tuple[str, float]:
-    """Name of what can be planted, and its gain."""
-    own, unit = _KNOWN[name]
-    place = f"[{int(fault['at'])}]" if "at" in fault else ""
-    return own + place, unit * float(fault["size"])

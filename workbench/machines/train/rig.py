@@ -20,7 +20,7 @@ PLACES = np.array([0.0, 2.5, 19.0, 21.5, 26.4, 28.9, 45.4, 47.9])  # of the axle
 STEP = 2e-3  # [s]
 
 _BRAKE_RADIUS, _GRAVITY = 0.300, 9.81  # m, m/s2
-_WET, _DRIES = 0.12, 0.45e6  # friction of a wet disc, work that leaves 1/e of its water [J]
+_WET, _DRIES = 0.12, 0.45e6  # friction of a wet disc, state that leaves 1/e of its water [J]
 _GRID = 5.0  # of what differs along the rail [m]
 _LEAD = 100.0  # of the rail before the start [m]
 _END = 6000.0  # of the rail [m]
@@ -31,7 +31,7 @@ _STANDSTILL = 0.05  # [m/s]
 
 @dataclass(frozen=True)
 class AskedStop:
-    """What is asked of a stop.
+    """A stop as it is asked for.
 
     Attributes
     ----------
@@ -98,8 +98,8 @@ class Way(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Ridden:
-    """What happened in a stop, every STEP.
+class StopResult:
+    """A stop, every STEP.
 
     Attributes
     ----------
@@ -121,8 +121,8 @@ class Ridden:
     standstill: float
 
 
-class _Work(NamedTuple):
-    """What the equations remember and work with.
+class _State(NamedTuple):
+    """State of the equations.
 
     Attributes
     ----------
@@ -179,91 +179,89 @@ def _clean(mu0, s, moved, energy):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _load(train, work, slowing):  # type: ignore[no-untyped-def]
+def _load(train, state, slowing):  # type: ignore[no-untyped-def]
     """Load of one wheel of each axle, which shifts with deceleration and forces."""
-    for i in range(work.loads.size):
+    for i in range(state.loads.size):
         j, first = (i // 2) % 2, i - i % 2
         m = train.mass[i // 4]
-        both = work.force[first] + work.force[first + 1]
+        both = state.force[first] + state.force[first + 1]
         shift = slowing * m * 1.3 / 38.0 * (1 - 2 * j) + both * 0.2 * (1 - 2 * (i % 2))
-        work.loads[i] = 0.5 * (m * _GRAVITY / 4.0 * train.share[i] + shift)
+        state.loads[i] = 0.5 * (m * _GRAVITY / 4.0 * train.share[i] + shift)
 
 
 @compiled
-def _protect(train, work, v):  # type: ignore[no-untyped-def]
+def _protect(train, state, v):  # type: ignore[no-untyped-def]
     """Slide protection: vents at 12 % slip, holds as the wheel gains speed, fills below 3 %."""
-    for i in range(work.valve.size):
-        slip = 1.0 - train.radius[i] * work.omega[i] / max(v, 0.1)
+    for i in range(state.valve.size):
+        slip = 1.0 - train.radius[i] * state.omega[i] / max(v, 0.1)
         if v < 2.0 or slip < 0.03:
-            work.valve[i] = 1.0
-        elif work.valve[i] < 1.0 and work.omega[i] > work.before[i]:
-            work.valve[i] = 0.0
+            state.valve[i] = 1.0
+        elif state.valve[i] < 1.0 and state.omega[i] > state.before[i]:
+            state.valve[i] = 0.0
         elif slip > 0.12:
-            work.valve[i] = -1.0
-        work.before[i] = work.omega[i]
+            state.valve[i] = -1.0
+        state.before[i] = state.omega[i]
 
 
 @compiled
-def _press(train, work, braking):  # type: ignore[no-untyped-def]
-    """Pressure behind the relay valves, in the cylinders, and what slide protection leaves."""
-    for j in range(work.supply.size):
+def _press(train, state, braking):  # type: ignore[no-untyped-def]
+    """Pressures behind the relay valves and in the cylinders, and share that protection passes."""
+    for j in range(state.supply.size):
         target = train.target[j] if braking >= train.begin[j] else 0.0
-        work.supply[j] += STEP / 0.45 * (target - work.supply[j])
-    for i in range(work.cylinder.size):
-        before = work.supply[i // 2]
-        lag = train.lag[i // 2]
-        share = STEP / (lag + STEP)  # all of it without a lag
-        work.cylinder[i] += share * (before - work.cylinder[i])
-        if work.valve[i] > 0.0:
-            work.passed[i] += STEP / 0.45 * (1.0 - work.passed[i])
-        elif work.valve[i] < 0.0:
-            work.passed[i] -= STEP / 0.2 * work.passed[i]
+        state.supply[j] += STEP / 0.45 * (target - state.supply[j])
+    for i in range(state.cylinder.size):
+        share = STEP / (train.lag[i // 2] + STEP)  # all of it without a lag
+        state.cylinder[i] += share * (state.supply[i // 2] - state.cylinder[i])
+        if state.valve[i] > 0.0:
+            state.passed[i] += STEP / 0.45 * (1.0 - state.passed[i])
+        elif state.valve[i] < 0.0:
+            state.passed[i] -= STEP / 0.2 * state.passed[i]
 
 
 @compiled
-def _pads(train, work, i, v):  # type: ignore[no-untyped-def]
+def _pads(train, state, i, v):  # type: ignore[no-untyped-def]
     """Torque of an axle's pads, disc by disc; isolated units press none."""
-    force = 0.1086 * max(0.0, work.cylinder[i] * work.passed[i] - 25e3)
+    force = 0.1086 * max(0.0, state.cylinder[i] * state.passed[i] - 25e3)
     speed, exponent, fade, glazing = train.law[0], train.law[1], train.law[2], train.law[3]
     common = train.friction[i] * (1.0 + speed * (1.0 - v / 22.0)) * force * _BRAKE_RADIUS
     common *= (max(force, 100.0) / 35e3) ** -exponent
     torque = 0.0
     for d in range(DISCS):
-        T = work.T[i, d]
+        T = state.T[i, d]
         glazed = 1.0 - glazing / (1.0 + math.exp(-(T - 110.0) / 6.0))
         acting = min(max(train.units[i] - d, 0.0), 1.0)
         dry = common * (1.0 - fade * (T - 60.0)) * glazed
-        film = train.law[4] * math.exp(-work.rubbed[i, d] / _DRIES)
-        work.heat[i, d] = acting * (dry + film * (_WET * force * _BRAKE_RADIUS - dry))
-        torque += work.heat[i, d]
+        film = train.law[4] * math.exp(-state.rubbed[i, d] / _DRIES)
+        state.heat[i, d] = acting * (dry + film * (_WET * force * _BRAKE_RADIUS - dry))
+        torque += state.heat[i, d]
     return torque
 
 
 @compiled
-def _turn(train, way, work, i, v, s):  # type: ignore[no-untyped-def]
+def _turn(train, way, state, i, v, s):  # type: ignore[no-untyped-def]
     """One implicit step of an axle, by its own speed; sets its creep force and heats each disc."""
-    omega, r = work.omega[i], train.radius[i] + _at(way.rolling, s)
-    mu0, load, K = _at(way.mu0, s), work.loads[i], train.stiffness[i]
+    omega, r = state.omega[i], train.radius[i] + _at(way.rolling, s)
+    mu0, load, K = _at(way.mu0, s), state.loads[i], train.stiffness[i]
     w, dw = v - r * omega, 1e-4
     F = 2.0 * _creep(train.polach, mu0, K, load, w, v)
     slope = (2.0 * _creep(train.polach, mu0, K, load, w + dw, v) - F) / dw
-    braked = _pads(train, work, i, v) + 25.0 + 0.6 * omega + 0.004 * omega * omega + train.drag[i]
+    braked = _pads(train, state, i, v) + 25.0 + 0.6 * omega + 0.004 * omega * omega + train.drag[i]
     smooth = math.tanh(omega / 0.05)
     rate = r * F - braked * smooth
     stiff = r * r * slope + braked / 0.05 * (1.0 - smooth * smooth)
     change = STEP * rate / (train.inertia[i] + STEP * stiff)
-    work.omega[i] = max(omega + change, 0.0)
-    work.force[i] = F - slope * r * (work.omega[i] - omega)
+    state.omega[i] = max(omega + change, 0.0)
+    state.force[i] = F - slope * r * (state.omega[i] - omega)
     for d in range(DISCS):
-        T = work.T[i, d]
+        T = state.T[i, d]
         cooling = 1.1 * (25.0 + 8.0 * (0.65 * v) ** 0.8) * (T - 20.0)
-        work.rubbed[i, d] += STEP * work.heat[i, d] * omega
-        work.T[i, d] = T + STEP / 37.5e3 * (0.93 * work.heat[i, d] * omega - cooling)
-    return abs(work.force[i] * w) / max(v, 1.0)
+        state.rubbed[i, d] += STEP * state.heat[i, d] * omega
+        state.T[i, d] = T + STEP / 37.5e3 * (0.93 * state.heat[i, d] * omega - cooling)
+    return abs(state.force[i] * w) / max(v, 1.0)
 
 
 @compiled
-def _run(train, way, work, places, v, command, rows):  # type: ignore[no-untyped-def]
+def _simulate(train, way, state, places, v, command, rows):  # type: ignore[no-untyped-def]
     """Fill rows of t, v, s, a, speeds, forces, loads, pressures; number of the last that moves.
 
     Rows are (n, 4 + 3*8 + 4).
@@ -272,15 +270,15 @@ def _run(train, way, work, places, v, command, rows):  # type: ignore[no-untyped
     A, B, C = train.resistance[0], train.resistance[1], train.resistance[2]
     for k in range(rows.shape[0]):
         t = k * STEP
-        _press(train, work, t - command)
-        _load(train, work, slowing)
+        _press(train, state, t - command)
+        _load(train, state, slowing)
         if k % 5 == 0:
-            _protect(train, work, v)
+            _protect(train, state, v)
         total = 0.0
-        for i in range(work.omega.size):
-            energy = _turn(train, way, work, i, v, s - places[i])
+        for i in range(state.omega.size):
+            energy = _turn(train, way, state, i, v, s - places[i])
             _clean(way.mu0, s - places[i], v * STEP, 0.5 * energy)
-            total += work.force[i]
+            total += state.force[i]
         first, second = _at(way.gradient, s - 10.75), _at(way.gradient, s - 37.15)
         hill = _GRAVITY * (train.mass[0] * first + train.mass[1] * second)
         hill += _GRAVITY * m * _at(way.curve, s - 23.95)
@@ -288,13 +286,13 @@ def _run(train, way, work, places, v, command, rows):  # type: ignore[no-untyped
         slowing = -rate
         rows[k, 0], rows[k, 1], rows[k, 2] = t, v, s
         rows[k, 3] = rate + _GRAVITY * first
-        n = work.omega.size
+        n = state.omega.size
         for i in range(n):
-            rows[k, 4 + i] = work.omega[i]
-            rows[k, 4 + n + i] = work.force[i]
-            rows[k, 4 + 2 * n + i] = 2.0 * work.loads[i]
-        for j in range(work.supply.size):
-            rows[k, 4 + 3 * n + j] = work.supply[j]
+            rows[k, 4 + i] = state.omega[i]
+            rows[k, 4 + n + i] = state.force[i]
+            rows[k, 4 + 2 * n + i] = 2.0 * state.loads[i]
+        for j in range(state.supply.size):
+            rows[k, 4 + 3 * n + j] = state.supply[j]
         s += STEP * (v + 0.5 * STEP * rate)
         v += STEP * rate
         if v < _STANDSTILL:
@@ -307,10 +305,10 @@ def points() -> Vector:
     return np.arange(-_LEAD, _END, _GRID)
 
 
-def ride(
+def simulate(
     train: Train, way: Way, stop: AskedStop, speed: float, command: float, T: Matrix
-) -> Ridden:
-    """Let a train stop.
+) -> StopResult:
+    """Simulate a stop.
 
     Parameters
     ----------
@@ -325,21 +323,20 @@ def ride(
         If the train does not stand after 150 s.
     """
     rows = np.zeros((round(_LONGEST / STEP), 4 + 3 * AXLES + BOGIES))
-    none = np.zeros(AXLES)
-    work = _Work(
-        speed / train.radius,
-        none.copy(),
-        T.copy(),
-        np.zeros((AXLES, DISCS)),
-        np.zeros((AXLES, DISCS)),
-        np.zeros(BOGIES),
-        none.copy(),
-        np.ones(AXLES),
-        np.ones(AXLES),
-        none.copy(),
-        none.copy(),
+    state = _State(
+        omega=speed / train.radius,
+        before=np.zeros(AXLES),
+        T=T.copy(),
+        heat=np.zeros((AXLES, DISCS)),
+        rubbed=np.zeros((AXLES, DISCS)),
+        supply=np.zeros(BOGIES),
+        cylinder=np.zeros(AXLES),
+        passed=np.ones(AXLES),
+        valve=np.ones(AXLES),
+        force=np.zeros(AXLES),
+        loads=np.zeros(AXLES),
     )
-    last = _run(train, way, work, PLACES, speed, command, rows)
+    last = _simulate(train, way, state, PLACES, speed, command, rows)
     if last < 0:
         raise InputError(
             where=stop.name,
@@ -353,4 +350,14 @@ def ride(
     rest[:, 2], rest[:, 28:] = rows[last, 2], rows[last, 28:]
     t, v, s, a = rows[:end, :4].T
     omega, force, load, pressure = np.split(rows[:end, 4:], (8, 16, 24), axis=1)
-    return Ridden(t, v, s, a, omega, pressure, force, load, float(rows[last, 0]))
+    return StopResult(
+        time=t,
+        v=v,
+        s=s,
+        a=a,
+        omega=omega,
+        pressure=pressure,
+        force=force,
+        load=load,
+        standstill=float(rows[last, 0]),
+    )

@@ -1,6 +1,7 @@
-"""Stops of the virtual rig: what is drawn of a train and of a stop, and what is recorded."""
+"""Stops of the virtual train: tolerances that are drawn, and the files of its computer."""
 
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -13,11 +14,11 @@ from workbench.machines.train.rig import (
     STEP,
     VEHICLES,
     AskedStop,
-    Ridden,
+    StopResult,
     Train,
     Way,
     points,
-    ride,
+    simulate,
 )
 from workbench.runtime.files import write_whole
 
@@ -28,6 +29,8 @@ _PERIOD = 0.02  # of the computer's samples [s]
 _SATELLITES = 5  # samples until their speed is new
 _TUNNELS, _TUNNEL = 1 / 8, (200.0, 800.0)  # share of stops with one, and how long it is [m]
 
+_no_axles, _no_bogies, _no_vehicles = (partial(np.zeros, n) for n in (AXLES, BOGIES, VEHICLES))
+
 USUAL = (
     AskedStop("01_120_service_dry", 120 / 3.6, 2.7e5, "dry"),
     AskedStop("02_160_service_dry", 160 / 3.6, 2.7e5, "dry"),
@@ -36,21 +39,9 @@ USUAL = (
 )
 
 
-def _axles() -> Vector:
-    return np.zeros(AXLES)
-
-
-def _bogies() -> Vector:
-    return np.zeros(BOGIES)
-
-
-def _vehicles() -> Vector:
-    return np.zeros(VEHICLES)
-
-
 @dataclass(frozen=True)
 class Faults:
-    """What a train has that its sheet does not say, SI.
+    """Faults of a train, SI.
 
     Attributes
     ----------
@@ -68,14 +59,14 @@ class Faults:
     noise, tolerances : of all sensors and draws, relative to the sheet's, less one.
     """
 
-    pads: Vector = field(default_factory=_axles)
-    units: Vector = field(default_factory=_axles)
-    drag: Vector = field(default_factory=_axles)
-    radius: Vector = field(default_factory=_axles)
-    late: Vector = field(default_factory=_axles)
-    lag: Vector = field(default_factory=_bogies)
-    reading: Vector = field(default_factory=_bogies)
-    mass: Vector = field(default_factory=_vehicles)
+    pads: Vector = field(default_factory=_no_axles)
+    units: Vector = field(default_factory=_no_axles)
+    drag: Vector = field(default_factory=_no_axles)
+    radius: Vector = field(default_factory=_no_axles)
+    late: Vector = field(default_factory=_no_axles)
+    lag: Vector = field(default_factory=_no_bogies)
+    reading: Vector = field(default_factory=_no_bogies)
+    mass: Vector = field(default_factory=_no_vehicles)
     gradient: float = 0.0
     glazing: float = 0.0
     water: float = 0.0
@@ -84,8 +75,8 @@ class Faults:
 
 
 @dataclass(frozen=True, eq=False)
-class Fixed:
-    """What differs from train to train, relative where no unit stands.
+class TrainTolerances:
+    """How a train differs from its sheet, relative where no unit stands.
 
     Attributes
     ----------
@@ -116,32 +107,32 @@ class Fixed:
 
 
 @dataclass(frozen=True, eq=False)
-class Made:
-    """A stop that was made.
+class SimulatedStop:
+    """A stop of the virtual train.
 
     Attributes
     ----------
-    command : when the brake was told [s].
+    command : when the brake was commanded [s].
     mass, weighed : (2,) of the vehicles, true and as reported [kg].
     track : (k, 3) rows of the file: position [m], gradient [permille], radius [m].
     gradient : (w,) true one, at the `points` of the way [1].
-    fixed : of the train.
+    tolerances : of the train.
     """
 
     stop: AskedStop
-    ridden: Ridden
+    result: StopResult
     command: float
     mass: Vector
     weighed: Vector
     track: Matrix
     gradient: Vector
-    fixed: Fixed
+    tolerances: TrainTolerances
 
 
-def draw_train(seed: int, tolerances: float) -> Fixed:
+def draw_train(seed: int, tolerances: float) -> TrainTolerances:
     """A train within the tolerances of its sheet, one sigma each where they are not limits."""
     rng, t = np.random.default_rng([seed, 0]), 1.0 + tolerances
-    return Fixed(
+    return TrainTolerances(
         radius=t * rng.uniform(-4e-4, 4e-4, AXLES),
         pads=t * rng.normal(0.0, 0.02, AXLES),
         stiffness=t * rng.normal(0.0, 0.02, AXLES),
@@ -160,7 +151,9 @@ def draw_train(seed: int, tolerances: float) -> Fixed:
     )
 
 
-def make(stop: AskedStop, seed: int, fixed: Fixed, faults: Faults) -> Made:
+def simulate_stop(
+    stop: AskedStop, seed: int, tolerances: TrainTolerances, faults: Faults
+) -> SimulatedStop:
     """Make one stop.
 
     Parameters
@@ -169,7 +162,9 @@ def make(stop: AskedStop, seed: int, fixed: Fixed, faults: Faults) -> Made:
     """
     rng, t = np.random.default_rng([seed, stop.number, 1]), 1.0 + faults.tolerances
     mass = 44e3 + rng.uniform(0.0, 12e3, 2)
-    weighed = mass * (1.0 + fixed.weighed + t * rng.normal(0.0, 0.013, 2)) / (1.0 + faults.mass)
+    weighed = (
+        mass * (1.0 + tolerances.weighed + t * rng.normal(0.0, 0.013, 2)) / (1.0 + faults.mass)
+    )
     track, gradient, curve = _line(rng, t)
     track[:, 1] -= 1e3 * faults.gradient
     mu0 = 0.40 * (1.0 + t * rng.normal(0.0, 0.02)) if stop.rail == "dry" else rng.uniform(0.25, 0.3)
@@ -180,32 +175,34 @@ def make(stop: AskedStop, seed: int, fixed: Fixed, faults: Faults) -> Made:
     level = 0.30 * (1.0 + t * rng.normal(0.0, 0.02)) * (1.0 + t * rng.normal(0.0, 0.007, AXLES))
     command = round(float(rng.uniform(20.0, 30.0)), 1)
     train = Train(
-        friction=level * (1.0 + fixed.pads) * (1.0 - faults.pads),
+        friction=level * (1.0 + tolerances.pads) * (1.0 - faults.pads),
         units=DISCS - faults.units,
         drag=faults.drag,
-        radius=_RADIUS + fixed.radius + faults.radius,
-        stiffness=12.4e6 * (1.0 + fixed.stiffness),
-        share=1.0 + fixed.share,
-        inertia=110.0 * (1.0 + fixed.inertia),
+        radius=_RADIUS + tolerances.radius + faults.radius,
+        stiffness=12.4e6 * (1.0 + tolerances.stiffness),
+        share=1.0 + tolerances.share,
+        inertia=110.0 * (1.0 + tolerances.inertia),
         target=(25e3 + (stop.pressure - 25e3) * np.repeat(weighed, 2) / 56e3)
-        * (1.0 + fixed.regulation),
+        * (1.0 + tolerances.regulation),
         begin=np.array([0.2, 0.2, 0.3, 0.3]),
         lag=faults.lag,
         mass=mass,
-        resistance=np.array([1100.0 * (1.0 + fixed.A) * wind, 12.0, 5.5 * (1.0 + fixed.C) * wind]),
-        law=np.array([*_law(fixed), faults.glazing, faults.water]),
+        resistance=np.array(
+            [1100.0 * (1.0 + tolerances.A) * wind, 12.0, 5.5 * (1.0 + tolerances.C) * wind]
+        ),
+        law=np.array([*_law(tolerances), faults.glazing, faults.water]),
         polach=np.array(_POLACH[stop.rail]),
     )
     at_command = stop.speed * (1.0 + t * rng.normal(0.0, 0.01))
     slowing = (1100.0 + 5.5 * at_command**2 + 1500.0 + faults.drag.sum() / _RADIUS) / mass.sum()
     temperature = 50.0 + t * rng.normal(0.0, 8.0, (AXLES, DISCS))
-    ridden = ride(train, way, stop, at_command + slowing * command, command, temperature)
-    return Made(stop, ridden, command, mass, weighed, track, gradient, fixed)
+    result = simulate(train, way, stop, at_command + slowing * command, command, temperature)
+    return SimulatedStop(stop, result, command, mass, weighed, track, gradient, tolerances)
 
 
-def _law(fixed: Fixed) -> tuple[float, float, float]:
+def _law(tolerances: TrainTolerances) -> tuple[float, float, float]:
     """Speed law, exponent and fade of the pads."""
-    return 0.20 + fixed.speed_law, 0.02 + fixed.exponent, 3e-4 * (1.0 + fixed.fade)
+    return 0.20 + tolerances.speed_law, 0.02 + tolerances.exponent, 3e-4 * (1.0 + tolerances.fade)
 
 
 def _walk(rng: np.random.Generator, length: float) -> Vector:
@@ -234,25 +231,28 @@ def _line(rng: np.random.Generator, t: float) -> tuple[Matrix, Vector, Vector]:
     return np.column_stack([shown, wrong, radius]), true, curve
 
 
-def write_stop(made: Made, seed: int, faults: Faults, folder: Path) -> None:
+def write_stop(made: SimulatedStop, seed: int, faults: Faults, folder: Path) -> None:
     """Write what the train's computer records, and the file of the track, into a new folder."""
     rng, stop, n = np.random.default_rng([seed, made.stop.number, 2]), made.stop, 1.0 + faults.noise
-    ridden, fixed = made.ridden, made.fixed
-    time = np.arange(0.0, ridden.time[-1], _PERIOD)
+    result, tolerances = made.result, made.tolerances
+    time = np.arange(0.0, result.time[-1], _PERIOD)
     columns: dict[str, Vector] = {"time [s]": time}
     for j in range(BOGIES):
-        pressure = np.interp(time, ridden.time, ridden.pressure[:, j]) * (1.0 + faults.reading[j])
-        read = pressure + fixed.zero[j] + n * 500.0 * rng.standard_normal(time.size)
+        pressure = np.interp(time, result.time, result.pressure[:, j]) * (1.0 + faults.reading[j])
+        read = pressure + tolerances.zero[j] + n * 500.0 * rng.standard_normal(time.size)
         columns[f"pB{j + 1} [bar]"] = 0.0024 * np.round(1e-5 * read / 0.0024)
     speeds = np.empty((AXLES, time.size))
     for i in range(AXLES):
-        true = np.interp(time - faults.late[i], ridden.time, ridden.omega[:, i])
+        true = np.interp(time - faults.late[i], result.time, result.omega[:, i])
         deviation = n * (0.002 + 3e-4 * true) * rng.standard_normal(time.size)
         speeds[i] = np.where(true < 0.5, 0.0, true + deviation)
         columns[f"omega{i + 1} [rad/s]"] = speeds[i]
-    felt = np.interp(time, ridden.time, _filtered(ridden.a)) * (1.0 + fixed.gain) + fixed.bias
+    felt = (
+        np.interp(time, result.time, _filtered(result.a)) * (1.0 + tolerances.gain)
+        + tolerances.bias
+    )
     columns["a [m/s2]"] = felt + n * 0.02 * rng.standard_normal(time.size)
-    columns["vGNSS [km/h]"] = _satellites(ridden, time, seed, stop.number, n)
+    columns["vGNSS [km/h]"] = _satellites(result, time, seed, stop.number, n)
     rolled = _PERIOD * np.cumsum(_RADIUS * np.median(speeds, axis=0))
     columns["s [m]"] = _START + rng.normal(0.0, 5.0) + rolled
     write_whole(folder / "measured.csv", _table(columns, "%.6g"))
@@ -262,12 +262,12 @@ def write_stop(made: Made, seed: int, faults: Faults, folder: Path) -> None:
     write_whole(folder / "case.toml", _case(stop, made))
 
 
-def _satellites(ridden: Ridden, time: Vector, seed: int, number: int, n: float) -> Vector:
+def _satellites(result: StopResult, time: Vector, seed: int, number: int, n: float) -> Vector:
     """Speed by satellites [km/h], (n,): new at 10 Hz, then held, NaN in a tunnel."""
     rng, new = np.random.default_rng([seed, number, 3]), time[::_SATELLITES]
-    v, s = (np.interp(new, ridden.time, values) for values in (ridden.v, ridden.s))
+    v, s = (np.interp(new, result.time, values) for values in (result.v, result.s))
     read = np.abs(np.round(3.6 * v + n * 0.06 * rng.standard_normal(new.size), 2))
-    begins, length = rng.uniform(-_TUNNEL[1], ridden.s[-1]), rng.uniform(*_TUNNEL)
+    begins, length = rng.uniform(-_TUNNEL[1], result.s[-1]), rng.uniform(*_TUNNEL)
     if rng.random() < _TUNNELS:
         read[(s > begins) & (s < begins + length)] = np.nan
     held: Vector = np.repeat(read, _SATELLITES)[: time.size]
@@ -289,7 +289,7 @@ def _table(columns: dict[str, Vector], form: str) -> str:
     return "\n".join([",".join(columns), *lines]) + "\n"
 
 
-def _case(stop: AskedStop, made: Made) -> str:
+def _case(stop: AskedStop, made: SimulatedStop) -> str:
     brake = "emergency" if stop.pressure > 3e5 else "service"
     return f"""\
 title = "{stop.speed * 3.6:.0f} km/h, {brake} brake, rail {stop.rail}"
