@@ -28,7 +28,7 @@ def run_confined() -> int:
     """Run a command line that may write to some folders only, which stand before it, as JSON."""
 
     def work() -> int:
-        folders = [Path(one) for one in json.loads(sys.argv[1])]
+        folders = [Path(folder) for folder in json.loads(sys.argv[1])]
         for folder in folders:
             folder.mkdir(parents=True, exist_ok=True)
         # Before anything starts a thread, which would stay as free as it was.
@@ -60,10 +60,10 @@ def main(arguments: Sequence[str] | None = None, *, confined: bool = False) -> i
         module = import_module(options.module)
         if getattr(options, "workers", 1) > 1:
             preload(*getattr(module, "WORKERS_NEED", ()))  # workers import while this process does
-        done = module.run(options, output)
-        if printing and done.page is not None:
-            output.result(f"printed: {print_page(done.page)}")
-        return output.close(command, done)
+        result = module.run(options, output)
+        if printing and result.page is not None:
+            output.result(f"printed: {print_page(result.page)}")
+        return output.close(command, result)
     except InputError as error:
         return output.fail(command, 2, error)
     except (FMUError, WorkerError, OSError) as error:

@@ -9,7 +9,13 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from workbench.cli.arguments import Commands, add_isolated, add_out, add_system, add_told
+from workbench.cli.arguments import (
+    Commands,
+    add_isolated,
+    add_out,
+    add_recording_options,
+    add_system,
+)
 from workbench.cli.extras import require_compiler
 from workbench.cli.output import CommandResult, Output
 from workbench.runtime.files import locked_folder, write_json
@@ -45,7 +51,7 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         metavar="CASE",
         help="recordings that observers and tuning are timed on (default: those of the system)",
     )
-    add_told(bench)
+    add_recording_options(bench)
     add_isolated(bench)
     return bench
 

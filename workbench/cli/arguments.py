@@ -118,7 +118,7 @@ def add_recordings(parser: argparse.ArgumentParser, out: str) -> None:
         help="case folder, folder of case folders, or a recorder's file whose channels have the "
         "system's names or were confirmed by 'workbench import' (default: those of the system)",
     )
-    add_told(parser)
+    add_recording_options(parser)
     add_out(parser, out)
 
 
@@ -176,8 +176,8 @@ def add_reference(parser: argparse.ArgumentParser, purpose: str) -> None:
     )
 
 
-def add_told(parser: argparse.ArgumentParser) -> None:
-    """Add what may be said of recordings without a case.toml, which `told` reads."""
+def add_recording_options(parser: argparse.ArgumentParser) -> None:
+    """Add options of recordings without a case.toml, which `recording_options` reads."""
     parser.add_argument(
         "--condition",
         action="append",

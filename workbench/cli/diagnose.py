@@ -83,7 +83,9 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
     return parser
 
 
-def _parted(cases: Sequence[Case], patterns: Sequence[str]) -> tuple[list[Case], list[Case]]:
+def _split_held_out(
+    cases: Sequence[Case], patterns: Sequence[str]
+) -> tuple[list[Case], list[Case]]:
     """Recordings that are fitted, and those that are held out."""
     names = [case.name for case in cases]
     for pattern in patterns:
@@ -95,10 +97,12 @@ def _parted(cases: Sequence[Case], patterns: Sequence[str]) -> tuple[list[Case],
                 found="no recording of this name",
                 expected=f"some of {', '.join(names)}",
             )
-    held_out = [
-        case for case in cases if any(fnmatchcase(case.name, pattern) for pattern in patterns)
-    ]
-    return [case for case in cases if case not in held_out], held_out
+    fitted: list[Case] = []
+    held_out: list[Case] = []
+    for case in cases:
+        out = any(fnmatchcase(case.name, pattern) for pattern in patterns)
+        (held_out if out else fitted).append(case)
+    return fitted, held_out
 
 
 def run(options: argparse.Namespace, output: Output) -> CommandResult:
@@ -123,7 +127,7 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
             {"effects": [{"name": effect.name, "text": effect.text} for effect in effects]}
         )
     require_compiler()
-    cases, held_out = _parted(given_cases(options, system), options.held_out)
+    cases, held_out = _split_held_out(given_cases(options, system), options.held_out)
     with locked_folder(options.out):
         return _run(options, output, Problem(system, cases, library, effects, held_out))
 

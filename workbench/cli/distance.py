@@ -51,15 +51,6 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         help="what the stop is asked for, or a condition, by the names of the system file; the "
         "rest is usual; may be repeated",
     )
-    _add_counts(parser)
-    add_model(parser)
-    add_seed(parser, "all that is drawn")
-    add_run(parser)
-    return parser
-
-
-def _add_counts(parser: argparse.ArgumentParser) -> None:
-    """How many stops are drawn, for what."""
     parser.add_argument(
         "--safety",
         type=count,
@@ -82,6 +73,10 @@ def _add_counts(parser: argparse.ArgumentParser) -> None:
         help="check the safety level by so many stops, each drawn by itself; 1e5 take minutes, 1e7 "
         "hours, and Ctrl-C keeps those that are drawn (default: %(default)s)",
     )
+    add_model(parser)
+    add_seed(parser, "all that is drawn")
+    add_run(parser)
+    return parser
 
 
 def run(options: argparse.Namespace, output: Output) -> CommandResult:
@@ -97,12 +92,12 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
     system = load_system(options.system)
     if options.fmu is not None:
         system = with_model(system, OBSERVER, options.fmu)
-    said = dict(_said(entry) for entry in options.ask)
+    asked = dict(map(_read_quantity, options.ask))
     cases = given_cases(options, system)
     effort = Effort(options.samples, options.safety, options.seed, options.plain)
     with locked_folder(options.out):
         engine = Engine(options.workers, output.stage)
-        predicted = distance_of_stop(system, cases, said, effort, engine)
+        prediction = distance_of_stop(system, cases, asked, effort, engine)
         provenance = {
             "run": run_of("distance", system, sources(cases)),
             **software(["numpy", "scipy"]),
@@ -110,16 +105,16 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
             "models": models(system, [OBSERVER]),
             "seed": options.seed,
         }
-        page = write_distance(predicted, provenance, options.out)
+        page = write_distance(prediction, provenance, options.out)
     output.stage("done")
-    output.result(predicted.summary())
+    output.result(prediction.summary())
     output.result(f"to read: {page}, data and figure beside it")
     result = read_result(options.out / "distance.json")
-    return CommandResult(result, _UNITS, 130 if predicted.interrupted else 0, page)
+    return CommandResult(result, _UNITS, 130 if prediction.interrupted else 0, page)
 
 
-def _said(text: str) -> tuple[str, str | float]:
-    """What is asked for, NAME=VALUE; a plain number where there is no unit."""
+def _read_quantity(text: str) -> tuple[str, str | float]:
+    """Read NAME=VALUE of a stop that is asked for; a plain number where there is no unit."""
     name, equals, value = (part.strip() for part in text.partition("="))
     if not equals:
         raise InputError(

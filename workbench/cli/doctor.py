@@ -7,11 +7,11 @@ import os
 import platform
 import sys
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 from workbench.cli.arguments import Commands, nearby
 from workbench.cli.extras import PURPOSES, missing_packages
@@ -47,7 +47,7 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
 
 @dataclass(frozen=True)
 class Inspection:
-    """One thing that was looked at.
+    """State of one part of the installation.
 
     Attributes
     ----------
@@ -62,9 +62,9 @@ class Inspection:
 
 
 def run(options: argparse.Namespace, output: Output) -> CommandResult:
-    """Look at everything."""
+    """Inspect the installation."""
     findings = []
-    for finding in _findings():
+    for finding in _inspect():
         findings.append(finding)
         output.result(f"{finding.state:<8} {finding.name:<20} {finding.found}")
         if finding.remedy:
@@ -75,7 +75,7 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
     )
 
 
-def _findings() -> Iterator[Inspection]:
+def _inspect() -> Iterator[Inspection]:
     where = "a wheel" if CHECKOUT is None else f"the checkout {CHECKOUT}"
     yield Inspection("workbench", "ok", f"{version('wheelset-workbench')} from {where}")
     yield Inspection("Python", "ok", f"{platform.python_version()}, {sys.executable}")
@@ -95,50 +95,36 @@ def _findings() -> Iterator[Inspection]:
             f"for {purpose}" + (f"; without {', '.join(lacking)}" if lacking else ""),
             installing(extra) if lacking else "",
         )
-    yield from _manifest(json.loads((fmus() / "manifest.json").read_text(encoding="utf-8")))
-    if not missing_packages("compiler"):
-        yield _sources()
-        yield _compiled()
-    yield _kept()
-
-
-def _manifest(manifest: Mapping[str, Any]) -> Iterator[Inspection]:
-    """Whether the FMUs are those that were built."""
+    path = fmus() / "manifest.json"
+    manifest = json.loads(path.read_text(encoding="utf-8"))
+    again = "install the wheel again" if CHECKOUT is None else "make fmus"
     for name, listed in manifest["fmus"].items():
-        path = fmus() / name
-        state = "as in the manifest"
-        if not path.is_file():
-            state = "no such file"
-        elif hashlib.sha256(path.read_bytes()).hexdigest() != listed["sha256"]:
-            state = f"its SHA-256 is not that of {nearby(fmus() / 'manifest.json')}"
-        sound = state.startswith("as")
-        yield Inspection(
-            f"fmus/{name}", "ok" if sound else "wrong", state, "" if sound else _anew()
-        )
+        fmu = fmus() / name
+        if not fmu.is_file():
+            yield Inspection(f"fmus/{name}", "wrong", "no such file", again)
+        elif hashlib.sha256(fmu.read_bytes()).hexdigest() != listed["sha256"]:
+            state = f"its SHA-256 is not that of {nearby(path)}"
+            yield Inspection(f"fmus/{name}", "wrong", state, again)
+        else:
+            yield Inspection(f"fmus/{name}", "ok", "as in the manifest")
+    if not missing_packages("compiler"):
+        from workbench.models.compiler import source_hash  # an extra
+
+        if manifest["source_sha256"] == source_hash(*built_models()):
+            yield Inspection("Modelica sources", "ok", "those that the FMUs were built from")
+        else:
+            yield Inspection("Modelica sources", "wrong", "not those of the FMUs", again)
+        yield _inspect_compiler()
+    yield _inspect_cache()
 
 
-def _anew() -> str:
-    """How FMUs are had again."""
-    return "install the wheel again" if CHECKOUT is None else "make fmus"
-
-
-def _sources() -> Inspection:
-    """Whether the Modelica sources are those that the FMUs were built from."""
-    from workbench.models.compiler import source_hash  # an extra
-
-    manifest = json.loads((fmus() / "manifest.json").read_text(encoding="utf-8"))
-    same = manifest["source_sha256"] == source_hash(*built_models())
-    state = "those that the FMUs were built from" if same else "not those of the FMUs"
-    return Inspection("Modelica sources", "ok" if same else "wrong", state, "" if same else _anew())
-
-
-def _compiled() -> Inspection:
-    """Whether a model can be compiled here, and runs."""
+def _inspect_compiler() -> Inspection:
+    """Compile a model and run it."""
     from workbench.models.compiler import build, native  # an extra
     from workbench.models.fmu import FMU
 
-    with tempfile.TemporaryDirectory() as scratch:
-        package, path = Path(scratch) / "package.mo", Path(scratch) / "Decay.fmu"
+    with tempfile.TemporaryDirectory() as folder:
+        package, path = Path(folder) / "package.mo", Path(folder) / "Decay.fmu"
         package.write_text(_MODEL, encoding="utf-8")
         try:
             build(package, "Small.Decay", path, platforms=[native()])
@@ -150,8 +136,8 @@ def _compiled() -> Inspection:
     return Inspection("compiler", "ok", state)
 
 
-def _kept() -> Inspection:
-    """Whether what is compiled can be kept between runs; without that, commands begin slowly."""
+def _inspect_cache() -> Inspection:
+    """Whether compiled code can be kept between runs; without a cache commands begin slowly."""
     from workbench.models.fmu_cache import cache_folder
 
     folder = cache_folder()

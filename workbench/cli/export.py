@@ -91,13 +91,13 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
     reference: Path | None = options.reference
     if reference is None and REFERENCE in system.models:
         reference = model_path(system, REFERENCE)
-    with locked_folder(options.out), tempfile.TemporaryDirectory() as scratch, ExitStack() as stack:
+    with locked_folder(options.out), tempfile.TemporaryDirectory() as folder, ExitStack() as stack:
         platforms = tuple(PLATFORMS) if options.platforms == "all" else (native(),)
         model, make = _maker(stack, system, chosen, platforms)
         name = model.rpartition(".")[2]
 
         def build(fmi: int) -> BuiltFMU:
-            path = Path(scratch) / f"fmi{fmi}" / f"{name}.fmu"
+            path = Path(folder) / f"fmi{fmi}" / f"{name}.fmu"
             return make(path, fmi, lambda done: output.stage(f"{name}, FMI {fmi}.0: {done}"))
 
         built = build(options.fmi)
@@ -105,7 +105,7 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
         files = [built.path]
         if reference is not None:
             packed = built if built.fmi == 2 else build(2)
-            ssp = Path(scratch) / f"{name}.ssp"
+            ssp = Path(folder) / f"{name}.ssp"
             write_package(system, packed.path, reference, ssp)
             files.append(ssp)
             summary["package"] = {
@@ -127,31 +127,31 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
 class _Choice:
     """An estimator with its gains, the text of their file, and where they are from."""
 
-    kind: type[Estimator]
+    estimator: type[Estimator]
     gains: Gains
     text: str
     source: str
 
 
-def _choose(system: System, asked: str | None, path: Path | None) -> _Choice:
-    """The estimator that is asked for, that of the gains, or the first that has a class."""
+def _choose(system: System, name: str | None, path: Path | None) -> _Choice:
+    """The estimator that is named, that of the gains, or the first that has a class."""
     from workbench.observers import choose, estimators_of
     from workbench.observers.estimators.kalman import ExtendedKalmanFilter
     from workbench.observers.gains_file import estimator_of, format_gains, read_gains, tuned_file
     from workbench.system.registry import open_model
 
     known = estimators_of(system)
-    if asked is None:
+    if name is None:
         usual = next(iter(system.export.classes), ExtendedKalmanFilter.name)
-        asked = usual if path is None else estimator_of(path, known)
-    estimator = choose(system, [asked])[asked]
-    name = estimator.tuned_as or estimator.name
+        name = usual if path is None else estimator_of(path, known)
+    estimator = choose(system, [name])[name]
+    tuned = estimator.tuned_as or estimator.name
     with open_model(system, estimator.role) as fmu:
         gains = estimator.default_gains(fmu, system)
-    path = path or tuned_file(system, name)
+    path = path or tuned_file(system, tuned)
     if path is None:
         return _Choice(estimator, gains, format_gains(gains, estimator.meaning, {}), gains.source)
-    gains = read_gains(path, {name: gains})
+    gains = read_gains(path, {tuned: gains})
     return _Choice(estimator, gains, path.read_text(encoding="utf-8"), path.name)
 
 
@@ -162,7 +162,7 @@ def _maker(
     from workbench.observers.export import EstimatorLaw, ObserverModel, build_law, build_observer
     from workbench.system.registry import open_model
 
-    estimator, gains = chosen.kind, chosen.gains
+    estimator, gains = chosen.estimator, chosen.gains
     if estimator.name in system.export.classes:
         observer = ObserverModel(system, estimator, gains, chosen.text)
         return observer.model, partial(build_observer, observer, platforms=platforms)
@@ -176,7 +176,7 @@ def _summary(system: System, chosen: _Choice, built: BuiltFMU) -> dict[str, Any]
 
     gains = chosen.gains
     return {
-        "estimator": chosen.kind.name,
+        "estimator": chosen.estimator.name,
         "gains": dict(zip(gains.names, gains.values.tolist(), strict=True)),
         **{name: values.tolist() for name, values in gains.design.items()},
         "fmu": _identity(built),

@@ -9,6 +9,8 @@ from workbench.errors import InputError
 from workbench.runtime import resources
 from workbench.runtime.resources import installing
 
+_PACKAGE = "wheelset-workbench"
+
 PURPOSES = {
     "compiler": "Modelica to FMU: diagnose, power, export, bench, systems without a built FMU",
     "files": "import of Excel, MDF, TDMS, MAT 7.3, Parquet",
@@ -44,12 +46,8 @@ def _requirements(extra: str) -> list[str]:
         project = tomllib.loads(text)["project"]
         listed = project["optional-dependencies"][extra] if extra else project["dependencies"]
         return list(map(str, listed))
-    own = []
-    for requirement in requires("wheelset-workbench") or ():
-        asked = re.search(r"extra == ['\"](.*?)['\"]", requirement)
-        if (asked[1] if asked else "") == extra:
-            own.append(requirement)
-    return own
+    matches = {r: re.search(r"extra == ['\"](.*?)['\"]", r) for r in requires(_PACKAGE) or ()}
+    return [r for r, match in matches.items() if (match[1] if match else "") == extra]
 
 
 def require_compiler() -> None:

@@ -163,22 +163,22 @@ def _build(options: argparse.Namespace, output: Output) -> CommandResult:
         output.result("\n".join(differences) or f"{nearby(fmus())} matches its sources")
         return CommandResult({"differences": differences}, status=1 if differences else 0)
     if options.all:
-        _require_checkout()
-        all_built = compiler.build_all(built_models(), nearby(fmus()))
-        return CommandResult(
-            {"fmus": [_built(output, built.path, built.sha256) for built in all_built]}
-        )
-    _require_model(options)
-    out = options.out or Path(f"{options.model.rsplit('.', 1)[-1]}.fmu")
-    require_writable(out)
-    built = compiler.build(options.package, options.model, out, fmi=options.fmi)
-    return CommandResult({"fmus": [_built(output, built.path, built.sha256)]})
-
-
-def _built(output: Output, path: Path, sha256: str) -> dict[str, str]:
-    """What is told of an FMU that was built."""
-    output.result(f"{path}  {sha256}")
-    return {"file": str(path), "sha256": sha256}
+        if CHECKOUT is None:
+            raise InputError(
+                where="--all",
+                found="a package that was installed from a wheel",
+                expected="a checkout of the sources, whose fmus/ it writes",
+                remedy="compare them with --all --check, or build one model with --out",
+            )
+        built = compiler.build_all(built_models(), nearby(fmus()))
+    else:
+        _require_model(options)
+        out = options.out or Path(f"{options.model.rsplit('.', 1)[-1]}.fmu")
+        require_writable(out)
+        built = [compiler.build(options.package, options.model, out, fmi=options.fmi)]
+    for fmu in built:
+        output.result(f"{fmu.path}  {fmu.sha256}")
+    return CommandResult({"fmus": [{"file": str(f.path), "sha256": f.sha256} for f in built]})
 
 
 def _build_with_omc(options: argparse.Namespace, output: Output) -> CommandResult:
@@ -200,16 +200,6 @@ def _build_with_omc(options: argparse.Namespace, output: Output) -> CommandResul
             output.result(str(path))
             written.append({"file": path})
     return CommandResult({"fmus": written})
-
-
-def _require_checkout() -> None:
-    if CHECKOUT is None:
-        raise InputError(
-            where="--all",
-            found="a package that was installed from a wheel",
-            expected="a checkout of the sources, whose fmus/ it writes",
-            remedy="compare them with --all --check, or build one model with --out",
-        )
 
 
 def _require_model(options: argparse.Namespace) -> None:
@@ -240,10 +230,13 @@ def _check(options: argparse.Namespace, output: Output) -> CommandResult:
     if options.limit is not None:
         limits = replace(limits, processor=options.limit, answer=max(limits.answer, options.limit))
     output.result(f"{'check':<38} {'result':<7} {'value':>9} {'limit':>9}  unit")
-    show = partial(_show_finding, output)
-    findings = check(
-        options.fmu, options.instantiations, limits, partial(_show_begin, output), show
-    )
+
+    def begin(name: str) -> None:
+        if sys.stderr.isatty() and not output.quiet:  # overwritten by the result
+            print(f"{name} ...", end="\r", file=sys.stderr, flush=True)
+
+    show = partial(_show_result, output)
+    findings = check(options.fmu, options.instantiations, limits, begin, show)
     unknown = any(finding.unknown for finding in findings)
     fit = None if unknown and is_fit(findings) else is_fit(findings)
     possible = uses(findings)
@@ -267,11 +260,6 @@ def _check(options: argparse.Namespace, output: Output) -> CommandResult:
     listed = [asdict(finding) for finding in findings]
     result = {"fmu": identity, "fit": fit, "uses": possible, "findings": listed}
     return CommandResult(result, status={True: 0, False: 1, None: 3}[fit])
-
-
-def _show_begin(output: Output, name: str) -> None:
-    if sys.stderr.isatty() and not output.quiet:  # overwritten by what is found
-        print(f"{name} ...", end="\r", file=sys.stderr, flush=True)
 
 
 def _format_description(description: Description) -> str:
@@ -298,12 +286,12 @@ def _format_description(description: Description) -> str:
     return "\n".join(lines)
 
 
-def _show_finding(output: Output, finding: CheckResult) -> None:
-    value, limit = (f"{n:.4g}" if n is not None else "" for n in (finding.value, finding.limit))
-    if finding.passed is None:
-        output.result(f"{finding.name:<38} -       {finding.reason}")
+def _show_result(output: Output, check: CheckResult) -> None:
+    value, limit = (f"{n:.4g}" if n is not None else "" for n in (check.value, check.limit))
+    if check.passed is None:
+        output.result(f"{check.name:<38} -       {check.reason}")
         return
-    result = "passed" if finding.passed else "FAILED"
-    output.result(f"{finding.name:<38} {result:<7} {value:>9} {limit:>9}  {finding.unit}")
-    if finding.reason:
-        output.result(f"    {finding.reason}")
+    result = "passed" if check.passed else "FAILED"
+    output.result(f"{check.name:<38} {result:<7} {value:>9} {limit:>9}  {check.unit}")
+    if check.reason:
+        output.result(f"    {check.reason}")

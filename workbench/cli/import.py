@@ -10,7 +10,7 @@ from itertools import chain, count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from workbench.cli.arguments import Commands, add_out, add_system, add_told, nearby
+from workbench.cli.arguments import Commands, add_out, add_recording_options, add_system, nearby
 from workbench.cli.output import CommandResult, Output, warn
 from workbench.errors import InputError
 from workbench.runtime.files import locked_folder
@@ -38,7 +38,7 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
     parser.add_argument("files", nargs="+", type=Path, metavar="FILE", help="of a recorder")
     add_out(parser, "imported")
     add_system(parser)
-    add_told(parser)
+    add_recording_options(parser)
     parser.add_argument(
         "--yes",
         action="store_true",
@@ -78,7 +78,7 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
         record = before = imported(options.out)
         for paths in together:
             try:
-                record, errors = _files(paths, record, system, known, options, output)
+                record, errors = _import(paths, record, system, known, options, output)
             except InputError as error:
                 errors = [error]
             for refusal in errors:
@@ -91,7 +91,7 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
     return CommandResult(result, {"begins": "s", "ends": "s", "seconds": "s"}, 2 if refused else 0)
 
 
-def _files(
+def _import(
     paths: Sequence[Path],
     record: list[dict[str, Any]],
     system: System,
@@ -99,7 +99,7 @@ def _files(
     options: argparse.Namespace,
     output: Output,
 ) -> tuple[list[dict[str, Any]], list[InputError]]:
-    """Import the recordings of some files; returns what is imported by now, and what is not."""
+    """Import the recordings of files; returns the record of all imports, and refusals."""
     from workbench.cli.import_confirmation import confirm
     from workbench.cli.import_figure import draw_cuts
     from workbench.recordings.channels import stored_columns
@@ -117,7 +117,7 @@ def _files(
     proposed, conditions = confirm(files, system, stored, known, output, options.yes)
     hashes = [file.sha256 for file in files]
     names = {recording.name or None for recording in proposed.held}
-    by_now = [
+    kept = [
         entry
         for entry in record
         if [file["sha256"] for file in entry["files"]] != hashes
@@ -126,7 +126,7 @@ def _files(
     refused = list(proposed.refused)
     warned: set[str] = set()
     for recording in proposed.held:
-        name = _free_name(paths[0], recording.name, by_now)
+        name = _free_name(paths[0], recording.name, kept)
         try:
             imported = import_recording(name, recording, system, conditions, whole=options.whole)
         except InputError as error:
@@ -136,9 +136,9 @@ def _files(
         store(options.out, {**stored, **proposed.named})
         if len(imported.parts) > 1:
             draw_cuts(imported, name, system, options.out)
-        _tell(imported, output, warned)
-        by_now = [*by_now, describe(imported, system)]
-        record = by_now
+        _report(imported, output, warned)
+        kept = [*kept, describe(imported, system)]
+        record = kept
         write_record(options.out, system, record)
     return record, refused
 
@@ -155,8 +155,8 @@ def _free_name(path: Path, part: str, others: Sequence[Mapping[str, Any]]) -> st
     return next(free for free in chain((name, second), further) if free.casefold() not in taken)
 
 
-def _tell(imported: Import, output: Output, warned: set[str]) -> None:
-    """Say what was written, what nobody knows, and what is unlikely and was not said by now."""
+def _report(imported: Import, output: Output, warned: set[str]) -> None:
+    """Print the cases that were written, unknown conditions, and doubts that were not told yet."""
     from workbench.recordings.case import UNKNOWN
 
     doubts = list(imported.measured.doubts)

@@ -1,4 +1,4 @@
-"""What files are taken for is shown, and one question asks for all of it."""
+"""Show the channels that are proposed for files, and ask to confirm them, once."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -23,7 +23,7 @@ from workbench.recordings.formats import RecordedFile
 from workbench.system.system import System
 from workbench.system.units import si_factor
 
-_Row = tuple[tuple[str, ...], str, float, float]  # what is said, of which recording, and its range
+_Row = tuple[tuple[str, ...], str, float, float]  # texts, of which recording, and its range
 
 
 def confirm(
@@ -47,7 +47,7 @@ def confirm(
         If they are not confirmed, or something is missing.
     """
     proposed = propose_recordings(files, system, stored, known)
-    output.result(_shown(files, proposed, system))
+    output.result(_format(files, proposed, system))
     conditions = dict(known.conditions)
     if proposed.certain:
         return proposed, conditions
@@ -66,7 +66,7 @@ def confirm(
 
 
 def _answers(files: Sequence[RecordedFile], proposed: ProposedRecordings) -> list[str]:
-    """What the user answers to a proposal: nothing, or corrections."""
+    """Ask the user for corrections of the proposal."""
     action = "name what is missing" if proposed.problems else "Enter takes this"
     print(f"{action}; correct with 'SIGNAL=CHANNEL [unit]; CONDITION=VALUE'; n refuses: ", end="")
     try:
@@ -105,8 +105,8 @@ def _complete(
     return proposed
 
 
-def _shown(files: Sequence[RecordedFile], proposed: ProposedRecordings, system: System) -> str:
-    """What files are and what their channels are taken for, a line each."""
+def _format(files: Sequence[RecordedFile], proposed: ProposedRecordings, system: System) -> str:
+    """A line for each file, clock and signal of a proposal."""
     lines = [f"{file.path}: {file.kind}" for file in files]
     if len(proposed.held) > 1:
         names = listed([f"'{recording.name}'" for recording in proposed.held])
@@ -126,11 +126,11 @@ def _clocks(held: Sequence[ProposedRecording]) -> Iterator[str]:
         for clock in recording.proposal.clocks.values():
             times = clock.times[np.isfinite(clock.times)]
             channel = f"{clock.channel} [{clock.unit}]" if clock.channel else "-"
-            every = f"{float(np.median(np.diff(times))):.4g} s"
-            rows.append(((channel, every, clock.reason), recording.name, times.size, times.size))
-    for (channel, every, reason), low, high, where in _alike(rows, len(held)):
-        counted = f"{low:.0f}" if low == high else f"{low:.0f} to {high:.0f}"
-        steps = f"{counted} samples, every {every}"
+            step = f"{float(np.median(np.diff(times))):.4g} s"
+            rows.append(((channel, step, clock.reason), recording.name, times.size, times.size))
+    for (channel, step, reason), low, high, where in _merged(rows, len(held)):
+        samples = f"{low:.0f}" if low == high else f"{low:.0f} to {high:.0f}"
+        steps = f"{samples} samples, every {step}"
         yield f"  {TIME:<10} {channel:<28} {steps} ({reason}){where}"
 
 
@@ -139,23 +139,24 @@ def _channels(held: Sequence[ProposedRecording], system: System) -> Iterator[str
     for signal in system.signals.values():
         scale = si_factor(signal.shown, signal.unit, signal.name)
         rows: list[_Row] = []
-        having = [recording for recording in held if signal.name in recording.proposal.assigned]
-        for recording in having:
-            taken = recording.proposal.assigned[signal.name]
-            via = f" = {taken.formula}" if taken.formula else ""
-            key = f"{taken.label} [{taken.unit}]{via}", taken.reason
-            low = float(np.nanmin(taken.values)) / scale
-            high = float(np.nanmax(taken.values)) / scale
-            rows.append((key, recording.name, low, high))
-        for (channel, reason), low, high, where in _alike(rows, len(held)):
+        for recording in held:
+            if assigned := recording.proposal.assigned.get(signal.name):
+                via = f" = {assigned.formula}" if assigned.formula else ""
+                key = f"{assigned.label} [{assigned.unit}]{via}", assigned.reason
+                low = float(np.nanmin(assigned.values)) / scale
+                high = float(np.nanmax(assigned.values)) / scale
+                rows.append((key, recording.name, low, high))
+        for (channel, reason), low, high, where in _merged(rows, len(held)):
             yield (
                 f"  {signal.name:<10} {channel:<28} {signal.label}, {low:.4g} to {high:.4g} "
                 f"{signal.shown} ({reason}){where}"
             )
 
 
-def _alike(rows: Sequence[_Row], count: int) -> Iterator[tuple[tuple[str, ...], float, float, str]]:
-    """What is said of recordings, its range over those of which it is, and which, if not all."""
+def _merged(
+    rows: Sequence[_Row], count: int
+) -> Iterator[tuple[tuple[str, ...], float, float, str]]:
+    """Rows with the same texts as one: these, their common range, and where, if not in all."""
     for key in dict.fromkeys(key for key, *_ in rows):
         own = [row for row in rows if row[0] == key]
         names = list(dict.fromkeys(f"'{name}'" for _, name, *_ in own))

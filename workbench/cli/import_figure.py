@@ -19,19 +19,18 @@ def draw_cuts(imported: Import, name: str, system: System, out: Path) -> None:
     Without a rule of the system it shows the first output.
     """
     rule = system.cutting
-    shown = [rule.begins, rule.ends] if rule else []
-    names = [threshold.signal for threshold in shown] or [system.outputs[0].name]
+    names = [rule.begins.signal, rule.ends.signal] if rule else [system.outputs[0].name]
     sheet = Figure(figsize=(11.0, 1.0 + 2.0 * len(names)), layout="constrained")
     sheet.suptitle(f"{name}: {len(imported.pieces)} recordings", fontsize=10)
     time, signals = imported.measured.time, imported.measured.signals
-    some = np.arange(0, time.size, max(1, time.size // _MOST))
+    drawn = np.arange(0, time.size, max(1, time.size // _MOST))
     rows = sheet.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
     for axes, signal in zip(rows, names, strict=True):
         values = system.signal(signal, signals)
         known = system.signals.get(signal)
         unit = known.shown if known else system.unit(signal)
         scale = si_factor(unit, known.unit, signal) if known else 1.0
-        axes.plot(time[some], values[some] / scale, linewidth=0.8, color="0.2")
+        axes.plot(time[drawn], values[drawn] / scale, linewidth=0.8, color="0.2")
         label = known.label if known else signal
         axes.set_title(f"{label} [{unit}]", fontsize=9, loc="left")
         for part in imported.parts:

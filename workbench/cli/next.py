@@ -6,7 +6,7 @@ import argparse
 import json
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from workbench.cli.arguments import Commands, add_out, add_run
 from workbench.cli.extras import require_compiler
@@ -18,8 +18,6 @@ from workbench.runtime.files import locked_folder, read_text
 if TYPE_CHECKING:
     from workbench.diagnosis.inference.rivals import Rivals
 
-
-_SUMMARY = "summary.json"
 
 WORKERS_NEED = ("workbench.studies.design",)
 
@@ -61,64 +59,51 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
     from workbench.studies.design.report import write_next_stop
     from workbench.system.registry import load_system
 
-    file = options.result / _SUMMARY
-    summary = _read(file)
-    rivals = _rivals(summary, file)
-    system = load_system(options.system or str(summary["provenance"]["system"]))
+    file = options.result / "summary.json"
+    diagnosed, rivals = _read_rivals(file)
+    system = load_system(options.system or diagnosed)
     require_compiler()
     with locked_folder(options.out):
-        proposed = next_stop(system, rivals, Engine(options.workers, output.stage))
+        proposal = next_stop(system, rivals, Engine(options.workers, output.stage))
         provenance = {
             "run": run_of("next", system, {"diagnosis": file}),
             "workbench": version("wheelset-workbench"),
             "system": system.name,
             "diagnosis": str(options.result),
         }
-        page = write_next_stop(proposed, provenance, options.out)
+        page = write_next_stop(proposal, provenance, options.out)
     output.stage("done")
-    output.result(proposed.summary())
+    output.result(proposal.summary())
     output.result(f"to read: {page}, data and figure beside it")
     return CommandResult(
         read_result(options.out / "next.json"), {"duration": "s", "every": "s"}, page=page
     )
 
 
-def _read(file: Path) -> dict[str, Any]:
-    """The summary of a diagnosis."""
+def _read_rivals(file: Path) -> tuple[str, Rivals]:
+    """Name of the system that was diagnosed, and the candidates that are left."""
+    from workbench.diagnosis.inference.rivals import read_rivals
+
     remedy = "give the folder that 'workbench diagnose' wrote, as it wrote it"
     text = read_text(file, remedy)
     try:
         summary = json.loads(text)
-        if summary["verdict"] not in ("nothing", "found", "partly explained", "unexplained"):
+        verdict, system = summary["verdict"], str(summary["provenance"]["system"])
+        if verdict in ("found", "partly explained"):
+            remedy = "diagnose the recordings anew with this version"
+            return system, read_rivals(summary["rivals"])
+        if verdict not in ("nothing", "unexplained"):
             raise KeyError("verdict")
-        str(summary["provenance"]["system"])
     except (ValueError, KeyError, TypeError, RecursionError):
-        raise _strange(file, remedy) from None
-    found: dict[str, Any] = summary
-    return found
-
-
-def _rivals(summary: dict[str, Any], file: Path) -> Rivals:
-    """What it left undecided."""
-    from workbench.diagnosis.inference.rivals import read_rivals
-
-    if summary["verdict"] not in ("found", "partly explained"):
         raise InputError(
             where=str(file),
-            found=f"the verdict '{summary['verdict']}'",
-            expected="a cause that was found, whose rivals or size are to be told better",
-            remedy="diagnose more recordings first",
-        )
-    try:
-        return read_rivals(summary["rivals"])
-    except (KeyError, TypeError, ValueError):
-        raise _strange(file, "diagnose the recordings anew with this version") from None
-
-
-def _strange(file: Path, remedy: str) -> InputError:
-    return InputError(
+            found="no summary of a diagnosis with its rivals",
+            expected="what 'workbench diagnose' writes",
+            remedy=remedy,
+        ) from None
+    raise InputError(
         where=str(file),
-        found="no summary of a diagnosis with its rivals",
-        expected="what 'workbench diagnose' writes",
-        remedy=remedy,
+        found=f"the verdict '{verdict}'",
+        expected="a cause that was found, whose rivals or size are to be told better",
+        remedy="diagnose more recordings first",
     )

@@ -83,42 +83,35 @@ def _run(
         "fmus": list(models(system, list(linear)).values()),
     }
     scales = {role: test.scale for role, test in linear.items()}
-    done: list[CaseObservability] = []
+    results: list[CaseObservability] = []
     begin = time.perf_counter()
     interrupted = False
     setup = (system, scales, options.out)
     with Pool(min(options.workers, len(cases)), nullcontext, setup) as pool:
         try:
             for _, result in pool.completed(_test_case, cases):
-                done.append(result)
-                output.step(len(done), len(cases), result.case.name, begin)
+                results.append(result)
+                output.step(len(results), len(cases), result.case.name, begin)
         except KeyboardInterrupt:
             interrupted = True
             pool.finish()
     summary: dict[str, Any] = {}
     page: Path | None = None
-    if done:
-        done.sort(key=lambda result: result.case.name)
+    if results:
+        results.sort(key=lambda result: result.case.name)
         tests = list(linear.values())
-        output.result(format_observability(system, tests, done))
+        output.result(format_observability(system, tests, results))
         path = options.out / "observability.json"
-        write_observability(system, tests, done, provenance, path)
+        write_observability(system, tests, results, provenance, path)
         summary = read_result(path)
-        page = write_observability_page(summary, done, len(cases), options.out)
-        line = f"{len(done)} of {len(cases)} cases; to read: {page}, data and figures beside it"
+        page = write_observability_page(summary, results, len(cases), options.out)
+        line = f"{len(results)} of {len(cases)} cases; to read: {page}, data and figures beside it"
         output.result(line)
-    return CommandResult(summary, _units(system), 130 if interrupted else 0, page)
-
-
-def _units(system: System) -> dict[str, str]:
-    """Of windows and signals; quantities and corrections have that of the quantity."""
-    signals = {signal.name: signal.unit for signal in (*system.inputs, *system.outputs)}
-    quantities = {
-        key: quantity.unit
-        for quantity in system.estimated
-        for key in (quantity.correction, f"median_{quantity.name}")
-    }
-    return {"window_s": "s", "stride_s": "s", **signals, **quantities}
+    units = {"window_s": "s", "stride_s": "s"}
+    units |= {signal.name: signal.unit for signal in (*system.inputs, *system.outputs)}
+    for quantity in system.estimated:
+        units |= dict.fromkeys((quantity.correction, f"median_{quantity.name}"), quantity.unit)
+    return CommandResult(summary, units, 130 if interrupted else 0, page)
 
 
 def _test_case(setup: tuple[System, Mapping[str, Vector], Path], case: Case) -> CaseObservability:

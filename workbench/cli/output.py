@@ -19,8 +19,8 @@ class CommandResult:
 
     Attributes
     ----------
-    result : what it found, which --json prints; also the values that stand in its files.
-    units : by key of `result`, at any depth; what is not named has the unit 1.
+    result : that --json prints; also the values that stand in its files.
+    units : by key of `result`, at any depth; of keys without one it is 1.
     status : of the process.
     page : that shows it; None without.
     """
@@ -33,12 +33,12 @@ class CommandResult:
 
 @dataclass(frozen=True)
 class Output:
-    """Where a command says what.
+    """Standard output for results, standard error for progress.
 
     Attributes
     ----------
     json : whether standard output takes one JSON document, and nothing else.
-    quiet : whether nothing is said of progress.
+    quiet : whether progress is not printed.
     begin : of the command, by `time.perf_counter` [s].
     """
 
@@ -47,34 +47,34 @@ class Output:
     begin: float = field(default_factory=time.perf_counter)
 
     def result(self, text: str) -> None:
-        """What was found, for people."""
+        """Print a result for people."""
         if not self.json:
             _print(text)
 
     def progress(self, line: str) -> None:
-        """What is being done."""
+        """Print a line of progress."""
         if not self.quiet:
             print(line, file=sys.stderr, flush=True)
 
     def stage(self, line: str) -> None:
-        """What is being done, with the time since the command began."""
+        """Print a line of progress, with the time since the command began."""
         self.progress(f"{time.perf_counter() - self.begin:6.1f} s  {line}")
 
     def step(self, done: int, total: int, name: str, begin: float) -> None:
-        """One of a known number of steps is done, since `begin`: with the time left."""
+        """Print that a step is done since `begin`, of how many, and the time left."""
         elapsed = time.perf_counter() - begin
         left = elapsed / done * (total - done)
         self.progress(f"[{done:>3}/{total}] {name:<28} {elapsed:5.1f} s, about {left:.0f} s left")
 
-    def close(self, command: str, done: CommandResult) -> int:
+    def close(self, command: str, result: CommandResult) -> int:
         """Print the document, if it is asked for; returns the status."""
         if self.json:
-            content = {"units": done.units, "result": done.result}
-            _print(_document(command, done.status, content))
-        return done.status
+            content = {"units": result.units, "result": result.result}
+            _print(_document(command, result.status, content))
+        return result.status
 
     def fail(self, command: str, status: int, error: Exception | str) -> int:
-        """Say what went wrong, on standard error and in the document; returns the status."""
+        """Print an error to standard error and into the document; returns the status."""
         print(error if isinstance(error, str) else f"error: {error}", file=sys.stderr)
         if self.json:
             parts = ("where", "found", "expected", "remedy")
@@ -85,7 +85,7 @@ class Output:
 
 
 def warn(message: object) -> None:
-    """Say what is unlikely, or went wrong and is survived."""
+    """Print a warning."""
     print(f"warning: {message}", file=sys.stderr, flush=True)
 
 

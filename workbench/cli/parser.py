@@ -8,6 +8,10 @@ from workbench.system.installed import installed_plugins
 
 # The one command of a room above this one.
 _BENCH = ("workbench.benchmark.bench", "time calls into the FMUs, the observers, and the tuning")
+_OUTPUT = {  # of all commands, before their names or after them
+    "--json": "print the result as one JSON document, with units, and nothing else",
+    "--quiet": "say nothing of progress, which goes to standard error",
+}
 
 
 def command_line(release: str, *asked: str) -> argparse.ArgumentParser:
@@ -37,24 +41,16 @@ def command_line(release: str, *asked: str) -> argparse.ArgumentParser:
             import_module(module).add(commands, text).set_defaults(module=module)
     for command in parsers(parser):
         command.formatter_class = argparse.RawDescriptionHelpFormatter  # examples keep their lines
-        _add_output(command)
+        for option, text in _OUTPUT.items():
+            command.add_argument(option, action="store_true", default=argparse.SUPPRESS, help=text)
     return parser
 
 
 def parsers(parser: argparse.ArgumentParser) -> list[argparse.ArgumentParser]:
     """A parser, those of its commands, and theirs."""
-    every = [parser]
+    nested = [parser]
     for action in parser._actions:
         if isinstance(action, argparse._SubParsersAction):
             for choice in action.choices.values():
-                every += parsers(choice)
-    return every
-
-
-def _add_output(parser: argparse.ArgumentParser) -> None:
-    """Add what every command may be told, before its name or after it."""
-    for option, text in (
-        ("--json", "print the result as one JSON document, with units, and nothing else"),
-        ("--quiet", "say nothing of progress, which goes to standard error"),
-    ):
-        parser.add_argument(option, action="store_true", default=argparse.SUPPRESS, help=text)
+                nested += parsers(choice)
+    return nested

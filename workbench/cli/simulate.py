@@ -102,6 +102,7 @@ def _run(
 ) -> CommandResult:
     from workbench.observers import choose
     from workbench.observers.report import format_table, summarise_runs, write_page
+    from workbench.observers.run import Ending
     from workbench.observers.simulation import case_figure, prepare, simulate
     from workbench.pages.provenance import run_of, sources
 
@@ -119,68 +120,55 @@ def _run(
     if window is None:
         runs = simulate(simulation, cases, options.workers, partial(_write, options.out))
     else:
-        runs = _shown(simulation, cases, window, options.out)
-    done: list[CaseResult] = []
+        runs = _run_live(simulation, cases, window, options.out)
+    results: list[CaseResult] = []
     begin = time.perf_counter()
     interrupted = False
     failure: InputError | None = None
     try:
         for result in runs:
-            done.append(result)
-            output.step(len(done), len(cases), result.case.name, begin)
+            results.append(result)
+            output.step(len(results), len(cases), result.case.name, begin)
     except KeyboardInterrupt:
         interrupted = True
         output.progress("interrupted")
-    except InputError as error:  # such as a full disk: what was estimated is told all the same
+    except InputError as error:  # such as a full disk: results until then are shown all the same
         failure = error
     summary: dict[str, Any] = {}
     page: Path | None = None
-    if done:
-        done.sort(key=lambda result: result.case.name)
-        output.result(format_table(system, done))
-        summary = summarise_runs(system, done, provenance)
+    if results:
+        results.sort(key=lambda result: result.case.name)
+        output.result(format_table(system, results))
+        summary = summarise_runs(system, results, provenance)
         write_json(options.out / "summary.json", summary)
         page = options.out / "index.html"
-        write_page(system, summary, [case_figure(result) for result in done], len(cases), page)
-        line = f"{len(done)} of {len(cases)} cases; to read: {page}, data and figures beside it"
+        write_page(system, summary, [case_figure(result) for result in results], len(cases), page)
+        line = f"{len(results)} of {len(cases)} cases; to read: {page}, data and figures beside it"
         output.result(line)
     if window is not None and not interrupted:
         window.wait()
     if failure is not None:
         raise failure
-    units = _units(system)
+    reference = system.signals[system.objective.signal]
+    units = {f"{reference.name}_rms_{reference.unit}": reference.unit, "seconds": "s"}
     if interrupted:
         return CommandResult(summary, units, 130, page)
-    idle = _idle(done)
-    for name in idle:
-        print(
-            f"error: {name} estimated nothing in any case; the reasons are above", file=sys.stderr
-        )
-    return CommandResult(summary, units, 1 if idle else 0, page)
-
-
-def _units(system: System) -> dict[str, str]:
-    """Of the numbers in a summary that are not plain; gains have those of their file."""
-    judged = system.objective.signal
-    unit = system.signals[judged].unit
-    return {f"{judged}_rms_{unit}": unit, "seconds": "s"}
-
-
-def _idle(results: Sequence[CaseResult]) -> list[str]:
-    """Estimators that failed in every case."""
-    from workbench.observers.run import Ending
-
-    return [
+    failed = [
         name
         for name in results[0].runs
         if all(result.runs[name].ending is not Ending.OK for result in results)
     ]
+    for name in failed:
+        print(
+            f"error: {name} estimated nothing in any case; the reasons are above", file=sys.stderr
+        )
+    return CommandResult(summary, units, 1 if failed else 0, page)
 
 
-def _shown(
+def _run_live(
     simulation: Simulation, cases: Sequence[Case], window: LiveWindow, out: Path
 ) -> Iterator[CaseResult]:
-    """All cases one after the other, each shown before."""
+    """Show each case in the window, then run it."""
     from workbench.observers.simulation import simulate
 
     for case in cases:
@@ -190,7 +178,7 @@ def _shown(
 
 
 def _models(simulation: Simulation) -> dict[str, Any]:
-    """Software and models that run; the observer's is always named."""
+    """Software and models that run, and always the observer's model."""
     from workbench.pages.provenance import models, software
     from workbench.system.system import OBSERVER
 
@@ -206,7 +194,7 @@ def _models(simulation: Simulation) -> dict[str, Any]:
 
 
 def _settings(simulation: Simulation, case: Case) -> dict[str, Any]:
-    """What each estimator runs with; their loops are compiled on the way."""
+    """Settings of each estimator; their loops are compiled on the way."""
     settings = {}
     with simulation.estimators() as running:
         for name, estimator in running.items():

@@ -15,9 +15,9 @@ from workbench.cli.arguments import (
     add_isolated,
     add_map,
     add_pdf,
+    add_recording_options,
     add_seed,
     add_system,
-    add_told,
     add_workers,
     positive,
 )
@@ -29,7 +29,7 @@ from workbench.runtime.pool import Pool
 if TYPE_CHECKING:
     from workbench.recordings.case import Case
     from workbench.runtime.cluster import DaskPool
-    from workbench.tuning import Evaluator, Job, Problem
+    from workbench.tuning import Evaluator, Problem
 
 WORKERS_NEED = ("workbench.tuning",)
 
@@ -62,7 +62,7 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         metavar="CASE",
         help="case folders, or folders of case folders (default: those of the system)",
     )
-    add_told(parser)
+    add_recording_options(parser)
     parser.add_argument(
         "--fmu",
         type=Path,
@@ -177,12 +177,15 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
 def _run(
     options: argparse.Namespace, output: Output, problem: Problem, cases: int, out: Path
 ) -> CommandResult:
-    from workbench.cli.tune_progress import PrintedProgress, written
+    from workbench.cli.cluster import open_cluster
+    from workbench.cli.tune_progress import PrintedProgress, write_or_print
     from workbench.pages.answer import with_answer
     from workbench.pages.provenance import run_of, sources
     from workbench.tuning import (
+        Evaluator,
         NoWorkersError,
         Plan,
+        evaluators,
         summarise_tuning,
         tune,
     )
@@ -202,10 +205,19 @@ def _run(
         f"generations of {plan.population * size} candidates"
     )
     progress = PrintedProgress(output, plan, options.folds, out, live=options.live)
+    job = problem.job
+    pool: Pool[Evaluator] | DaskPool[Evaluator]
+    if options.cluster is None:
+        pool = evaluators(job, options.workers, options.timeout)
+    else:
+        pool = open_cluster(options.cluster, Evaluator, job, options.timeout, job.system, warn)
     try:
-        with _one_interruption(), closing(_pool(options, problem.job)) as pool:
+        with _one_interruption(), closing(pool):
             tuned = tune(
-                *(pool, problem, plan, out),
+                pool,
+                problem,
+                plan,
+                out,
                 folds=options.folds,
                 resume=options.resume,
                 progress=progress,
@@ -216,9 +228,10 @@ def _run(
         output.progress("interrupted before the first generation was evaluated; nothing is written")
         return CommandResult(status=130)
     content = summarise_tuning(tuned, options.folds)
-    content["provenance"] |= {"run": run_of("tune", problem.job.system, sources(problem.cases))}
+    content["provenance"] |= {"run": run_of("tune", job.system, sources(problem.cases))}
     summary = with_answer(tuning_answer(headline(content), content), content)
-    if not (progress.kept and written(out / "summary.json", json.dumps(summary, indent=2) + "\n")):
+    text = json.dumps(summary, indent=2) + "\n"
+    if not (progress.kept and write_or_print(out / "summary.json", text)):
         return CommandResult(status=1)
     draw_convergence(tuned.search.history, out / "convergence.png")
     draw_cases(summary["cases"], out / "cases.png")
@@ -265,12 +278,3 @@ def _one_interruption() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGINT, before)
-
-
-def _pool(options: argparse.Namespace, job: Job) -> Pool[Evaluator] | DaskPool[Evaluator]:
-    from workbench.cli.cluster import open_cluster
-    from workbench.tuning import Evaluator, evaluators
-
-    if options.cluster is None:
-        return evaluators(job, options.workers, options.timeout)
-    return open_cluster(options.cluster, Evaluator, job, options.timeout, job.system, warn)

@@ -1,4 +1,4 @@
-"""How `workbench tune` tells what it does, and keeps the gains that it has found."""
+"""Progress of `workbench tune`, and the gains that it keeps."""
 
 import sys
 import time
@@ -62,15 +62,15 @@ class PrintedProgress(Progress):
 
     def found(self, tuned: TuningResult) -> None:
         """Write the gains, first of all, so that nothing after them can lose them."""
-        self.kept = written(self._out / "gains.toml", tuned_gains(tuned))
+        self.kept = write_or_print(self._out / "gains.toml", tuned_gains(tuned))
 
     def warn(self, message: str) -> None:
         """See Progress."""
         warn(message)
 
 
-def written(path: Path, text: str) -> bool:
-    """Write a result; if that fails show it instead, so that it is not lost."""
+def write_or_print(path: Path, text: str) -> bool:
+    """Write a result; if that fails print it instead, so that it is not lost."""
     try:
         write_whole(path, text)
     except InputError as error:
