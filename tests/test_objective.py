@@ -4,13 +4,20 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
+from scipy.integrate import solve_ivp
 
+from workbench.observers import choose
 from workbench.observers.run import Ending, Run
 from workbench.observers.score import judged_window, low_pass, score
+from workbench.observers.simulation import prepare
 from workbench.recordings.case import Case
+from workbench.system.registry import load_system
 from workbench.system.system import System
+
+from . import heater
 
 
 def stop(Fx: np.ndarray | None, step: float = 0.005) -> Case:
@@ -124,3 +131,41 @@ def test_uneven_samples_give_the_same_score(system: System) -> None:
         scores.append(score(case, run_of(system, case, Fx=force + error), system).nrmse)
     # Interpolation to the even grid: curvature * h^2 / 8 = 1e-4 of the error.
     assert_allclose(scores[1], scores[0], rtol=1e-3)
+
+
+def test_a_sensor_that_rectifies_is_scored_by_its_reading(tmp_path: Path) -> None:
+    """A block that is heated and cooled in turn; the sensor reads how far it is off.
+
+    The recording is the model's own, so that its free run errs by the noise alone. By the state,
+    it would err by twice the temperature wherever the block is cold.
+    """
+    pytest.importorskip("casadi")
+    pytest.importorskip("rumoca")
+    folder = tmp_path / "block"
+    folder.mkdir()
+    output = '  output Real reading(unit="K") = abs(T) "As read";\n'
+    library = heater.LIBRARY.replace("    Real Tc(", f"  {output}    Real Tc(")
+    (folder / "package.mo").write_text(library)
+    file = heater.SYSTEM.format(sensor='reading = "reading"') + '\n[objective]\njudged = "T"\n'
+    (folder / "system.toml").write_text(file)
+    block = load_system(folder)
+    time = np.arange(600.0)
+    power = 60.0 * np.sign(np.sin(2.0 * np.pi * time / 200.0 + 0.1))
+
+    def rates(t: float, x: np.ndarray) -> list[float]:
+        T, casing = x
+        P = power[min(int(t), 599)]
+        return [(P - 2.0 * (T - casing)) / 100.0, (2.0 * (T - casing) - 0.5 * casing) / 200.0]
+
+    run = solve_ivp(rates, (0.0, 599.0), [0.0, 0.0], t_eval=time, max_step=1.0, rtol=1e-8)
+    noise = heater.NOISE * np.random.default_rng(1).standard_normal(time.size)
+    assert run.y[0].min() < -5.0
+    frame = pd.DataFrame({"time [s]": time, "P [W]": power, "T [K]": np.abs(run.y[0]) + noise})
+    (case,) = heater.cases(block, [frame])
+    result = prepare(block, choose(block, ["open_loop"])).run(case)
+    score = result.scores["open_loop"]
+    assert score.rms is not None
+    assert score.rms < 2.0 * heater.NOISE  # inputs change between samples of a second
+    error = result.error("open_loop")
+    assert error is not None
+    assert np.sqrt(np.mean(error**2)) == pytest.approx(score.rms, rel=0.01)

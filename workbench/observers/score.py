@@ -1,11 +1,14 @@
 """How well a run fits its recording, stage 5: errors of what is judged, and z of the paper."""
 
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
 from workbench.arrays import Vector
+from workbench.errors import FMUError
+from workbench.models.fmu import FMU
 from workbench.models.native import compiled
 from workbench.observers.run import Ending, Run
 from workbench.recordings.case import Case
@@ -14,6 +17,8 @@ from workbench.system.system import System
 
 # Two equal poles at a corner are down by 3 dB at this share of it.
 _CORNER = 2 * np.pi / np.sqrt(np.sqrt(2) - 1)
+
+_POINTS, _ROUNDED = 8, 1e-9  # states by chance, and share of a value that arithmetic leaves
 
 
 @dataclass(frozen=True)
@@ -33,6 +38,50 @@ class Score:
     nrmse: float | None
     z: float | None
     reason: str
+
+
+def with_readings(system: System, models: Sequence[FMU]) -> System:
+    """Report what sensors read of the scored signals, where that is another value in the model.
+
+    A sensor that rectifies or lags is scored by its reading; see `scored_column`. A reading that
+    equals its output at states by chance is that output. The models are started anew.
+    """
+    names = dict.fromkeys((system.objective.signal, *system.objective.weights))
+    readings = {
+        name: signal.reading
+        for name, signal in system.signals.items()
+        if name in names and name in system.columns and signal.reading not in system.columns
+    }
+    outputs = set.intersection(*({*fmu.outputs} for fmu in models)) if models else set()
+    readings = {name: reading for name, reading in readings.items() if reading in outputs}
+    differing = {name for fmu in models for name in _differing(fmu, readings)}
+    units = {readings[n]: system.signals[n].unit for n in readings if n in differing}
+    return replace(system, reported={**system.reported, **units}) if units else system
+
+
+def _differing(fmu: FMU, readings: Mapping[str, str]) -> list[str]:
+    """Signals whose reading is another value than their output."""
+    if not readings:
+        return []
+    fmu.start({})
+    rng, rest = np.random.default_rng(0), fmu.get_states().copy()
+    outputs, read = fmu.variables(list(readings)), fmu.variables(list(readings.values()))
+    away = np.zeros(len(readings), bool)
+    for _ in range(_POINTS):
+        fmu.set_states(rest + np.maximum(np.abs(rest), 1.0) * rng.uniform(-1.0, 1.0, rest.size))
+        try:
+            shown, said = fmu.get(outputs).copy(), fmu.get(read).copy()
+        except FMUError:  # no state of this machine
+            continue
+        away |= np.abs(said - shown) > _ROUNDED * np.abs(shown)
+    fmu.start({})
+    return [name for name, other in zip(readings, away, strict=True) if other]
+
+
+def scored_column(system: System, columns: Collection[str], name: str) -> str:
+    """Column of an estimate that is scored by a measured signal: its reading, where it is there."""
+    signal = system.signals.get(name)
+    return signal.reading if signal is not None and signal.reading in columns else name
 
 
 def judged_window(case: Case, system: System) -> slice:
@@ -122,7 +171,10 @@ def score(case: Case, run: Run, system: System) -> Score:
         return Score(None, None, None, f"the recording has no {missing[0]} to judge by")
     # A method that takes a signal as measured makes no error in it.
     deviations = np.column_stack(
-        [np.nan_to_num(run.signal(name) - case[name]) for name in objective.weights]
+        [
+            np.nan_to_num(run.signal(scored_column(system, run.columns, name)) - case[name])
+            for name in objective.weights
+        ]
     )
     steps, shares = samples(case.time)
     memory = np.zeros((2, len(objective.weights)))
@@ -132,7 +184,8 @@ def score(case: Case, run: Run, system: System) -> Score:
     window = judged_window(case, system)
     if window.stop - window.start < 2:
         return Score(None, None, z, "the recording holds nothing that is judged")
-    error = run.signal(objective.signal) - case[objective.signal]
+    column = scored_column(system, run.columns, objective.signal)
+    error = run.signal(column) - case[objective.signal]
     measured = low_pass(case.time, case[objective.signal], objective.bandwidth)
     rms = float(np.sqrt(np.mean(low_pass(case.time, error, objective.bandwidth)[window] ** 2)))
     return Score(rms, rms / float(np.mean(np.abs(measured[window]))), z, "")

@@ -27,7 +27,14 @@ from workbench.observers.run import (
     probability_panel,
     value_range,
 )
-from workbench.observers.score import Score, judged_window, low_pass, score
+from workbench.observers.score import (
+    Score,
+    judged_window,
+    low_pass,
+    score,
+    scored_column,
+    with_readings,
+)
 from workbench.pages.figures import ESTIMATORS, CaseFigure, Curve, Panel
 from workbench.pages.views import (
     below,
@@ -88,7 +95,9 @@ class CaseResult:
         reference, bandwidth = self.system.objective.signal, self.system.objective.bandwidth
         if reference not in self.case:
             return None
-        error = self.runs[name].signal(reference) - self.case[reference]
+        run = self.runs[name]
+        column = scored_column(self.system, run.columns, reference)
+        error = run.signal(column) - self.case[reference]
         return low_pass(self.case.time, error, bandwidth)
 
     def surprise(self, name: str) -> float:
@@ -331,6 +340,7 @@ def prepare(
     """
     with ExitStack() as stack:
         models = _models(stack, system, kinds)
+        system = with_readings(system, list(models.values()))
         gains = {
             name: gains_for(kind, models[kind.role], system, tuned) for name, kind in kinds.items()
         }

@@ -15,7 +15,7 @@ from workbench.arrays import Matrix, Vector
 from workbench.errors import FMUError, InputError, WorkerError
 from workbench.models.fmu import FMU
 from workbench.observers import Estimator, Gains, estimators_of
-from workbench.observers.score import corner, integrate, samples, weights
+from workbench.observers.score import corner, integrate, samples, scored_column, weights
 from workbench.recordings.case import Case, Value
 from workbench.runtime.pool import Pool
 from workbench.system.registry import open_file
@@ -188,7 +188,8 @@ class Evaluator:
         kind = estimators_of(job.system)[job.estimator]
         names = list(kind.fed(job.system).columns)
         self._settling = Settling(self._fmu, job.system, kind) if job.follows else None
-        self._judged = [names.index(name) for name in job.system.objective.weights]
+        scored = [scored_column(job.system, names, n) for n in job.system.objective.weights]
+        self._judged = [names.index(name) for name in scored]
         # The loop is compiled here, so that no candidate's time is spent on it.
         start = job.recordings[0].part(slice(PIECES))
         self._evaluate_case(job_estimator(job, self._fmu, job.gains), start, np.inf)

@@ -16,6 +16,7 @@ from workbench.observers import Estimator, Gains, SearchSpace, estimators_of
 from workbench.observers.gains_file import format_gains
 from workbench.observers.replay import observed
 from workbench.observers.run import Ending
+from workbench.observers.score import with_readings
 from workbench.recordings.case import Case
 from workbench.runtime.pool import NoWorkersError
 from workbench.runtime.progress import StepReporter
@@ -182,6 +183,7 @@ def pose(
     slowest = 1.0 / max(case.time[-1] - case.time[0] for case in cases)
     fastest = 1.0 / max(float(np.median(np.diff(case.time))) for case in cases)
     with open_model(system, kind.role) as model:
+        system = with_readings(system, [model])
         gains = kind.default_gains(model, system)
         space = kind.space(model, system, gains, slowest, fastest)
         meanings = kind.meanings(model, system, gains)
