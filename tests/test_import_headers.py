@@ -64,14 +64,167 @@ TOA5 = ['"TOA5","Station","CR6","1234","CR6.Std.09","CPU:prog.CR6","5678","Fast"
             "{0};1.{0}",
             [("ch 1", "s"), ("ch 2", "bar")],
         ),
+        (
+            [
+                "Sampling interval,500ms",
+                "CH,Signal name,Span",
+                "CH1,inflow,10,-10,l/s",
+                "Number,Date&Time,ms,CH1,CH2,Alarm1-10,AlarmOut",
+                "NO.,Time,ms,l/s,mm,A1234567890,A1234",
+            ],
+            "{0},2025/06/06 08:00:{0:02d},500,+ 4.10,+ 950.{0},LLLLLLLLLL,LLLL",
+            [("Date&Time ms", "s"), ("Number", ""), ("CH1", "l/s"), ("CH2", "mm")],
+        ),
+        (
+            [
+                "Name\tTime\tinflow\th",
+                "Unit\ts\tl/s\tmm",
+                "Length\t60\t60\t60",
+                "Min\t0\t4\t950",
+                "Max\t59\t5\t951",
+            ],
+            "\t{0}\t4.{0}\t950.{0}",
+            [("Time", "s"), ("inflow", "l/s"), ("h", "mm")],
+        ),
+        (
+            [
+                "Start time\t3/5/2024 10:00 AM",
+                "Sample rate\t2",
+                "Time [s]\tinflow [l/s] AVE\th [mm] AVE",
+            ],
+            "{0}\t4.{0}\t950.{0}",
+            [("Time", "s"), ("inflow AVE", "l/s"), ("h AVE", "mm")],
+        ),
+        (
+            ['"Zeit 1 [s]"\t"inflow [l/s]"\t"h [mm]"', '"RAW"\t"MX840"\t"MX840"'],
+            "{0}\t4.{0}\t950.{0}",
+            [("Zeit 1", "s"), ("inflow", "l/s"), ("h", "mm")],
+        ),
+        (
+            [
+                "Abtastfrequenz [Hz]: 2",
+                "",
+                "Kanal:\t1\t2",
+                "Name:\tinflow\th",
+                "Einheit:\tl/s\tmm",
+                "Skalierung:\t1.0\t1.0",
+            ],
+            "{0}\t4.{0}\t950.{0}",
+            [("Name:", ""), ("inflow", "l/s"), ("h", "mm")],
+        ),
+        (
+            [
+                "LabVIEW Measurement",
+                "Date\t2024/03/05",
+                "Time\t10:00:00.123",
+                "***End_of_Header***",
+                "Channels\t2",
+                "Samples\t60\t60",
+                "Y_Unit_Label\tl/s\tmm",
+                "X0\t0.0\t0.0",
+                "Delta_X\t1.0\t1.0",
+                "***End_of_Header***",
+                "X_Value\tinflow\th\tComment",
+            ],
+            "{0}\t4.{0}\t950.{0}",
+            [("time", "s"), ("inflow", "l/s"), ("h", "mm")],
+        ),
+        (
+            [
+                '"TraceName","inflow","h"',
+                '"VUnit","l/s","mm"',
+                '"HOffset",0,0',
+                '"Date","2024/03/05"',
+                "",
+            ],
+            ",4.{0},950.{0}",
+            [("inflow", "l/s"), ("h", "mm")],
+        ),
+        (
+            ["s;l/s;mm", "Time;inflow;h"],
+            "{0};4.{0};950.{0}",
+            [("Time", "s"), ("inflow", "l/s"), ("h", "mm")],
+        ),
+        (
+            ['"Time', '[s]";"inflow', '[l/s]";"h', '[mm]"'],
+            "{0};4.{0};950.{0}",
+            [("Time", "s"), ("inflow", "l/s"), ("h", "mm")],
+        ),
+        (
+            ["Time;inflow;h"],
+            "{0} s;4.{0} l/s;950.{0} mm",
+            [("Time", "s"), ("inflow", "l/s"), ("h", "mm")],
+        ),
+        (
+            ["Time inflow [l/s] h [mm]"],
+            "2024-03-05 10:00:{0:02d} 4.{0} 950.{0}",
+            [("Time", "s"), ("inflow", "l/s"), ("h", "mm")],
+        ),
     ],
-    ids=["TOA5", "parts of a second", "numbered", "two rows of names", "channel numbers"],
+    ids=[
+        *("TOA5", "parts of a second", "numbered", "two rows of names", "channel numbers"),
+        *("Graphtec", "DIAdem", "DEWESoft", "catman", "labels", "LabVIEW", "Yokogawa"),
+        *("units above", "folded", "units behind numbers", "a name over date and time"),
+    ],
 )
 def test_names_and_units_stand_in_rows_of_their_own(
     tmp_path: Path, head: list[str], row: str, expected: list[tuple[str, str]]
 ) -> None:
     path = table(tmp_path / "a.csv", [*head, *(row.format(k) for k in range(60))])
     assert channels(path) == expected
+
+
+@pytest.mark.parametrize(
+    "below",
+    [
+        ["Mean;4.3;901", "Max;4.6;951"],
+        ["", "29.75;4.3;901"],
+        ["", "Statistics", "Min;4.0;850", "60;258;54000"],
+    ],
+)
+def test_statistics_below_samples_are_left_out_and_told(tmp_path: Path, below: list[str]) -> None:
+    rows = [f"{k};4.{k % 9};95{k % 7}.1" for k in range(60)]
+    path = table(tmp_path / "a.csv", ["time [s];inflow [l/s];h [mm]", *rows, *below])
+    recorded = read_recorded_file(path)
+    for channel in recorded.groups[0].channels:
+        assert channel.values.size == 60
+    assert "lines that are no samples were left out, the first in line" in recorded.notes[-1]
+
+
+def test_statistics_above_samples_are_no_samples(tmp_path: Path) -> None:
+    head = ["Statistics", "Min;0;4.0;850", "Max;60;4.6;951", "Mean;30;4.3;901", ""]
+    rows = [f"{k};{0.5 * k};4.{k % 9};95{k % 7}.1" for k in range(60)]
+    path = table(tmp_path / "a.csv", [*head, "Nr;Time [s];inflow [l/s];h [mm]", *rows])
+    assert channels(path)[1:] == [("Time", "s"), ("inflow", "l/s"), ("h", "mm")]
+
+
+def test_columns_of_fixed_places_may_be_empty(tmp_path: Path) -> None:
+    """An event, once in three lines, between two signals."""
+    rows = [f"{k:8.1f} {7.5 if k % 3 == 0 else '':>8} {4.0:8.2f} {900 + k:8.3f}" for k in range(60)]
+    head = ["    Time    event   inflow        h", "       s       mm      l/s       mm"]
+    (group,) = read_recorded_file(table(tmp_path / "a.txt", [*head, *rows])).groups
+    assert [(c.name, c.unit) for c in group.channels] == [
+        *(("Time", "s"), ("event", "mm"), ("inflow", "l/s"), ("h", "mm"))
+    ]
+    assert_allclose(group.channels[3].values, 900.0 + np.arange(60.0))
+    assert np.isnan(group.channels[1].values).sum() == 40
+
+
+def test_channels_may_be_rows(tmp_path: Path) -> None:
+    signals = {"time [s]": range(60), "inflow [l/s]": range(60, 120), "h [mm]": range(900, 960)}
+    lines = [";".join([name, *map(str, values)]) for name, values in signals.items()]
+    assert channels(table(tmp_path / "a.csv", lines)) == [
+        ("time", "s"),
+        ("inflow", "l/s"),
+        ("h", "mm"),
+    ]
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-16-be", "utf-32", "latin-1"])
+def test_encodings_are_found(tmp_path: Path, encoding: str) -> None:
+    text = "\n".join(["time [s];T [°C]", *(f"{k};2{k % 7}.5" for k in range(60))])
+    (tmp_path / "a.csv").write_bytes(text.encode(encoding) + b"\0" * 512)
+    assert channels(tmp_path / "a.csv") == [("time", "s"), ("T", "degC")]
 
 
 def test_merged_cells_of_a_workbook_name_all_columns_below(tmp_path: Path) -> None:
@@ -94,6 +247,8 @@ def test_a_number_in_brackets_is_that_of_a_channel() -> None:
     assert named("log(1)[s]") == ("log(1)", "s")
     assert named("slip [1]") == ("slip", "1")
     assert named("x [3]") == ("x [3]", "")
+    assert named("flow {l/s}") == named("flow <l/s>") == ("flow", "l/s")
+    assert named("flow [l/s] (raw)") == ("flow (raw)", "l/s")
 
 
 @pytest.mark.parametrize(
@@ -107,6 +262,26 @@ def test_a_sign_may_stand_apart_from_its_number(tmp_path: Path) -> None:
     path = table(tmp_path / "a.csv", ["time [s];h [mm]", *(f"{k};- {k}.5" for k in range(60))])
     (group,) = read_recorded_file(path).groups
     assert_allclose(group.channels[1].values, -(np.arange(60.0) + 0.5))
+
+
+@pytest.mark.parametrize("form", ["{0}.5D+01", '="{0}5"', "'{0}5", "{0}5 mm", "{0}5mm"])
+def test_numbers_are_read_as_people_and_programs_write_them(tmp_path: Path, form: str) -> None:
+    rows = [f"{k};{form.format(k)}" for k in range(10, 70)]
+    (group,) = read_recorded_file(table(tmp_path / "a.csv", ["time [s];h [mm]", *rows])).groups
+    assert_allclose(group.channels[1].values, 10.0 * np.arange(10, 70) + 5.0)
+    assert group.channels[1].unit == "mm"
+
+
+def test_on_and_off_are_1_and_0_of_what_has_no_unit(tmp_path: Path) -> None:
+    rows = [f"{k};{'ON' if k % 20 < 5 else 'OFF'};{k}.5" for k in range(60)]
+    (group,) = read_recorded_file(
+        table(tmp_path / "a.csv", ["time [s];valve;h [mm]", *rows])
+    ).groups
+    assert_allclose(group.channels[1].values, np.arange(60) % 20 < 5)
+    (other,) = read_recorded_file(
+        table(tmp_path / "b.csv", ["time [s];inflow [l/s];h [mm]", *rows])
+    ).groups
+    assert [channel.name for channel in other.channels] == ["time", "h"]
 
 
 def test_a_censored_cell_is_no_sample_and_is_told(tmp_path: Path) -> None:

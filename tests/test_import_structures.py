@@ -4,12 +4,14 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal
 
+import h5py
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.io import savemat
 
 from workbench.recordings.formats import Group, read_recorded_file
+from workbench.recordings.formats.stamps import iso
 
 TIME = np.arange(0.0, 60.0, 0.5)  # s
 FLOW, LEVEL = 4.0 + np.sin(TIME), 900.0 + np.cos(TIME)
@@ -57,6 +59,117 @@ def test_all_signals_of_a_structure_are_channels(
     assert_allclose(u.values, FLOW)
     assert_allclose(y.values, LEVEL)
     assert np.isfinite(found.step) == ("est" in content)
+
+
+def struct(**fields: Any) -> Mapping[str, Any]:
+    return fields
+
+
+def array(*entries: Mapping[str, Any]) -> np.ndarray:
+    """A structure array of MATLAB."""
+    held = np.zeros(len(entries), dtype=[(name, "O") for name in entries[0]])
+    for k, entry in enumerate(entries):
+        held[k] = tuple(entry.values())
+    return held
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        struct(u=column(FLOW), y=column(LEVEL), InputName="inflow", OutputName="h", InputUnit="l/s")
+        | struct(OutputUnit="mm", Ts=500.0, TimeUnit="ms"),
+        struct(InputData=column(FLOW), OutputData=column(LEVEL), InputName="inflow", OutputName="h")
+        | struct(InputUnit="l/s", OutputUnit="mm", Ts=0.5),
+    ],
+)
+def test_data_of_system_identification_has_its_names_units_and_steps(
+    tmp_path: Path, content: Mapping[str, Any]
+) -> None:
+    found = group(tmp_path / "a.mat", {"data": content})
+    assert [(c.name, c.unit) for c in found.channels] == [("inflow", "l/s"), ("h", "mm")]
+    assert found.step == 0.5
+
+
+@pytest.mark.parametrize(
+    "logged",
+    [
+        {
+            "element1": struct(
+                Name="inflow", Values=struct(Time=TIME, Data=column(FLOW), Units="l/s")
+            ),
+            "element2": struct(Name="h", Values=struct(Time=TIME, Data=column(LEVEL), Units="mm")),
+        },
+        array(
+            struct(Name="inflow", Values=struct(Time=TIME, Data=column(FLOW), Units="l/s")),
+            struct(Name="h", Values=struct(Time=TIME, Data=column(LEVEL), Units="mm")),
+        ),
+        {
+            "inflow": struct(Time=TIME, Data=FLOW.reshape(1, 1, -1), DataInfo=struct(Units="l/s")),
+            "h": struct(Time=TIME, Data=LEVEL.reshape(1, 1, -1), DataInfo=struct(Units="mm")),
+        },
+        {
+            "inflow": struct(v=FLOW, t=TIME, unit="l/s"),
+            "h": struct(v=LEVEL, t=TIME, unit="mm"),
+        },
+    ],
+    ids=["Dataset", "array of signals", "time series", "values, times and units"],
+)
+def test_signals_with_times_of_their_own_have_their_names(
+    tmp_path: Path, logged: Mapping[str, Any] | np.ndarray
+) -> None:
+    savemat(tmp_path / "a.mat", {"logsout": logged})
+    groups = read_recorded_file(tmp_path / "a.mat").groups
+    found = {c.name: c for held in groups for c in held.channels}
+    assert (found["inflow"].unit, found["h"].unit) == ("l/s", "mm")
+    assert_allclose(found["inflow"].values, FLOW)
+    assert_allclose(found["h"].values, LEVEL)
+
+
+def test_signals_over_common_times_are_those_of_a_test_stand(tmp_path: Path) -> None:
+    signals = array(
+        struct(Name="inflow", Data=FLOW, Unit="l/s"), struct(Name="h", Data=LEVEL, Unit="mm")
+    )
+    found = group(tmp_path / "a.mat", {"exp": {"X": struct(Data=TIME, Unit="s"), "Y": signals}})
+    assert [(c.name, c.unit) for c in found.channels] == [
+        *(("time", "s"), ("inflow", "l/s"), ("h", "mm"))
+    ]
+
+
+def test_times_may_be_texts(tmp_path: Path) -> None:
+    stamps = np.array([f"2024-03-05 10:00:{t:06.3f}" for t in TIME], dtype=object)
+    found = group(tmp_path / "a.mat", {"t": stamps, "h": column(LEVEL)})
+    assert_allclose(found.channels[0].values, TIME)
+
+
+def test_arrays_of_another_length_than_times_say_so(tmp_path: Path) -> None:
+    savemat(tmp_path / "a.mat", {"t": TIME[:-1], "u": FLOW, "y": LEVEL})
+    doubts = [held.step_doubt for held in read_recorded_file(tmp_path / "a.mat").groups]
+    assert "no times for 120 samples of u, y: 't' has 119" in doubts
+
+
+def test_hdf5_is_read_with_what_its_attributes_say(tmp_path: Path) -> None:
+    """A table with names, rows of a compound, a rate, times since a date; no object of MATLAB."""
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        table = file.create_group("a").create_dataset("data", data=np.column_stack([FLOW, LEVEL]))
+        table.attrs["columns"] = ["inflow [l/s]", "h [mm]"]
+        table.attrs["sample_rate"] = 2.0
+        rows = np.array(list(zip(TIME, LEVEL, strict=True)), dtype=[("time", float), ("h", float)])
+        file.create_dataset("b", data=rows)
+        c = file.create_group("c")
+        c.create_dataset("h", data=LEVEL)
+        c.create_dataset("time", data=TIME).attrs["units"] = "seconds since 2024-03-05 10:00:00"
+        opaque = file.create_dataset("d", data=np.arange(6, dtype=np.uint32))
+        opaque.attrs["MATLAB_class"] = b"timetable"
+        opaque.attrs["MATLAB_object_decode"] = 3
+    recorded = read_recorded_file(tmp_path / "a.h5")
+    a, b, c = recorded.groups
+    assert [(channel.name, channel.unit) for channel in a.channels] == [
+        *(("inflow", "l/s"), ("h", "mm"))
+    ]
+    assert a.step == 0.5
+    assert [channel.name for channel in b.channels] == ["time", "h"]
+    assert iso(c.channels[1].start) == "2024-03-05T10:00:00.000000"
+    assert "'d' is an object of MATLAB (timetable), which only MATLAB reads" in recorded.notes[0]
 
 
 def texts(rows: list[str], *, turned: bool) -> np.ndarray:

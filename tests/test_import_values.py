@@ -80,6 +80,46 @@ def test_a_value_that_may_be_a_marker_is_asked_about_and_declared(
     assert np.nanmax(kept.assigned["h"].values) == pytest.approx(12.345)
 
 
+@pytest.mark.parametrize("value", [0.0, -1.0, -99.99, 888888.0, 9999.999])
+def test_samples_that_go_out_and_back_at_once_are_asked_about(
+    tmp_path: Path, tank: System, value: float
+) -> None:
+    """As no tank moves; the proposal leaves them out, be they possible or not."""
+    path = write(tmp_path / "a.csv", np.where(np.arange(200) % 60 == 20, value, LEVEL))
+    proposal = proposed(path, tank)
+    (doubt,) = proposal.doubts
+    assert f"'h' is {value:.15g} in 3 samples, far outside of all others" in doubt
+    assert f"missing {value:.15g}' confirms it" in doubt
+    assert np.isnan(proposal.assigned["h"].values).sum() == 3
+
+
+def test_two_markers_beside_each_other_are_no_samples(tmp_path: Path, tank: System) -> None:
+    counts = np.arange(200) % 50
+    path = write(
+        tmp_path / "a.csv", np.where(counts == 3, -9999.0, np.where(counts == 30, -7999.0, LEVEL))
+    )
+    assert set(proposed(path, tank).assigned["h"].missing) == {-9999.0, -7999.0}
+
+
+def test_a_level_that_rests_at_zero_is_one(tmp_path: Path, tank: System) -> None:
+    path = write(tmp_path / "a.csv", np.where(np.arange(200) < 4, 0.0, LEVEL))
+    assert proposed(path, tank).assigned["h"].missing == ()
+
+
+def test_a_signal_that_holds_texts_says_which(tmp_path: Path, tank: System) -> None:
+    path = write(tmp_path / "a.csv", LEVEL)
+    path.write_text(path.read_text().replace("\n", " high\n").replace("h [mm] high", "h [mm]"))
+    (problem,) = proposed(path, tank).problems
+    assert "'h' holds texts such as '900.000 high', no numbers" in problem
+
+
+def test_two_columns_of_one_name_can_be_told(tmp_path: Path, tank: System) -> None:
+    path = write(tmp_path / "a.csv", LEVEL, extra=";h [mm]", more=";7.1")
+    (problem,) = proposed(path, tank).problems
+    assert "it may be 'h#1' or 'h#2'" in problem
+    assert_allclose(proposed(path, tank, "h=h#1").assigned["h"].values, 1e-3 * LEVEL, atol=1e-6)
+
+
 def test_steps_between_a_few_values_are_samples() -> None:
     valve = np.where(np.arange(200) % 20 == 0, 9999.0, 0.0)
     noisy = 0.5 + 0.3 * np.sin(np.arange(200.0))
@@ -103,7 +143,8 @@ def test_a_unit_that_is_wrong_by_a_thousand_is_asked_about(tmp_path: Path, tank:
     assert "--column 'h=h [um]' confirms" in doubt
     assert not proposed(path, tank, "h=h [um]").doubts
     (problem,) = proposed(write(tmp_path / "b.csv", LEVEL, "m"), tank).problems
-    assert "goes beyond what is possible" in problem
+    assert "goes beyond what is possible, -0.1 to 20 m: 900 m in sample 1" in problem
+    assert "a thousandth of it would be usual" in problem
 
 
 @pytest.mark.parametrize(

@@ -358,9 +358,11 @@ def _unevenness(times: Vector) -> float:
 def _counting(channel: FileChannel, unit: str, factor: float, reason: str) -> Clock:
     """Times that are numbers; a counter that goes round goes on."""
     values, rounds = _unwrapped(channel.values)
-    start = math.nan
+    start = channel.start
     first = next((float(value) for value in values if math.isfinite(value)), math.nan)
-    if _UNIX[0] <= first * factor <= _UNIX[1] and is_time(channel.name):
+    if math.isfinite(start):
+        pass  # the file says from when times count
+    elif _UNIX[0] <= first * factor <= _UNIX[1] and is_time(channel.name):
         values, start = values - first, first * factor
     with np.errstate(over="ignore"):  # what no clock counts
         times = factor * values
@@ -372,7 +374,7 @@ def _counting(channel: FileChannel, unit: str, factor: float, reason: str) -> Cl
         reason="; ".join((reason, *rounds)),
         certain=True,
         corrections=rounds,
-        zoned=math.isfinite(start),
+        zoned=channel.zoned or (math.isfinite(start) and not math.isfinite(channel.start)),
     )
 
 

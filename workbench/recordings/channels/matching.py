@@ -102,12 +102,29 @@ def missing_of(
     said = "".join(f"; {value:g}, {count} times, is no sample" for value, count in known.items())
     doubt = ""
     if others:
-        value, count = next(iter(others.items()))
-        doubt = (
-            f"'{channel.name}' is {value:g} in {count} samples, far outside of all others; "
-            f"--column '{column} missing {value:g}' leaves them out, 'missing none' keeps them"
+        counted = " and ".join(
+            f"{value:.15g} in {count} samples" for value, count in others.items()
         )
-    return tuple(known), said, doubt
+        listed = ", ".join(f"{value:.15g}" for value in (*known, *others))
+        doubt = (
+            f"'{channel.name}' is {counted}, far outside of all others, and taken for no sample; "
+            f"--column '{column} missing {listed}' confirms it, 'missing none' keeps all"
+        )
+    return (*known, *others), said, doubt
+
+
+def _beyond(name: str, unit: str, values: Vector, signal: Signal) -> str:
+    """Why values cannot be those of a signal: the first that is not possible, and what may be."""
+    low, high = signal.possible
+    first = int(np.flatnonzero((values < low) | (values > high))[0])
+    limits = f"{low:g} to {high:g} {signal.unit}"
+    words = f"'{name}' in [{unit}] goes beyond what is possible, {limits}: "
+    words += f"{values[first]:.6g} {signal.unit} in sample {first + 1}"
+    for factor, meant in ((1e-3, "a thousandth"), (1e3, "a thousand times")):
+        largest = factor * float(np.nanmax(np.abs(values)))
+        if signal.scale / _TYPICAL <= largest <= signal.scale * _TYPICAL:
+            words += f"; {meant} of it would be usual, so that the unit may be another one"
+    return words
 
 
 def is_difference(signal: Signal) -> bool:
@@ -209,7 +226,7 @@ def _candidate(
     if not np.isfinite(values).any():
         return None, f"'{channel.name}' holds no numbers"
     if np.nanmin(values) < low or np.nanmax(values) > high:
-        return None, f"'{channel.name}' in [{unit}] goes beyond what is possible"
+        return None, _beyond(channel.name, unit, values, signal)
     reason = "name and unit" if likeness else "the only one of its unit"
     doubt = ""
     if concluded:

@@ -1,13 +1,14 @@
 """Which channel a user says is which signal, and how alike their names are."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from workbench.errors import InputError
-from workbench.recordings.formats import RecordedFile
+from workbench.recordings.formats import FileChannel, Group, RecordedFile
 from workbench.recordings.formats.spelling import named, spelled
 from workbench.system.parts import Signal
 from workbench.system.system import System
@@ -199,15 +200,37 @@ def stored_columns(folder: Path, system: System) -> dict[str, NamedChannel]:
     return read_named(table.table("columns"), system)
 
 
+def labelled(
+    files: Sequence[RecordedFile],
+) -> Iterator[tuple[int, int, Group, FileChannel, str]]:
+    """All channels with file and group, counted from 0, and a name that no other channel has.
+
+    Of namesakes, those of a group alone have its name before theirs; others are counted, `h#2`.
+    """
+    counts = Counter(c.name for file in files for group in file.groups for c in group.channels)
+    for i, file in enumerate(files):
+        for j, group in enumerate(file.groups):
+            own = Counter(channel.name for channel in group.channels)
+            before = Counter[str]()
+            for channel in group.channels:
+                before[channel.name] += 1
+                label = channel.name
+                if counts[label] > own[label]:
+                    label = f"{group.name}/{label}"
+                if own[channel.name] > 1:
+                    label = f"{label}#{before[channel.name]}"
+                yield i, j, group, channel, label
+
+
 def usable(
     stored: Mapping[str, NamedChannel], files: Sequence[RecordedFile]
 ) -> dict[str, NamedChannel]:
     """Of stored channels those that some files have, in no other unit than what was confirmed."""
     units: dict[str, str] = {}
-    for group in (group for file in files for group in file.groups):
-        for channel in (*group.channels, *group.left):
-            unit = "" if channel.stamp else channel.unit
-            units[channel.name] = units[f"{group.name}/{channel.name}"] = unit
+    for _, _, group, channel, label in labelled(files):
+        unit = "" if channel.stamp else channel.unit
+        units[channel.name] = units[f"{group.name}/{channel.name}"] = units[label] = unit
+    units |= {text.name: "" for file in files for group in file.groups for text in group.left}
     return {
         signal: assignment
         for signal, assignment in stored.items()

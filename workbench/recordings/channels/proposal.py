@@ -1,6 +1,5 @@
 """Channels are proposed for signals, as the user names them, then as names and units tell."""
 
-from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -20,8 +19,8 @@ from workbench.recordings.channels.matching import (
     unconfirmed,
     unit_reason,
 )
-from workbench.recordings.channels.names import TIME, NamedChannel, listed
-from workbench.recordings.formats import RecordedFile
+from workbench.recordings.channels.names import TIME, NamedChannel, alike, labelled, listed
+from workbench.recordings.formats import FileChannel, RecordedFile
 from workbench.recordings.formats.spelling import conversion, is_unit
 from workbench.recordings.formats.stamps import is_said
 from workbench.system.parts import Signal
@@ -107,8 +106,8 @@ def propose(
         if name != TIME
     }
     _refuse_shared(assigned, where)
-    texts = {channel.name for file in files for group in file.groups for channel in group.left}
-    if TIME in given and given[TIME].channel not in texts:
+    texts = [channel for file in files for group in file.groups for channel in group.left]
+    if TIME in given and given[TIME].channel not in {channel.name for channel in texts}:
         _find(given[TIME], TIME, places, where)
     times = {given[TIME].channel} if TIME in given else set()
     free = [
@@ -120,7 +119,7 @@ def propose(
     ]
     assigned, doubts = match(assigned, free, system)
     problems = tuple(
-        f"{signal.name}: {doubts.get(signal.name, 'no channel whose name or unit tells')}"
+        f"{signal.name}: {doubts.get(signal.name) or _text_of(signal, texts)}"
         for signal in (*system.inputs, *system.outputs)
         if signal.name not in assigned
     )
@@ -138,25 +137,18 @@ def propose(
     return ProposedMapping(assigned, clocks, shown, problems, unmatched, contradictions)
 
 
+def _text_of(signal: Signal, texts: Sequence[FileChannel]) -> str:
+    """Why a signal has no channel: one of its name may hold texts."""
+    for channel in texts:
+        if alike(channel.name, channel.about, signal):
+            example = next(filter(None, channel.texts), "")
+            return f"'{channel.name}' holds texts such as '{example}', no numbers"
+    return "no channel whose name or unit tells"
+
+
 def _places(files: Sequence[RecordedFile]) -> list[PlacedChannel]:
-    """All channels, each with a name that no other has, if groups have names."""
-    channels = [
-        (i, j, group, channel)
-        for i, file in enumerate(files)
-        for j, group in enumerate(file.groups)
-        for channel in group.channels
-    ]
-    counts = Counter(channel.name for *_, channel in channels)
-    return [
-        PlacedChannel(
-            i,
-            j,
-            group,
-            channel,
-            channel.name if counts[channel.name] == 1 else f"{group.name}/{channel.name}",
-        )
-        for i, j, group, channel in channels
-    ]
+    """All channels, each with a name that no other has."""
+    return [PlacedChannel(*placed) for placed in labelled(files)]
 
 
 def _find(

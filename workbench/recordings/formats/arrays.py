@@ -9,13 +9,17 @@ from typing import Any
 import numpy as np
 
 from workbench.recordings.formats.contents import FileChannel, Group
-from workbench.recordings.formats.spelling import named, spelled
+from workbench.recordings.formats.spelling import conversion, named, spelled
+from workbench.recordings.formats.stamps import is_stamp, read_stamps
 
 _UNIT = re.compile(r"(?P<of>.*?)[_.]?(units?|einheit)", re.IGNORECASE)
-_VALUES = ("data", "values", "value", "daten", "y")
+_VALUES = ("data", "values", "value", "val", "v", "daten", "y")
 _TIMES = ("time", "t", "zeit", "times", "x")
 _RATES = ("fs", "samplerate", "sample_rate", "samplingrate", "sampling_rate", "abtastrate")
 _STEPS = ("dt", "ts", "sampletime", "sample_time", "delta_t", "abtastzeit")
+_TIME_UNITS = ("timeunit", "time_unit")
+_PLACE = re.compile(r"\(\d+\)")  # of a structure in an array of them
+_SINCE = re.compile(r"(?P<unit>\w+) since (?P<date>.+)")  # as netCDF has units of time
 _TEXTS = ("name", "description", "comment", "label")
 
 
@@ -36,46 +40,137 @@ def read_groups(content: Mapping[str, Any]) -> tuple[list[Group], list[str]]:
     return groups, notes
 
 
+class Opaque(str):
+    """What only another program reads, in words."""
+
+
 def _collect(
-    within: tuple[str, ...], content: Mapping[str, Any], groups: list[Group], notes: list[str]
+    within: tuple[str, ...],
+    content: Mapping[str, Any],
+    groups: list[Group],
+    notes: list[str],
+    step: float = math.nan,
 ) -> None:
-    units = _units(content)
+    content = _identified(_displayed(content))
+    units, step = _units(content), _step(content, step)
     by_size: dict[int, list[FileChannel]] = {}
     for key, value in content.items():
         name, unit = named(key)
         unit = unit or units.get(key, "")
-        if isinstance(value, Mapping):
+        if isinstance(value, Opaque):
+            notes.append(f"'{key}' is {value}")
+        elif isinstance(value, list) and len(value) > 2 and any(map(is_stamp, value[:100])):
+            if (stamps := read_stamps(name, value)) is not None:
+                by_size.setdefault(len(value), []).append(stamps)
+        elif isinstance(value, Mapping):
+            name, value = _element(name, value)
             timed = _simulink(name, value) or _timed(name, value)
             if timed is not None:
                 groups.append(replace(timed, within=within))
             elif (channel := _single(name, value)) is not None:
                 by_size.setdefault(channel.values.size, []).append(channel)
             else:
-                _collect((*within, key), value, groups, notes)
+                _collect((*within, key), value, groups, notes, step)
         elif isinstance(value, np.ndarray):
+            value = _real(value) if value.ndim <= 2 else _real(np.squeeze(value))
             if value.dtype.kind not in "fiub" and value.size > 1:
                 notes.append(f"'{key}' holds no real numbers")
             for channel in _columns(name, unit, value, content):
                 by_size.setdefault(channel.values.size, []).append(channel)
             if value.ndim > 2:
                 notes.append(f"'{key}' has {value.ndim} dimensions")
-    for size, channels in by_size.items():
-        if size > 1:
-            name = "/".join(within if len(by_size) == 1 else (*within, f"{size} samples"))
-            groups.append(Group(name, tuple(channels), step=_step(content), within=within))
+    several = [size for size in by_size if size > 1]
+    for size in several:
+        name = "/".join(within if len(by_size) == 1 else (*within, f"{size} samples"))
+        doubt = _other_times(by_size, size) if len(several) > 1 and math.isnan(step) else ""
+        groups.append(Group(name, tuple(by_size[size]), step=step, step_doubt=doubt, within=within))
 
 
-def _step(content: Mapping[str, Any]) -> float:
-    """Time between samples that a number beside the arrays states [s]; NaN without one."""
+def _other_times(by_size: Mapping[int, Sequence[FileChannel]], size: int) -> str:
+    """That channels have no times of their own, and which have not as many samples; or nothing."""
+    clocks = {n: c for n, held in by_size.items() for c in held if c.name.lower() in _TIMES}
+    if not clocks or size in clocks:
+        return ""
+    count, clock = next(iter(clocks.items()))
+    names = ", ".join(channel.name for channel in by_size[size][:5])
+    return f"no times for {size} samples of {names}: '{clock.name}' has {count}"
+
+
+def _real(value: np.ndarray) -> np.ndarray:
+    """Numbers without an imaginary part, where it is zero in all of them."""
+    return value.real if value.dtype.kind == "c" and not value.imag.any() else value
+
+
+def _element(name: str, content: Mapping[str, Any]) -> tuple[str, Mapping[str, Any]]:
+    """Name and content of a signal that says its own name, such as one of a Dataset of Simulink."""
+    own = next((v for k, v in content.items() if k.lower() == "name" and isinstance(v, str)), "")
+    values = next(
+        (v for k, v in content.items() if k.lower() == "values" and isinstance(v, Mapping)), None
+    )
+    numbered = _PLACE.fullmatch(name) is not None
+    label = own if own and (numbered or values is not None) else name
+    return label, content if values is None else values
+
+
+def _displayed(content: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Signals `Y` over the times `X`, as test stands store what they plot, by their names."""
+    parts = {key.lower(): value for key, value in content.items()}
+    times, signals = parts.get("x"), parts.get("y")
+    if not isinstance(times, Mapping) or not isinstance(signals, Mapping):
+        return content
+    held = {"(1)": signals} if "(1)" not in signals else signals
+    members = {"time": times, **held}
+    found: dict[str, Any] = {}
+    for key, member in members.items():
+        _, values = _entry(member, _VALUES) if isinstance(member, Mapping) else ("", None)
+        if not isinstance(values, np.ndarray):
+            return content
+        name = "time" if member is times else _element(key, member)[0]
+        _, unit = _entry(member, ("unit", "units"))
+        found |= {name: values, f"{name}_unit": unit if isinstance(unit, str) else ""}
+    return found
+
+
+def _identified(content: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Arrays of inputs and outputs by the names beside them, as of System Identification.
+
+    `InputName` and `InputUnit` are those of `InputData` or `u`, `OutputName` those of `OutputData`
+    or `y`.
+    """
+    found = dict(content)
+    for side, letter in (("Input", "u"), ("Output", "y")):
+        key = next((key for key in (f"{side}Data", letter) if key in content), "")
+        values, names = content.get(key), content.get(f"{side}Name")
+        units = content.get(f"{side}Unit", "")
+        names = [names] if isinstance(names, str) else names
+        units = [units] if isinstance(units, str) else units
+        if not isinstance(values, np.ndarray) or not isinstance(names, list):
+            continue
+        table = np.atleast_2d(values)
+        table = table if table.shape[0] >= table.shape[1] else table.T
+        if table.shape[1] != len(names) or "" in names:
+            continue
+        for part in (key, f"{side}Name", f"{side}Unit"):
+            found.pop(part, None)
+        for i, name in enumerate(names):
+            found[name] = table[:, i]
+            found[f"{name}_unit"] = units[i] if i < len(units) else ""
+    return found
+
+
+def _step(content: Mapping[str, Any], outer: float) -> float:
+    """Time between samples that a number beside the arrays states [s]; else that further out."""
+    unit = next((v for k, v in content.items() if k.lower() in _TIME_UNITS), "s")
+    scale = conversion(spelled(unit), "s") if isinstance(unit, str) else None
     for key, value in content.items():
         if isinstance(value, Mapping | str | list) or np.size(value) != 1:
             continue
         number = float(np.ravel(value)[0])
         if key.lower() in _RATES and number > 0.0:
             return 1.0 / number
-        if key.lower() in _STEPS and number > 0.0:
-            return number
-    return math.nan
+        if key.lower() in _STEPS and number > 0.0 and scale is not None:
+            return number * scale.factor
+    return outer
 
 
 def _units(content: Mapping[str, Any]) -> dict[str, str]:
@@ -111,7 +206,8 @@ def _timed(name: str, content: Mapping[str, Any]) -> Group | None:
         return None
     if times.size != channel.values.size or times.size < 2:
         return None
-    clock = FileChannel(key, _units(content).get(key, ""), _flat(times))
+    unit = _units(content).get(key, "") or _within(content, "TimeInfo")
+    clock = FileChannel(key, unit, _flat(times))
     return Group(name, (clock, channel))
 
 
@@ -142,6 +238,7 @@ def _single(name: str, content: Mapping[str, Any]) -> FileChannel | None:
     key, values = _entry(content, _VALUES)
     if not isinstance(values, np.ndarray) or values.size != max(values.shape, default=0):
         return None
+    values = _real(values)
     clock, _ = _entry(content, _TIMES)
     others = [held for other, held in content.items() if other not in (key, clock)]
     if any(isinstance(held, np.ndarray) and held.size == values.size > 1 for held in others):
@@ -150,10 +247,18 @@ def _single(name: str, content: Mapping[str, Any]) -> FileChannel | None:
     _, about = _entry(content, _TEXTS)
     return FileChannel(
         name,
-        spelled(unit) if isinstance(unit, str) else _units(content).get(key, ""),
+        spelled(unit)
+        if isinstance(unit, str)
+        else _units(content).get(key, "") or _within(content, "DataInfo"),
         _flat(values),
         about if isinstance(about, str) else "",
     )
+
+
+def _within(content: Mapping[str, Any], key: str) -> str:
+    """Units that a time series has in a structure beside its arrays; empty: none."""
+    unit = content[key].get("Units") if isinstance(content.get(key), Mapping) else None
+    return spelled(unit) if isinstance(unit, str) else ""
 
 
 def _columns(
@@ -166,7 +271,7 @@ def _columns(
     if value.dtype.kind not in "fiub" or value.ndim > 2:
         return []
     if value.ndim < 2 or 1 in value.shape:
-        return [FileChannel(name, unit, _flat(value))]
+        return [_channel(name, unit, _flat(value))]
     table = value if value.shape[0] >= value.shape[1] else value.T
     width = table.shape[1]
     lists = {key: held for key, held in content.items() if isinstance(held, list)}
@@ -179,6 +284,15 @@ def _columns(
         FileChannel(label, stated or spelled(units[i]), _flat(table[:, i]))
         for i, (label, stated) in enumerate(labels)
     ]
+
+
+def _channel(name: str, unit: str, values: np.ndarray) -> FileChannel:
+    """A channel; of times such as "seconds since 2024-03-05" with their date."""
+    since = _SINCE.fullmatch(unit)
+    zero = read_stamps("", [since["date"]] * 2) if since else None
+    if since is None or zero is None or not math.isfinite(zero.start):
+        return FileChannel(name, unit, values)
+    return FileChannel(name, spelled(since["unit"]), values, start=zero.start, zoned=zero.zoned)
 
 
 def _flat(value: np.ndarray) -> np.ndarray:

@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
+from itertools import pairwise, zip_longest
 
 import numpy as np
 
@@ -38,6 +39,11 @@ _QUANTITY = re.compile(
     rf"(?P<unit>{'|'.join((*_PER_SECOND, *_SECONDS))})\b",
     re.IGNORECASE,
 )
+_UNIT_BEFORE = re.compile(  # Abtastrate [Hz]: 200
+    rf"[\[(](?P<unit>{'|'.join((*_PER_SECOND, *_SECONDS))})[\])]\W{{1,4}}"
+    r"(?P<value>\d[\d.,]{0,20}([eE][+-]?\d+)?)\s*$",
+    re.IGNORECASE,
+)
 _ABOUT = 100  # characters before a quantity that may say of what it is
 # Words for samples, for their rate and for the time between two; and of what else there are such.
 _SAMPLES = re.compile("sampl|abtast|scan|mess(?!age)|meas|zeit|time|\\bdt\\b", re.IGNORECASE)
@@ -49,9 +55,25 @@ _OTHERS = re.compile("filter|pass|cut-?off|grenz|tr\u00e4ger|carrier|netz|mains"
 
 _DIGITS = frozenset("0123456789+-.,eE")
 _HEADER_ROWS = 5  # of names, units and kinds
+_MOST_TURNED = 500  # rows of a table whose channels are rows
+_FEWEST = 3  # samples one after the other
+# Labels of rows: of names, of units; and of a column that holds remarks.
+_NAME_ROW = re.compile(
+    r"((channel|kanal|signal|trace|sensor)[ _]?)?(names?|bezeichnung)\W*|kanal|channel|signal",
+    re.IGNORECASE,
+)
+_UNIT_ROW = re.compile(r"(y[ _]|v)?(units?|unit[ _]label|einheit(en)?)\W*", re.IGNORECASE)
+_REMARK = re.compile(r"comments?|remarks?|notes?|kommentar|bemerkung", re.IGNORECASE)
+_WITH_UNIT = re.compile(
+    r"\s*(?P<number>[+-]?\s?[\d.,]*\d([eE][+-]?\d+)?)\s*(?P<unit>[^\W\d][^\s;,|]{0,9}|%|°\S)\s*"
+)
+_FORTRAN = re.compile(r"(\d\.?)[dD]([+-]?\d+)")
+_STATES = {"true": "1", "false": "0", "on": "1", "off": "0"}
 # What recorders write into a row of units above record numbers, dates and times.
 _NO_UNIT = re.compile(
-    r"(ts|rn|no|nr|num|number|#|date|time|datum|zeit|date ?& ?time|id|index|text)\.?", re.IGNORECASE
+    r"(ts|rn|no|nr|num|number|#|date|time|datum|zeit|date ?& ?time|id|index|text|sequence)\.?"
+    r"|[A-Z]\d{4,}",  # of Graphtec's alarms
+    re.IGNORECASE,
 )
 # Columns that hold parts of a second beside time stamps, and digits of these.
 _PARTS = {
@@ -111,9 +133,12 @@ def find_table(rows: Sequence[Sequence[str]], lines: Sequence[int], where: str) 
     InputError
         If there are no two columns of samples, or their names do not reach as far as they do.
     """
-    data = [i for i, row in enumerate(rows) if _is_data(row)]
-    width = Counter(len(rows[i]) for i in data).most_common(1)[0][0] if data else 0
-    samples = [i for i in data if len(rows[i]) == width or len(_trimmed(rows[i])) == width]
+    if turned := _turned(rows):
+        return find_table(turned, range(1, len(turned) + 1), where)
+    samples = _samples(rows, lines, _is_data)
+    if len(samples) < _FEWEST:  # numbers may have units behind them
+        samples = _samples(rows, lines, _has_quantities)
+    width = Counter(len(rows[i]) for i in samples).most_common(1)[0][0] if samples else 0
     # A line of a preamble may hold numbers, too, but not several one after the other.
     first = next((i for i, j in zip(samples, samples[2:], strict=False) if j == i + 2), None)
     if first is None or width < 2:
@@ -127,12 +152,73 @@ def find_table(rows: Sequence[Sequence[str]], lines: Sequence[int], where: str) 
     head = tuple(" ".join(filter(None, row)) for row in rows[:first])
     kept = [i for i in samples if i >= first]
     body = [list(rows[i][:width]) for i in kept]
+    if 0 < len(_trimmed(names)) == width - 1:
+        body = _with_whole_stamps(body)
+        width = len(body[0])
     if names:
         _refuse_narrow(names, units, body, f"{where}, above line {lines[first]}")
     else:
         names = [f"column {i + 1}" for i in range(width)]
     filled = (tuple((row + [""] * width)[:width]) for row in (names, units))
     return Cells(body, [lines[i] for i in kept], head, *filled)
+
+
+def _samples(
+    rows: Sequence[Sequence[str]], lines: Sequence[int], is_sample: Callable[[Sequence[str]], bool]
+) -> list[int]:
+    """Places of the rows that are samples, of one width.
+
+    A row whose first cell is a text, where those of samples are none, is one of statistics or of
+    settings; one or two rows below an empty line at the end are sums.
+    """
+    data = [i for i, row in enumerate(rows) if is_sample(row)]
+    width = Counter(len(rows[i]) for i in data).most_common(1)[0][0] if data else 0
+    samples = [i for i in data if len(rows[i]) == width or len(_trimmed(rows[i])) == width]
+    texts = {i for i in samples if _is_text(rows[i][0])}
+    if 2 * len(texts) < len(samples):
+        samples = [i for i in samples if i not in texts]
+    empty = [lines[j] - lines[i] > j - i for i, j in pairwise(samples)]  # lines that are no rows
+    for k in range(max(2, len(samples) - _FEWEST + 1), len(samples)):
+        if empty[k - 1] and not empty[k - 2]:
+            return samples[:k]
+    return samples
+
+
+def _is_text(cell: str) -> bool:
+    """Whether a cell is neither a number nor a time, nor says that there is none."""
+    text = cell.strip().strip("'\"")
+    if not text or text[0] in "0123456789+-.<>=":
+        return False
+    return not (is_missing(text) or is_number(text) or is_stamp(text))
+
+
+def is_quantity(cell: str) -> bool:
+    """Whether a cell is a number with a unit behind it."""
+    return _WITH_UNIT.fullmatch(cell) is not None
+
+
+def _has_quantities(row: Sequence[str]) -> bool:
+    """Whether a row holds two numbers with units behind them."""
+    return _is_data([match["number"] if (match := _WITH_UNIT.fullmatch(c)) else c for c in row])
+
+
+def _turned(rows: Sequence[Sequence[str]]) -> list[list[str]]:
+    """Columns as rows, where each channel is a row with its name first; empty: they are none."""
+    data = [row for row in rows if _is_data(row)] if len(rows) < _MOST_TURNED else []
+    width = max(map(len, data), default=0)
+    if not 2 <= len(data) <= width // 4 or not all(_is_text(row[0]) for row in data):
+        return []
+    return [list(column) for column in zip_longest(*data, fillvalue="")]
+
+
+def _with_whole_stamps(rows: list[list[str]]) -> list[list[str]]:
+    """The same samples, with days and times beside them as one, where a name stands above both."""
+    columns = list(zip(*rows, strict=True))
+    for i, (days, clocks) in enumerate(pairwise(columns)):
+        dated = _mostly(days, is_stamp) and has_day_alone(days)
+        if dated and _mostly(clocks, is_stamp) and not has_day(clocks):
+            return [[*row[:i], f"{row[i]} {row[i + 1]}", *row[i + 2 :]] for row in rows]
+    return rows
 
 
 def _refuse_narrow(
@@ -179,6 +265,8 @@ def _header(above: Sequence[Sequence[str]], width: int) -> tuple[list[str], list
     rows: list[list[str]] = []
     for row in reversed(above):
         cells = [cell.strip() for cell in row]
+        if len(cells) == width + 1 and _REMARK.fullmatch(cells[-1]):
+            cells = cells[:width]
         if not _trimmed(cells):
             continue
         if len(_trimmed(cells)) > width or len(_trimmed(cells)) < max(2, width // 2):
@@ -187,14 +275,37 @@ def _header(above: Sequence[Sequence[str]], width: int) -> tuple[list[str], list
         if len(rows) == _HEADER_ROWS:
             break
     at = next((i for i in range(1, len(rows)) if _are_units(rows[i])), None)
+    if at is None and len(rows) > 1 and _are_units(rows[0]):
+        rows = [*rows[1:2], rows[0], *rows[2:]]
+        at = 1
     # Below units stand kinds, such as Avg; channel numbers are no names.
     named = [row for row in rows[:at] if not all(is_number(cell) for cell in row if cell)]
+    labelled = _labelled(above, _UNIT_ROW, width) if at is None else []
+    if labelled and (own := _labelled(above, _NAME_ROW, width)):
+        named = [own]
     if not named:
         return (rows[-1], []) if rows and at is None else ([], [])
     if at is None:
-        return _whole_names(named), []
+        with_units = max(named, key=_units_within)
+        if 2 * _units_within(with_units) > width and all(with_units):  # above a row of kinds
+            return with_units, []
+        return _whole_names(named), [spelled(cell) for cell in labelled]
     units = [cell if is_unit(cell) or not _says_nothing(cell) else "" for cell in rows[at]]
     return _whole_names(named), [spelled(cell) for cell in units]
+
+
+def _units_within(row: Sequence[str]) -> int:
+    """How many names of a row have a unit behind them."""
+    return sum(bool(named(cell)[1]) for cell in row)
+
+
+def _labelled(above: Sequence[Sequence[str]], label: re.Pattern[str], width: int) -> list[str]:
+    """The row of a preamble that a label of its own says what it is, over all columns; or none."""
+    for row in reversed(above):
+        cells = [cell.strip() for cell in row]
+        if 2 <= len(_trimmed(cells)) <= width and label.fullmatch(cells[0]):
+            return ["", *cells[1:], *[""] * (width - len(cells))]
+    return []
 
 
 def _whole_names(rows: Sequence[list[str]]) -> list[str]:
@@ -216,11 +327,11 @@ def _whole_names(rows: Sequence[list[str]]) -> list[str]:
 
 def _says_nothing(cell: str) -> bool:
     """Whether a cell in a row of units is of a column that has none, such as one of dates."""
-    return not cell or _NO_UNIT.fullmatch(cell) is not None
+    return not cell or bool(_NO_UNIT.fullmatch(cell) or _UNIT_ROW.fullmatch(cell))
 
 
 def _are_units(cells: Sequence[str]) -> bool:
-    held = [cell for cell in cells if not _says_nothing(cell)]
+    held = [cell for cell in cells if not _says_nothing(cell) and not is_number(cell)]
     return bool(held) and sum(map(is_unit, held)) >= 0.75 * len(held)
 
 
@@ -252,6 +363,9 @@ def read_group(
             notes += [f"'{labels[i][0]}' holds {channel.doubt}"] * bool(channel.doubt)
         elif _mostly(cells, is_number):
             numbers[i] = all_plain(cells)
+        elif (bare := _bare(cells, labels[i][1])) is not None:
+            numbers[i] = all_plain(bare[0])
+            labels[i] = labels[i][0], bare[1]
         elif any(cells):
             notes.append(f"'{labels[i][0]}' holds texts")
             none = np.full(len(cells), math.nan)
@@ -287,6 +401,30 @@ def read_group(
         begun=stated_begin(table.head),
     )
     return group, reading, notes
+
+
+def _bare(cells: Sequence[str], unit: str) -> tuple[list[str], str] | None:
+    """Numbers of cells that hold their unit, too, or are written as no other; and the unit.
+
+    Texts of a spreadsheet (="1.5"), exponents of Fortran (1.5D+02), and what is on or off.
+    """
+    held = [cell for cell in cells if not is_missing(cell) or cell.casefold() in _STATES]
+    if held and unit in ("", "1") and all(cell.casefold() in _STATES for cell in held):
+        return [_STATES.get(cell.casefold(), cell) for cell in cells], unit or "1"
+    plainer = [_FORTRAN.sub(r"\1E\2", cell.removeprefix("=").strip("'\"")) for cell in cells]
+    if _mostly(plainer, is_number):
+        return plainer, unit
+    matches = [_WITH_UNIT.fullmatch(cell) for cell in plainer]
+    units = Counter(match["unit"] for match in matches if match)
+    own = next(iter(units), "")
+    if len(units) != 1 or not is_unit(own) or 2 * units[own] <= len(held):
+        return None
+    if unit and spelled(unit) != spelled(own):
+        return None
+    bare = [
+        match["number"] if match else cell for match, cell in zip(matches, plainer, strict=True)
+    ]
+    return bare, spelled(own)
 
 
 def _assembled(
@@ -424,7 +562,7 @@ def stated_step(head: Sequence[str]) -> tuple[float, str]:
     """
     steps: dict[str, float] = {}
     for line in head:
-        for match in _QUANTITY.finditer(line):
+        for match in (*_QUANTITY.finditer(line), *_UNIT_BEFORE.finditer(line)):
             before = line[max(0, match.start() - _ABOUT) : match.start()]
             about = re.split(r"\d", before)[-1]
             value, unit = match["value"].strip(), match["unit"].casefold()

@@ -1,17 +1,20 @@
 """MAT 7.3, which is HDF5, and plain HDF5 with units in attributes."""
 
 import io
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
 
-from workbench.recordings.formats.arrays import numbered, read_groups
+from workbench.recordings.formats.arrays import Opaque, numbered, read_groups
 from workbench.recordings.formats.contents import Contents
 
 _CLASS = "MATLAB_class"
+_DECODED = "MATLAB_object_decode"
+_RATES = ("fs", "sample_rate", "samplerate", "sampling_rate", "dt", "sample_time")
+_NAMES = ("columns", "column_names", "names", "channels", "channel_names", "labels", "fields")
 _UNITS = ("unit", "units", "Unit", "Units")
 
 
@@ -26,7 +29,20 @@ def read(path: Path, raw: bytes) -> Contents:
 def _members(group: h5py.Group, file: h5py.File) -> dict[str, Any]:
     """What a group holds, by name; #refs# are what cells point at."""
     structures = _structures(group, file)
-    return numbered(structures) if structures else _entries(dict(group.items()), file)
+    if structures:
+        return numbered(structures)
+    return {**_entries(dict(group.items()), file), **_stated(group, ("unit", "units", *_RATES))}
+
+
+def _stated(item: Any, keys: Collection[str]) -> dict[str, Any]:
+    """Texts and numbers that attributes of an entry state under some names."""
+    found: dict[str, Any] = {}
+    for key, value in item.attrs.items():
+        if key.lower() in keys:
+            found[key] = value.decode() if isinstance(value, bytes) else value
+            if np.size(value) == 1 and not isinstance(found[key], str):
+                found[key] = np.ravel(value)[0]
+    return found
 
 
 def _entries(items: Mapping[str, Any], file: h5py.File) -> dict[str, Any]:
@@ -42,6 +58,12 @@ def _entries(items: Mapping[str, Any], file: h5py.File) -> dict[str, Any]:
         if value is None:
             continue
         members[name] = value
+        members |= _stated(item, _RATES)
+        for key in _NAMES:
+            labels = item.attrs.get(key)
+            if isinstance(labels, np.ndarray | list) and len(labels) > 1:
+                texts = [text.decode() if isinstance(text, bytes) else str(text) for text in labels]
+                members[f"{name}_{key}"] = texts
         unit = next((item.attrs[key] for key in _UNITS if key in item.attrs), None)
         if unit is not None:
             members[f"{name}_unit"] = unit.decode() if isinstance(unit, bytes) else str(unit)
@@ -73,12 +95,24 @@ def _class_of(item: Any) -> str:
 
 def _value(item: h5py.Dataset, file: h5py.File) -> Any:
     kind = _class_of(item)
+    if _DECODED in item.attrs:
+        return Opaque(
+            f"an object of MATLAB ({kind}), which only MATLAB reads: save it as a structure, "
+            "table2struct(X, 'ToScalar', true), or by writetable or writetimetable as CSV"
+        )
+    if item.dtype.names:  # rows of a table
+        rows = item[()]
+        return {name: rows[name] for name in item.dtype.names if rows[name].dtype.kind in "fiub"}
     if item.dtype.kind == "O" and h5py.check_ref_dtype(item.dtype) is not None:
         entries = [_value(file[reference], file) for reference in np.ravel(item[()])]
         return [entry for entry in entries if isinstance(entry, str)]
     value = item[()]
     if kind == "char":
         return "".join(map(chr, np.ravel(np.asarray(value).T, order="F").astype(int)))
+    if isinstance(value, np.ndarray) and value.dtype.kind in "SO":
+        return [
+            v.decode("utf-8", "replace") if isinstance(v, bytes) else str(v) for v in value.flat
+        ]
     if isinstance(value, bytes):
         return value.decode("utf-8", "replace")
     if not isinstance(value, np.ndarray) or value.dtype.kind not in "fiub":

@@ -10,11 +10,15 @@ import numpy as np
 from scipy.io import loadmat
 from scipy.io.matlab import MatlabOpaque
 
-from workbench.recordings.formats.arrays import numbered, read_groups
+from workbench.recordings.formats.arrays import Opaque, numbered, read_groups
 from workbench.recordings.formats.contents import Contents, FileChannel, Group
 from workbench.recordings.formats.spelling import spelled
 
 _UNIT = re.compile(r".*\[([^\[\]|]*)(\|[^\[\]]*)?\]\s*")  # of a description: Level [m|cm]
+_OBJECT = (
+    "an object that only MATLAB reads, such as a table or a timetable: save it as a structure, or "
+    "as CSV or Parquet"
+)
 _RESULT = frozenset({"Aclass", "name", "dataInfo", "data_2"})
 
 
@@ -28,20 +32,14 @@ def read(path: Path, raw: bytes) -> Contents:
             return _result(plain)
         stream.seek(0)
     content = loadmat(stream, simplify_cells=True, chars_as_strings=True)
-    opaque = [name for name, value in content.items() if isinstance(value, MatlabOpaque)]
     held = {
-        name: _plain(value)
+        name: Opaque(_OBJECT) if isinstance(value, MatlabOpaque) else _plain(value)
         for name, value in content.items()
-        if not name.startswith("__") and name not in opaque
+        if not name.startswith("__")
     }
     groups, notes = read_groups(held)
-    notes += [
-        f"'{name}' is an object that only MATLAB reads, such as a table or a timetable: save it as "
-        "a structure, or as CSV or Parquet"
-        for name in opaque
-    ]
-    if opaque and not groups:
-        raise ValueError(notes[-1])
+    if not groups and any(isinstance(value, Opaque) for value in held.values()):
+        raise ValueError("; ".join(notes))
     return Contents(words, groups, notes)
 
 

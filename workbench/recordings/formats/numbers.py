@@ -12,7 +12,7 @@ from workbench.errors import InputError
 
 # What recorders write where there is no number: nothing, words, an overload, dashes.
 _MISSING = re.compile(
-    r"|nan|na|n/a|n\.a\.|n\.d\.|<na>|#n/a|#nv|#value!|#div/0!|#bezug!|#ref!|null|none|[+-]?inf"
+    r"|nan|na|n/a|n\.a\.|n\.d\.|<na>|#n/a|#nv|#value!|#div/0!|#bezug!|#ref!|null|none|[+-]?inf(inity)?"
     r"|-?1\.#(inf|qnan|ind)\w*|[+-]?(ol|ovl|over|overload|overrange|overflow|underrange)|burnout"
     r"|no ?data|invalid|bad|err|error|fault|open|-+|\*+|#+|\?+|_+",
     re.IGNORECASE,
@@ -59,27 +59,51 @@ _LARGEST = 1e100  # no measurement comes near
 def markers(values: Vector) -> tuple[dict[float, int], dict[float, int]]:
     """Values that stand alone far outside of all others, and how often: known markers, and others.
 
-    Known are those that recorders write where they have no sample; others come more than once.
+    Known are those that recorders write where they have no sample; others are rare, and come more
+    than once, one or two samples at a time, or stand a hundred widths of all others apart.
     """
     known: dict[float, int] = {}
     others: dict[float, int] = {}
     left = values[np.isfinite(values)]
+    sizes = np.abs(left)
+    coded = np.isin(sizes, list(_MARKERS)) | ((sizes >= _LARGE[0]) & (sizes <= _LARGE[1]))
+    samples = left[~coded]
+    if samples.size > _FEWEST and _is_varied(samples):
+        for value in np.unique(left[coded]):  # beside each other they are no range
+            if _apart(float(value), samples) > _FAR:
+                known[float(value)] = int((left == value).sum())
+        left = left[~np.isin(left, list(known))]
     while left.size > _FEWEST:
         for extreme in (float(left.max()), float(left.min())):
             rest = left[left != extreme]
-            if np.unique(rest[: 100 * _FEWEST]).size < _FEWEST:
-                continue  # steps between a few values
-            distance = float(np.abs(rest - extreme).min()) / float(np.ptp(rest) or 1.0)
+            if not _is_varied(rest):
+                continue
+            apart, at = _apart(extreme, rest), left == extreme
             count = left.size - rest.size
-            marker = abs(extreme) in _MARKERS or _LARGE[0] <= abs(extreme) <= _LARGE[1]
-            rare = count > 1 and count <= _RARE * left.size and distance > _FARTHER
-            if distance > _FAR and (rare or marker or abs(extreme) in _MAYBE):
-                (known if marker else others)[extreme] = count
+            # Far outside of all others, or out and back at once, as no machine moves.
+            rare = count <= max(1.0, _RARE * left.size)
+            alone = apart > _FARTHER or not (at[1:-1] & at[2:] & at[:-2]).any()
+            if apart > _FAR and (
+                abs(extreme) in _MAYBE
+                or (rare and alone and count > 1)
+                or (rare and apart > _FARTHER)
+            ):
+                others[extreme] = count
                 left = rest
                 break
         else:
             break
     return known, others
+
+
+def _is_varied(values: Vector) -> bool:
+    """Whether values are no steps between a few."""
+    return np.unique(values[: 100 * _FEWEST]).size >= _FEWEST
+
+
+def _apart(value: float, others: Vector) -> float:
+    """How far a value is from all others, in widths of these."""
+    return float(np.abs(others - value).min()) / float(np.ptp(others) or 1.0)
 
 
 def is_number(cell: str) -> bool:

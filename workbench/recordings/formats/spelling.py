@@ -99,7 +99,10 @@ def is_unit(text: str) -> bool:
     return True
 
 
-_NAMED = re.compile(r"(?P<name>.*?)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\))\s*")
+_NAMED = re.compile(
+    r"(?P<name>.*?)\s*(?:\[(?P<square>[^\[\]]*)\]|[({<](?P<round>[^(){}<>]*)[)}>])\s*"
+)
+_WITHIN = re.compile(r"(?P<name>.*\S)\s*\[(?P<unit>[^\[\]]+)\]\s*(?P<rest>\S.*)")
 _TRAILING = re.compile(r"(?P<name>.*\S)\s*(?:\s/\s?|\s+in\s+|,\s*)(?P<unit>\S+)")
 
 
@@ -118,6 +121,8 @@ def named(cell: str) -> tuple[str, str]:
         number = unit.strip().isdecimal() and (match["square"] is None or unit.strip() != "1")
         if match["name"] and not number and (match["square"] is not None or is_unit(unit)):
             return match["name"], spelled(unit)
+    if (match := _WITHIN.fullmatch(text)) and is_unit(match["unit"]) and match["unit"] != "1":
+        return f"{match['name']} {match['rest']}", spelled(match["unit"])
     if (match := _TRAILING.fullmatch(text)) and is_unit(match["unit"]):
         return match["name"], spelled(match["unit"])
     return text, ""

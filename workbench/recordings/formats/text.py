@@ -3,17 +3,24 @@
 import csv
 import re
 from collections.abc import Callable, Sequence
+from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
+import numpy as np
+
 from workbench.errors import InputError
-from workbench.recordings.formats.cells import find_table, read_group
+from workbench.recordings.formats.cells import Cells, find_table, is_quantity, read_group
 from workbench.recordings.formats.contents import Contents
+from workbench.recordings.formats.numbers import is_missing, is_number
+from workbench.recordings.formats.stamps import is_stamp
 
 _SEPARATORS = {";": "semicolons", "\t": "tabs", "|": "bars", ",": "commas", " ": "spaces"}
 _COMMENT = re.compile(r"\s*\"?(#+|%+|//+|!+|\*+)\s*")
 _BEFORE_UNIT = re.compile(r"\s+(?=[\[(])")  # between a name and its unit
 _SAMPLED = 200  # lines from the middle of a file, which tell how it is laid out
-_CELL = re.compile(r"\s*[+-]?[0-9.,:/TZ\s+-]*[0-9][0-9.,:/TZ\s+-]*([eE][+-]?[0-9]+)?\s*")
+_FOLDED = 5  # lines over which a name in quotation marks may go
+_UNEVEN = 0.9  # of lines with as many cells as most have; fewer, and columns are at fixed places
 
 
 def read(path: Path, raw: bytes) -> Contents:
@@ -25,16 +32,24 @@ def read(path: Path, raw: bytes) -> Contents:
         If it holds no table, or one that can be read in two ways.
     """
     text, encoding = _decoded(path, raw)
-    lines = text.replace("\r\n", "\n").replace("\r", "\n").rstrip("\n").split("\n")
+    lines = (
+        text.replace("\r\r\n", "\n")
+        .replace("\r\n", "\n")
+        .replace("\r", "\n")
+        .rstrip("\n")
+        .split("\n")
+    )
     separator = _separator(path, lines)
     rows, numbers, broken = _rows(lines, separator)
     table = find_table(rows, numbers, str(path))
+    if lines[0].startswith("LabVIEW Measurement"):
+        table = _of_labview(table)
     # Between commas, a number has a comma only in quotation marks.
     commas = separator != "," or any("," in cell for row in table.rows for cell in row)
     group, reading, notes = read_group(table, "", str(path), commas=commas)
     words = ["CSV", _SEPARATORS[separator], reading, encoding]
     below = [number for number in numbers if number >= table.lines[0]]
-    broken += len(below) - len(table.lines)
+    broken += max(0, len(below) - len(table.lines))
     if broken:
         kept = set(table.lines)
         first = next((number for number in below if number not in kept), 0)
@@ -46,8 +61,15 @@ def read(path: Path, raw: bytes) -> Contents:
 
 def _decoded(path: Path, raw: bytes) -> tuple[str, str]:
     """Text and name of its encoding."""
+    raw = raw.rstrip(b"\0")  # with which some recorders fill what they have reserved
+    if raw.startswith((b"\xff\xfe\0\0", b"\0\0\xfe\xff")):
+        return (raw + b"\0" * (-len(raw) % 4)).decode("utf-32", "replace"), "UTF-32"
     if raw.startswith((b"\xff\xfe", b"\xfe\xff")):
-        return raw.decode("utf-16", "replace"), "UTF-16"
+        return (raw + b"\0" * (len(raw) % 2)).decode("utf-16", "replace"), "UTF-16"
+    begin = raw[:2000]
+    for first, encoding in ((1, "utf-16-le"), (0, "utf-16-be")):  # of mostly Latin letters
+        if b"\0" in begin and begin[first::2].count(0) > 0.4 * len(begin):
+            return (raw + b"\0" * (len(raw) % 2)).decode(encoding, "replace"), "UTF-16"
     if b"\0" in raw:
         raise InputError(
             where=str(path),
@@ -77,7 +99,10 @@ def _separator(path: Path, lines: Sequence[str]) -> str:
             continue
         width = max(set(widths), key=widths.count)
         cells = [cell for row in rows for cell in row]
-        good = sum(not cell.strip() or bool(_CELL.fullmatch(cell)) for cell in cells)
+        good = sum(
+            is_missing(cell) or is_number(cell) or is_stamp(cell.strip()) or is_quantity(cell)
+            for cell in cells
+        )
         even = widths.count(width) / len(widths)
         if width > 1:
             scores[mark] = good / len(cells) * even
@@ -103,20 +128,76 @@ def _rows(lines: Sequence[str], separator: str) -> tuple[list[list[str]], list[i
     rows: list[list[str]] = []
     numbers: list[int] = []
     broken = 0
+    left = 0  # lines that are part of one above
+    edges = _edges(lines) if separator == " " else []
     for number, line in enumerate(lines, 1):
+        if left:
+            left -= 1
+            continue
         bare = line[match.end() :] if (match := _COMMENT.match(line)) else line
         if not bare.strip():
             continue
-        if separator == " ":
+        if edges and match is None:
+            cells = [line[a:b].strip() for a, b in pairwise(edges)]
+        elif separator == " ":
             cells = _BEFORE_UNIT.sub("", bare).split()
         elif '"' not in bare:
             cells = bare.split(separator)
         else:
             try:
-                (cells,) = csv.reader([bare], delimiter=separator, strict=True)
+                cells, left = _quoted(bare, lines[number : number + _FOLDED], separator)
             except (csv.Error, ValueError):
                 broken += 1
                 continue
         rows.append(cells)
         numbers.append(number)
     return rows, numbers, broken
+
+
+def _quoted(line: str, below: Sequence[str], separator: str) -> tuple[list[str], int]:
+    """Cells of a line with quotation marks, and how many lines below it they go on."""
+    count = 0
+    while line.count('"') % 2 and count < len(below):
+        line = f"{line} {below[count]}"
+        count += 1
+    (cells,) = csv.reader([line], delimiter=separator, strict=True)
+    return cells, count
+
+
+def _edges(lines: Sequence[str]) -> list[int]:
+    """Where columns of fixed places begin and end; none where spaces alone part cells.
+
+    Columns are parted by places that are blank in all lines of samples.
+    """
+    middle = [line for line in lines if line.strip() and not _COMMENT.match(line)]
+    begin = max(0, (len(middle) - _SAMPLED) // 2)
+    some = [line for line in middle[begin : begin + _SAMPLED] if _is_numeric(line)]
+    widths = [len(line.split()) for line in some]
+    if not widths or widths.count(max(set(widths), key=widths.count)) >= _UNEVEN * len(widths):
+        return []
+    length = max(map(len, middle))
+    filled = np.zeros(length + 2, dtype=bool)
+    for line in some:
+        for place, character in enumerate(line, 1):
+            filled[place] |= not character.isspace()
+    # A column ends behind its last figure: numbers of fixed columns stand at their right ends.
+    ends = np.flatnonzero(filled[:-1] & ~filled[1:])
+    return [0, *ends[:-1].tolist(), length]
+
+
+def _is_numeric(line: str) -> bool:
+    """Whether most of what stands in a line are numbers or times."""
+    cells = line.split()
+    return 2 * sum(is_number(cell) or is_stamp(cell) for cell in cells) > len(cells)
+
+
+def _of_labview(table: Cells) -> Cells:
+    """A table of LabVIEW: X_Value is the time, or steps of Delta_X are, both in seconds."""
+    names = tuple("time" if name == "X_Value" else name for name in table.names)
+    units = tuple(
+        "s" if name == "time" else unit for name, unit in zip(names, table.units, strict=True)
+    )
+    steps = [line.split()[1] for line in table.head if line.startswith("Delta_X ")]
+    return replace(
+        table, names=names, units=units, head=(*table.head, *(f"dt {s} s" for s in steps))
+    )
