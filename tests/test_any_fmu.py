@@ -16,8 +16,11 @@ from workbench.errors import FMUError, InputError
 from workbench.models.fmu import FMU, EventError
 from workbench.observers import estimators_of
 from workbench.observers.contract import Estimator
+from workbench.observers.fmpy_comparison import RIGHT, compare_with_fmpy
 from workbench.observers.gains_file import usual_gains
-from workbench.system.registry import load_system
+from workbench.observers.replay import replay
+from workbench.recordings.case import read_case
+from workbench.system.registry import load_system, open_model
 
 from .hostile_fmus import COMPILER, needs_compiler
 
@@ -65,14 +68,16 @@ Build = Callable[..., Path]
 def build(tmp_path: Path) -> Build:
     """Builds the room in a folder with its system file; returns the FMU."""
 
-    def make(what: str, start: float = 0.0, correction: str = "dG") -> Path:
+    def make(
+        what: str, start: float = 0.0, correction: str = "dG", variables: str = VARIABLES
+    ) -> Path:
         library = tmp_path / f"Room{fmpy.sharedLibraryExtension}"
         headers = Path(fmpy.__file__).parent / "c-code"
         source = Path(__file__).with_name("events.c")
         flags = ["-shared", "-fPIC", "-w", f"-DWHAT={what}", "-I", headers]
         subprocess.run([str(COMPILER), *flags, source, "-o", library, "-lm"], check=True)
         description = DESCRIPTION.format(
-            count=int(what == "THERMOSTAT"), start=start, variables=VARIABLES
+            count=int(what == "THERMOSTAT"), start=start, variables=variables
         )
         with zipfile.ZipFile(tmp_path / "Room.fmu", "w") as archive:
             archive.writestr("modelDescription.xml", description)
@@ -229,6 +234,40 @@ def test_parameters_are_set_by_their_type_where_references_repeat(build: Build) 
             fmu.variables(["mode"])
 
 
+SWITCHED = VARIABLES.replace(
+    'name="flag" valueReference="1" causality="parameter" variability="fixed"',
+    'name="flag" valueReference="1" causality="input" variability="discrete"',
+).replace(
+    'name="mode" valueReference="0" causality="parameter" variability="fixed"><Integer start="0"/>',
+    'name="mode" valueReference="0" causality="output" variability="discrete"><Integer/>',
+)
+
+
+def test_the_open_loop_sets_discrete_inputs_at_events_and_reads_whole_numbers(build: Build) -> None:
+    """A Boolean input that adds 1 K/s from 20 s to 40 s; an Integer output that says 10 or 11."""
+    path = build("RELAYS", variables=SWITCHED)
+    file = path.parent / "system.toml"
+    text = file.read_text().partition("[estimated.G]")[0]
+    text += 'inputs.flag = { unit = "1", noise = 0.0, scale = 1.0 }\n'
+    file.write_text(text + 'outputs.mode = { unit = "1", noise = 0.5, scale = 1.0 }\n')
+    system = load_system(file)
+    time = np.arange(0.0, 65.0, 10.0)
+    on = (time >= 20.0) & (time < 40.0)
+    u, y = np.column_stack([np.full(time.size, 280.0), on]), np.full((time.size, 2), np.nan)
+    with open_model(system) as fmu:
+        kinds = estimators_of(system)
+        loop = kinds["open_loop"](fmu, system, usual_gains(kinds["open_loop"], fmu, system))
+        values = np.asarray(loop.run(time, u, y).values)
+        with pytest.raises(InputError, match=r"a discrete input|of type (Boolean|Integer)"):
+            kinds["ukf"](fmu, system, usual_gains(kinds["ukf"], fmu, system))
+    assert list(system.columns) == ["T", "mode"]
+    before = exact(1500.0, 20.0)
+    heated = exact(1500.0 + 1e5, 20.0, begin=before)
+    after = exact(1500.0, 20.0, begin=heated)
+    assert values[[2, 4, 6], 0] == pytest.approx([before, heated, after], abs=1e-4)
+    assert values[:, 1].tolist() == [10, 10, 11, 11, 10, 10, 10]
+
+
 @pytest.mark.parametrize(
     ("correction", "found"),
     [
@@ -252,3 +291,153 @@ def test_compiled_code_gets_samples_of_the_size_that_it_needs(build: Build) -> N
         for u, y in ((two, one), (one[:4], one), (one, one[:4])):
             with pytest.raises(ValueError, match="samples of shape"):
                 filter_.run(time, u, y)
+
+
+def recorded(folder: Path, outside: str = "Ta", inside: str = "T") -> Path:
+    """A recording of ten minutes at 280 K outside; returns its folder."""
+    case = folder / "cases" / "one"
+    case.mkdir(parents=True)
+    (case / "case.toml").write_text('title = "x"\n[measurement]\nfile = "measured.csv"\n')
+    rows = "".join(f"{10 * k},280,{291 + 0.05 * (-1) ** k:.2f}\n" for k in range(61))
+    (case / "measured.csv").write_text(f"time [s],{outside} [K],{inside} [K]\n{rows}")
+    return case
+
+
+def renamed_system(path: Path) -> Path:
+    """The system of the room with names of its own, no class; returns the file."""
+    file = path.parent / "system.toml"
+    text = SYSTEM.format(correction="more").replace('class = "Room", ', "")
+    text = text.replace("inputs.Ta = {", 'inputs.outside = { variable = "Ta",')
+    text = text.replace("outputs.T = {", "outputs.inside = { variable = 'T',")
+    text = text.replace(
+        "[estimated.G]", '[variables]\nmore = "dG"\n[estimated.loss]\nvariable = "G"'
+    )
+    file.write_text(text.replace('acts_on = "T"', 'acts_on = "inside"'))
+    return file
+
+
+def test_a_system_file_gives_variables_names_of_its_own(build: Build) -> None:
+    path = build("RELAYS")
+    time, u, y = np.arange(0.0, 605.0, 10.0), np.full((61, 1), 280.0), np.full((61, 1), 291.0)
+    with FMU(path) as fmu:
+        plain = estimator(fmu, "ekf").run(time, u, y).values
+    system = load_system(renamed_system(path))
+    assert list(system.columns) == ["inside", "more", "loss"]
+    with open_model(system) as fmu:
+        chosen = estimators_of(system)["ekf"]
+        renamed = chosen(fmu, system, usual_gains(chosen, fmu, system)).run(time, u, y).values
+    np.testing.assert_array_equal(plain, renamed)
+
+
+@pytest.mark.parametrize(
+    ("line", "match"),
+    [
+        ('variable = "Tx"', r"no variable 'Tx'.*'inside'"),
+        ('variable = "Ta"', r"\[outputs.inside\] variable: found 'Ta' for 'inside', after"),
+    ],
+)
+def test_a_name_that_the_fmu_has_not_or_that_is_taken_is_refused(
+    line: str, match: str, build: Build
+) -> None:
+    file = renamed_system(build("RELAYS"))
+    file.write_text(file.read_text().replace("variable = 'T'", line))
+    with pytest.raises(InputError, match=match):
+        load_system(file)
+
+
+def test_names_of_a_system_file_may_come_from_the_command_line(
+    build: Build, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The file has none of the FMU's names: they are known before its variables are looked up."""
+    file = renamed_system(build("RELAYS"))
+    text = file.read_text().replace('variable = "Ta",', "").replace("variable = 'T',", "")
+    file.write_text(text.replace('variable = "G"', "").replace('[variables]\nmore = "dG"\n', ""))
+    with pytest.raises(InputError, match=r"write variable = 'NAME' in the table of 'outside'"):
+        load_system(file)
+    case = recorded(file.parent, "outside", "inside")
+    names = {"outside": "Ta", "inside": "T", "loss": "G", "more": "dG"}
+    options = [part for name in names.items() for part in ("--map", "=".join(name))]
+    arguments = ["simulate", "--system", file, case, "--estimator", "open_loop", "--workers", "1"]
+    out = file.parent / "out"
+    assert main([*map(str, arguments), *options, "--out", str(out)]) == 0
+    assert "open_loop.inside [K]" in (out / "one.csv").read_text()
+    capsys.readouterr()
+
+
+def test_a_recording_says_where_its_time_begins_for_the_model(build: Build) -> None:
+    """From 550 s of the timetable on, the heating goes off after 50 s, else after 600 s."""
+    path = build("TIMETABLE")
+    case = recorded(path.parent)
+    system = load_system(path.parent)
+    with open_model(system) as fmu:
+        loop = estimators_of(system)["open_loop"]
+        values = {}
+        for begin in ("", 'model_time = "550 s"\n', ""):
+            text = (case / "case.toml").read_text().partition("model_time")[0]
+            (case / "case.toml").write_text(text + begin)
+            run = replay(read_case(case, system), loop(fmu, system, usual_gains(loop, fmu, system)))
+            values[begin] = run.signal("T")[[5, 20]]
+    heated = exact(1500.0, 50.0, begin=291.05)
+    assert values[""] == pytest.approx([heated, exact(1500.0, 200.0, begin=291.05)], abs=1e-4)
+    off = exact(0.0, 150.0, begin=heated)
+    assert values['model_time = "550 s"\n'] == pytest.approx([heated, off], abs=1e-4)
+
+
+def test_what_needs_modelica_asks_for_the_class(build: Build) -> None:
+    system = load_system(renamed_system(build("RELAYS")))
+    with pytest.raises(InputError, match=r"found the FMU Room.fmu, and no 'class'"):
+        system.models["observer"].name  # noqa: B018
+
+
+ALONE = 'CoSimulation modelIdentifier="Alone"'
+COASTING = """
+<ScalarVariable name="x" valueReference="0" causality="output" initial="exact"><Real start="1"/></ScalarVariable>
+<ScalarVariable name="u" valueReference="1" causality="input"><Real start="0"/></ScalarVariable>
+"""  # noqa: E501
+
+
+@pytest.fixture
+def integrator(tmp_path: Path) -> Path:
+    """A system on a Co-Simulation alone: der(x) = u from 1, each step exact."""
+    source = Path(__file__).with_name("co_simulation.c")
+    library = tmp_path / f"Alone{fmpy.sharedLibraryExtension}"
+    headers = Path(fmpy.__file__).parent / "c-code"
+    flags = ["-shared", "-fPIC", "-w", "-I", headers]
+    subprocess.run([str(COMPILER), *flags, source, "-o", library], check=True)
+    description = DESCRIPTION.format(count=0, start=0.0, variables=COASTING)
+    description = description.replace('ModelExchange modelIdentifier="Room"', ALONE)
+    structure = description[description.index("<Outputs>") : description.index("</ModelStruct")]
+    description = description.replace(structure, "<Outputs><Unknown index='1'/></Outputs>")
+    with zipfile.ZipFile(tmp_path / "Alone.fmu", "w") as archive:
+        archive.writestr("modelDescription.xml", description)
+        archive.write(library, f"binaries/{fmpy.platform}/{library.name}")
+    (tmp_path / "system.toml").write_text(
+        'title = "Alone"\nsample_time = "1 s"\nmodels.observer = { fmu = "Alone.fmu" }\n'
+        'inputs.u = { unit = "1", noise = 0.0, scale = 1.0, held = true }\n'
+        'outputs.x = { unit = "1", noise = 0.1, scale = 1.0 }\n'
+    )
+    return tmp_path
+
+
+def test_the_open_loop_runs_on_co_simulation_alone(integrator: Path) -> None:
+    """An input that is held: 3 s of 1 and 3 s of 0 make 3."""
+    system = load_system(integrator)
+    time, u = np.arange(7.0), np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0])[:, None]
+    with open_model(system) as fmu:
+        loop = estimators_of(system)["open_loop"]
+        estimate = loop(fmu, system, usual_gains(loop, fmu, system)).run(time, u, u + np.nan)
+    np.testing.assert_allclose(np.asarray(estimate.values)[:, 0], [1, 2, 3, 4, 4, 4, 4])
+    assert compare_with_fmpy(integrator / "Alone.fmu").verdict == RIGHT
+
+
+@pytest.mark.parametrize("name", ["ekf", "mhe", "smoother"])
+def test_what_co_simulation_alone_cannot_do_is_said_with_what_would_make_it_possible(
+    name: str, integrator: Path
+) -> None:
+    system = load_system(integrator)
+    with open_model(system) as fmu:
+        chosen = estimators_of(system)[name]
+        with pytest.raises(InputError, match=r"Co-Simulation, without .*export the model for Mod"):
+            chosen(fmu, system, usual_gains(chosen, fmu, system))
+        with pytest.raises(InputError, match="without derivatives"):
+            fmu.state_jacobian()

@@ -221,7 +221,7 @@ def _info(options: argparse.Namespace, output: Output) -> CommandResult:
 
 
 def _check(options: argparse.Namespace, output: Output) -> CommandResult:
-    from workbench.models.checks import check, is_fit, uses
+    from workbench.models.checks import check, is_fit, remember_findings, uses
     from workbench.models.description import read_description
     from workbench.models.trial import usual_limits
 
@@ -240,17 +240,17 @@ def _check(options: argparse.Namespace, output: Output) -> CommandResult:
     unknown = any(finding.unknown for finding in findings)
     fit = None if unknown and is_fit(findings) else is_fit(findings)
     possible = uses(findings)
-    would_do = sum(not failed for failed in possible.values())
+    good = [use for use, failed in possible.items() if not failed]
     verdict = {
         True: "fit for observers",
-        False: f"not fit for observers; it would do for {would_do} of {len(possible)} uses",
+        False: f"fit for {', '.join(good) or 'nothing'}; not fit for what else there is",
         None: "not measured",
     }
     output.result(f"{options.fmu.name} ({description.name}): {verdict[fit]}")
-    if fit is False:
-        for use, failed in possible.items():
-            reason = f"no, for {', '.join(failed)}" if failed else "it would do"
-            output.result(f"    {use}: {reason}")
+    for use, failed in possible.items() if fit is not None else ():
+        reason = f"no, for {', '.join(failed)}" if failed else "it would do"
+        output.result(f"    {use}: {reason}")
+    remember_findings(description.sha256, [f for f in findings if f.passed is False])
     identity = {
         "file": description.path.name,
         "model": description.name,

@@ -99,7 +99,7 @@ def chosen_system(options: argparse.Namespace) -> tuple[System, list[Case]]:
     InputError
         If system, models or cases cannot be read, or do not fit each other.
     """
-    system = load_system(options.system)
+    system = _load(options)
     cases = given_cases(options, system)
     names = model_names(options.map, system, cases)
     if options.fmu is not None or names:
@@ -108,6 +108,38 @@ def chosen_system(options: argparse.Namespace) -> tuple[System, list[Case]]:
     if options.full_fmu is not None:
         system = with_model(system, FULL, options.full_fmu)
     return system, cases
+
+
+def _load(options: argparse.Namespace) -> System:
+    """The system; where its own names are not those of its FMU, with the names of --map."""
+    try:
+        return load_system(options.system)
+    except InputError:
+        if not options.map:
+            raise
+        return load_system(options.system, options.fmu, _mapped(options.map))
+
+
+def _mapped(entries: Sequence[str]) -> dict[str, str]:
+    """What --map says: the FMU's names by ours.
+
+    Raises
+    ------
+    InputError
+        If an entry cannot be read.
+    """
+    given: dict[str, str] = {}
+    for entry in entries:
+        ours, equals, theirs = entry.partition("=")
+        if not equals or ours in given:
+            raise InputError(
+                where=f"command line, --map {entry}",
+                found=f"a second name for '{ours}'" if equals else "no '='",
+                expected="OURS=THEIRS, once for each variable",
+                remedy="write for instance --map p=pressure",
+            )
+        given[ours] = theirs
+    return given
 
 
 def model_names(
@@ -125,18 +157,7 @@ def model_names(
     InputError
         If an entry cannot be read, names no variable of ours, or cases contradict each other.
     """
-    given: dict[str, str] = {}
-    for entry in mapped:
-        ours, equals, theirs = entry.partition("=")
-        if not equals or ours in given:
-            raise InputError(
-                where=f"command line, --map {entry}",
-                found=f"a second name for '{ours}'" if equals else "no '='",
-                expected="OURS=THEIRS, once for each variable",
-                remedy="write for instance --map p=pressure",
-            )
-        given[ours] = theirs
-    given = check_names(given, "command line, --map", system)
+    given = check_names(_mapped(mapped), "command line, --map", system)
     names: dict[str, str] = {}
     for case in cases:
         for ours, theirs in case.names.items():

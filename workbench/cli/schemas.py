@@ -182,11 +182,12 @@ def case_schema(system: System) -> Schema:
         "file": {**NAMED, "description": "recording in this folder"},
         "columns": columns,
         "counts_from": {**TEXT, "description": "time with unit"},
+        "model_time": {**TEXT, "description": "time with unit"},
     }
     entries = {
         "title": NAMED,
         "date": {**TEXT, "description": "when it was recorded, ISO 8601"},
-        "measurement": closed(measurement, optional="columns counts_from"),
+        "measurement": closed(measurement, optional="columns counts_from model_time"),
         "conditions": closed(conditions, optional=unsaid),
         "model": closed({"names": by_name(NAMED)}, optional="names"),
     }

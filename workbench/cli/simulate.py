@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import hashlib
 import sys
 import time
 from collections.abc import Iterator, Sequence
@@ -20,7 +21,7 @@ from workbench.cli.arguments import (
     add_workers,
     example_case,
 )
-from workbench.cli.output import CommandResult, Output
+from workbench.cli.output import CommandResult, Output, warn
 from workbench.errors import InputError
 from workbench.runtime.files import locked_folder, write_json
 
@@ -93,6 +94,18 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
         return _run(options, output, system, cases, window)
 
 
+def _warn_of_findings(system: System) -> None:
+    """Say what 'fmu check' found of the models that run, where it was made."""
+    from workbench.models.checks import remembered_findings
+
+    for model in system.models.values():
+        if model.path is None:
+            continue
+        digest = hashlib.sha256(model.path.read_bytes()).hexdigest()
+        for name, reason in remembered_findings(digest).items():
+            warn(f"{model.path.name}: 'fmu check' found {name} failed: {reason}")
+
+
 def _run(
     options: argparse.Namespace,
     output: Output,
@@ -106,6 +119,7 @@ def _run(
     from workbench.observers.simulation import case_figure, prepare, simulate
     from workbench.pages.provenance import run_of, sources
 
+    _warn_of_findings(system)
     chosen = choose(system, options.estimator)
     simulation = prepare(system, chosen, options.gains, tuned=not options.untuned)
     output.stage("preparing the observers' loops (compiled once, up to a minute)")

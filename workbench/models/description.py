@@ -41,6 +41,7 @@ class Variable:
     ----------
     real : a scalar of type Real (FMI 2.0) or Float64 (FMI 3.0).
     nominal, minimum, maximum : in `unit`, None where the description has none.
+    initial : "exact" and "approx" may be set before the start, "calculated" may not.
     """
 
     name: str
@@ -56,6 +57,12 @@ class Variable:
     maximum: float | None
     text: str
     array: bool = False
+    initial: str | None = None
+
+    @property
+    def holds_number(self) -> bool:
+        """Whether its type is of numbers, of which a Boolean has two."""
+        return self.type not in ("String", "Binary", "Clock")
 
 
 @dataclass(frozen=True)
@@ -156,7 +163,13 @@ class Description:
                 found=f"FMI {self.version}, {', '.join(self.interfaces) or 'no interface'} only",
                 expected=f"{interface} of FMI 2.0 or 3.0"
                 + (", whose states an observer can set" if interface == MODEL_EXCHANGE else ""),
-                remedy=f"export the model for {interface}",
+                remedy=f"export the model for {interface}"
+                + (
+                    "; what Co-Simulation alone will do for is the open loop: workbench simulate "
+                    "--estimator open_loop"
+                    if CO_SIMULATION in self.interfaces
+                    else ""
+                ),
             )
         if not {fmpy.platform, fmpy.platform_tuple} & set(self.platforms):
             raise InputError(
@@ -365,6 +378,7 @@ def _variable(variable: "fmpy.model_description.ModelVariable") -> Variable:
         maximum=limit("max"),
         text=variable.description or "",
         array=bool(variable.dimensions),
+        initial=variable.initial,
     )
 
 

@@ -63,13 +63,13 @@ _NEEDED = {
     CO_SIMULATION: ("do_step", "set", "get"),
 }
 
-# FMPy's functions that set parameters which are no Real or Float64, by type.
-_SETTERS = {
-    "Integer": "setInteger",
-    "Enumeration": "setInteger",
-    "Boolean": "setBoolean",
+# Ends of FMPy's functions for numbers that are no Real or Float64, by type.
+_ACCESSORS = {
+    "Integer": "Integer",
+    "Enumeration": "Integer",
+    "Boolean": "Boolean",
     **{
-        name: f"set{name}"
+        name: name
         for name in ("Float32", *(f"{sign}Int{n}" for sign in ("", "U") for n in (8, 16, 32, 64)))
     },
 }
@@ -82,6 +82,18 @@ _CLASSES = {
     (CO_SIMULATION, "2.0"): fmi2.FMU2Slave,
     (CO_SIMULATION, "3.0"): fmi3.FMU3Slave,
 }
+
+
+def co_simulation_alone(description: Description, found: str) -> InputError:
+    """The refusal of an FMU whose states nobody can set or differentiate."""
+    offered = ", ".join(description.interfaces)
+    return InputError(
+        where=str(description.path),
+        found=f"{offered}, without {found}",
+        expected="Model Exchange, which lets states be set and says their derivatives",
+        remedy="export the model for Model Exchange. With Co-Simulation alone the open loop runs: "
+        "workbench simulate --estimator open_loop",
+    )
 
 
 class EventError(FMUError):
@@ -315,6 +327,22 @@ class FMUInstance:
         name = self._description.path.name
         return FMUError(f"{name}: it asks to end the simulation: {self._logged()}")
 
+    def get_whole(self, variable: Variable) -> float:
+        """Value of a variable whose type is not Real or Float64, as a number."""
+        try:
+            (value,) = getattr(self._instance, f"get{self._accessor(variable)}")(
+                [variable.reference]
+            )
+        except FMICallException as error:
+            raise self.refusal(error.function, error.status) from None
+        return float(value)
+
+    def _accessor(self, variable: Variable) -> str:
+        """End of the name of FMPy's functions for a type that holds whole numbers, or Float32."""
+        if variable.type == "Enumeration" and self.version == "3.0":
+            return "Int64"
+        return _ACCESSORS[variable.type]
+
     def set_whole(self, variable: Variable, value: float) -> None:
         """Set a parameter whose type is not Real or Float64, from a number.
 
@@ -340,10 +368,12 @@ class FMUInstance:
                 else f"a whole number, of {type_name}",
                 remedy="correct the value",
             )
-        name = _SETTERS[type_name]
-        if type_name == "Enumeration" and self.version == "3.0":
-            name = "setInt64"
-        getattr(self._instance, name)([variable.reference], [number])
+        try:
+            getattr(self._instance, f"set{self._accessor(variable)}")(
+                [variable.reference], [number]
+            )
+        except FMICallException as error:
+            raise self.refusal(error.function, error.status) from None
 
     def call(self, use: str, *arguments: object) -> None:
         """Call the function for a use such as "get".
@@ -352,7 +382,11 @@ class FMUInstance:
         ------
         FMUError
             If the FMU refuses the call.
+        InputError
+            If it has no such function: Co-Simulation alone does not let states be set.
         """
+        if use not in self._call:
+            raise co_simulation_alone(self._description, _FUNCTIONS[use][self.version])
         status = self._call[use](self._component, *arguments)
         if status > 1:
             raise self.refusal(_FUNCTIONS[use][self.version], status)
@@ -405,6 +439,23 @@ class Variables:
 
 
 @dataclass(frozen=True)
+class TypedVariables:
+    """A fixed set of variables of one FMU, of any types that hold numbers; see `FMU.typed`.
+
+    Attributes
+    ----------
+    real, others : those of type Real or Float64, and all others.
+    real_at, others_at : their places among all.
+    """
+
+    names: tuple[str, ...]
+    real: Variables
+    real_at: NDArray[np.intp]
+    others: tuple[Variable, ...]
+    others_at: NDArray[np.intp]
+
+
+@dataclass(frozen=True)
 class Linearisation:
     """dx/dt ~ A dx + B du, dy ~ C dx + D du; shapes (n, n), (n, m), (l, n), (l, m)."""
 
@@ -444,7 +495,7 @@ class FMU:
     units : unit of each variable that has one.
     defaults : start values, those given or of the model description, in the FMU's units.
     sha256 : hash of the file, its identity in results.
-    start_time : of the model's default experiment [s]; 0 where it has none.
+    start_time : at which the model starts [s], see `begin_at`.
     event_signs : (z,) whether event indicators were above 0 at the last start.
     time : (1,) that the FMU was set to last [s].
     next_event : (1,) time of the next time event [s], told at the last start; infinite for none.
@@ -485,8 +536,9 @@ class FMU:
         } | self._given
         self._references = {v.name: v.reference for v in self.description.variables}
         self._real_names = {v.name for v in self.description.variables if v.real}
-        self._whole_parameters = [
-            v for v in self.description.variables if v.type in _SETTERS and not v.array
+        self._calculated = {v.name for v in self.description.variables if v.initial == "calculated"}
+        self._whole = [
+            v for v in self.description.variables if v.type in _ACCESSORS and not v.array
         ]
         self._rates = np.array([self._references[r] for r in self.description.rates], np.uint32)
         self.has_directional_derivatives = offered.directional_derivatives
@@ -494,7 +546,7 @@ class FMU:
         self._x = np.zeros(len(self.states))
         self._dx = np.zeros(len(self.states))
         self._z = np.zeros(self.description.event_indicators)
-        self.start_time = self.description.start or 0.0
+        self.begin_at(None)
         self.event_signs = np.zeros(self._z.size, np.bool_)
         self.time = np.full(1, self.start_time)
         self.next_event = np.full(1, np.inf)
@@ -553,7 +605,9 @@ class FMU:
                     where=self.place,
                     found=f"no variable '{name}'",
                     expected=f"one of {', '.join(self.inputs + self.outputs)}",
-                    remedy=f"use an FMU that has it, or map its name: --map {name}=NAME",
+                    remedy="use an FMU that has it. If the FMU names it otherwise, write "
+                    f"variable = 'NAME' in the table of '{name}' of the system file, or "
+                    f"--map {name}=NAME",
                 )
             if name not in self._real_names:
                 variable = next(v for v in self.description.variables if v.name == name)
@@ -566,6 +620,44 @@ class FMU:
                 )
         references = np.array([self._references[n] for n in names], np.uint32)
         return Variables(tuple(names), references, np.zeros(len(names)))
+
+    def typed(self, names: Sequence[str]) -> TypedVariables:
+        """Look up names of variables of any types that hold numbers.
+
+        Raises
+        ------
+        InputError
+            If the FMU has no variable of a name, or it holds no number, or several.
+        """
+        whole = {v.name: v for v in self._whole}
+        others = [i for i, name in enumerate(names) if name in whole]
+        real = [i for i, name in enumerate(names) if name not in whole]
+        return TypedVariables(
+            names=tuple(names),
+            real=self.variables([names[i] for i in real]),
+            real_at=np.array(real, np.intp),
+            others=tuple(whole[names[i]] for i in others),
+            others_at=np.array(others, np.intp),
+        )
+
+    def get_typed(self, variables: TypedVariables) -> Vector:
+        """Read values as numbers, (k,) in the FMU's units."""
+        values = np.zeros(len(variables.names))
+        values[variables.real_at] = self.get(variables.real)
+        values[variables.others_at] = [self._loaded.get_whole(v) for v in variables.others]
+        return values
+
+    def set_typed(self, variables: TypedVariables, values: Vector) -> None:
+        """Set values, (k,) in the FMU's units.
+
+        Raises
+        ------
+        InputError
+            If a type does not hold its number.
+        """
+        self.set(variables.real, values[variables.real_at])
+        for variable, value in zip(variables.others, values[variables.others_at], strict=True):
+            self._loaded.set_whole(variable, float(value))
 
     def get(self, variables: Variables) -> Vector:
         """Read values; returns (k,) in the FMU's units, the buffer of `variables` itself."""
@@ -583,6 +675,22 @@ class FMU:
             return
         tail = (count,) if self.version == "3.0" else ()
         self._loaded.call(use, references, count, values, *tail)
+
+    def references(self, names: Sequence[str]) -> References:
+        """Value references of variables that there are, (k,)."""
+        self.typed(names)
+        return np.array([self._references[name] for name in names], np.uint32)
+
+    def is_real(self, name: str) -> bool:
+        """Whether a variable is a scalar of type Real or Float64."""
+        return name in self._real_names
+
+    def is_continuous(self, name: str) -> bool:
+        """Whether a variable is real and may be set between events."""
+        return any(
+            v.name == name and v.real and v.variability == "continuous"
+            for v in self.description.variables
+        )
 
     @property
     def rate_references(self) -> NDArray[np.uint32]:
@@ -604,6 +712,10 @@ class FMU:
 
     # --- the extended-FMI pattern ---
 
+    def begin_at(self, time: float | None) -> None:
+        """Start at a time [s] from now on; None: that of the default experiment, 0 without one."""
+        self.start_time = (self.description.start or 0.0) if time is None else time
+
     def start(
         self, states: Mapping[str, float], parameters: Mapping[str, float] | None = None
     ) -> None:
@@ -614,8 +726,9 @@ class FMU:
         states : start values of states, in the FMU's units; others keep their defaults.
         parameters : values of parameters; others keep their defaults.
         """
-        given = {**self._given, **(parameters or {}), **states}
-        whole = [(v, given.pop(v.name)) for v in self._whole_parameters if v.name in given]
+        begin = {name: value for name, value in states.items() if name not in self._calculated}
+        given = {**self._given, **(parameters or {}), **begin}
+        whole = [(v, given.pop(v.name)) for v in self._whole if v.name in given]
         variables = self.variables(list(given))
         values = np.array(list(given.values()))
 
@@ -626,8 +739,17 @@ class FMU:
 
         self.time[0] = self.start_time
         self.next_event[0] = self._loaded.start(prepare, self.start_time)
+        if self.interface == MODEL_EXCHANGE:
+            self._correct_start(states)
         if self.event_signs.size and self.interface == MODEL_EXCHANGE:
             self.event_signs[:] = self.event_indicators() > 0.0
+
+    def _correct_start(self, states: Mapping[str, float]) -> None:
+        """Set states that the start did not leave where they are to be, such as calculated ones."""
+        x = self.get_states()
+        wanted = np.array([states.get(name, x[i]) for i, name in enumerate(self.states)])
+        if not np.array_equal(x, wanted):
+            self.set_states(wanted)
 
     @property
     def has_events(self) -> bool:
@@ -661,7 +783,7 @@ class FMU:
         )
 
     def handle_event(
-        self, variables: Variables | None = None, values: Vector | None = None
+        self, variables: TypedVariables | None = None, values: Vector | None = None
     ) -> EventUpdate:
         """Update discrete states at the present point, with variables that jump there.
 
@@ -673,7 +795,7 @@ class FMU:
 
         def prepare() -> None:
             if variables is not None and values is not None:
-                self.set(variables, values)
+                self.set_typed(variables, values)
 
         update = self._loaded.handle_event(prepare)
         self.next_event[0] = update.time
@@ -730,7 +852,9 @@ class FMU:
         """
         columns = knowns.references.size
         result = np.zeros((columns, unknowns.size))
-        if result.size and not self.has_directional_derivatives:
+        if not result.size:
+            return result.T
+        if not self.has_directional_derivatives:
             return self._difference(unknowns, knowns)
         seed = np.ones(1)
         for j in range(columns):
@@ -843,21 +967,34 @@ class CoSimulation(FMU):
     def check_event(self) -> None:
         """Nothing: a Co-Simulation treats its events itself."""
 
+    def jacobian(self, unknowns: NDArray[np.uint32], knowns: Variables) -> Matrix:
+        """Derivatives, see `FMU.jacobian`; refused where the FMU has Co-Simulation alone."""
+        if MODEL_EXCHANGE not in self.description.interfaces:
+            raise co_simulation_alone(self.description, "derivatives")
+        return super().jacobian(unknowns, knowns)
+
     def set_time(self, t: float) -> None:
         """Say where the next step begins [s], after `restore`."""
         self._t = t
 
     def step(self, h: float) -> Vector:
-        """Advance by h [s] with inputs held; returns the new states, (n,)."""
+        """Advance by h [s] with inputs held; returns the new states, (n,).
+
+        Raises
+        ------
+        FMUError
+            If the FMU refuses the step, or asks to end.
+        """
         tail: tuple[object, ...] = ()
+        event, end, early = (ctypes.c_bool() for _ in range(3))
         if self.version == "3.0":
-            tail = (
-                *(ctypes.byref(ctypes.c_bool()) for _ in range(3)),
-                ctypes.byref(ctypes.c_double()),
-            )
+            reached = ctypes.c_double()
+            tail = tuple(ctypes.byref(value) for value in (event, end, early, reached))
         # The zero: the state may be rolled back to before this point.
         self._loaded.call(
             "do_step", ctypes.c_double(self._t), ctypes.c_double(h), ctypes.c_int(0), *tail
         )
+        if end.value or early.value:
+            raise self._loaded.end_error()
         self._t += h
         return self.get(self._state_variables).copy()

@@ -1,7 +1,8 @@
-"""Simulation of a model with events, by the standard: what an open loop runs on.
+"""Simulation from sample to sample by the standard: what an open loop runs on.
 
-Steps of integration end at samples and at time events. After each, event indicators are read; a
-change of sign is located within the step, and the model goes through Event Mode there.
+A model with events: steps of integration end at samples and at time events. After each, event
+indicators are read; a change of sign is located within the step, and the model goes through Event
+Mode there. A Co-Simulation makes a step of its own from sample to sample.
 Source: FMI 2.0.4, section 3.2; FMI 3.0, sections 2.5 and 3.
 """
 
@@ -11,7 +12,7 @@ from scipy.integrate import Radau
 
 from workbench.arrays import Matrix, Vector
 from workbench.errors import FMUError
-from workbench.models.fmu import FMU, Variables, central_differences
+from workbench.models.fmu import FMU, CoSimulation, TypedVariables, central_differences
 
 # Of a step, relative to the state and to its nominal value: far below what a sensor resolves.
 _TOLERANCE = 1e-8
@@ -27,16 +28,23 @@ class HybridSimulation:
     Parameters
     ----------
     fmu : after its start, whose inputs have the values of the first sample.
-    inputs : what drives it, (m,).
+    inputs : what drives it, (m,), of any types that hold numbers.
     held : (m,) whether an input stays until the next sample; others go there in a straight line.
+        Discrete ones stay, and jump in Event Mode.
     """
 
-    def __init__(self, fmu: FMU, inputs: Variables, held: NDArray[np.bool_]) -> None:
-        self._fmu, self._inputs, self._held = fmu, inputs, held
+    def __init__(self, fmu: FMU, inputs: TypedVariables, held: NDArray[np.bool_]) -> None:
+        self._fmu, self._inputs = fmu, inputs
+        variability = {v.name: v.variability for v in fmu.description.variables}
+        moving = [variability[name] == "continuous" for name in inputs.real.names]
+        self._continuous_at = inputs.real_at[moving]
+        self._continuous = fmu.variables([inputs.names[i] for i in self._continuous_at])
+        self._held = np.ones(held.size, np.bool_)
+        self._held[self._continuous_at] = held[self._continuous_at]
         self._t = float(fmu.time[0])
         self._x = fmu.get_states()
         self._nominal = fmu.nominals()
-        self._before = self._after = fmu.get(inputs).copy()  # at the ends of the interval
+        self._before = self._after = fmu.get_typed(inputs)  # at the ends of the interval
         self._begin, self._end = self._t, np.inf
         self._signs = np.sign(fmu.event_indicators())
         self._step: float | None = None
@@ -79,8 +87,8 @@ class HybridSimulation:
     def _place(self, t: float, x: Vector) -> None:
         """Put the FMU at a point."""
         self._fmu.set_time(t)
-        if self._inputs.names:
-            self._fmu.set(self._inputs, self._inputs_at(t))
+        if self._continuous.names:
+            self._fmu.set(self._continuous, self._inputs_at(t)[self._continuous_at])
         self._fmu.set_states(x)
 
     def _go_on(self, end: float) -> None:
@@ -180,3 +188,43 @@ class HybridSimulation:
 
     def _error(self, what: str) -> FMUError:
         return FMUError(f"{self._fmu.path.name}: it {what} at {self._t:.9g} s of its time")
+
+
+class CoSimulationRun:
+    """A Co-Simulation that was started, driven by inputs from sample to sample.
+
+    Parameters
+    ----------
+    fmu : after its start, whose inputs have the values of the first sample.
+    inputs : what drives it, (m,).
+    held : (m,) whether an input stays until the next sample; of others the mean of a step acts.
+    """
+
+    def __init__(self, fmu: CoSimulation, inputs: TypedVariables, held: NDArray[np.bool_]) -> None:
+        self._fmu, self._inputs, self._held = fmu, inputs, held.copy()
+        self._held[inputs.others_at] = True
+        self._states = fmu.variables(fmu.states)
+        self._t = fmu.start_time
+        self._before = fmu.get_typed(inputs)
+
+    def begin(self, u: Vector) -> None:
+        """Take the inputs of the first sample, (m,)."""
+        self._fmu.set_typed(self._inputs, u)
+        self._before = u.copy()
+
+    def advance(self, t: float, u: Vector) -> Vector:
+        """Go on to the sample at t [s] with inputs u, (m,); returns the states there, (n,).
+
+        Raises
+        ------
+        FMUError
+            If the FMU refuses the step, or asks to end.
+        """
+        if t > self._t:
+            mean = 0.5 * (self._before + u)
+            self._fmu.set_typed(self._inputs, np.where(self._held, self._before, mean))
+            self._fmu.step(t - self._t)
+            self._t = t
+        self._fmu.set_typed(self._inputs, u)
+        self._before = u.copy()
+        return self._fmu.get(self._states).copy()

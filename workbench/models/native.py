@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from workbench.arrays import Matrix, Vector
 from workbench.errors import FMUError, InputError
-from workbench.models.fmu import FMU, CoSimulation, References
+from workbench.models.description import CO_SIMULATION
+from workbench.models.fmu import FMU, CoSimulation, References, co_simulation_alone
 from workbench.models.jit import jit
 
 compiled = jit()
@@ -101,7 +102,12 @@ class Instance(NamedTuple):
 
 
 def instance(
-    fmu: FMU, inputs: Sequence[str], corrections: Sequence[str], outputs: Sequence[str]
+    fmu: FMU,
+    inputs: Sequence[str],
+    corrections: Sequence[str],
+    outputs: Sequence[str],
+    *,
+    only_read: bool = False,
 ) -> Instance:
     """Prepare an FMU for compiled loops; the FMU must outlive the result.
 
@@ -110,9 +116,20 @@ def instance(
     inputs : measured.
     corrections : inputs that an observer sets, (q,).
     outputs : what estimates are made of, (l,).
+    only_read : whether the caller makes no step that the FMU cannot, so that Co-Simulation and
+        variables of other types will do.
+
+    Raises
+    ------
+    InputError
+        If the FMU lacks a function that is called, or an input may change at events only.
     """
+    if fmu.interface == CO_SIMULATION and not only_read:
+        raise co_simulation_alone(fmu.description, "derivatives")
     n, m, q, k = len(fmu.states), len(inputs), len(corrections), len(outputs)
-    _refuse_discrete(fmu, [*inputs, *corrections])
+    if not only_read:
+        _refuse_discrete(fmu, [*inputs, *corrections])
+        fmu.variables([*inputs, *outputs])
     return Instance(
         address=fmu.instance_address,
         set_states=fmu.function_address("set_states"),
@@ -136,9 +153,9 @@ def instance(
         y=np.zeros(k),
         jacobian=np.zeros((n + q, n + k)),
         seed=np.ones(1),
-        inputs=fmu.variables([*inputs, *corrections]).references,
-        outputs=fmu.variables(outputs).references,
-        unknowns=np.concatenate([fmu.rate_references, fmu.variables(outputs).references]),
+        inputs=fmu.references([*inputs, *corrections]),
+        outputs=fmu.references(outputs),
+        unknowns=np.concatenate([fmu.rate_references, fmu.references(outputs)]),
         knowns=fmu.variables([*fmu.states, *corrections]).references,
     )
 
@@ -196,7 +213,7 @@ def co_simulation_instance(
         outputs=fmu.variables(outputs).references,
         u=np.zeros(len(inputs)),
         y=np.zeros(len(outputs)),
-        time=np.zeros(1),
+        time=np.full(1, fmu.start_time),
         told=np.zeros(3, np.bool_),
         reached=np.zeros(1),
     )

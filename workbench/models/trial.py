@@ -212,18 +212,21 @@ def describe_end(status: int, call: str, seconds: str, at: str = "") -> str:
 def _task(description: Description, interface: str, folder: Path, limits: Limits) -> dict[str, Any]:
     """What `trial_calls` is asked to do."""
     offered = description.interfaces[interface]
-    references = {v.name: v.reference for v in description.variables if v.real}
+    real = [v for v in description.variables if v.real]
+    references = {v.name: v.reference for v in real}
+    # Others may be set, and differentiated, in Event Mode alone.
+    continuous = {v.name for v in real if v.variability == "continuous"}
 
     def known(names: tuple[str, ...]) -> list[int]:
-        return [references[name] for name in names if name in references]
+        return [references[name] for name in names if name in continuous]
 
     exchange = interface == MODEL_EXCHANGE
     inputs, outputs = known(description.names("input")), known(description.names("output"))
     states, rates = known(description.states), known(description.rates)
     begin = [
         (v.reference, float(v.start))
-        for v in description.variables
-        if v.real and v.start is not None and (v.causality == "input" or v.reference in states)
+        for v in real
+        if v.start is not None and (v.causality == "input" or v.reference in states)
     ]
     resources = folder / "resources"
     wanted = [(rows, columns) for rows in (rates, outputs) for columns in (states, inputs)]
@@ -238,6 +241,7 @@ def _task(description: Description, interface: str, folder: Path, limits: Limits
         "reals": list(references.values()),
         "inputs": inputs,
         "start": begin,
+        "time": description.start or 0.0,
         "directional": [pair for pair in wanted if all(pair)]
         if exchange and offered.directional_derivatives
         else [],

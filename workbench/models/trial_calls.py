@@ -148,13 +148,13 @@ class _Calls:
 
 def _initialise(call: _Calls, task: dict[str, Any]) -> None:
     if not call.three:
-        zero = _DOUBLE(0.0)
-        call("SetupExperiment", ctypes.c_int(0), zero, zero, ctypes.c_int(0), zero)
+        zero, time = _DOUBLE(0.0), _DOUBLE(task["time"])
+        call("SetupExperiment", ctypes.c_int(0), zero, time, ctypes.c_int(0), zero)
     begin = task["start"]
     call.reals("Set", [r for r, _ in begin], (_DOUBLE * len(begin))(*(v for _, v in begin)))
     if call.three:
-        false, zero = ctypes.c_bool(False), _DOUBLE(0.0)
-        call("EnterInitializationMode", false, zero, zero, false, zero)
+        false, zero, time = ctypes.c_bool(False), _DOUBLE(0.0), _DOUBLE(task["time"])
+        call("EnterInitializationMode", false, zero, time, false, zero)
     else:
         call("EnterInitializationMode")
     call("ExitInitializationMode")
@@ -178,7 +178,7 @@ def _go(call: _Calls, task: dict[str, Any]) -> None:
     for k in range(_ROUNDS):
         call.reals("Set", inputs, held)
         if task["exchange"]:
-            call("SetTime", _DOUBLE(1e-3 * k))
+            call("SetTime", _DOUBLE(task["time"] + 1e-3 * k))
             if n:
                 call("GetContinuousStates", states, _SIZE(n))
                 call("SetContinuousStates", states, _SIZE(n))
@@ -189,7 +189,7 @@ def _go(call: _Calls, task: dict[str, Any]) -> None:
             if task["completed"]:
                 call("CompletedIntegratorStep", ctypes.c_int(0), *map(ctypes.byref, flags))
         else:
-            _step(call, 1e-3 * k)
+            _step(call, task["time"] + 1e-3 * k)
         call.reals("Get", task["reals"], everything)
         for unknowns, knowns in task["directional"]:
             _differentiate(call, unknowns, knowns[k % len(knowns)])

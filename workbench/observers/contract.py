@@ -10,6 +10,7 @@ import numpy as np
 
 from workbench.arrays import Matrix, Vector
 from workbench.errors import InputError
+from workbench.models.description import CO_SIMULATION
 from workbench.models.fmu import FMU
 from workbench.models.native import Instance, instance, raise_on_failure, read_only
 from workbench.observers.gains import Gains, SearchSpace
@@ -87,6 +88,7 @@ class Estimator(ABC):
     offline : whether it needs a whole recording, and has no `init`, `step` and `advance`.
     tuned_as : estimator whose gains it takes; empty: its own.
     sticks : whether a follower rolls where a step would take it past its leader near standstill.
+    co_simulates : whether it runs on a model that has Co-Simulation alone.
     modes : what it weighs models by, in columns and figures; none if it runs on one model.
     finds : conditions that it finds out by itself.
     aided : whether samples may be missing, so that it takes aids as outputs, too.
@@ -109,6 +111,7 @@ class Estimator(ABC):
     offline: ClassVar[bool] = False
     tuned_as: ClassVar[str] = ""
     sticks: ClassVar[bool] = False
+    co_simulates: ClassVar[bool] = False
     aided: ClassVar[bool] = False
     modes: tuple[str, ...] = ()
     finds: frozenset[str] = frozenset()
@@ -123,7 +126,9 @@ class Estimator(ABC):
         inputs = [signal.name for signal in system.inputs]
         unseen = [output.name for output in system.outputs if output.name not in fmu.states]
         outputs = [*system.reported, *unseen]
-        self._model: Any = instance(fmu, inputs, system.corrections, outputs)
+        self._model: Any = instance(
+            fmu, inputs, system.corrections, outputs, only_read=self.co_simulates
+        )
         self._layout = layout(fmu, system)
         self._t = 0.0
         self._model_time = fmu.start_time
@@ -262,8 +267,8 @@ class Estimator(ABC):
             begin[rolling.follower] = rolling_ratio(self.fmu, self.system) * begin[rolling.leader]
         estimated = {quantity.name for quantity in self.system.estimated}
         held = {name: value for name, value in self._known.items() if name not in estimated}
-        if self.fmu.event_signs.size:  # that may depend on inputs: events there are of the start
-            held |= dict(zip((signal.name for signal in self.system.inputs), u, strict=True))
+        # What a model calculates at its start, and events there, may depend on inputs.
+        held |= dict(zip((signal.name for signal in self.system.inputs), u, strict=True))
         self.fmu.start(begin, held)
         if shown := self._shown_states(u, y, begin.keys()):
             self.fmu.start({**begin, **shown}, held)
@@ -282,11 +287,13 @@ class Estimator(ABC):
         unseen = [
             (output, value)
             for output, value in zip(system.outputs, self._measured(y), strict=True)
-            if output.name not in fmu.states and np.isfinite(value)
+            if output.name not in fmu.states and np.isfinite(value) and fmu.is_real(output.name)
         ]
-        if not unseen or not fmu.states:
+        inputs = [signal.name for signal in system.inputs]
+        alone = fmu.interface == CO_SIMULATION
+        if not unseen or not fmu.states or alone or not all(map(fmu.is_continuous, inputs)):
             return {}
-        fmu.set(fmu.variables([signal.name for signal in system.inputs]), u)
+        fmu.set(fmu.variables(inputs), u)
         outputs = fmu.variables([output.name for output, _ in unseen])
         knowns = (fmu.variables(names) for names in (fmu.states, system.corrections))
         # What a state or a quantity moves each output by, if it is off by what is not known of it.

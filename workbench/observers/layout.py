@@ -273,6 +273,13 @@ def put(model, z):  # type: ignore[no-untyped-def]
 def report(model, layout, estimate):  # type: ignore[no-untyped-def]
     """Write the estimate that the FMU is at into a row; returns a status."""
     status = read(model)
+    write_estimate(model, layout, estimate)
+    return status
+
+
+@inlined
+def write_estimate(model, layout, estimate):  # type: ignore[no-untyped-def]
+    """Write the estimate at states and outputs that were read into a row."""
     outputs, q = layout.seen.size, layout.nominal.size
     first = model.u.size - q
     for j in range(outputs):
@@ -282,4 +289,3 @@ def report(model, layout, estimate):  # type: ignore[no-untyped-def]
         estimate[outputs + q + i] = layout.nominal[i] + model.u[first + i]
     for i in range(layout.reported):
         estimate[outputs + 2 * q + i] = model.y[i]
-    return status

@@ -146,7 +146,7 @@ def prior(system: System) -> Vector:
 
     Any value of its range is as likely.
     """
-    ranges = np.array([quantity.prior for quantity in system.estimated])
+    ranges = np.array([quantity.prior for quantity in system.estimated]).reshape(-1, 2)
     deviation: Vector = np.diff(ranges)[:, 0] / np.sqrt(12.0)
     return deviation
 
@@ -355,6 +355,7 @@ def inseparable(fmu: FMU, system: System, case: Case) -> dict[tuple[str, ...], f
     if values is not None and not np.isfinite(values).all():
         return {}
     places = [fmu.states.index(name) for name in held]
+    fmu.begin_at(case.model_time)
     fmu.start({} if values is None else dict(zip(held, values[0], strict=True)))
     u = np.column_stack([case.u[kept], np.zeros((kept.size, q))])
     inputs = fmu.variables(_inputs(system))
@@ -363,6 +364,7 @@ def inseparable(fmu: FMU, system: System, case: Case) -> dict[tuple[str, ...], f
         x[:, places] = values
     if len(fmu.states) > len(held):
         for k, h in enumerate(np.diff(case.time[kept])):
+            fmu.set_time(fmu.start_time + case.time[kept[k]] - case.time[0])
             fmu.set_states(x[k])
             fmu.set(inputs, u[k])
             free = fmu.step(h)
@@ -402,6 +404,7 @@ def follow(fmu: FMU, system: System, case: Case, run: Run) -> tuple[Matrix, Matr
     held = [output.name for output in system.outputs if output.name in fmu.states]
     places = [fmu.states.index(name) for name in held]
     values = np.column_stack([run.signal(name) for name in held]) if held else case.y[:, :0]
+    fmu.begin_at(case.model_time)
     fmu.start(dict(zip(held, values[0], strict=True)))
     corrections = [
         run.signal(quantity.name) - fmu.defaults[quantity.name] for quantity in system.estimated
@@ -412,6 +415,7 @@ def follow(fmu: FMU, system: System, case: Case, run: Run) -> tuple[Matrix, Matr
     x[:, places] = values
     if len(fmu.states) > len(held):
         for k, h in enumerate(np.diff(case.time)):
+            fmu.set_time(fmu.start_time + case.time[k] - case.time[0])
             fmu.set_states(x[k])
             fmu.set(inputs, u[k])
             x[k + 1] = fmu.step(h)
@@ -443,8 +447,10 @@ def linearise_along(fmu: FMU, system: System, time: Vector, x: Matrix, u: Matrix
     for j, state in seen:
         slopes[:, j, state], y[:, j] = 1.0, x[:, state]
     for k in range(n):
+        fmu.set_time(fmu.start_time + time[k] - time[0])
         fmu.set_states(x[k])
         fmu.set(inputs, u[k])
+        fmu.check_event()
         if others:
             linear = fmu.linearise(inputs, unseen)
             generator[k, :count] = np.hstack([linear.A, linear.B])

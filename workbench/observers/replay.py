@@ -48,6 +48,8 @@ def replay(case: Case, estimator: Estimator) -> Run:
     ending, message = Ending.OK, ""
     try:
         estimator.set_conditions(case.conditions)
+        for model in estimator.models:
+            model.begin_at(case.model_time)
         estimate = estimator.run(case.time, case.u, case.y)
         seconds = time.perf_counter() - begin
         values = np.asarray(estimate.values)

@@ -149,6 +149,7 @@ class Case:
     names : the model's own name of each variable that it names otherwise.
     date : when it was recorded, ISO 8601 in UTC where it says its zone; empty: unknown.
     counts_from : s, time before which samples only lead a simulation to those that are compared.
+    model_time : s, of the model at the first sample; None: the start time of its FMU.
     doubts : what is unlikely in the recording, in words.
     """
 
@@ -163,6 +164,7 @@ class Case:
     names: Mapping[str, str] = field(default_factory=dict)
     date: str = ""
     counts_from: float = -np.inf
+    model_time: float | None = None
     doubts: tuple[str, ...] = ()
     aids: tuple[str, ...] = ()
 
@@ -343,7 +345,7 @@ def read_case(folder: Path, system: System) -> Case:
     conditions = read_conditions(document.table("conditions"), system)
     document.take("measurement", dict)
     measurement = document.table("measurement")
-    measurement.refuse_unknown(("file", "columns", "counts_from"))
+    measurement.refuse_unknown(("file", "columns", "counts_from", "model_time"))
     source = folder / measurement.take("file", str)
     time, signals, origin = _recorded(source, measurement, system)
     origin = replace(origin, conditions=f"{toml}, [conditions]")
@@ -358,6 +360,7 @@ def read_case(folder: Path, system: System) -> Case:
         names=check_names(names.content, f"{toml}, [model.names]", system),
         date=document.date("date"),
         counts_from=_counts_from(measurement, time),
+        model_time=measurement.number("model_time", "s") if "model_time" in measurement else None,
     )
 
 

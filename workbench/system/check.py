@@ -24,6 +24,11 @@ from workbench.system.stopping import ASKED, MOVED, OUTSIDE, RISING
 from workbench.system.system import System
 from workbench.system.units import si_factor
 
+_NAME_IT = (
+    "if the FMU names it otherwise, write variable = 'NAME' in the table of '{0}', or {0} = 'NAME' "
+    "in [variables], or --map {0}=NAME"
+)
+
 
 def check_model(system: System, model: Description) -> None:
     """Refuse a model that estimators cannot work on; a variable without a unit is taken as SI.
@@ -44,7 +49,7 @@ def check_model(system: System, model: Description) -> None:
                 where=str(model.path),
                 found=f"no variable '{ours}'",
                 expected=f"one for '{ours}' of {system.source}",
-                remedy=f"use an FMU that has it, or map its name: --map {ours}=NAME",
+                remedy=_NAME_IT.format(ours),
             )
         needs_value = ours in system.constants or any(q.name == ours for q in system.estimated)
         if needs_value and variables[ours].start is None:
@@ -52,7 +57,8 @@ def check_model(system: System, model: Description) -> None:
                 where=where,
                 found="no start value",
                 expected=f"a parameter with a value for {ours}",
-                remedy=f"make it a parameter of the model, or map another: --map {ours}=NAME",
+                remedy="make it a parameter of the model, or name another; "
+                + _NAME_IT.format(ours),
             )
         declared = variables[ours].unit
         if declared and unit not in ("1", "") and si_factor(declared, unit, where) != 1.0:

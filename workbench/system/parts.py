@@ -25,6 +25,8 @@ SHOWN = f"{STATE}, or a measured output"
 CONDITION = "a condition of this system"
 QUANTITY = "an estimated quantity of this system"
 
+_VARIABLE = "name of the FMU's variable, where it has another one there"
+
 ENDLESS = float("inf")
 _ALL = (-ENDLESS, ENDLESS)
 _LIMITS = "the lower limit before the upper one"
@@ -88,6 +90,8 @@ def _fmu(table: Table, name: str, scope: Scope) -> Path:
 @declared
 class Model:
     """Model of a role."""
+
+    SOME: ClassVar = ("class", "fmu")
 
     modelica: str = key(
         "Modelica class, without the library's name; diagnosis, exported observers, and a model "
@@ -157,9 +161,10 @@ class RecordedAs:
 
 @declared
 class Signal:
-    """A measured signal, by the name of the model's variable."""
+    """A measured signal, and the model's variable of this name."""
 
     name: str = table_name()
+    variable: str = key(_VARIABLE, absent="{name}")
     unit: Unit = key("of the model's variable")
     noise: float = key(
         "standard deviation of one sample; 0 of an input that is exactly known, as a command is",
@@ -294,6 +299,7 @@ class EstimatedQuantity:
     """A parameter of the model that observers estimate."""
 
     name: str = table_name()
+    variable: str = key(_VARIABLE, absent="{name}")
     unit: Unit = key("of the parameter", absent="1")
     correction: str = key("input of the model that is added to the parameter")
     range: tuple[float, float] = key("in which estimates are kept", "{unit}", ordered=True)
@@ -365,6 +371,7 @@ class StateNoise:
     """What is known of a state of the model, in its unit."""
 
     name: str = table_name()
+    variable: str = key(_VARIABLE, absent="{name}")
     walk: float | None = key(
         "how far it moves in a second beyond what the model says",
         unit=lambda scope, _: unit_in_model(scope, scope.own["name"]),
@@ -667,6 +674,7 @@ class Condition:
     sets: str = key(
         "parameter of the model that a quantity is, such as a load; nobody needs to say it: it is "
         "then as in the model",
+        aliases=("variable",),
         absent="",
         of=PARAMETER,
     )

@@ -24,7 +24,7 @@ from workbench.system.declaration import (
     table_name_of,
 )
 from workbench.system.expression import Expression
-from workbench.system.parts import Model
+from workbench.system.parts import EstimatedQuantity, Model, Signal, StateNoise
 from workbench.system.system import OBSERVER, System
 from workbench.system.tables import Table, read_table
 from workbench.system.units import check_unit, si_factor
@@ -32,8 +32,15 @@ from workbench.system.units import check_unit, si_factor
 T = TypeVar("T")
 
 
-def read_system(path: Path) -> System:
+def read_system(
+    path: Path, fmu: Path | None = None, names: Mapping[str, str] | None = None
+) -> System:
     """Read a system file and check it against the FMU of its observer, if that is built.
+
+    Parameters
+    ----------
+    fmu : of the observer, instead of that of the file.
+    names : the FMU's names of variables by ours; they win over those of the file.
 
     Raises
     ------
@@ -41,7 +48,7 @@ def read_system(path: Path) -> System:
         At the first problem: the file and key, what was found, what was expected, what to do.
     """
     file = read_table(path, "give a system file, or the name of an installed one", 'title = "..."')
-    return _read(file, path, {})
+    return _read(file, path, {} if fmu is None else {OBSERVER: fmu}, names or {})
 
 
 def system_of(content: Mapping[str, Any], path: Path) -> System:
@@ -51,7 +58,7 @@ def system_of(content: Mapping[str, Any], path: Path) -> System:
     ----------
     path : that refusals name.
     """
-    return _read(Table(content, str(path)), path, {})
+    return _read(Table(content, str(path)), path, {}, {})
 
 
 def with_built(system: System, paths: Mapping[str, Path]) -> System:
@@ -63,10 +70,10 @@ def with_built(system: System, paths: Mapping[str, Path]) -> System:
         As `read_system`.
     """
     file = read_table(system.source, "keep the file while it is used", 'title = "..."')
-    return _read(file, system.source, paths)
+    return _read(file, system.source, paths, system.names)
 
 
-def _read(file: Table, path: Path, built: Mapping[str, Path]) -> System:
+def _read(file: Table, path: Path, built: Mapping[str, Path], names: Mapping[str, str]) -> System:
     (models,) = (entry for entry in entries(System) if entry.field == "models")
     file.refuse_unknown(dict.fromkeys(name.partition(".")[0] for name in key_names(System)))
     roles: dict[str, Model] = _field(models, file, Scope(path, None))
@@ -74,7 +81,8 @@ def _read(file: Table, path: Path, built: Mapping[str, Path]) -> System:
         role: replace(model, path=built.get(role, model.path)) for role, model in roles.items()
     }
     fmu = roles[OBSERVER].path
-    description = read_description(fmu) if fmu is not None else None
+    names = {**_names(file), **names}
+    description = read_description(fmu).renamed(names) if fmu is not None else None
     units = {v.name: v.unit or "1" for v in description.variables} if description else None
     scope = Scope(path, units)
     values = _values(description) if description else {}
@@ -85,7 +93,7 @@ def _read(file: Table, path: Path, built: Mapping[str, Path]) -> System:
         models=roles,
         source=path,
         library=path.parent / "package.mo",
-        names={},
+        names=names,
         values=values,
         states=description.states if description else None,
     )
@@ -96,6 +104,42 @@ def _read(file: Table, path: Path, built: Mapping[str, Path]) -> System:
         raise problem
     check_references(system, description, scope.references)
     return system
+
+
+def _names(file: Table) -> dict[str, str]:
+    """The FMU's names of variables by ours, that a file says.
+
+    Raises
+    ------
+    InputError
+        If two of our names stand for one variable, or one of ours for two.
+    """
+    names: dict[str, str] = {}
+    ours: dict[str, str] = {}
+    places = [(file.table("variables"), name, name) for name in file.table("variables").content]
+    for entry in entries(System):
+        inside = typing.get_args(entry.hint)
+        if not inside or inside[0] not in (Signal, EstimatedQuantity, StateNoise):
+            continue
+        for group in (entry.name, *entry.key.aliases):
+            if group in file:
+                named = file.table(group)
+                places += [
+                    (named.table(name), "variable", name)
+                    for name, content in named.content.items()
+                    if isinstance(content, dict) and "variable" in content
+                ]
+    for table, key, name in places:
+        variable = table.take(key, str)
+        if names.setdefault(name, variable) != variable or ours.setdefault(variable, name) != name:
+            raise InputError(
+                where=table.place(key),
+                found=f"'{variable}' for '{name}', after '{names[name]}' for "
+                f"'{ours.get(variable, name)}'",
+                expected="one name of yours for one variable of the FMU",
+                remedy="give both the same name, or remove one",
+            )
+    return {name: variable for name, variable in names.items() if name != variable}
 
 
 def with_model(system: System, role: str, path: Path | None) -> System:

@@ -48,6 +48,8 @@ def schema(cls: type) -> Schema:
         made["allOf"] = [{"anyOf": names} for names in choices]
     if either := getattr(cls, "EITHER", None):
         made["oneOf"] = [{"required": [name]} for name in either.names]
+    if some := getattr(cls, "SOME", None):
+        made["anyOf"] = [{"required": [name]} for name in some]
     return made
 
 

@@ -1,10 +1,12 @@
 """Systems by name or file, and their models."""
 
+from collections.abc import Mapping
 from pathlib import Path
 
 from workbench.errors import InputError
 from workbench.models import fmu_cache
-from workbench.models.fmu import FMU
+from workbench.models.description import CO_SIMULATION, MODEL_EXCHANGE, read_description
+from workbench.models.fmu import FMU, CoSimulation
 from workbench.models.modelica import read_library
 from workbench.system.installed import system_path
 from workbench.system.parts import Model
@@ -12,8 +14,15 @@ from workbench.system.reader import read_system, with_built
 from workbench.system.system import OBSERVER, System
 
 
-def load_system(which: str | Path) -> System:
+def load_system(
+    which: str | Path, fmu: Path | None = None, names: Mapping[str, str] | None = None
+) -> System:
     """Read a system by its name, its file, or the folder that holds its file.
+
+    Parameters
+    ----------
+    fmu : of its observer, instead of that of its file.
+    names : the FMU's names of variables by ours, beside those of its file.
 
     A model without an FMU is compiled from the system's library, once for each state of it; that
     needs the extra [compiler].
@@ -23,7 +32,7 @@ def load_system(which: str | Path) -> System:
     InputError
         If there is none of this name, or its file or its library has a mistake.
     """
-    return _built(read_system(system_path(which)))
+    return _built(read_system(system_path(which), fmu, names))
 
 
 def _built(system: System) -> System:
@@ -86,10 +95,9 @@ def open_model(system: System, role: str = OBSERVER) -> FMU:
 
 
 def open_file(path: Path, system: System) -> FMU:
-    """Open a model file as one of a system; see `open_model`."""
-    fmu = FMU(path, system.names)
-    given = {name: value for name, value in system.given.items() if name in fmu.parameters}
-    if given:
-        fmu.close()
-        fmu = FMU(path, system.names, given)
-    return fmu
+    """Open a model file as one of a system; Co-Simulation, where it has no more."""
+    description = read_description(path).renamed(system.names)
+    alone = CO_SIMULATION in description.interfaces and MODEL_EXCHANGE not in description.interfaces
+    parameters = description.names("parameter")
+    given = {name: value for name, value in system.given.items() if name in parameters}
+    return (CoSimulation if alone else FMU)(path, system.names, given)

@@ -119,7 +119,8 @@ class System:
     ----------
     source : the file it was read from.
     library : `package.mo` of its Modelica library.
-    names : the models' own names of variables that we name otherwise.
+    names : the models' own names of variables that we name otherwise: of `[variables]`, of each
+        `variable` of a table, and those given elsewhere.
     values : all parameters of the observer model as they act, `given` included, SI.
     states : of the observer model that the system comes with, None before that is known; observers
         correct these.
@@ -127,10 +128,15 @@ class System:
 
     source: Path
     library: Path
-    names: Mapping[str, str]
     values: Mapping[str, float]
     states: tuple[str, ...] | None
 
+    names: Mapping[str, str] = key(
+        "names of the FMU's variables by yours, of those that have no table with `variable`: "
+        "corrections, parameters, what formulas name",
+        name="variables",
+        absent={},
+    )
     title: str = key("what the machine is, for people")
     name: str = key(
         "by which it is asked for",

@@ -64,6 +64,7 @@ class Samples:
     whitening : (b, c, c) makes the errors of a block, by channel, white with variance one.
     modes : by column of y, of the structure before its sensor.
     set_aside : number of samples by reason.
+    model_time : see `Case`.
     """
 
     name: str
@@ -88,6 +89,7 @@ class Samples:
     whitening: NDArray[np.float64]
     modes: Mapping[int, Mode]
     set_aside: dict[str, int]
+    model_time: float | None = None
 
     def falls(self, signal: str) -> bool:
         """Whether an input falls, by more than its sensor's noise and a valve's overshoot.
@@ -245,6 +247,7 @@ def prepare(
     return Samples(
         name=case.name,
         time=time,
+        model_time=case.model_time,
         inputs=case.inputs,
         u=np.ascontiguousarray(np.reshape(driving, (len(driving), time.size)).T),
         signals=signals,

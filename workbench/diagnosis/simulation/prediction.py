@@ -292,7 +292,9 @@ class Predictor:
         fmu, values = self._fmu, {**self.begin(samples), **values}
         for column in columns:
             values |= column.setting
-        fmu.start(values)
+        fmu.begin_at(samples.model_time)
+        # What a model calculates at its start may depend on inputs.
+        fmu.start({**dict(zip(samples.inputs, samples.u[0], strict=True)), **values})
         errors = np.zeros_like(samples.y)
         self._model.u[:] = 0.0
         x0 = fmu.get_states()

@@ -7,6 +7,12 @@ tried, so that a fault is named once, where it is.
 """
 
 from workbench.models.checks.checks import check
-from workbench.models.checks.result import CheckResult, is_fit, uses
+from workbench.models.checks.result import (
+    CheckResult,
+    is_fit,
+    remember_findings,
+    remembered_findings,
+    uses,
+)
 
-__all__ = ["CheckResult", "check", "is_fit", "uses"]
+__all__ = ["CheckResult", "check", "is_fit", "remember_findings", "remembered_findings", "uses"]

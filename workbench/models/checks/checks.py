@@ -15,6 +15,7 @@ from workbench.models.checks.cost import endure, time_calls
 from workbench.models.checks.excitation import (
     COMMUNICATION_STEPS,
     Excitation,
+    continuous_variables,
     excite,
     real_variables,
     run,
@@ -167,7 +168,7 @@ def _reset(path: Path, instantiations: int) -> Iterator[CheckResult]:
         def replay() -> Matrix:
             fmu.start({})
             fresh = fmu.get(everything).copy()
-            return np.vstack([fresh, walk(fmu, excite(fmu), 0.0)[0]])
+            return np.vstack([fresh, walk(fmu, excite(fmu), fmu.start_time)[0]])
 
         first = replay()
         parameters = real_variables(fmu, fmu.parameters)
@@ -209,7 +210,7 @@ def _inject(path: Path, instantiations: int) -> Iterator[CheckResult]:
 def _roll_back(path: Path, instantiations: int) -> Iterator[CheckResult]:
     with FMU(path) as fmu:
         excitation = excite(fmu)
-        _, t = walk(fmu, excitation, 0.0)
+        _, t = walk(fmu, excitation, fmu.start_time)
         fmu.set(excitation.inputs, excitation.first)
         saved = fmu.save()
         first, _ = walk(fmu, excitation, t)
@@ -222,7 +223,7 @@ def _roll_back(path: Path, instantiations: int) -> Iterator[CheckResult]:
 def _serialise(path: Path, instantiations: int) -> Iterator[CheckResult]:
     with FMU(path) as fmu:
         excitation = excite(fmu)
-        _, t = walk(fmu, excitation, 0.0)
+        _, t = walk(fmu, excitation, fmu.start_time)
         fmu.set(excitation.inputs, excitation.first)
         saved = fmu.save()
         data = fmu.serialise(saved)
@@ -244,7 +245,7 @@ def _roll_back_co_simulation(path: Path, instantiations: int) -> Iterator[CheckR
         excitation = excite(fmu)
     with CoSimulation(path) as simulation:
         start_co_simulation(simulation, excitation)
-        _, t = run(simulation, excitation, 0.0)
+        _, t = run(simulation, excitation, simulation.start_time)
         simulation.set(excitation.inputs, excitation.first)
         saved = simulation.save()
         first, _ = run(simulation, excitation, t)
@@ -258,7 +259,7 @@ def _roll_back_co_simulation(path: Path, instantiations: int) -> Iterator[CheckR
 def _differentiate(path: Path, instantiations: int) -> Iterator[CheckResult]:
     with FMU(path) as fmu:
         excitation = excite(fmu)
-        outputs = real_variables(fmu, fmu.outputs)
+        outputs = continuous_variables(fmu, fmu.outputs)
         stated = fmu.linearise(excitation.inputs, outputs)
         jacobian = np.block([[stated.A, stated.B], [stated.C, stated.D]])
         n = excitation.nominal.size
@@ -306,7 +307,7 @@ def _compare_interfaces(path: Path, instantiations: int) -> Iterator[CheckResult
         excitation = excite(fmu)
         start_co_simulation(simulation, excitation)
         start = simulation.get(simulation.variables(simulation.states)).copy()
-        rows, end = run(simulation, excitation, 0.0)
+        rows, end = run(simulation, excitation, simulation.start_time)
         names = real_variables(simulation).names
         simulated = rows[:, [names.index(state) for state in simulation.states]]
         reference = _integrate(fmu, excitation, start, end)
@@ -336,7 +337,7 @@ def _integrate(fmu: FMU, excitation: Excitation, start: Vector, end: float) -> M
         return central_differences(lambda x: rates(t, x), x, steps)
 
     rows = start[None, :]
-    times = np.linspace(0.0, end, COMMUNICATION_STEPS + 1)
+    times = np.linspace(fmu.start_time, end, COMMUNICATION_STEPS + 1)
     jump = COMMUNICATION_STEPS // 2
     for inputs, part in (
         (excitation.first, times[: jump + 1]),

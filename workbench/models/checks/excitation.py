@@ -21,7 +21,7 @@ class Excitation:
     ----------
     states : (n,) start values, off the FMU's own by up to a tenth of a nominal value.
     nominal : (n,) typical size of the states.
-    inputs : the real inputs.
+    inputs : the real inputs that may change in continuous time.
     first, second : (m,) inputs, and those after a jump.
     """
 
@@ -36,7 +36,7 @@ def excite(fmu: FMU) -> Excitation:
     """Start the FMU and bring it to an excited point; returns where."""
     by_name = {v.name: v for v in fmu.description.variables}
     nominal = np.array([abs(by_name[name].nominal or 1.0) for name in fmu.states])
-    inputs = real_variables(fmu, fmu.inputs)
+    inputs = continuous_variables(fmu, fmu.inputs)
     fmu.start({})
     states = origin = fmu.get_states()
     rest = fmu.get(inputs).copy()
@@ -89,6 +89,12 @@ def real_variables(fmu: FMU, names: Sequence[str] | None = None) -> Variables:
     return fmu.variables([n for n in real if names is None or n in names])
 
 
+def continuous_variables(fmu: FMU, names: Sequence[str]) -> Variables:
+    """Look up those of the names that are real scalars and continuous."""
+    continuous = {v.name for v in fmu.description.variables if v.variability == "continuous"}
+    return real_variables(fmu, [name for name in names if name in continuous])
+
+
 def step_size(fmu: FMU) -> float:
     """Communication step [s]: the FMU's own, or a thousandth of its experiment, or 10 ms."""
     return fmu.description.step or (fmu.description.stop or 10.0) / 1000
@@ -116,6 +122,7 @@ def walk(fmu: FMU, excitation: Excitation, begin: float) -> tuple[Matrix, float]
         t += h
         fmu.set_time(t)
         fmu.set_states(fmu.get_states() + h * rates)
+        fmu.complete_step()
     return np.array(rows), t
 
 

@@ -1,7 +1,14 @@
-"""What is asked of an FMU, and how the answer looks."""
+"""What is asked of an FMU, how the answer looks, and what is kept of it."""
 
-from collections.abc import Iterable
+import json
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
+from pathlib import Path
+
+from workbench.errors import InputError
+from workbench.models.fmu_cache import cache_folder
+from workbench.runtime.files import write_json
 
 
 @dataclass(frozen=True)
@@ -59,6 +66,7 @@ TIME_STEP = CheckResult("time of states and step", limit=SAMPLE, unit="us")
 # instances are tuning and diagnosis; what rolls back are other tools.
 _OBSERVING = (START, EVENTS, RESET, INJECTION, DERIVATIVES)
 _USES = {
+    "open loop": (START, RESET),
     "observers on recordings": _OBSERVING,
     "tuning and diagnosis": (*_OBSERVING, INSTANCES, LOADS, MEMORY),
     "observers beside a running rig": (
@@ -74,9 +82,37 @@ _USES = {
 
 
 def uses(findings: Iterable[CheckResult]) -> dict[str, list[str]]:
-    """Uses of an FMU, each with the names of what failed that it rests on; none: it would do."""
+    """Uses of an FMU, each with the names of what failed that it rests on; none: it would do.
+
+    Exported observers are made of Modelica classes, not of FMUs.
+    """
     failed = {finding.name for finding in findings if finding.passed is False}
     return {
         use: [question.name for question in questions if question.name in failed]
         for use, questions in _USES.items()
     }
+
+
+def _kept(sha256: str) -> Path:
+    return cache_folder() / "findings" / f"{sha256}.json"
+
+
+def remember_findings(sha256: str, failed: Iterable[CheckResult]) -> None:
+    """Keep what failed in the check of an FMU, by the hash of its file."""
+    reasons = {finding.name: finding.reason for finding in failed}
+    with suppress(OSError, InputError):
+        if reasons:
+            _kept(sha256).parent.mkdir(parents=True, exist_ok=True)
+            write_json(_kept(sha256), reasons)
+        else:
+            _kept(sha256).unlink(missing_ok=True)
+
+
+def remembered_findings(sha256: str) -> Mapping[str, str]:
+    """What failed in the last check of an FMU that observers rest on, with reasons."""
+    try:
+        reasons: dict[str, str] = json.loads(_kept(sha256).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    needed = {question.name for question in _OBSERVING}
+    return {name: reason for name, reason in reasons.items() if name in needed}

@@ -5,21 +5,21 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from workbench.arrays import Matrix, Vector
-from workbench.models.fmu import FMU
-from workbench.models.hybrid import HybridSimulation
+from workbench.models.description import MODEL_EXCHANGE
+from workbench.models.fmu import FMU, CoSimulation
+from workbench.models.hybrid import CoSimulationRun, HybridSimulation
 from workbench.models.native import (
     compiled,
     evaluate,
     implicit,
     inlined,
     linearise,
-    raise_on_failure,
     set_states,
     solve,
 )
 from workbench.observers.contract import Estimator
 from workbench.observers.gains import Gains
-from workbench.observers.layout import Layout, act, assign, measure, report
+from workbench.observers.layout import Layout, act, assign, measure, report, write_estimate
 from workbench.system.system import System
 
 
@@ -67,36 +67,48 @@ class OpenLoop(Estimator):
     label = "open loop"
     rank = 0
     tunable = False
+    co_simulates = True
     _step = staticmethod(_step)
     _loop = staticmethod(_loop)
 
     def __init__(self, fmu: FMU, system: System, gains: Gains) -> None:
         super().__init__(fmu, system, gains)
         n, m = len(fmu.states), len(system.inputs) + 1
-        self._hybrid: HybridSimulation | None = None
+        self._simulation: HybridSimulation | CoSimulationRun | None = None
+        unseen = [output.name for output in system.outputs if output.name not in fmu.states]
+        self._read = fmu.typed([*system.reported, *unseen])
+        # Whether the compiled loop can set and read all that there is.
+        self._plain = not self._read.others and all(
+            fmu.is_continuous(signal.name) for signal in system.inputs
+        )
         self._state = _State(np.zeros((n, n + 1)), np.zeros(m), np.zeros(m))
 
     def _arguments(self) -> tuple[Layout, Any]:
         return self._layout, self._state
 
     def _begin(self, u: Vector, y: Vector) -> None:
-        self._model.x[:] = self.fmu.get_states()
-        self._hybrid = None
-        if self.fmu.has_events:
-            held = np.array([signal.held for signal in self.system.inputs], np.bool_)
-            inputs = self.fmu.variables([signal.name for signal in self.system.inputs])
-            self._hybrid = HybridSimulation(self.fmu, inputs, held)
-            self._hybrid.begin(u)
+        if self.fmu.interface == MODEL_EXCHANGE:
+            self._model.x[:] = self.fmu.get_states()
+        self._simulation = None
+        held = np.array([signal.held for signal in self.system.inputs], np.bool_)
+        inputs = self.fmu.typed([signal.name for signal in self.system.inputs])
+        if isinstance(self.fmu, CoSimulation):
+            self._simulation = CoSimulationRun(self.fmu, inputs, held)
+        elif self.fmu.has_events or not self._plain:
+            self._simulation = HybridSimulation(self.fmu, inputs, held)
+        if self._simulation is not None:
+            self._simulation.begin(u)
 
     def _run(self, steps: Vector, u: Matrix, y: Matrix) -> Matrix:
-        """Rows of estimates; a model with events goes through them as FMI says."""
-        if self._hybrid is None:
+        """Rows of estimates; models with events, and Co-Simulations, run as FMI says."""
+        if self._simulation is None:
             return super()._run(steps, u, y)
         rows = np.full((steps.size, self._width), np.nan)
         samples, _ = self._samples(steps, u, y)
         model = self._model
         for row, sample in zip(rows, samples, strict=True):
-            model.x[:] = self._hybrid.advance(float(sample[-1]), sample[:-1])
+            model.x[:] = self._simulation.advance(float(sample[-1]), sample[:-1])
             model.u[: model.measured] = sample[:-1]
-            raise_on_failure(report(model, self._layout, row), self.fmu)
+            model.y[:] = self.fmu.get_typed(self._read)
+            write_estimate(model, self._layout, row)
         return rows

@@ -14,7 +14,16 @@ from workbench.diagnosis.simulation.steps import restart, steps
 from workbench.diagnosis.simulation.steps import step as advance
 from workbench.errors import FMUError
 from workbench.models.fmu import FMU
-from workbench.models.native import EVENT, OK, compiled, instance, place, raise_on_failure, read
+from workbench.models.native import (
+    EVENT,
+    OK,
+    check_state_events,
+    compiled,
+    instance,
+    place,
+    raise_on_failure,
+    read,
+)
 from workbench.system.stopping import Stopping
 from workbench.system.system import System
 
@@ -89,6 +98,9 @@ def _stop(model, x0, drive, limits, y, result, work):  # type: ignore[no-untyped
         return 1
     way, speed = 0.0, model.x[state]
     for k in range(most):
+        status = check_state_events(model)
+        if status:
+            return status
         if k < y.shape[0]:
             if read(model):
                 return 1

@@ -1,0 +1,34 @@
+/* FMI 2.0 Co-Simulation without Model Exchange: der(x) = u, each step exact. */
+#include <stdlib.h>
+#include "fmi2FunctionTypes.h"
+enum { X, U, SIZE };
+const char *fmi2GetTypesPlatform(void) { return fmi2TypesPlatform; }
+const char *fmi2GetVersion(void) { return "2.0"; }
+fmi2Component fmi2Instantiate(fmi2String a, fmi2Type b, fmi2String c, fmi2String d, const fmi2CallbackFunctions *e, fmi2Boolean f, fmi2Boolean g) {
+    double *r = calloc(SIZE, sizeof *r);
+    r[X] = 1.0;
+    return r;
+}
+void fmi2FreeInstance(fmi2Component c) { free(c); }
+fmi2Status fmi2Reset(fmi2Component c) { ((double *)c)[X] = 1.0, ((double *)c)[U] = 0.0; return fmi2OK; }
+fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean a, fmi2Real b, fmi2Real t, fmi2Boolean d, fmi2Real e) { return fmi2OK; }
+fmi2Status fmi2EnterInitializationMode(fmi2Component c) { return fmi2OK; }
+fmi2Status fmi2ExitInitializationMode(fmi2Component c) { return fmi2OK; }
+fmi2Status fmi2Terminate(fmi2Component c) { return fmi2OK; }
+fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean n) { ((double *)c)[X] += h * ((double *)c)[U]; return fmi2OK; }
+fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference k[], size_t n, fmi2Real v[]) {
+    for (size_t i = 0; i < n; i++) v[i] = ((double *)c)[k[i]];
+    return fmi2OK;
+}
+fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference k[], size_t n, const fmi2Real v[]) {
+    for (size_t i = 0; i < n; i++) ((double *)c)[k[i]] = v[i];
+    return fmi2OK;
+}
+/* FMPy looks for all functions; these are never called. */
+#define NEVER(name) fmi2Status name(void) { return fmi2Error; }
+NEVER(fmi2SetDebugLogging) NEVER(fmi2GetInteger) NEVER(fmi2GetBoolean) NEVER(fmi2GetString) NEVER(fmi2SetInteger)
+NEVER(fmi2SetBoolean) NEVER(fmi2SetString) NEVER(fmi2GetFMUstate) NEVER(fmi2SetFMUstate) NEVER(fmi2FreeFMUstate)
+NEVER(fmi2SerializedFMUstateSize) NEVER(fmi2SerializeFMUstate) NEVER(fmi2DeSerializeFMUstate)
+NEVER(fmi2GetDirectionalDerivative) NEVER(fmi2SetRealInputDerivatives) NEVER(fmi2GetRealOutputDerivatives)
+NEVER(fmi2CancelStep) NEVER(fmi2GetStatus) NEVER(fmi2GetRealStatus) NEVER(fmi2GetIntegerStatus)
+NEVER(fmi2GetBooleanStatus) NEVER(fmi2GetStringStatus)
