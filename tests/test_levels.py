@@ -144,3 +144,27 @@ def test_a_wrong_rate_or_a_parameter_that_is_none_is_refused(
 ) -> None:
     with pytest.raises(InputError, match=message):
         block(tmp_path / "block", more)
+
+
+def test_a_free_run_is_free_whatever_noise_an_input_declares(tmp_path: Path) -> None:
+    """Noise of the power makes outputs correct the run that is compared: its errors are smaller.
+
+    A draught takes 0.1 W/K more; the same recordings, with a power that is exact and one that is
+    declared to be wrong by 5 W. The nominal model has no level, so that it is one model.
+    """
+    frames = [recorded(0.1, seed) for seed in range(2)]
+    free, corrected = [], []
+    for name, noise in (("exact", "0 W"), ("noisy", "5 W")):
+        folder = tmp_path / name
+        file = SYSTEM.format(sensor="").replace('noise = "0 W"', f'noise = "{noise}"')
+        file = file.replace('[states.Tc]\nspread = "30 K"\n', "")
+        of = declare(folder, LIBRARY, file)
+        outcome = diagnosed(of, cases(of, frames[:1]), folder, cases(of, frames)[1:])
+        free.append([error.free_run[0] for error in outcome.errors])
+        corrected.append([error.rms[0] for error in outcome.errors])
+        said = {error.corrected for error in outcome.errors}
+        assert said == ({""} if name == "exact" else {"measured outputs"})
+        assert ("free run" in outcome.summary()) is (name == "noisy")
+    assert corrected[0] == free[0]
+    assert free[1] == pytest.approx(free[0], rel=0.05)  # the first value read is fitted again
+    assert np.all(np.array(corrected[1]) < 0.5 * np.array(free[1]))

@@ -426,7 +426,8 @@ def test_an_input_without_a_unit_has_that_of_what_it_is_bound_to(tmp_path: Path)
 )
 def test_a_law_is_worth_a_tenth_of_an_error(rms: list[tuple[float, float]], falls: bool) -> None:
     errors = [
-        Errors("new", f"channel {k}", "m", True, 100, pair, pair) for k, pair in enumerate(rms)
+        Errors("new", f"channel {k}", "m", True, 100, pair, pair, "", pair)
+        for k, pair in enumerate(rms)
     ]
     assert _falls(errors) is falls
 

@@ -217,9 +217,23 @@ class Outcome:
                 ends = zip(np.sqrt(squares) / factor, means / factor, strict=True)
                 before, after = (f"{rms:.3g} and {mean:.3g} {channel.shown}" for rms, mean in ends)
                 change = f"{before}, now {after}" if self.diagnosis.best.active else before
-                fate = "held out" if held_out else "fitted"
-                lines.append(f"  {channel.label}, {len(own)} recordings {fate}: {change}")
+                fate = "of --held-out" if held_out else "fitted"
+                run = f" ({own[0].corrected} correct the run)" if own[0].corrected else ""
+                lines.append(f"  {channel.label}, {len(own)} recordings {fate}{run}: {change}")
+                if own[0].corrected:
+                    free = [self._free_run(own, i, channel, factor) for i in (0, 1)]
+                    runs = ", now ".join(free if self.diagnosis.best.active else free[:1])
+                    lines.append(f"    free run, root mean square: {runs}")
         return lines
+
+    def _free_run(self, own: Sequence[Errors], model: int, channel: Channel, factor: float) -> str:
+        """Error of free runs of one of the two models, over some recordings."""
+        errors = [e.free_run[model] for e in own]
+        if None in errors:
+            return "none, the model cannot be simulated so far"
+        squares = np.square(np.array(errors, float))
+        rms = np.sqrt(np.average(squares, weights=[e.samples for e in own]))
+        return f"{rms / factor:.3g} {channel.shown}"
 
     def to_frame(self) -> pd.DataFrame:
         """Causes, strongest first, a row for each of their parameters."""

@@ -154,9 +154,11 @@ def _shown(
     first: Recording,
 ) -> list[Block]:
     added = " and ".join(_extended(summary))
+    compared = _compared(summary)
+    ran = f", {compared}; errors of free runs are in a table below" if compared else ""
     text = (
-        f"The model ran from the measured {_inputs(system)}. Where a curve stays outside the grey "
-        "band, the simulation is wrong by more than noise explains"
+        f"The model ran from the measured {_inputs(system)}{ran}. Where a curve stays outside the "
+        "grey band, the simulation is wrong by more than noise explains"
     )
     if summary["causes"]:
         text += f"; the effect is what the model with {added} takes away"
@@ -542,18 +544,29 @@ def _errors(system: System, summary: Mapping[str, Any]) -> Table:
         unit = shown[error["channel"]]
         factor = si_factor(unit, error["unit"], error["channel"])
         sizes = (error[key][i] for i in range(len(models)) for key in ("rms", "mean_absolute"))
-        fitted = "held out" if error["held_out"] else "yes"
+        fitted = "--held-out" if error["held_out"] else "yes"
         channel = f"{error['channel']} [{unit}]"
-        cells = (number(size / factor, ".3g") for size in sizes)
+        cells = [number(size / factor, ".3g") for size in sizes]
+        free = error["free_run"][: len(models)]
+        cells += [Cell("n/a") if e is None else number(e / factor, ".3g") for e in free]
         rows.append((error["recording"], fitted, channel, *cells))
+    compared = _compared(summary)
     titles = [f"{size}, {m}" for m in models for size in ("root mean square", "mean absolute")]
+    titles += [f"free run: root mean square, {m}" for m in models]
     caption = Markup(
-        "Errors of single samples in the units of the sensors. To recordings that were held out, "
-        'only states at the start and tolerances were fitted. Data: <a href="errors.csv">'
-        "errors.csv</a>"
-    )
+        "Errors of single samples in the units of the sensors: first of the simulation that is "
+        "compared, {}, then of a free run, which no measured output corrects. Of recordings given "
+        "by --held-out, only states at the start and tolerances were fitted. Data: "
+        '<a href="errors.csv">errors.csv</a>'
+    ).format(compared or "itself a free run")
     columns = ("recording", "fitted", "channel", *map(Numbers, titles))
     return Table("error-table", caption, columns, rows)
+
+
+def _compared(summary: Mapping[str, Any]) -> str:
+    """What corrects the simulations that are compared; empty for free runs."""
+    said = dict.fromkeys(e["corrected"] for e in summary["errors"] if e["corrected"])
+    return f"corrected by {' and by '.join(said)}" if said else ""
 
 
 def _observers(system: System, cases: Sequence[str], observers: Mapping[str, Any]) -> Table:

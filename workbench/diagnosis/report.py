@@ -128,6 +128,8 @@ def _write_tables(summary: Mapping[str, Any], out: Path) -> None:
                 for size in ("rms", "mean_absolute")
                 for i, when in enumerate(("before", "after"))
             },
+            "corrected": error["corrected"],
+            **{f"free_run_{w}": error["free_run"][i] for i, w in enumerate(("before", "after"))},
         }
         for error in summary["errors"]
     ]

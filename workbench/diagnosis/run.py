@@ -72,7 +72,7 @@ def diagnose(
             assessed = assess(fit, best, report) if asked else None
             answer = _Found(problem, engine, simulations, fit, diagnosis)
             extension = answer.extend(every_platform=every_platform)
-            errors = errors_of(simulations, base.linearised, best.linearised, held_out=False)
+            errors = errors_of(simulations, fit, base.linearised, best.linearised, held_out=False)
             starts = fit.unknowns.starts(best.point)
             if problem.held_out:
                 report("errors on recordings that were held out")

@@ -92,11 +92,13 @@ class Lead:
     gain : (p, l) constant gain.
     ahead : (l, l) covariance of predicted outputs, by what led the states and by inputs that
         outputs show at once.
+    noisy : whether an input has noise; else a gain only keeps the equation solvable.
     """
 
     states: tuple[str, ...]
     gain: Matrix
     ahead: Matrix
+    noisy: bool
 
 
 def motion(fmu: FMU, system: System) -> Motion:
@@ -144,7 +146,7 @@ def led_by(motion: Motion, inputs: Vector, outputs: Vector, h: float) -> Lead:
     innovation = C @ P @ C.T + R
     gain = np.linalg.solve(innovation, C @ P).T * scale[:, None] / outputs
     ahead: Matrix = (innovation - np.eye(len(C))) * np.outer(outputs, outputs)
-    return Lead(motion.states, gain, ahead)
+    return Lead(motion.states, gain, ahead, bool(np.any(inputs > 0.0)))
 
 
 def effects_on_led(motion: Motion, output: str) -> Vector:

@@ -156,6 +156,18 @@ class Samples:
             return np.zeros(len(self.blocks), np.bool_)
         return self.restarts.at[self.blocks[:, 0]]
 
+    @property
+    def corrected(self) -> str:
+        """What corrects a simulation along the recording; empty for a free run."""
+        leads = self.gain.any() or (self.lead is not None and self.lead.noisy)
+        sets = self.restarts is not None and self.restarts.at.any()
+        return " and ".join(["measured outputs"] * bool(leads) + ["restarts"] * bool(sets))
+
+    @property
+    def free(self) -> "Samples":
+        """The same, of which nothing corrects a simulation."""
+        return replace(self, gain=np.zeros_like(self.gain), lead=None, restarts=None)
+
     def loosened(self, moved: Sequence[Matrix], apart: Sequence[Matrix]) -> "Samples":
         """The same with errors that are uncertain by more, apart from each other.
 

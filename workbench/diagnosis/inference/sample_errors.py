@@ -24,6 +24,10 @@ class Errors:
     held_out : whether nothing common to the recordings was fitted to this one.
     samples : whose errors are told.
     rms, mean_absolute : of these, (before, after) [unit].
+    corrected : what corrects the simulation that they are of: measured outputs, where inputs have
+        noise that a motion integrates, or restarts; empty for a free run.
+    free_run : root mean square of a free run, which nothing corrects, (before, after) [unit]; None
+        where the model cannot be simulated so far.
     """
 
     recording: str
@@ -33,13 +37,25 @@ class Errors:
     samples: int
     rms: tuple[float, float]
     mean_absolute: tuple[float, float]
+    corrected: str
+    free_run: tuple[float | None, float | None]
 
 
 def errors_of(
-    simulations: ResidualModel, before: LinearizedPoint, after: LinearizedPoint, *, held_out: bool
+    simulations: ResidualModel,
+    fit: Fit,
+    before: LinearizedPoint,
+    after: LinearizedPoint,
+    *,
+    held_out: bool,
 ) -> list[Errors]:
-    """Errors of all recordings by two models."""
-    rows = []
+    """Errors of all recordings by two models, as they are compared and in free runs."""
+    rows, same = [], before.point is after.point
+    if any(recording.corrected for recording in simulations.recordings):
+        first = simulations.free_runs(fit.unknowns.values(before.point))
+        last = first if same else simulations.free_runs(fit.unknowns.values(after.point))
+    else:
+        first, last = ([one.sizes for one in lin.residuals] for lin in (before, after))
     for k, recording in enumerate(simulations.recordings):
         sizes = [lin.residuals[k].sizes for lin in (before, after)]
         samples = int(recording.told.sum())
@@ -47,8 +63,20 @@ def errors_of(
             if recording.silent[c]:
                 continue
             rms, mean = ((float(sizes[0][i, c]), float(sizes[1][i, c])) for i in (0, 1))
+            free = [float(runs[k][0, c]) for runs in (first, last)]
+            known = [error if np.isfinite(error) else None for error in free]
             rows.append(
-                Errors(recording.name, channel.name, channel.unit, held_out, samples, rms, mean)
+                Errors(
+                    recording=recording.name,
+                    channel=channel.name,
+                    unit=channel.unit,
+                    held_out=held_out,
+                    samples=samples,
+                    rms=rms,
+                    mean_absolute=mean,
+                    corrected=recording.corrected,
+                    free_run=(known[0], known[1]),
+                )
             )
     return rows
 
@@ -88,4 +116,4 @@ def held_out_errors(
 
         before, after = map(apart, ends)
         starts = fit.unknowns.starts(after.point)
-        return errors_of(simulations, before, after, held_out=True), starts
+        return errors_of(simulations, fit, before, after, held_out=True), starts

@@ -231,6 +231,13 @@ class ResidualModel:
         )
         return [results[k] for k in range(len(self.recordings))]
 
+    def free_runs(self, points: Sequence[Mapping[str, float]]) -> list[Matrix]:
+        """Errors of samples of every recording that nothing corrects, each (2, c); see `at`."""
+        found = self._gathered(
+            {k: (Simulator.free_run, self._at[k], points[k]) for k in self._order}
+        )
+        return [found[k] for k in range(len(self.recordings))]
+
     def predicted(self, points: Sequence[Mapping[str, float]]) -> list[Matrix]:
         """Signals of every recording as the model has them, each (n, c); see `at`."""
         found = self._gathered(

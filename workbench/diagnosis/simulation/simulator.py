@@ -14,6 +14,7 @@ from workbench.diagnosis.data.clocks import in_time, late_signals, lateness, mir
 from workbench.diagnosis.data.samples import Samples
 from workbench.diagnosis.inference.thresholds import Thresholds
 from workbench.diagnosis.simulation.prediction import Predictor, Variation
+from workbench.errors import FMUError
 from workbench.models.fmu import FMU
 from workbench.system.system import System
 
@@ -104,6 +105,21 @@ class Simulator:
         recording = self._in_time(number, values)
         predictor = Predictor(self._fmu, self._system, recording.signals, self._parts, watched)
         return predictor.along(recording, self._known(values))
+
+    def free_run(self, number: int, values: Mapping[str, float]) -> Matrix:
+        """Errors of samples of one recording that nothing corrects, see `Samples.sizes`, (2, c).
+
+        NaN where the model cannot be simulated so far by itself.
+        """
+        recording = self._recordings[number]
+        late = lateness(self._clocks, values)
+        freed = in_time(recording.free, late)
+        try:
+            errors = self._predictor.errors(freed, self._known(values)) + (recording.y - freed.y)
+        except FMUError:
+            return np.full((2, len(recording.slopes)), np.nan)
+        with np.errstate(over="ignore", invalid="ignore"):  # what runs away is as large as it gets
+            return recording.sizes(self._read(number, errors, values))
 
     def predicted(self, number: int, values: Mapping[str, float]) -> Matrix:
         """Signals of one recording as the model has them, (n, c)."""
