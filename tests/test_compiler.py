@@ -322,6 +322,6 @@ def test_a_panic_of_the_front_end_is_an_error_with_file_and_line(
         tmp_path,
         "  model M\n    input Real u; output Real y;\n  equation\n    y = der(u);\n  end M;\n",
     )
-    with pytest.raises(InputError, match=r"package\.mo:5: der\(u\): .*continuous state"):
+    with pytest.raises(InputError, match=r"package\.mo:5: found der\(u\): .*continuous state"):
         flatten(package, "Lib.M")
     assert "panicked" not in capfd.readouterr().err

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from workbench.cli.arguments import Commands, above_zero, add_isolated, nearby, positive
 from workbench.cli.extras import require_compiler
-from workbench.cli.output import CommandResult, Output
+from workbench.cli.output import CommandResult, Output, warn
 from workbench.errors import InputError
 from workbench.runtime.files import require_writable
 from workbench.runtime.resources import CHECKOUT, fmus
@@ -178,6 +178,8 @@ def _build(options: argparse.Namespace, output: Output) -> CommandResult:
         built = [compiler.build(options.package, options.model, out, fmi=options.fmi)]
     for fmu in built:
         output.result(f"{fmu.path}  {fmu.sha256}")
+        for note in fmu.notes:
+            warn(note)
     return CommandResult({"fmus": [{"file": str(f.path), "sha256": f.sha256} for f in built]})
 
 

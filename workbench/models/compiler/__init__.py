@@ -37,11 +37,11 @@ FMI_VERSIONS = (2, 3)
 def source_hash(*libraries: Path) -> str:
     """SHA-256 over all files of libraries, of those that they use, and of the compiler."""
     here = Path(__file__).parent
-    every = dict.fromkeys(package for library in libraries for package in packages(library))
-    sources = [(package.parent, files(package)) for package in every]
-    sources.append((here, tuple(sorted([*here.glob("*.py"), *RUNTIME.glob("*.[ch]")]))))
+    used = dict.fromkeys(package for library in libraries for package in packages(library))
+    folders = [(package.parent, files(package)) for package in used]
+    folders.append((here, tuple(sorted([*here.glob("*.py"), *RUNTIME.glob("*.[ch]")]))))
     parts: list[str | bytes] = []
-    for root, inside in sources:
+    for root, inside in folders:
         for file in inside:
             parts += [file.relative_to(root).as_posix(), file.read_bytes()]
     return digest(parts)

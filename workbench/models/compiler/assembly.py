@@ -27,13 +27,14 @@ _HEADERS = Path(fmpy.__file__).parent / "c-code"
 
 @dataclass(frozen=True)
 class BuiltFMU:
-    """A built FMU and what made it."""
+    """A built FMU and what made it; `notes` are what the user should know, a sentence each."""
 
     path: Path
     model: str
     fmi: int
     token: str
     sha256: str
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -112,7 +113,7 @@ def assemble(
         if fmi == 3:
             (sources / "buildDescription.xml").write_text(_build_description(name, files))
         pack(folder, fmu)
-    return BuiltFMU(fmu, model, fmi, token, digest_file(fmu))
+    return BuiltFMU(fmu, model, fmi, token, digest_file(fmu), space.notes)
 
 
 def _token(digits: str) -> str:

@@ -89,12 +89,13 @@ def generate(model: StateSpace, token: str, prefix: str = "model") -> GeneratedC
         "derivatives": ("xdot", model.f),
         "algebraics": ("w", model.w),
         "assertions": ("holds", model.assertions),
+        **({"starts": ("start", model.x0)} if model.follows and model.x0 is not None else {}),
         "jacobian_xu": ("nonzeros", _nonzeros(jacobian_xu)),
         "jacobian_p": ("nonzeros", _nonzeros(jacobian_p)),
     }
-    variables = [*model.states, *model.inputs, *model.parameters]
+    starts = model.initial_states() + [v.start for v in (*model.inputs, *model.parameters)]
     tables = [
-        _table("double", f"{prefix}_start", [_number(v.start) for v in variables]),
+        _table("double", f"{prefix}_start", [_number(start) for start in starts]),
         _table("double", f"{prefix}_nominal", [_number(v.nominal or 1.0) for v in model.states]),
         _table("unsigned char", f"{prefix}_tunable", [str(int(t)) for t in model.tunable]),
         _table(
@@ -116,6 +117,7 @@ def generate(model: StateSpace, token: str, prefix: str = "model") -> GeneratedC
         "NP": model.p.numel(),
         "NW": model.w.numel(),
         "NA": model.assertions.numel(),
+        "STARTS_FOLLOW": int(model.follows),
         "NNZ_XU": jacobian_xu.nnz(),
         "NNZ_P": jacobian_p.nnz(),
     }

@@ -1,9 +1,10 @@
 """modelDescription.xml of FMI 2.0 and FMI 3.0, stage 4 of the compiler."""
 
+import math
 import re
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import casadi as ca
@@ -15,7 +16,8 @@ from workbench.models.compiler.explicit import StateSpace
 from workbench.models.compiler.flat import FlatVariable
 
 _REGISTRY: "pint.UnitRegistry[float]" = pint.UnitRegistry()
-_REGISTRY.define("@alias ohm = Ohm")  # as Modelica writes it
+_REGISTRY.define("@alias ohm = Ohm")  # as Modelica writes them
+_REGISTRY.define("@alias turn = rev")
 _BASE_UNITS = {
     "kilogram": "kg",
     "meter": "m",
@@ -59,24 +61,27 @@ def describe(
     sources : names of the C sources (FMI 2 lists them here).
     """
     entries = _entries(model)
-    units = sorted({e.unit for e in entries if e.unit})
+    units = {e.unit: e.variable.place for e in reversed(entries) if e.unit}
     root = _root2(model, token, tool, sources) if fmi == 2 else _root3(model, token, tool)
-    definitions = ET.SubElement(root, "UnitDefinitions")
-    for unit in units:
-        _define_unit(definitions, unit)
+    if units:  # an empty list is not valid
+        definitions = ET.SubElement(root, "UnitDefinitions")
+        for unit, place in sorted(units.items()):
+            _define_unit(definitions, unit, place)
     categories = ET.SubElement(root, "LogCategories")
     for name, text in (
         ("logAll", "All messages"),
         ("logStatusError", "Errors and discarded steps"),
     ):
         ET.SubElement(categories, "Category", name=name, description=text)
-    ET.SubElement(
-        root,
-        "DefaultExperiment",
-        startTime=f"{model.experiment.get('StartTime', 0.0):g}",
-        stopTime=repr(model.experiment.get("StopTime", 1.0)),
-        tolerance=repr(model.experiment.get("Tolerance", 1e-6)),
-    )
+    begin = model.experiment.get("StartTime", 0.0)
+    experiment = {
+        "startTime": f"{begin:.17g}",
+        "stopTime": repr(model.experiment.get("StopTime", begin + 1.0)),
+        "tolerance": repr(model.experiment.get("Tolerance", 1e-6)),
+    }
+    if "Interval" in model.experiment:
+        experiment["stepSize"] = repr(model.experiment["Interval"])
+    ET.SubElement(root, "DefaultExperiment", experiment)
     variables = ET.SubElement(root, "ModelVariables")
     structure = ET.SubElement(root, "ModelStructure")
     if fmi == 2:
@@ -121,9 +126,10 @@ def _entries(model: StateSpace) -> list[_Entry]:
             )
         )
 
-    for i, state in enumerate(model.states):
+    starts = zip(model.states, model.initial_states(), strict=True)
+    for i, (state, start) in enumerate(starts):
         role = "output" if state.name in model.state_outputs else "local"
-        add(state, role, "continuous", "exact", column=i)
+        add(replace(state, start=start), role, "continuous", "exact", column=i)
     for i, state in enumerate(model.states):
         entries.append(
             _Entry(
@@ -170,8 +176,8 @@ def _root2(model: StateSpace, token: str, tool: str, sources: Sequence[str]) -> 
     simulation = ET.SubElement(
         root, "CoSimulation", {**common, "canHandleVariableCommunicationStepSize": "true"}
     )
-    for kind in (exchange, simulation):
-        files = ET.SubElement(kind, "SourceFiles")
+    for interface in (exchange, simulation):
+        files = ET.SubElement(interface, "SourceFiles")
         for name in sources:
             ET.SubElement(files, "File", name=name)
     return root
@@ -201,7 +207,7 @@ def _root3(model: StateSpace, token: str, tool: str) -> ET.Element:
     return root
 
 
-def base_units(unit: str) -> tuple[dict[str, int], float]:
+def base_units(unit: str, where: str = "") -> tuple[dict[str, int], float]:
     """Exponents of the SI base units (and rad) of a Modelica unit, and its factor to them.
 
     >>> base_units("N.m")
@@ -209,26 +215,37 @@ def base_units(unit: str) -> tuple[dict[str, int], float]:
     >>> base_units("Ohm")
     ({'A': -2, 'kg': 1, 'm': 2, 's': -3}, 1.0)
     """
+    exponents, zero, one = _in_base_units(unit, where)
+    return exponents, one - zero
+
+
+def _in_base_units(unit: str, where: str) -> tuple[dict[str, int], float, float]:
+    """Exponents of the base units, and what 0 and 1 of a unit are in them."""
     spelled = re.sub(r"([A-Za-z])(-?\d+)", r"\1**\2", unit).replace(".", "*")
     try:
-        quantity: Any = _REGISTRY.Quantity(spelled).to_base_units()
-    except (pint.errors.PintError, AttributeError, TypeError) as error:
+        parsed: Any = _REGISTRY.parse_units(spelled)
+        zero, one, two = (_REGISTRY.Quantity(v, parsed).to_base_units() for v in (0.0, 1.0, 2.0))
+        if not math.isclose(two.magnitude - one.magnitude, one.magnitude - zero.magnitude):
+            raise ValueError("a logarithm")  # as dB
+        exponents = {_BASE_UNITS[str(name)]: int(power) for name, power in one.unit_items()}
+    except (pint.errors.PintError, AttributeError, KeyError, TypeError, ValueError) as error:
         raise InputError(
-            where=f"unit '{unit}'",
-            found=f"a unit that is not known ({error})",
+            where=where or f"unit '{unit}'",
+            found=f"unit '{unit}', which is not known ({error})",
             expected="an SI unit in Modelica's notation, such as N.m or kg.m2",
             remedy="correct the unit attribute",
         ) from None
-    exponents = {_BASE_UNITS[str(name)]: int(power) for name, power in quantity.unit_items()}
-    return dict(sorted(exponents.items())), float(quantity.magnitude)
+    return dict(sorted(exponents.items())), float(zero.magnitude), float(one.magnitude)
 
 
-def _define_unit(parent: ET.Element, unit: str) -> None:
-    exponents, factor = base_units(unit)
+def _define_unit(parent: ET.Element, unit: str, where: str) -> None:
+    exponents, zero, one = _in_base_units(unit, where)
     element = ET.SubElement(parent, "Unit", name=unit)
     base = ET.SubElement(element, "BaseUnit", {k: str(v) for k, v in exponents.items()})
-    if factor != 1.0:
-        base.set("factor", repr(factor))
+    if one - zero != 1.0:
+        base.set("factor", repr(one - zero))
+    if zero != 0.0:
+        base.set("offset", repr(zero))
     if unit in _DISPLAY_UNITS:
         name, scale = _DISPLAY_UNITS[unit]
         ET.SubElement(element, "DisplayUnit", name=name, factor=repr(scale))

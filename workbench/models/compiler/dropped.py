@@ -1,10 +1,10 @@
-"""What is right in Modelica, but dropped by the front end without a word (rumoca 0.10.2)."""
+"""What is right in Modelica, but dropped by the front end (rumoca 0.10.2)."""
 
 from collections.abc import Iterable
 
 from workbench.errors import InputError
 from workbench.models.modelica import Library
-from workbench.models.modelica.classes import Modifier
+from workbench.models.modelica.classes import Component, Modifier
 
 
 def refuse_dropped(library: Library, reached: Iterable[str]) -> None:
@@ -26,22 +26,38 @@ def refuse_dropped(library: Library, reached: Iterable[str]) -> None:
         for component in library.classes[name].components:
             for modification in component.modifier.inner.values():
                 _refuse_values(_inside(modification))
+            if "outer" in component.prefixes:
+                _refuse_outer(component)
+
+
+def _refuse_outer(component: Component) -> None:
+    """Refuse an outer variable: the front end misses the equation that ties it to the inner one."""
+    if component.type in ("Real", "Integer", "Boolean") and not component.prefixes & {
+        "parameter",
+        "constant",
+    }:
+        raise InputError(
+            where=component.where,
+            found=f"'outer {component.type} {component.name}'",
+            expected="an outer component of a model, as the Modelica front end needs",
+            remedy=f"put '{component.name}' into a model, and declare that inner and outer",
+        )
 
 
 def _refuse_redeclarations(library: Library, name: str) -> None:
-    for extends, kind in zip(library.classes[name].extends, library.bases(name), strict=True):
-        if kind not in library.classes:
+    for extends, base in zip(library.classes[name].extends, library.bases(name), strict=True):
+        if base not in library.classes:
             continue
-        inherited = set(library.components(kind))
-        inherited -= {component.name for component in library.classes[kind].components}
+        inherited = set(library.components(base))
+        inherited -= {component.name for component in library.classes[base].components}
         for slot, modifier in extends.modifier.inner.items():
             if modifier.redeclared is not None and slot in inherited:
                 raise InputError(
                     where=modifier.where,
-                    found=f"a redeclaration of '{slot}', which {kind} inherits",
+                    found=f"a redeclaration of '{slot}', which {base} inherits",
                     expected="one of a component that the extended class itself declares, as "
                     "the Modelica front end needs",
-                    remedy=f"declare '{slot}' in {kind}, or extend the class that declares it",
+                    remedy=f"declare '{slot}' in {base}, or extend the class that declares it",
                 )
 
 

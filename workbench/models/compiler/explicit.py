@@ -4,10 +4,14 @@ Equations are matched to unknowns and sorted into blocks (Dulmage-Mendelsohn), l
 solved symbolically. Velocities of spring-dampers, `der(e)` of an algebraic `e`, follow by the chain
 rule along the states. Blocks that are nonlinear in their unknowns are refused: none of the rig's
 models needs an iteration inside the right-hand side, and an observer's step should have none.
+
+States are the differentiated variables with `fixed = true`. Where these are too few, others join
+them, by stateSelect and start; where equations tie them to each other, they are chosen anew. What
+is not fixed begins as initial equations say, else at its start.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import casadi as ca
 import numpy as np
@@ -36,6 +40,8 @@ class StateSpace:
     states, inputs, parameters, outputs : the variables behind x, u, p, w.
     state_outputs : names of the states that the model declares as outputs.
     experiment : numbers of the model's experiment annotation.
+    x0 : (n,) states at the start, of t, u and p; None where they are the starts of `states`.
+    notes : what the user should know, a sentence each.
     """
 
     name: str
@@ -55,6 +61,22 @@ class StateSpace:
     tunable: list[bool]
     outputs: list[FlatVariable]
     state_outputs: list[str]
+    x0: ca.SX | None = None
+    notes: tuple[str, ...] = ()
+
+    @property
+    def follows(self) -> bool:
+        """Whether the states at the start follow parameters, inputs or time."""
+        return self.x0 is not None and not self.x0.is_constant()
+
+    def initial_states(self) -> list[float]:
+        """States at the start of the experiment, at the starts of inputs and parameters."""
+        if self.x0 is None:
+            return [state.start for state in self.states]
+        time = self.experiment.get("StartTime", 0.0)
+        u, p = ([v.start for v in group] for group in (self.inputs, self.parameters))
+        function = ca.Function("x0", [self.t, self.u, self.p], [ca.densify(self.x0)])
+        return [float(value) for value in function(time, u, p).full().ravel()]
 
 
 def make_explicit(model: FlatModel) -> StateSpace:
@@ -63,42 +85,28 @@ def make_explicit(model: FlatModel) -> StateSpace:
     Raises
     ------
     InputError
-        If equations and unknowns do not match, or a block is nonlinear in its unknowns.
+        If equations and unknowns do not match, a block is nonlinear in its unknowns, or the start
+        of a state is not given.
     """
+    fixed = [v.name for v in model.differentiated if v.fixed and v.select != "Never"]
+    solver = _Solver(model, fixed)
+    try:
+        solver.solve()
+    except InputError as error:
+        # Equations may tie fixed variables to each other: choose one after the other, from none.
+        solver = _Solver(model, [])
+        try:
+            solver.solve()
+        except InputError:
+            raise error from None
+    states = [v for v in model.differentiated if v.name in solver.states]
     x, u, p = (
-        _column([v.symbol for v in group])
-        for group in (model.states, model.inputs, model.parameters)
+        _column([v.symbol for v in group]) for group in (states, model.inputs, model.parameters)
     )
-    n = len(model.states)
-    state_rates = _column(model.derivatives[:n])
-    dependent_rates = _column(model.derivatives[n:])
-    dependent = _column([v.symbol for v in model.dependent])
-    algebraic = ca.vertcat(dependent, *(v.symbol for v in model.algebraic))
-    rates = ca.vertcat(state_rates, dependent_rates)
-
-    solver = _Solver(model)
-    unknowns = ca.vertcat(rates, algebraic)
-    pending = list(range(len(model.dependent)))
-    while pending:
-        # What the states alone determine (positions, then velocities) gives its own derivative.
-        solver.solve_determined(unknowns)
-        expressions = solver.resolve(dependent)
-        free = [bool(row.any()) for row in _incidence(expressions, ca.vertcat(unknowns, u))]
-        ready = [i for i in pending if not free[i]]
-        if not ready:
-            names = [model.dependent[i].name for i in pending]
-            raise _singular(model, names, "no equation gives them without derivatives or inputs")
-        known = expressions[ready]
-        change = ca.jtimes(known, x, state_rates) + ca.jacobian(known, model.time)
-        solver.equate(dependent_rates[ready], change)
-        pending = [i for i in pending if free[i]]
-    solver.solve_all(unknowns)
-
-    by_name = {v.name: v for v in [*model.states, *model.dependent, *model.algebraic]}
-    state_names = {v.name for v in model.states}
-    outputs = [by_name[name] for name in model.outputs if name not in state_names]
+    by_name = {v.name: v for v in [*model.differentiated, *model.algebraic]}
+    outputs = [by_name[name] for name in model.outputs if name not in solver.states]
     conditions = _column([condition for condition, _ in model.assertions])
-    return StateSpace(
+    space = StateSpace(
         name=model.name,
         description=model.description,
         experiment=model.experiment,
@@ -106,16 +114,130 @@ def make_explicit(model: FlatModel) -> StateSpace:
         x=x,
         u=u,
         p=p,
-        f=solver.resolve(state_rates),
+        f=solver.resolve(_column([solver.rates[v.name] for v in states])),
         w=solver.resolve(_column([v.symbol for v in outputs])),
         assertions=solver.resolve(conditions),
         assertion_texts=[text for _, text in model.assertions],
-        states=model.states,
+        states=states,
         inputs=model.inputs,
         parameters=model.parameters,
         tunable=model.tunable,
         outputs=outputs,
-        state_outputs=[name for name in model.outputs if name in state_names],
+        state_outputs=[name for name in model.outputs if name in solver.states],
+        x0=_initial_states(model, solver, states),
+        notes=model.notes,
+    )
+    starts = zip(states, space.initial_states(), strict=True)
+    return replace(space, states=[replace(state, start=start) for state, start in starts])
+
+
+def _initial_states(model: FlatModel, solver: "_Solver", states: list[FlatVariable]) -> ca.SX:
+    """Solve starts and initial equations for the states at the start.
+
+    A variable with `fixed = true` that is no state is an initial equation, too.
+    """
+    names = {state.name for state in states}
+    others = [v for v in [*model.differentiated, *model.algebraic] if v.name not in names]
+    equations = [
+        *((solver.resolve(residual), place) for residual, place in model.initial_equations),
+        *((solver.resolve(v.symbol) - _start(v), v.place) for v in others if v.fixed),
+    ]
+    known = {v.name: _start(v) for v in states if v.fixed}
+    free = [v for v in states if not v.fixed]
+    equations = [(_insert(residual, states, known), place) for residual, place in equations]
+    symbols = _column([v.symbol for v in free])
+    determining = [e for e in equations if free and ca.depends_on(e[0], symbols)]
+    for residual, place in equations:
+        if not any(residual is r for r, _ in determining) and not _vanishes(residual, model):
+            raise InputError(
+                where=place,
+                found="an initial value that contradicts those of "
+                + ", ".join(v.name for v in states if v.fixed),
+                expected="starts that the equations allow, for all values of the parameters",
+                remedy="give one of them fixed = false",
+            )
+    begun = [v for v in free if v.has_start or not determining]
+    if determining and len(free) == len(determining):
+        begun = []
+    unsaid = [v for v in begun if not v.has_start]
+    if unsaid and not determining:
+        raise InputError(
+            where=unsaid[0].place,
+            found=f"state '{unsaid[0].name}' without a start",
+            expected="a start, or an initial equation",
+            remedy="give it a start, with fixed = true",
+        )
+    if unsaid or len(begun) + len(determining) != len(free):
+        raise InputError(
+            where=(unsaid or free or states)[0].place,
+            found=f"{len(determining)} initial equations for {len(free)} states that are not "
+            f"fixed, {', '.join(v.name for v in free)}",
+            expected="a start of each state",
+            remedy="give a start, with fixed = true, to those that no initial equation determines",
+        )
+    known |= {v.name: _start(v) for v in begun}
+    if determining:
+        sought = [v for v in free if v.name not in known]
+        known |= _solve_starts(model, solver, determining, sought, known)
+    return _column([known[v.name] for v in states])
+
+
+def _solve_starts(
+    model: FlatModel,
+    solver: "_Solver",
+    equations: Sequence[tuple[ca.SX, str]],
+    sought: Sequence[FlatVariable],
+    known: Mapping[str, ca.SX],
+) -> dict[str, ca.SX]:
+    """States at the start that initial equations determine."""
+    residual = _column([_insert(r, model.differentiated, known) for r, _ in equations])
+    symbols = _column([v.symbol for v in sought])
+    coefficients = ca.jacobian(residual, symbols)
+    solved = None
+    if not ca.depends_on(coefficients, symbols):
+        right_hand = -ca.substitute(residual, symbols, ca.SX.zeros(symbols.shape))
+        numbers, late = solver.numbers(coefficients), np.zeros(len(sought), bool)
+        solved = _eliminate(coefficients, right_hand, symbols, numbers, late)
+    if solved is None:
+        raise InputError(
+            where=equations[0][1],
+            found="initial equations that cannot be solved for "
+            + ", ".join(v.name for v in sought),
+            expected="independent initial equations, linear in the states",
+            remedy="give these states a start with fixed = true",
+        )
+    starts: dict[str, ca.SX] = {}
+    for symbol, expression in solved:
+        starts[symbol.name()] = _insert(expression, sought, starts)
+    return starts
+
+
+def _start(variable: FlatVariable) -> ca.SX:
+    expression = variable.start_expression
+    return ca.SX(variable.start) if expression is None else expression
+
+
+def _insert(
+    expression: ca.SX, variables: Sequence[FlatVariable], values: Mapping[str, ca.SX]
+) -> ca.SX:
+    """Replace variables by their values, those that have one."""
+    inserted = [v for v in variables if v.name in values]
+    if not inserted:
+        return expression
+    symbols, new = ([v.symbol for v in inserted], [values[v.name] for v in inserted])
+    return ca.substitute(expression, _column(symbols), _column(new))
+
+
+def _vanishes(residual: ca.SX, model: FlatModel) -> bool:
+    """Whether a residual is zero, but for rounding, whatever the parameters."""
+    symbols = ca.symvar(residual)
+    starts = {v.symbol.name(): v.start for v in [*model.parameters, *model.inputs]}
+    defaults = np.array([starts.get(s.name(), 0.0) for s in symbols])
+    function = ca.Function("residual", [_column(symbols)], [residual])
+    points = (defaults, 1.1 * defaults + 0.1, 0.7 * defaults - 0.3)
+    return all(
+        abs(float(function(point))) <= 1e-9 * (1.0 + abs(point).max(initial=0.0))
+        for point in points
     )
 
 
@@ -130,10 +252,10 @@ def _incidence(expression: ca.SX, symbols: ca.SX) -> Incidence:
     return incidence
 
 
-def _singular(model: FlatModel, names: Sequence[str], reason: str) -> InputError:
+def _singular(model: FlatModel, names: Sequence[str], reason: str, where: str = "") -> InputError:
     listed = ", ".join(names[:6]) + (" ..." if len(names) > 6 else "")
     return InputError(
-        where=f"model {model.name}",
+        where=where or model.place,
         found=f"unknowns that cannot be solved for: {listed} ({reason})",
         expected="as many independent equations as unknowns, linear within each loop",
         remedy="check connects and start values: states carry start and fixed = true, on one side "
@@ -141,16 +263,90 @@ def _singular(model: FlatModel, names: Sequence[str], reason: str) -> InputError
     )
 
 
-class _Solver:
-    """Residuals that are not yet used, and the solution so far (name -> expression)."""
+# In this order variables become states. One that is never to be chosen is where nothing else can
+# be: the choice changes the numerics, not the solution.
+_SELECT = ("Always", "Prefer", "Default", "Avoid", "Never")
 
-    def __init__(self, model: FlatModel) -> None:
+
+class _Solver:
+    """Residuals that are not yet used, and the solution so far (name -> expression).
+
+    Attributes
+    ----------
+    states : names of the variables that are states.
+    rates : symbol of the derivative of each differentiated variable.
+    """
+
+    def __init__(self, model: FlatModel, states: Sequence[str]) -> None:
         self.model = model
-        self.residuals = ca.vertcat(*(residual for residual, _ in model.equations))
+        self.states = set(states)
+        names = [v.name for v in model.differentiated]
+        self.rates = dict(zip(names, model.rates, strict=True))
+        self.residuals = _column([residual for residual, _ in model.equations])
         self.places = [place for _, place in model.equations]
-        self.state_rates = {s.name() for s in model.derivatives[: len(model.states)]}
         self.solution: dict[str, ca.SX] = {}
-        self.start = {v.symbol.name(): v.start for v in [*model.states, *model.parameters]}
+        known = [*model.differentiated, *model.algebraic, *model.parameters]
+        self.start = {v.symbol.name(): v.start for v in known}
+
+    def solve(self) -> None:
+        """Solve for all unknowns, and let variables become states where these are too few."""
+        model = self.model
+        inputs = _column([v.symbol for v in model.inputs])
+        pending = [v for v in model.differentiated if v.name not in self.states]
+        while pending:
+            # What the states alone determine (positions, then velocities) gives its own derivative.
+            unknowns = self._unknowns()
+            self.solve_determined(unknowns)
+            expressions = self.resolve(_column([v.symbol for v in pending]))
+            incidence = _incidence(expressions, ca.vertcat(unknowns, inputs))
+            ready = [i for i in range(len(pending)) if not incidence[i].any()]
+            if ready:
+                chosen = [v for v in model.differentiated if v.name in self.states]
+                x = _column([v.symbol for v in chosen])
+                known = expressions[ready]
+                change = ca.jtimes(known, x, _column([self.rates[v.name] for v in chosen]))
+                change += ca.jacobian(known, model.time)
+                self.equate(_column([self.rates[pending[i].name] for i in ready]), change)
+                pending = [v for i, v in enumerate(pending) if i not in ready]
+            else:
+                pending.remove(self._promote(pending))
+        self.solve_all(self._unknowns())
+
+    def _promote(self, pending: Sequence[FlatVariable]) -> FlatVariable:
+        """Make a state of the first variable that nothing determines."""
+        candidates = [v for v in pending if v.symbol.name() not in self.solution]
+        if not candidates:
+            first = pending[0]
+            solution = self.solution[first.symbol.name()]
+            inputs = [v.name for v in self.model.inputs if ca.depends_on(solution, v.symbol)]
+            raise InputError(
+                where=first.place,
+                found=f"der({first.name}), for which der({inputs[0]}) is needed"
+                if inputs
+                else f"der({first.name}), which no equation gives",
+                expected="derivatives of what states and time determine",
+                remedy="make the derivative an input of its own, or pass the input through a "
+                "first-order lag",
+            )
+        chosen = min(
+            candidates,
+            key=lambda v: (
+                v.select == "Never",
+                v.select != "Always",
+                not v.fixed,
+                _SELECT.index(v.select),
+                not v.has_start,
+            ),
+        )
+        self.states.add(chosen.name)
+        return chosen
+
+    def _unknowns(self) -> ca.SX:
+        """Rates of the states, of the other differentiated variables, these, and all others."""
+        states = [v for v in self.model.differentiated if v.name in self.states]
+        dependent = [v for v in self.model.differentiated if v.name not in self.states]
+        rates = [self.rates[v.name] for v in [*states, *dependent]]
+        return _column([*rates, *(v.symbol for v in [*dependent, *self.model.algebraic])])
 
     def equate(self, symbols: ca.SX, expressions: ca.SX) -> None:
         """Add symbol = expression as equations."""
@@ -231,18 +427,28 @@ class _Solver:
         coefficients = ca.jacobian(residual, unknowns)
         if ca.depends_on(coefficients, unknowns):
             names = [s.name() for s in ca.vertsplit(unknowns)]
-            places = ", ".join(sorted({self.places[i] for i in rows})[:3])
-            raise _singular(self.model, names, f"a nonlinear loop at {places}")
+            where, *others = sorted({self.places[i] for i in rows})
+            more = f", with {', '.join(others[:2])}" if others else ""
+            raise InputError(
+                where=where,
+                found=f"a nonlinear loop: equations that cannot be solved for {', '.join(names)}"
+                + more,
+                expected="equations that are linear in what they are solved for",
+                remedy="solve them by hand, make one of these variables a state that follows "
+                "quickly, or export the model as an FMU from a tool that iterates",
+            )
         right_hand = -ca.substitute(residual, unknowns, ca.SX.zeros(unknowns.shape))
-        late = np.array([s.name() in self.state_rates for s in ca.vertsplit(unknowns)])
-        solved = _eliminate(coefficients, right_hand, unknowns, self._numbers(coefficients), late)
+        rates = {self.rates[name].name() for name in self.states}
+        late = np.array([s.name() in rates for s in ca.vertsplit(unknowns)])
+        solved = _eliminate(coefficients, right_hand, unknowns, self.numbers(coefficients), late)
         if solved is None:
             names = [s.name() for s in ca.vertsplit(unknowns)]
-            raise _singular(self.model, names, "their equations depend on each other")
+            where = self.places[rows[0]]
+            raise _singular(self.model, names, "their equations depend on each other", where)
         for symbol, expression in solved:
             self.solution[symbol.name()] = self.resolve(expression)
 
-    def _numbers(self, coefficients: ca.SX) -> np.ndarray:
+    def numbers(self, coefficients: ca.SX) -> np.ndarray:
         """Coefficients at the default parameters and the initial state; inputs and time are 0."""
         if coefficients.is_constant():
             return np.array(ca.evalf(ca.densify(coefficients)).full())

@@ -3,8 +3,10 @@
 Values are numpy arrays of scalar SX, so that Modelica's rules of rank hold: a vector is no matrix.
 """
 
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import reduce
 from typing import Any
 
 import casadi as ca
@@ -14,6 +16,8 @@ from numpy.typing import NDArray
 from workbench.errors import InputError
 
 Value = NDArray[Any]
+
+_DEEPEST = 30  # calls within each other; each is inlined
 
 
 def lift(value: object) -> Value:
@@ -55,7 +59,17 @@ def _product(a: Value, b: Value) -> Value:
     return np.asarray(out, object) if isinstance(out, np.ndarray) else lift(out)
 
 
-def _power(a: ca.SX, b: ca.SX) -> ca.SX:
+def _power(a: Value, b: Value) -> Value:
+    """Modelica's `^`: of a square matrix repeated products (spec 10.6.7), else of scalars."""
+    if a.ndim != 2:
+        return each(_scalar_power, a, b)
+    result = each(ca.SX, np.array(np.eye(len(a)), object))
+    for _ in range(int(float(b[()]))):
+        result = _product(result, a)
+    return result
+
+
+def _scalar_power(a: ca.SX, b: ca.SX) -> ca.SX:
     """a^b with small integer exponents as products, which keeps derivatives polynomial."""
     if b.is_constant() and float(b) in (2.0, 3.0):
         return a * a if float(b) == 2.0 else a * a * a
@@ -66,10 +80,12 @@ BINARY: Mapping[str, Callable[[ca.SX, ca.SX], ca.SX]] = {
     "add": lambda x, y: x + y,
     "subtract": lambda x, y: x - y,
     "divide": lambda x, y: x / y,
-    "power": _power,
+    "power": _scalar_power,
+    "elementwise_add": lambda x, y: x + y,
+    "elementwise_subtract": lambda x, y: x - y,
     "elementwise_multiply": lambda x, y: x * y,
     "elementwise_divide": lambda x, y: x / y,
-    "elementwise_power": _power,
+    "elementwise_power": _scalar_power,
     "less": lambda x, y: x < y,
     "less_equal": lambda x, y: x <= y,
     "greater": lambda x, y: x > y,
@@ -79,6 +95,12 @@ BINARY: Mapping[str, Callable[[ca.SX, ca.SX], ca.SX]] = {
     "and": ca.logic_and,
     "or": ca.logic_or,
 }
+
+
+def _truncate(x: ca.SX) -> ca.SX:
+    return ca.if_else(x < 0, ca.ceil(x), ca.floor(x))
+
+
 _UNARY: Mapping[str, Callable[[ca.SX], ca.SX]] = {
     "negate": lambda x: -x,
     "plus": lambda x: x,
@@ -101,9 +123,24 @@ _ELEMENTWISE: Mapping[str, Callable[..., ca.SX]] = {
     "sqrt": ca.sqrt,
     "abs": ca.fabs,
     "sign": ca.sign,
+    "floor": ca.floor,
+    "ceil": ca.ceil,
+    "integer": ca.floor,
     "no_event": lambda x: x,
     "smooth": lambda order, x: x,
+    "homotopy": lambda actual, simplified: actual,
+    "div": lambda x, y: _truncate(x / y),
+    "rem": lambda x, y: x - y * _truncate(x / y),
+    "mod": lambda x, y: x - y * ca.floor(x / y),
 }
+NO_EVENT = (
+    "write noEvent(...) around it where it may switch without an event, use a smooth expression, "
+    "or export the model as an FMU from a tool that treats events, and use that FMU"
+)
+REWRITE = (
+    "write it in another way, or export the model as an FMU from another Modelica tool, "
+    "and use that FMU"
+)
 
 
 def _matrix(value: Value) -> Value:
@@ -129,12 +166,13 @@ class Arena:
     rates : value of the time derivative of each differentiated variable.
     """
 
-    def __init__(self, dae: Mapping[str, Any], model: str) -> None:
-        self.model = model
+    def __init__(self, dae: Mapping[str, Any], model_place: str) -> None:
+        self.model_place = model_place
         self.sources = {key: (path, text) for key, path, text in dae["source_map"]["files"]}
         storage = dae["storage"]
         self.storage = storage
         self.nodes: list[dict[str, Any]] = storage["expressions"]["nodes"]
+        self._provenance: list[dict[str, Any]] = storage["expressions"]["provenance"]
         self.types: list[dict[str, Any]] = storage["value_types"]
         self.functions: list[dict[str, Any]] = storage["functions"]
         self.domains = [d["domain"]["binders"] for d in storage["domains"]]
@@ -145,6 +183,7 @@ class Arena:
         self.symbols: list[Value] = []
         self.rates: dict[int, Value] = {}
         self.binders: dict[tuple[int, int], int] = {}
+        self._depth = 0  # of the function call that is being evaluated
 
     def _deal_arenas(self, expressions: Mapping[str, Any]) -> None:
         """Operands and subscripts lie in two flat lists, in the order of their owners."""
@@ -160,68 +199,126 @@ class Arena:
             ]
 
     def place(self, entry: Mapping[str, Any]) -> str:
-        """'file:line' of an entry of the DAE."""
-        span = (entry.get("provenance") or entry.get("declaration") or {}).get("span")
-        if not span or span["source"] not in self.sources:
-            return self.model
-        path, text = self.sources[span["source"]]
-        line = text.encode()[: span["start"]].count(b"\n") + 1
-        return f"{path}:{line}"
+        """'file:line' of an entry of the DAE; of the model where it has none."""
+        return self._locate(entry)[0]
 
-    def refuse(self, what: str, place: str | None = None) -> InputError:
-        """The error for what this compiler does not treat."""
-        return InputError(
-            where=place or f"model {self.model}",
-            found=what,
-            expected="continuous equations without events, solvable for derivatives",
-            remedy="rewrite it with smooth expressions or noEvent(...)",
-        )
+    def quote(self, entry: Mapping[str, Any]) -> str:
+        """What the source says at an entry of the DAE, in quotes; empty where it has no place."""
+        return self._locate(entry)[1]
+
+    def _locate(self, entry: Mapping[str, Any]) -> tuple[str, str]:
+        source, start, end = self._span(entry)
+        if source not in self.sources:
+            return self.model_place, ""
+        path, text = self.sources[source]
+        content = text.encode()
+        line = content[:start].count(b"\n") + 1
+        words = " ".join(content[start:end].decode().split())
+        return f"{path}:{line}", f"'{words}'" if len(words) < 80 else f"'{words[:76]} ...'"
+
+    @staticmethod
+    def _span(entry: Mapping[str, Any]) -> tuple[Any, int, int]:
+        """Source, begin and end (in bytes) of an entry of the DAE."""
+        span = (entry.get("provenance") or entry.get("declaration") or entry).get("span") or {}
+        return span.get("source"), span.get("start", 0), span.get("end", 0)
+
+    def refuse(
+        self,
+        what: str,
+        entry: Mapping[str, Any] | int | None = None,
+        expected: str = "an expression that the workbench's compiler treats",
+        remedy: str = REWRITE,
+    ) -> InputError:
+        """The error for what this compiler does not treat, at an entry or expression of the DAE."""
+        where = self._provenance[entry] if isinstance(entry, int) else entry or {}
+        place, quote = self._locate(where)
+        said = f"{what}: {quote}" if quote and quote.strip("'") not in what else what
+        return InputError(where=place, found=said, expected=expected, remedy=remedy)
+
+    def evaluate(self, number: int) -> Value:
+        """Value of an expression node, or the refusal of what it holds.
+
+        Raises
+        ------
+        InputError
+            With file and line.
+        """
+        try:
+            return self.value(number)
+        except InputError:
+            raise
+        except (ArithmeticError, LookupError, NotImplementedError, TypeError, ValueError):
+            raise self.refuse("an expression that cannot be evaluated", number) from None
 
     def value(self, number: int, call: _Call | None = None) -> Value:
         """Value of expression node `number`; inside a function call, in its environment."""
         ((kind, body),) = self.nodes[number].items()
-        operands = [self.value(o, call) for o in self.operands.get(number, [])]
         match kind:
             case "literal":
                 ((form, content),) = body.items()
                 if form == "string":
-                    raise self.refuse("a string in an equation")
+                    raise self.refuse(
+                        "a string in an equation",
+                        number,
+                        "numbers",
+                        "use an enumeration or a Boolean parameter in its place",
+                    )
                 return lift(float(content))
             case "coordinate":
-                return self._coordinate(body, call)
+                return self._coordinate(number, body, call)
             case "unary":
                 return each(_UNARY[body["operator"]], self.value(body["operand"], call))
             case "binary":
-                lhs, rhs = self.value(body["lhs"], call), self.value(body["rhs"], call)
-                if body["operator"] == "multiply":
-                    return _product(lhs, rhs)
-                return each(BINARY[body["operator"]], lhs, rhs)
-            case "array":
-                return np.stack(operands)
-            case "index":
-                return self._index(self.value(body["base"], call), self.subscripts[number], call)
-            case "range":
-                return self._range(body, call)
-            case "builtin":
-                return self._builtin(body["builtin"], operands)
+                return self._binary(body, call)
             case "conditional":
-                return self._conditional(operands)
+                return self._conditional(self.operands[number], call)
             case "comprehension":
                 return self._comprehension(body["domain"], body["body"], call)
             case "function_value":
                 assert call is not None
                 return call.values[body["value"]]
             case "call":
-                return self._call(body, call)
-        raise self.refuse(f"the construct '{kind}'")
+                return self._call(number, body, call)
+            case "field":
+                record = self.value(body["base"], call)[()]
+                if not isinstance(record, list):
+                    raise self.refuse("a field of what is no record", number)
+                return np.asarray(record[body["field"]], object)
+        operands = [self.value(o, call) for o in self.operands.get(number, [])]
+        match kind:
+            case "array":
+                return np.stack(operands)
+            case "record":
+                box: Value = np.empty((), object)
+                box[()] = operands
+                return box
+            case "index":
+                picks = self._picks(number, call)
+                return self._index(self.value(body["base"], call), picks)
+            case "array_update":
+                return self._update(number, body, call)
+            case "range":
+                return self._range(body, call)
+            case "builtin":
+                return self._builtin(number, body["builtin"], operands)
+        raise self.refuse(f"the construct '{kind}'", number)
 
-    def _coordinate(self, body: Any, call: _Call | None) -> Value:
+    def _binary(self, body: Mapping[str, Any], call: _Call | None) -> Value:
+        lhs, rhs = self.value(body["lhs"], call), self.value(body["rhs"], call)
+        match body["operator"]:
+            case "multiply":
+                return _product(lhs, rhs)
+            case "power":
+                return _power(lhs, rhs)
+        return each(BINARY[body["operator"]], lhs, rhs)
+
+    def _coordinate(self, number: int, body: Any, call: _Call | None) -> Value:
         if body == "time":
             return lift(self.time)
         ((kind, content),) = body.items()
-        if kind == "parameter" and self.is_structural(content):
-            return self.value(self.storage["variables"][content]["attributes"]["binding"])
         match kind:
+            case "parameter" if self.is_structural(content):
+                return self.default(content)
             case "parameter" | "state" | "algebraic" | "input":
                 return self.symbols[int(content)]
             case "derivative":
@@ -231,31 +328,72 @@ class Arena:
             case "function_parameter":
                 assert call is not None
                 return call.arguments[int(content["ordinal"])]
-        raise self.refuse(f"a reference of kind '{kind}'")
+            case "condition":
+                node = self.storage["conditions"][content]
+                raise self.refuse(
+                    "a condition of events", node, "equations without events", NO_EVENT
+                )
+        raise self.refuse(f"a reference of kind '{kind}'", number)
+
+    def has_start(self, number: int) -> bool:
+        """Whether the source gives a start; one of the front end stands at the declaration."""
+        entry = self.storage["variables"][number]
+        node = entry["attributes"]["start"]
+        return node is not None and self._span(self._provenance[node]) != self._span(entry)
+
+    def default(self, number: int) -> Value:
+        """Value of a parameter: what it is bound to, else its start (spec 8.6), else zero."""
+        entry = self.storage["variables"][number]
+        attributes = entry["attributes"]
+        given = attributes["binding"] is not None or self.has_start(number)
+        if not given and self.is_structural(number):
+            raise self.refuse(
+                f"parameter '{entry['name']}' without a value", entry, "a value", "give it one"
+            )
+        node = attributes["start"] if attributes["binding"] is None else attributes["binding"]
+        value = lift(0.0) if node is None else self.evaluate(node)
+        return np.broadcast_to(value, self.symbols[number].shape)
 
     def is_structural(self, number: int) -> bool:
         """Integer and Boolean parameters choose sizes and branches: they are compiled in."""
         kind: str = self.types[self.storage["variables"][number]["value_type"]]["scalar"]
         return kind != "real"
 
-    def _index(self, base: Value, subscripts: Sequence[Any], call: _Call | None) -> Value:
+    def _picks(self, owner: int, call: _Call | None) -> list[Any]:
+        """Places, from 0, of each subscript of a node."""
         picks: list[Any] = []
-        for subscript in subscripts:
+        for subscript in self.subscripts[owner]:
             if subscript == "whole":
                 picks.append(slice(None))
                 continue
             ((_, node),) = subscript.items()
             chosen = self.value(node, call)
             if not all(element.is_constant() for element in chosen.flat):
-                raise self.refuse("an array index that is not constant")
+                raise self.refuse(
+                    "an array index that is not constant",
+                    owner,
+                    "indices that are known before the simulation",
+                    "choose by if-expressions inside noEvent(...)",
+                )
             numbers = np.array([int(float(element)) - 1 for element in chosen.flat])
             picks.append(int(numbers[0]) if chosen.ndim == 0 else numbers)
+        return picks
+
+    def _index(self, base: Value, picks: Sequence[Any]) -> Value:
         out = base
         axis = 0
         for pick in picks:
             out = np.take(out, pick, axis=axis) if not isinstance(pick, slice) else out
             axis += 0 if isinstance(pick, int) else 1
         return out if isinstance(out, np.ndarray) else lift(out)
+
+    def _update(self, number: int, body: Mapping[str, Any], call: _Call | None) -> Value:
+        """An array with some elements assigned: what `y[i] := v` makes of y."""
+        out = np.array(self.value(body["base"], call), object)
+        value = self.value(body["value"], call)
+        picks = tuple(self._picks(number, call))
+        out[picks] = value[()] if value.ndim == 0 else value
+        return out
 
     def _range(self, body: Mapping[str, Any], call: _Call | None) -> Value:
         start, stop = (
@@ -265,26 +403,40 @@ class Arena:
         step = 1.0 if step_node is None else float(self.value(step_node, call)[()])
         return np.stack([lift(v) for v in np.arange(start, stop + 0.5 * step, step)])
 
-    def _builtin(self, name: str, operands: list[Value]) -> Value:
+    def _builtin(self, number: int, name: str, operands: list[Value]) -> Value:
         if name in _ELEMENTWISE:
             return each(_ELEMENTWISE[name], *operands)
+        first = operands[0] if operands else lift(0.0)
         match name:
             case "min" | "max":
                 choose = ca.fmin if name == "min" else ca.fmax
                 if len(operands) == 2:
                     return each(choose, *operands)
-                least = operands[0].flat[0]
-                for element in operands[0].flat[1:]:
+                least = first.flat[0]
+                for element in first.flat[1:]:
                     least = choose(least, element)
                 return lift(least)
             case "sum":
-                return lift(_total(list(operands[0].flat)))
+                return lift(_total(list(first.flat)))
+            case "product":
+                return lift(reduce(lambda x, y: x * y, first.flat, ca.SX(1)))
+            case "size" if len(operands) == 1:
+                return np.stack([lift(length) for length in first.shape])
+            case "size":
+                return lift(first.shape[int(float(operands[1][()])) - 1])
+            case "linspace":
+                count = int(float(operands[2][()]))
+                step = (operands[1][()] - first[()]) / (count - 1)
+                return np.stack([lift(first[()] + k * step) for k in range(count)])
+            case "diagonal":
+                out = each(ca.SX, np.array(np.zeros((first.size, first.size)), object))
+                out[np.diag_indices(first.size)] = first
+                return out
             case "identity":
-                size = int(float(operands[0][()]))
-                return each(ca.SX, np.array(np.eye(size), object))
+                return each(ca.SX, np.array(np.eye(int(float(first[()]))), object))
             case "fill":
                 shape = [int(float(o[()])) for o in operands[1:]]
-                return np.broadcast_to(operands[0], (*shape, *operands[0].shape))
+                return np.broadcast_to(first, (*shape, *first.shape))
             case "zeros" | "ones":
                 shape = [int(float(o[()])) for o in operands]
                 return each(ca.SX, np.full(shape, float(name == "ones"), object))
@@ -293,18 +445,26 @@ class Arena:
                 rows = [(1, 2), (2, 0), (0, 1)]
                 return np.stack([lift(a[i] * b[j] - a[j] * b[i]) for i, j in rows])
             case "transpose":
-                return operands[0].T
+                return first.T
             case "promoted_cat1" | "promoted_cat2":
                 matrices = [_matrix(o) for o in operands]
                 return np.concatenate(matrices, axis=int(name[-1]) - 1)
-        raise self.refuse(f"the function '{name}'")
+        raise self.refuse(f"the function '{name}'", number)
 
-    def _conditional(self, operands: list[Value]) -> Value:
-        """Operands: condition, value, condition, value, ..., value otherwise."""
-        out = operands[-1]
-        for position in range(len(operands) - 3, -1, -2):
-            out = each(ca.if_else, operands[position], operands[position + 1], out)
-        return out
+    def _conditional(self, operands: Sequence[int], call: _Call | None) -> Value:
+        """Operands: condition, value, condition, value, ..., value otherwise.
+
+        Branches that a constant condition rules out are not evaluated: they need not exist.
+        """
+        if len(operands) == 1:
+            return self.value(operands[0], call)
+        condition: ca.SX = self.value(operands[0], call)[()]
+        if condition.is_constant():
+            taken = operands[1:2] if float(condition) else operands[2:]
+            return self._conditional(taken, call)
+        value = self.value(operands[1], call)
+        otherwise = self._conditional(operands[2:], call)
+        return each(lambda x, y: ca.if_else(condition, x, y), value, otherwise)
 
     def points(self, domain: int) -> Iterator[tuple[int, ...]]:
         """Walk a domain of loop indices, binding each; yields the positions from 0."""
@@ -320,22 +480,59 @@ class Arena:
         shape = tuple(last + 1 for last in max(values))
         return np.stack(list(values.values())).reshape(shape + next(iter(values.values())).shape)
 
-    def _call(self, body: Mapping[str, Any], call: _Call | None) -> Value:
+    def _call(self, number: int, body: Mapping[str, Any], call: _Call | None) -> Value:
         function = self.functions[body["function"]]
-        if function["external"] is not None:
-            raise self.refuse(f"the external function {function['name']}", self.place(function))
+        external = function["external"]
+        if external is not None and external["language"] == "builtin":
+            # As Modelica.Math declares its functions.
+            arguments = [self.value(o, call) for o in self.operands[body["owner"]]]
+            if external["symbol"] in _ELEMENTWISE and self._in_order(function):
+                return each(_ELEMENTWISE[external["symbol"]], *arguments)
+        if external is not None:
+            raise self.refuse(
+                f"the external function '{function['name']}'",
+                number,
+                "functions that are written in Modelica",
+                "write its algorithm in Modelica, or export the model as an FMU from another "
+                "Modelica tool, and use that FMU",
+            )
+        if self._depth > _DEEPEST:
+            raise self.refuse(
+                f"function '{function['name']}', which calls itself without end",
+                number,
+                "recursion that ends by constants",
+                "write it with a for loop",
+            )
+        self._depth += 1
         inner = _Call([self.value(o, call) for o in self.operands[body["owner"]]])
-        for statement in function["statements"]:
-            ((kind, content),) = statement.items()
-            if kind == "assignment":
-                inner.values[content["target"]] = self.value(content["rhs"], inner)
-            elif kind == "assignment_group":
-                self._assign_group(content, inner)
-            else:
-                raise self.refuse(f"a statement '{kind}'", self.place(function))
+        self._execute(function["statements"], function, inner)
+        self._depth -= 1
         return inner.values[body["output"]]
 
-    def _assign_group(self, group: Mapping[str, Any], inner: _Call) -> None:
-        """An if statement: its assignments hold conditional expressions, valid side by side."""
-        new = {a["target"]: self.value(a["rhs"], inner) for a in group["assignments"]}
-        inner.values.update(new)
+    def _in_order(self, function: Mapping[str, Any]) -> bool:
+        """Whether an external call passes the inputs in their order, which the flat DAE drops."""
+        path, start, end = self._span(function)
+        text = self.sources[path][1].encode()[start:end].decode()
+        call = re.search(r'external\s*"builtin"[^;(]*\(([^)]*)\)', text)
+        passed = [name.strip() for name in call[1].split(",")] if call else []
+        return passed == [parameter["name"] for parameter in function["parameters"]]
+
+    def _execute(
+        self, statements: Sequence[Mapping[str, Any]], function: Mapping[str, Any], inner: _Call
+    ) -> None:
+        for statement in statements:
+            ((kind, content),) = statement.items()
+            match kind:
+                case "assignment":
+                    inner.values[content["target"]] = self.value(content["rhs"], inner)
+                case "assignment_group":
+                    # An if statement: its right-hand sides are conditional, valid side by side.
+                    new = {a["target"]: self.value(a["rhs"], inner) for a in content["assignments"]}
+                    inner.values.update(new)
+                case "for" if not content["iteration_locals"]:
+                    for _ in self.points(content["domain"]):
+                        self._execute(content["statements"], function, inner)
+                case _:
+                    raise self.refuse(
+                        f"a statement '{kind}' in function '{function['name']}'", function
+                    )

@@ -22,19 +22,58 @@ import rumoca
 
 from workbench.errors import InputError
 from workbench.models.compiler.dropped import refuse_dropped
-from workbench.models.compiler.expressions import BINARY, Arena, Value, each, lift
-from workbench.models.modelica import check, files, packages, read_library
+from workbench.models.compiler.expressions import (
+    BINARY,
+    NO_EVENT,
+    REWRITE,
+    Arena,
+    Value,
+    each,
+)
+from workbench.models.modelica import Library, check, files, packages, read_library
 from workbench.models.modelica.classes import Class
 
 SCHEMA = 43
+
+# What the front end says, and what to do about it; the first that fits.
+_REMEDIES = (
+    (r"der\(\.\.\.\) must have exactly one", "name what is differentiated: e = ...; and der(e)"),
+    (
+        r"der\(\.\.\.\) must name a coordinate",
+        "make the derivative an input of its own, or its argument a state",
+    ),
+    (r"missing source scope", "name each output of the call: (a, b) = f(u)"),
+    (r"expected Real, found Integer", "write real numbers, such as 1.0"),
+    (r"shape mismatch", "make the sizes of both sides equal; '.+' adds a scalar to an array"),
+    (r"initial algorithm", "write it as an initial equation"),
+    (r"function loop reduction", "use a for loop of constant length"),
+    (r"for-equation range", "loop over a range of numbers, such as 1:3"),
+    (r"declarative algorithm", "write equations, or a function with this algorithm"),
+    (r"violates constrainedby", "extend a common class, and name it after 'constrainedby'"),
+    (
+        r"unbalanced model",
+        "add the missing equation or remove the one too many; inputs of components need a value",
+    ),
+    (r"not a discrete-time expression", "use a Real, or an if-expression inside noEvent(...)"),
+    (r"unresolved|not found|undefined", "correct the name"),
+    (r"unsupported|no checked canonical|rejected", REWRITE),
+)
 
 
 @dataclass(frozen=True)
 class FlatVariable:
     """One scalar variable of the flat model.
 
-    `symbol` stands for it in the equations; `unit`, `description`, `minimum`, `maximum` and
-    `nominal` are the Modelica attributes, None where not given.
+    Attributes
+    ----------
+    symbol : stands for it in the equations.
+    start : its value before the simulation, at the defaults of all parameters.
+    unit, description, minimum, maximum, nominal : Modelica's attributes, None where not given.
+    start_expression : start as an expression of parameters; None where it is a number.
+    has_start : whether the source gives a start.
+    fixed : whether it begins at its start, whatever else holds.
+    select : Modelica's stateSelect, such as "Default" or "Prefer".
+    place : "file:line" of its declaration.
     """
 
     name: str
@@ -45,6 +84,11 @@ class FlatVariable:
     minimum: float | None
     maximum: float | None
     nominal: float | None
+    start_expression: ca.SX | None = None
+    has_start: bool = True
+    fixed: bool = False
+    select: str = "Default"
+    place: str = ""
 
 
 @dataclass(frozen=True)
@@ -53,31 +97,34 @@ class FlatModel:
 
     Attributes
     ----------
-    states : differentiated variables with `fixed = true`: they carry the initial state.
-    dependent : differentiated variables without it: algebraic, their derivatives follow.
-    derivatives : symbols of der(state) and der(dependent), in this order.
+    place : "file:line" of the model.
+    differentiated : variables whose derivative is in the equations, in order of declaration.
+    rates : symbols of their derivatives.
     algebraic : unknowns that are not differentiated.
     inputs, parameters : what the environment sets; parameters bound to others are substituted.
     outputs : names of top-level outputs, in order of declaration.
-    equations : (residual, "file:line") pairs, all scalar.
+    equations, initial_equations : (residual, "file:line") pairs, all scalar.
     assertions : (condition, text) pairs; a condition is 1 where it holds.
     experiment : numbers of the experiment annotation, such as StopTime [s].
+    notes : what the user should know, a sentence each.
     """
 
     name: str
     description: str
+    place: str
     experiment: dict[str, float]
     time: ca.SX
-    states: list[FlatVariable]
-    dependent: list[FlatVariable]
-    derivatives: list[ca.SX]
+    differentiated: list[FlatVariable]
+    rates: list[ca.SX]
     algebraic: list[FlatVariable]
     inputs: list[FlatVariable]
     parameters: list[FlatVariable]
     tunable: list[bool]
     outputs: list[str]
     equations: list[tuple[ca.SX, str]]
+    initial_equations: list[tuple[ca.SX, str]]
     assertions: list[tuple[ca.SX, str]]
+    notes: tuple[str, ...]
 
 
 def flatten(package: Path, model: str) -> FlatModel:
@@ -88,8 +135,7 @@ def flatten(package: Path, model: str) -> FlatModel:
     Raises
     ------
     InputError
-        With the compiler's own diagnostics (file, line, what is wrong), or naming a construct
-        that the later stages do not treat.
+        With file and line of what is wrong, or of a construct that the later stages do not treat.
     """
     if not package.is_file():
         raise InputError(
@@ -99,27 +145,28 @@ def flatten(package: Path, model: str) -> FlatModel:
             remedy="give the path of the library's package.mo",
         )
     library = read_library(package)
-    refuse_dropped(library, check(library, model))
-    used = [str(file.parent) for file in packages(package)[1:]]
+    reached = check(library, model)
+    refuse_dropped(library, reached)
+    source = library.find(model)
+    if source.partial or source.kind in ("package", "function", "type", "connector", "record"):
+        raise InputError(
+            where=source.where,
+            found=f"{'a partial' if source.partial else 'a'} {source.kind} {model}",
+            expected="a model or block that is complete",
+            remedy="choose a model that extends or uses it",
+        )
     try:
         with _quiet_panic():
-            dae = rumoca.Session(roots=used).load(str(package), model=model).to_dict("dae")
+            roots = [str(used.parent) for used in packages(package)[1:]]
+            dae = rumoca.Session(roots=roots).load(str(package), model=model).to_dict("dae")
     except rumoca.RumocaError as error:
-        raise InputError(
-            where=f"{package.parent}, model {model}",
-            found=_diagnostics(package, model, str(error)),
-            expected="a balanced Modelica model without errors",
-            remedy="correct the source and build again",
-        ) from None
+        drawn = _diagnostics(package, model)
+        place, message = drawn or _placed(library, reached, source, str(error))
+        raise _front_end_refusal(place, message) from None
     except BaseException as panic:  # a panic of the front end is no Exception
         if type(panic).__name__ != "PanicException":
             raise
-        raise InputError(
-            where=f"{package.parent}, model {model}",
-            found=_panic(package, str(panic)),
-            expected="Modelica that the front end treats",
-            remedy="write what stands there in another way, and build again",
-        ) from None
+        raise _front_end_refusal(*_panic(library, reached, source, str(panic))) from None
     if dae["schema_version"] != SCHEMA:
         raise InputError(
             where=f"rumoca {rumoca.version()}",
@@ -127,7 +174,7 @@ def flatten(package: Path, model: str) -> FlatModel:
             expected=f"schema {SCHEMA}",
             remedy="install the rumoca release that the extra [compiler] pins",
         )
-    return _Reader(dae, library.find(model), model).flat_model()
+    return _Reader(dae, source, model).flat_model()
 
 
 @contextlib.contextmanager
@@ -144,47 +191,100 @@ def _quiet_panic() -> Iterator[None]:
             os.close(shown)
 
 
-def _panic(package: Path, text: str) -> str:
-    """What a panic of the front end says, with file and line where its span tells them.
+def _front_end_refusal(place: str, message: str) -> InputError:
+    remedies = (remedy for pattern, remedy in _REMEDIES if re.search(pattern, message))
+    return InputError(
+        where=place,
+        found=message,
+        expected="a balanced Modelica model without errors, of what the front end treats",
+        remedy=next(remedies, "correct the source and build again"),
+    )
 
-    >>> _panic(Path("package.mo"), 'Unsupported { detail: "der(...) of an input" }')
-    'der(...) of an input'
-    """
+
+def _panic(library: Library, reached: Sequence[str], source: Class, text: str) -> tuple[str, str]:
+    """File and line, and message, of a panic of the front end."""
     detail = re.search(r'detail: "((?:[^"\\]|\\.)*)"', text)
     message = detail.group(1) if detail else text.splitlines()[0]
     span = re.search(r"start: BytePos\((\d+)\), end: BytePos\((\d+)\)", text)
-    if span is None or not message.startswith("der("):
-        return message
-    # The span names no file: of those of the library it is in the one that has a der() there.
-    start, end = int(span.group(1)), int(span.group(2))
-    texts = {path: path.read_bytes() for path in files(package) if path.suffix == ".mo"}
-    places = [
-        (path, content[:start].count(b"\n") + 1, content[start:end].decode())
-        for path, content in texts.items()
-        if content[start:end].startswith(b"der(")
-    ]
-    if len(places) != 1:
-        return message
-    path, line, derivative = places[0]
-    return f"{path}:{line}: {derivative}: {message}"
+    if span is not None and message.startswith("der("):
+        # The span names no file: of those of the library it is in the one that has a der() there.
+        start, end = int(span.group(1)), int(span.group(2))
+        for path in files(library.file):
+            content = path.read_bytes()
+            if content[start:end].startswith(b"der("):
+                line = content[:start].count(b"\n") + 1
+                return f"{path}:{line}", f"{content[start:end].decode()}: {message}"
+    return _placed(library, reached, source, message)
 
 
-def _diagnostics(package: Path, model: str, fallback: str) -> str:
-    """The compiler's diagnostics as 'file:line:column: message'; its summary where it has none."""
+def _diagnostics(package: Path, model: str) -> tuple[str, str] | None:
+    """Place of the front end's first diagnostic with a line, and what all of them say."""
     with contextlib.redirect_stdout(io.StringIO()):
         try:
             diagnostics = rumoca.validate(str(package), model=model)
         except rumoca.RumocaError:
-            return fallback
-    lines = []
+            return None
+    messages: dict[str, str] = {}
     for diagnostic in diagnostics:
         # Syntax errors carry their place in a drawing, all others as attributes.
         drawn = re.findall(r"\u00d7 (.+?)\n\s*\u256d\u2500\[(.+?)\]", diagnostic.message)
-        lines += [f"{place}: {message}" for message, place in drawn]
+        for message, place in drawn:
+            messages.setdefault(place.rpartition(":")[0], message)
         if not drawn and diagnostic.line is not None:
-            place = f"{diagnostic.file or package}:{diagnostic.line}:{diagnostic.column}"
-            lines.append(f"{place}: {diagnostic.message.strip()}")
-    return "; ".join(dict.fromkeys(lines)) or fallback
+            place = f"{diagnostic.file or package}:{diagnostic.line}"
+            messages.setdefault(place, diagnostic.message.strip())
+    if not messages:
+        return None
+    first, *others = messages.items()
+    return first[0], "; ".join([first[1], *(f"{place}: {text}" for place, text in others)])
+
+
+def _placed(library: Library, reached: Sequence[str], source: Class, text: str) -> tuple[str, str]:
+    """Where what the front end's message is about stands in the source, and the message.
+
+    The front end gives no place for what it does not treat, but quotes a name: it is looked for in
+    the model, then in the classes that it uses. Without one, the place is that of the model.
+    """
+    message = re.sub(r"^\w+ failed: \S+ failed in \w+: ", "", text.split("\n")[0])
+    message = message.split(";")[0]
+    if place := re.search(r" \[([^\[\]]+:\d+):\d+\]$", message):
+        return place[1], message[: place.start()]
+    quoted = re.findall(r"`([^`]+)`", message)
+    if "der(...)" in message:
+        patterns = [r"\bder\s*\((?!\s*[\w.]+(\[[\w,:]*\])?\s*\))"]
+    elif "for-equation range" in message:
+        patterns = [r"\bfor\s+\w+\s+in\s+(?!\d+\s*:)"]
+    elif "missing source scope" in message:
+        patterns = [r"\(\s*,"]
+    elif "unbalanced model" in message:
+        patterns = []
+    else:
+        words = [word for word in quoted if re.fullmatch(r"[\w.]+", word)]
+        patterns = [
+            pattern
+            for word in words
+            for pattern in (rf"\b{word}\s*\(", rf"\b{word}\b")
+            if word not in (source.name, source.name.rpartition(".")[2])
+        ]
+    for pattern in patterns:
+        for name in dict.fromkeys([source.name, *reached]):
+            file, _, line = library.classes[name].where.rpartition(":")
+            for number, words_of_line in enumerate(_own_lines(library.classes[name]), int(line)):
+                if re.search(pattern, words_of_line):
+                    return f"{file}:{number}", message
+    return source.where, message
+
+
+def _own_lines(source: Class) -> list[str]:
+    """Lines of a class, from its name to its end, without strings and comments."""
+    file, _, line = source.where.rpartition(":")
+    text = "\n".join(Path(file).read_text(encoding="utf-8-sig").split("\n")[int(line) - 1 :])
+    short = re.escape(source.name.rpartition(".")[2])
+    text = re.split(rf"\bend\s+{short}\s*;", text, maxsplit=1)[0]
+    hidden = r'"(?:[^"\\]|\\.)*"|//[^\n]*|/\*.*?\*/'
+    return re.sub(hidden, lambda match: "\n" * match[0].count("\n"), text, flags=re.DOTALL).split(
+        "\n"
+    )
 
 
 class _Reader:
@@ -194,13 +294,15 @@ class _Reader:
         self.source = source
         self.model = model
         self.storage = dae["storage"]
-        self.arena = Arena(dae, model)
+        self.variables: list[dict[str, Any]] = self.storage["variables"]
+        self.arena = Arena(dae, source.where)
+        self.notes: list[str] = []
 
     def flat_model(self) -> FlatModel:
         """Read variables, then equations."""
         self._refuse_events()
-        entries = self.storage["variables"]
-        for number, entry in enumerate(entries):
+        for number, entry in enumerate(self.variables):
+            self._refuse_type(entry)
             shape = tuple(self.arena.types[entry["value_type"]]["dimensions"])
             symbol: Value = np.empty(shape, object)
             for index in np.ndindex(shape):
@@ -208,67 +310,118 @@ class _Reader:
             self.arena.symbols.append(symbol)
             if entry["role"] == "state":
                 self.arena.rates[number] = each(lambda s: ca.SX.sym(f"der({s.name()})"), symbol)
-        free, bound = self._bind_parameters(entries)
-        numeric = self._numbers(free, bound)
-        groups: dict[str, list[FlatVariable]] = {"state": [], "dependent": [], "algebraic": []}
-        rates: dict[str, list[ca.SX]] = {"state": [], "dependent": []}
-        inputs, outputs = [], []
-        for number, entry in enumerate(entries):
+        free, bound = self._bind_parameters()
+        substitute = _substitution(bound)
+        numeric = self._numbers(free, substitute)
+        groups: dict[str, list[FlatVariable]] = {"state": [], "algebraic": [], "input": []}
+        outputs, input_equations = [], []
+        for number, entry in enumerate(self.variables):
             role = "algebraic" if entry["role"] == "output" else entry["role"]
-            scalars = self._scalars(number, entry, numeric)
-            if role == "state":
-                fixed = entry["attributes"]["fixed"]
-                role = "state" if fixed and all(fixed) else "dependent"
-                rates[role] += list(self.arena.rates[number].flat)
-            if role in groups:
-                groups[role] += scalars
-            elif role == "input":
-                inputs += scalars
-            elif role not in ("parameter", "constant"):
-                raise self.arena.refuse(
-                    f"variable {entry['name']} of kind '{role}'", self.arena.place(entry)
-                )
+            if role not in groups:
+                continue
+            if role == "input" and (equations := self._bound_input(number)):
+                role = "algebraic"
+                input_equations += equations
+            scalars = self._scalars(number, substitute, numeric)
+            groups[role] += scalars
             attributes = entry["attributes"]
             top_level = len(attributes["component_ref"]["parts"]) == 1
             if top_level and attributes["causality"] == "output":
                 outputs += [v.name for v in scalars]
+        parameters = [v for n in free for v in self._scalars(n, substitute, numeric)]
+        _refuse_outside(parameters)
         tunable = [
-            entries[n]["attributes"]["is_tunable"] for n in free for _ in self.arena.symbols[n].flat
+            self.variables[n]["attributes"]["is_tunable"]
+            for n in free
+            for _ in self.arena.symbols[n].flat
         ]
-        substitute = _substitution(bound)
+        operations = self.storage["continuous_equation_operations"]
+        initial = self.storage["initialization_equation_operations"]
         return FlatModel(
             name=self.model,
             description=self.source.description or self.model,
+            place=self.source.where,
             experiment=self._experiment(),
             time=self.arena.time,
-            states=groups["state"],
-            dependent=groups["dependent"],
-            derivatives=rates["state"] + rates["dependent"],
+            differentiated=groups["state"],
+            rates=[rate for rates in self.arena.rates.values() for rate in rates.flat],
             algebraic=groups["algebraic"],
-            inputs=inputs,
-            parameters=[v for n in free for v in self._scalars(n, entries[n], numeric)],
+            inputs=groups["input"],
+            parameters=parameters,
             tunable=tunable,
             outputs=outputs,
-            equations=[(substitute(e), place) for e, place in self._equations()],
+            equations=[
+                (substitute(residual), place)
+                for residual, place in (*self._equations(operations), *input_equations)
+            ],
+            initial_equations=[(substitute(e), place) for e, place in self._equations(initial)],
             assertions=[(substitute(c), text) for c, text in self._assertions()],
+            notes=tuple(self.notes),
+        )
+
+    def _bound_input(self, number: int) -> list[tuple[ca.SX, str]]:
+        """Equations of an input whose value varies: `extends Lag(u=pressure)` leaves none free."""
+        node = self.variables[number]["attributes"]["binding"]
+        if node is None:
+            return []
+        binding = np.broadcast_to(self.arena.evaluate(node), self.arena.symbols[number].shape)
+        if all(element.is_constant() for element in binding.flat):
+            return []
+        place = self.arena.place(self.variables[number])
+        pairs = zip(self.arena.symbols[number].flat, binding.flat, strict=True)
+        return [(symbol - value, place) for symbol, value in pairs]
+
+    def _refuse_type(self, entry: Mapping[str, Any]) -> None:
+        """Refuse variables and inputs that are not Real, and what only events change."""
+        scalar = self.arena.types[entry["value_type"]]["scalar"]
+        role = entry["role"]
+        if role in ("parameter", "constant") or (
+            role in ("state", "algebraic", "output", "input") and scalar == "real"
+        ):
+            return
+        causality = entry["attributes"]["declared_causality"]
+        prefix = f"{causality} " if causality in ("input", "output") else ""
+        kind = "discrete Real" if scalar == "real" else str(scalar).capitalize()
+        remedy = "declare it a parameter where it is constant, or as Real"
+        if prefix == "input ":
+            remedy = "declare it as Real, and compare inside noEvent(...): noEvent(u > 0.5)"
+        raise self.arena.refuse(
+            f"{prefix}{kind} '{entry['name']}'", entry, "Real variables and inputs", remedy
         )
 
     def _refuse_events(self) -> None:
-        asserted = {r for a in self.storage["event_actions"] for r in self._relations(a["guard"])}
-        for root in [*self.storage["roots"], *self.storage["structured_roots"]]:
+        storage, refuse = self.storage, self.arena.refuse
+        asserted = {r for a in storage["event_actions"] for r in self._relations(a["guard"])}
+        expected = "continuous equations without events"
+        export = "export the model as an FMU from a tool that treats events, and use that FMU"
+        whens = [a for a in storage["event_actions"] if not _assertion(a["kind"])]
+        for clock in storage["clocks"]:
+            raise refuse("sampling", clock, expected, export)
+        for when in [*whens, *storage["discrete_real_equations"]]:
+            raise refuse("a when-clause", when, expected, export)
+        for delay in storage["delays"]:
+            remedy = "replace it by a first-order lag, or a Padé approximation"
+            raise refuse("a delay", delay, "ordinary differential equations", remedy)
+        for event in storage["time_events"]:
+            raise refuse("an expression that causes an event", event, expected, NO_EVENT)
+        for root in [*storage["roots"], *storage["structured_roots"]]:
             body = root.get("root", root)
             if "relation" not in body or body["relation"] not in asserted:
-                raise self.arena.refuse("an expression that causes events", self.arena.place(body))
-        for kind in (
-            "time_events",
-            "clocks",
-            "delays",
-            "previous_values",
-            "discrete_real_equations",
-            "initialization_equation_operations",
+                place, remedy = body, NO_EVENT
+                if "quotient_owner" in body:  # div, mod and rem, whatever of
+                    place = storage["conditions"][body["quotient_owner"]["owner"]]
+                    remedy = (
+                        "of parameters, write floor(a/b) for div(a, b) and a - b*floor(a/b) for "
+                        "mod(a, b); else use a smooth expression"
+                    )
+                raise refuse("an expression that causes events", place, expected, remedy)
+        for kind, name in (
+            ("previous_values", "pre(...)"),
+            ("initial_discrete_values", "an initial value of a discrete variable"),
+            ("initial_parameter_values", "a parameter with fixed = false"),
         ):
-            if self.storage[kind]:
-                raise self.arena.refuse(f"{kind.replace('_', ' ')} in the model")
+            for entry in storage[kind]:
+                raise refuse(name, entry if isinstance(entry, dict) else None, expected, export)
 
     def _relations(self, condition: int) -> Iterator[int]:
         """Yield the relations that a condition is made of."""
@@ -281,103 +434,133 @@ class _Reader:
         for part in [body] if kind == "not" else body.values() if kind in ("and", "or") else []:
             yield from self._relations(part)
 
-    def _bind_parameters(self, entries: Sequence[Mapping[str, Any]]) -> tuple[list[int], list[Any]]:
+    def _bind_parameters(self) -> tuple[list[int], list[Any]]:
         """Split into free parameters and (symbols, expression) pairs of bound ones."""
         free: list[int] = []
         bound: list[tuple[Value, Value]] = []
-        for number, entry in enumerate(entries):
-            if entry["role"] not in ("parameter", "constant"):
+        for number, entry in enumerate(self.variables):
+            text = self.arena.types[entry["value_type"]]["scalar"] == "string"
+            if entry["role"] not in ("parameter", "constant") or text:
                 continue
-            node = entry["attributes"]["binding"]
-            binding = lift(0.0) if node is None else self.arena.value(node)
-            binding = np.broadcast_to(binding, self.arena.symbols[number].shape)
+            if entry["attributes"]["fixed"] == [False]:
+                raise self.arena.refuse(
+                    f"parameter '{entry['name']}' with fixed = false",
+                    entry,
+                    "parameters that are known before the initialisation",
+                    "compute its value by hand, or from other parameters",
+                )
+            binding = self.arena.default(number)
             constant = all(element.is_constant() for element in binding.flat)
             if entry["role"] == "parameter" and constant and not self.arena.is_structural(number):
                 free.append(number)
+                if entry["attributes"]["binding"] is None and not self.arena.has_start(number):
+                    self.notes.append(
+                        f"{self.arena.place(entry)}: parameter '{entry['name']}' has neither a "
+                        "value nor a start, and is 0."
+                    )
             else:
                 bound.append((self.arena.symbols[number], binding))
         return free, bound
 
-    def _numbers(self, free: list[int], bound: list[Any]) -> Callable[[ca.SX], float]:
+    def _numbers(
+        self, free: list[int], substitute: Callable[[ca.SX], ca.SX]
+    ) -> Callable[[ca.SX], float]:
         """A function that evaluates expressions of parameters at their default values."""
         symbols, values = [], []
         for number in free:
-            binding = self.storage["variables"][number]["attributes"]["binding"]
-            default = lift(0.0) if binding is None else self.arena.value(binding)
             symbols += list(self.arena.symbols[number].flat)
-            values += list(np.broadcast_to(default, self.arena.symbols[number].shape).flat)
-        substitute = _substitution(bound)
-        every, defaults = ca.vertcat(*symbols), ca.vertcat(*values)
+            values += list(self.arena.default(number).flat)
+        free_symbols, defaults = ca.vertcat(*symbols), ca.vertcat(*values)
 
         def number_of(expression: ca.SX) -> float:
             if expression.is_constant():  # most are, and models have thousands
                 return float(expression)
-            return float(ca.evalf(ca.substitute(substitute(expression), every, defaults)))
+            return float(ca.evalf(ca.substitute(substitute(expression), free_symbols, defaults)))
 
         return number_of
 
     def _scalars(
-        self, number: int, entry: Mapping[str, Any], numeric: Callable[[ca.SX], float]
+        self,
+        number: int,
+        substitute: Callable[[ca.SX], ca.SX],
+        numeric: Callable[[ca.SX], float],
     ) -> list[FlatVariable]:
+        entry = self.variables[number]
         attributes = entry["attributes"]
         symbol = self.arena.symbols[number]
-        key = "binding" if entry["role"] == "parameter" else "start"
 
-        def attribute(name: str) -> list[float | None]:
-            node = attributes[name]
+        def elements(node: int | None) -> list[ca.SX | None]:
             if node is None:
                 return [None] * symbol.size
-            values = np.broadcast_to(self.arena.value(node), symbol.shape)
-            return [numeric(element) for element in values.flat]
+            return list(np.broadcast_to(self.arena.evaluate(node), symbol.shape).flat)
 
-        starts = attribute(key)
+        def numbers(name: str) -> list[float | None]:
+            return [None if e is None else numeric(e) for e in elements(attributes[name])]
+
+        starts = elements(attributes["start"])
+        if entry["role"] == "parameter":
+            starts = list(self.arena.default(number).flat)
+        elif entry["role"] == "input" and not self._bound_input(number):
+            bound = attributes["binding"] is not None
+            starts = elements(attributes["binding" if bound else "start"])
+        starts = [None if start is None else substitute(start) for start in starts]
+        fixed = attributes["fixed"] or [False]
         columns = zip(
             symbol.flat,
             starts,
-            attribute("min"),
-            attribute("max"),
-            attribute("nominal"),
+            numbers("min"),
+            numbers("max"),
+            numbers("nominal"),
+            np.broadcast_to(np.array(fixed, bool), symbol.size) if len(fixed) == 1 else fixed,
             strict=True,
         )
         return [
             FlatVariable(
                 name=s.name(),
                 symbol=s,
-                start=0.0 if start is None else start,
+                start=0.0 if start is None else numeric(start),
                 unit=attributes["unit"],
                 description=attributes["description"],
                 minimum=minimum,
                 maximum=maximum,
                 nominal=nominal,
+                start_expression=None if start is None or start.is_constant() else start,
+                has_start=self.arena.has_start(number),
+                fixed=bool(is_fixed),
+                select=attributes["state_select"],
+                place=self.arena.place(entry),
             )
-            for s, start, minimum, maximum, nominal in columns
+            for s, start, minimum, maximum, nominal, is_fixed in columns
         ]
 
-    def _equations(self) -> Iterator[tuple[ca.SX, str]]:
-        for operation in self.storage["continuous_equation_operations"]:
+    def _equations(self, operations: Sequence[Mapping[str, Any]]) -> Iterator[tuple[ca.SX, str]]:
+        for operation in operations:
             ((kind, body),) = operation.items()
             place = self.arena.place(body)
             if kind == "residual":
-                residuals = list(self.arena.value(body["residual"]).flat)
+                residuals = list(self.arena.evaluate(body["residual"]).flat)
             elif kind == "structured" and body["scalar_view"] == "BinderSubstitution":
                 residuals = [
                     element
                     for _ in self.arena.points(body["domain"])
                     for node in body["bodies"]
-                    for element in self.arena.value(node).flat
+                    for element in self.arena.evaluate(node).flat
                 ]
             elif kind == "structured":
-                residuals = [e for node in body["bodies"] for e in self.arena.value(node).flat]
+                residuals = [e for node in body["bodies"] for e in self.arena.evaluate(node).flat]
             else:
-                raise self.arena.refuse(f"an equation of kind '{kind}'", place)
+                raise self.arena.refuse(f"an equation of kind '{kind}'", body)
             for residual in residuals:
                 yield residual, place
 
     def _assertions(self) -> Iterator[tuple[ca.SX, str]]:
         for action in self.storage["event_actions"]:
             kind = action["kind"]
-            if "assert" not in kind:
-                raise self.arena.refuse("a when-clause", self.arena.place(action))
+            if "warning" in kind:
+                self.notes.append(
+                    f"{self.arena.place(action)}: an assertion of level warning is not checked."
+                )
+                continue
             yield (
                 ca.logic_not(self._condition(action["guard"])),
                 self._text(kind["assert"]["message"]),
@@ -385,37 +568,64 @@ class _Reader:
 
     def _condition(self, number: int) -> ca.SX:
         """The expression of a condition node; an assertion's guard is its negation."""
-        node = self.storage["conditions"][number]["node"]
-        ((kind, body),) = node.items()
-        match kind:
-            case "relation":
-                relation = self.storage["relations"][body]
-                return self.arena.value(relation.get("relation", relation)["expression"])[()]
-            case "not":
-                return ca.logic_not(self._condition(body))
-            case "and" | "or":
-                lhs, rhs = self._condition(body["lhs"]), self._condition(body["rhs"])
-                return BINARY[kind](lhs, rhs)
-            case "expression" | "discrete":
-                return self.arena.value(body)[()]
-        raise self.arena.refuse(f"a condition of kind '{kind}'")
+        condition = self.storage["conditions"][number]
+        if isinstance(condition["node"], dict):
+            ((kind, body),) = condition["node"].items()
+            match kind:
+                case "relation":
+                    relation = self.storage["relations"][body]
+                    return self.arena.evaluate(relation.get("relation", relation)["expression"])[()]
+                case "not":
+                    return ca.logic_not(self._condition(body))
+                case "and" | "or":
+                    lhs, rhs = self._condition(body["lhs"]), self._condition(body["rhs"])
+                    return BINARY[kind](lhs, rhs)
+                case "expression" | "discrete":
+                    return self.arena.evaluate(body)[()]
+        raise self.arena.refuse("a condition of an assertion", condition)
 
     def _text(self, number: int) -> str:
+        """An assertion's text; one that is put together, as the source has it."""
         literal = self.arena.nodes[number].get("literal", {})
-        return str(literal.get("string", "assertion failed"))
+        quoted = self.arena.quote(self.storage["expressions"]["provenance"][number])
+        return str(literal.get("string", quoted))
 
     def _experiment(self) -> dict[str, float]:
-        """Read the experiment annotation of the model's own class, which the flat DAE drops.
+        """Numbers of the model's experiment annotation, which the flat DAE drops."""
+        numbers = {}
+        for name, text in self.source.experiment.items():
+            try:
+                numbers[name] = float(text)
+            except ValueError:
+                if name not in ("StartTime", "StopTime", "Tolerance", "Interval"):
+                    continue
+                raise InputError(
+                    where=self.source.where,
+                    found=f"experiment({name}={text})",
+                    expected="a number",
+                    remedy="write the number",
+                ) from None
+        return numbers
 
-        It ends with its class: a class of the same short name elsewhere in the file is another.
-        """
-        file, _, line = self.source.where.rpartition(":")
-        short = self.source.name.rpartition(".")[2]
-        lines = Path(file).read_text(encoding="utf-8").splitlines()[int(line) - 1 :]
-        own = re.split(rf"\bend\s+{short}\s*;", "\n".join(lines), maxsplit=1)[0]
-        experiment = re.search(r"\bexperiment\s*\(([^)]*)\)", own)
-        pairs = re.findall(r"(\w+)\s*=\s*([-+.\deE]+)", experiment[1]) if experiment else []
-        return {name: float(value) for name, value in pairs}
+
+def _assertion(kind: Mapping[str, Any]) -> bool:
+    return "assert" in kind or "warning" in kind
+
+
+def _refuse_outside(parameters: Sequence[FlatVariable]) -> None:
+    """Refuse a value of a parameter that its own limits exclude."""
+    for parameter in parameters:
+        low, high = parameter.minimum, parameter.maximum
+        if (low is not None and parameter.start < low) or (
+            high is not None and parameter.start > high
+        ):
+            limits = {"min": low, "max": high}
+            raise InputError(
+                where=parameter.place,
+                found=f"parameter '{parameter.name}' = {parameter.start:g}",
+                expected=" and ".join(f"{k} = {v:g}" for k, v in limits.items() if v is not None),
+                remedy="correct the value, or its limits",
+            )
 
 
 def _scalar_name(name: str, index: tuple[int, ...]) -> str:

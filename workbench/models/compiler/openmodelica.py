@@ -148,8 +148,8 @@ def _build(omc: str, package: Path, model: str, folder: Path) -> Path:
         built = Path(scratch) / name
         errors = errors_in(run.stdout + run.stderr)
         if errors or not built.is_file():
-            said = (run.stdout + run.stderr).strip()[-500:]
-            first = errors[0] if errors else Message("", said or "nothing printed")
+            printed = (run.stdout + run.stderr).strip()[-500:]
+            first = errors[0] if errors else Message("", printed or "nothing printed")
             raise InputError(
                 where=first.place or f"omc, model {model}",
                 found=first.text,

@@ -78,6 +78,7 @@ class Class:
     equations : components that stand alone on the left side of an equation.
     vendor : content of `annotation(__Workbench(...))`: numbers, strings, booleans, tuples and, for
         what stands in parentheses, mappings.
+    experiment : what its annotation of that name says, as text by name.
     where : file and line.
     """
 
@@ -92,6 +93,7 @@ class Class:
     equations: frozenset[str]
     connections: tuple[Connection, ...]
     vendor: Mapping[str, Any]
+    experiment: Mapping[str, str]
     where: str
 
     @property

@@ -1,5 +1,7 @@
 """Which files a library is made of: its own, and those of the libraries that it uses."""
 
+import os
+import re
 from pathlib import Path
 
 from workbench.errors import InputError
@@ -13,8 +15,9 @@ def packages(file: Path) -> tuple[Path, ...]:
     """A library and all that it uses, directly or through others: `package.mo` of each.
 
     What `annotation(uses(Name(version="1.0")))` names is looked for beside the library, as
-    `Name/package.mo`, then among the libraries that come with the workbench. The version is
-    for people.
+    `Name/package.mo`, then among the libraries that come with the workbench, then in the folders
+    of the environment variable MODELICAPATH, as `Name/package.mo`, `Name 4.0.0/package.mo` with the
+    version, or `Name.mo`. Elsewhere the version is for people.
 
     Parameters
     ----------
@@ -25,16 +28,26 @@ def packages(file: Path) -> tuple[Path, ...]:
     InputError
         If there is no such file, or a library that it uses is in neither place.
     """
-    places = {file: file.resolve()}
+    resolved = {file: file.resolve()}
     waiting = [file]
     while waiting:
         package = waiting.pop(0)
-        for name, where in _Uses(package, read(package)).names().items():
-            used = _used(name, package, where)
-            if used.resolve() not in places.values():
-                places[used] = used.resolve()
+        for name, (version, where) in _Uses(package, read(package)).names().items():
+            used = _used(name, version, package, where)
+            if used.resolve() not in resolved.values():
+                resolved[used] = used.resolve()
                 waiting.append(used)
-    return tuple(places)
+    return tuple(resolved)
+
+
+def is_installed(package: Path) -> bool:
+    """Whether a library stands in a folder of MODELICAPATH: it is of others, and may be large."""
+    return any(folder in package.parents for folder in _modelica_path())
+
+
+def _modelica_path() -> list[Path]:
+    folders = os.environ.get("MODELICAPATH", "").split(os.pathsep)
+    return [Path(folder).absolute() for folder in folders if folder]
 
 
 def files(package: Path) -> tuple[Path, ...]:
@@ -78,28 +91,34 @@ def read(file: Path) -> str:
 class _Uses(Cursor):
     """Reads what a library says of others, whatever else is in its file."""
 
-    def names(self) -> dict[str, str]:
-        """Names of used libraries, each with file and line."""
-        names: dict[str, str] = {}
+    def names(self) -> dict[str, tuple[str, str]]:
+        """Version, and file and line, of each used library by its name."""
+        names: dict[str, tuple[str, str]] = {}
         while self.token.kind != "end":
             if self.advance().text != "uses" or not self.took("("):
                 continue
             while not self.took(")"):
-                where = self.where
-                names[self.identifier()] = where
-                self.group()
+                where, name = self.where, self.identifier()
+                self.expect("(")
+                version = re.search(r'version\s*=\s*"([^"]*)"', self.skip(")"))
+                self.expect(")")
+                names[name] = (version[1] if version else "", where)
                 self.took(",")
         return names
 
 
-def _used(name: str, by: Path, where: str) -> Path:
+def _used(name: str, version: str, by: Path, where: str) -> Path:
     places = [folder / name / PACKAGE for folder in (beside(by), resources.modelica())]
+    for folder in _modelica_path():
+        places += [folder / f"{name} {version}" / PACKAGE, folder / name / PACKAGE]
+        places += [folder / f"{name}.mo"]
     for place in places:
         if place.is_file():
             return place
     raise InputError(
         where=where,
         found=f"uses({name}), but no such library",
-        expected=f"{places[0]}, or a library that comes with the workbench",
-        remedy=f"put {name} there, or remove it from the annotation",
+        expected=f"{places[0]}, a library that comes with the workbench, or one in a folder of the "
+        "environment variable MODELICAPATH",
+        remedy=f"put {name} there, or set MODELICAPATH to the folder that holds it",
     )

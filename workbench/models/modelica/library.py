@@ -3,14 +3,78 @@
 Source: Modelica Language Specification 3.6, sections 5.3 (lookup of names) and 13.4 (files).
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from workbench.errors import InputError, unknown_name
 from workbench.models.modelica.classes import Class, Component, Modifier
-from workbench.models.modelica.files import packages, read
+from workbench.models.modelica.files import PACKAGE, is_installed, packages, read
 from workbench.models.modelica.source import Reader
+
+
+class _Classes(dict[str, Class]):
+    """Classes by dotted name; those of installed libraries are read when they are asked for.
+
+    Walking through it gives those that have been read.
+    """
+
+    def __init__(self, installed: Sequence[Path]) -> None:
+        super().__init__()
+        self._installed = {_library_name(file): file for file in installed}
+        self._absent: set[str] = set()
+
+    def __contains__(self, name: object) -> bool:
+        if super().__contains__(name):
+            return True
+        if not isinstance(name, str) or name.partition(".")[0] not in self._installed:
+            return False
+        if name not in self._absent:
+            self._read(name)
+        return super().__contains__(name)
+
+    def __missing__(self, name: str) -> Class:
+        if name in self:
+            return self[name]
+        raise KeyError(name)
+
+    def get(self, name: str, default: Any = None) -> Any:
+        """The class of a name, or `default`."""
+        return super().get(name, default) if name in self else default
+
+    def _read(self, name: str) -> None:
+        """Read the files on the way to a class: of its library, of each package, and its own."""
+        self._absent.add(name)
+        root, *parts = name.split(".")
+        file = self._installed[root]
+        if not super().__contains__(root):
+            self._take(file, "")
+        enclosing = root
+        for part in parts:
+            dotted = f"{enclosing}.{part}"
+            if not super().__contains__(dotted):
+                if file.name != PACKAGE:
+                    return
+                places = (file.parent / part / PACKAGE, file.parent / f"{part}.mo")
+                file = next((place for place in places if place.is_file()), file)
+                if file not in places:
+                    return
+                self._take(file, enclosing)
+            elif (file.parent / part / PACKAGE).is_file() and file.name == PACKAGE:
+                file = file.parent / part / PACKAGE
+            elif (file.parent / f"{part}.mo").is_file() and file.name == PACKAGE:
+                file = file.parent / f"{part}.mo"
+            enclosing = dotted
+
+    def _take(self, file: Path, enclosing: str) -> None:
+        for cls in Reader(file, read(file)).file(enclosing):
+            self.setdefault(cls.name, cls)
+
+
+def _library_name(file: Path) -> str:
+    """Name of a library by its file, whose folder may bear the version, too."""
+    return file.parent.name.partition(" ")[0] if file.name == PACKAGE else file.stem
 
 
 class Library:
@@ -20,6 +84,7 @@ class Library:
     ----------
     file : `package.mo` of the library, or its only file.
     classes : all, in the order of `package.order` and of the files; those of used libraries last.
+    installed : libraries of MODELICAPATH that it uses; their classes are read when they are named.
 
     Attributes
     ----------
@@ -27,10 +92,10 @@ class Library:
     classes : by dotted name.
     """
 
-    def __init__(self, file: Path, classes: list[Class]) -> None:
+    def __init__(self, file: Path, classes: list[Class], installed: Sequence[Path] = ()) -> None:
         self.file = file
         self.name = classes[0].name
-        self.classes: dict[str, Class] = {}
+        self.classes = _Classes(installed)
         for cls in classes:
             if cls.name in self.classes:
                 raise InputError(
@@ -211,7 +276,10 @@ def read_library(file: Path) -> Library:
         With file and line, if something is not Modelica, or not in its place; if a library that it
         uses is not found.
     """
-    return Library(file, [cls for package in packages(file) for cls in _read(package, "")])
+    own, installed = [], []
+    for package in packages(file):
+        (installed if package != file and is_installed(package) else own).append(package)
+    return Library(file, [cls for package in own for cls in _read(package, "")], installed)
 
 
 def _read(file: Path, enclosing: str) -> Iterator[Class]:

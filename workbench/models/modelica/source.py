@@ -6,6 +6,7 @@ file and line.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -37,7 +38,15 @@ class _Body:
     components: list[Component] = field(default_factory=list)
     equations: list[str] = field(default_factory=list)
     connections: list[Connection] = field(default_factory=list)
+    annotation: "_Annotation | None" = None
+
+
+@dataclass
+class _Annotation:
+    """What the workbench reads of an annotation: its own, and numbers of the experiment."""
+
     vendor: Mapping[str, Any] = field(default_factory=dict)
+    experiment: dict[str, str] = field(default_factory=dict)
 
 
 class Reader(Cursor):
@@ -83,12 +92,14 @@ class Reader(Cursor):
         outer, self._owner = self._owner, name
         if self.took("="):
             extends = self._alias()
-            description, vendor = self._comment()
-            body = _Body(extends=extends, vendor=vendor)
+            description = self.string()
+            body = _Body(extends=extends)
+            body.annotation = self._annotation() if self.sees("annotation") else None
         else:
             description, body = self.string(), _Body()
             self._composition(name, body)
         self._owner = outer
+        annotation = body.annotation or _Annotation()
         made = Class(
             name=name,
             kind=kind,
@@ -100,7 +111,8 @@ class Reader(Cursor):
             components=tuple(body.components),
             equations=frozenset(body.equations),
             connections=tuple(body.connections),
-            vendor=body.vendor,
+            vendor=annotation.vendor,
+            experiment=annotation.experiment,
             where=where,
         )
         self._found.insert(place, made)
@@ -136,7 +148,9 @@ class Reader(Cursor):
                 self.advance()
                 in_equations = True
             elif word == "annotation":
-                body.vendor = self._annotation()
+                if body.annotation is not None:
+                    raise self.refusal("one annotation of a class")
+                body.annotation = self._annotation()
                 self.expect(";")
             elif in_equations or word == "external":
                 self._statement(body)
@@ -318,10 +332,6 @@ class Reader(Cursor):
             raise self.refusal("the rest of an expression")
         return self._text[start : self._tokens[self._next - 1].end]
 
-    def _comment(self) -> tuple[str, Mapping[str, Any]]:
-        description = self.string()
-        return description, self._annotation() if self.sees("annotation") else {}
-
     def _inner_comment(self) -> str:
         """Read the comment of what is inside a class; returns its description."""
         description = self.string()
@@ -335,22 +345,38 @@ class Reader(Cursor):
         One of the workbench is the class's: the ';' before it is missing, which would drop it.
         """
         misplaced = self.refusal("';' before the annotation of the class")
-        if self._annotation():
+        annotation = self._annotation()
+        if annotation.vendor or annotation.experiment:
             raise misplaced
 
-    def _annotation(self) -> Mapping[str, Any]:
-        """Content of the workbench's annotation; others are passed over."""
-        vendor: Mapping[str, Any] = {}
+    def _annotation(self) -> _Annotation:
+        """Read what the workbench uses of an annotation; pass over all else."""
+        annotation = _Annotation()
         self.expect("annotation")
         self.expect("(")
         while not self.took(")"):
             if self.took(VENDOR):
-                vendor = self._tree()
+                annotation.vendor = self._tree()
+            elif self.sees("experiment") and self.following.text == "(":
+                self.advance()
+                annotation.experiment = self._texts()
+            elif get_close_matches(self.token.text.lower(), [VENDOR.lower()], cutoff=0.8):
+                raise self.refusal(f"'{VENDOR}'")
             else:
                 self.skip(",", ")")
             if not self.sees(")"):
                 self.expect(",")
-        return vendor
+        return annotation
+
+    def _texts(self) -> dict[str, str]:
+        """Values by name, as they are written."""
+        texts: dict[str, str] = {}
+        self.expect("(")
+        while not self.took(")"):
+            name = self.identifier()
+            texts[name] = self.skip(",", ")").removeprefix("=").strip()
+            self.took(",")
+        return texts
 
     def _tree(self) -> dict[str, Any]:
         tree: dict[str, Any] = {}

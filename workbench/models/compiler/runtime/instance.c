@@ -86,6 +86,29 @@ void enter(Instance *i, Phase phase) {
     }
 }
 
+/* Before the start: gives the states that the importer has not set their start values, which
+ * parameters, inputs and the start time may change. */
+static COLD void start_states(Instance *i) {
+#if STARTS_FOLLOW
+    State *const s = &i->state;
+    double start[NX + 1];
+    if (model_starts(s->time, s->value, inputs(i), parameters(i), start) == 0) {
+        for (int n = 0; n < NX; n++) {
+            if (!s->given[n]) {
+                s->value[n] = start[n];
+            }
+        }
+    }
+    i->valid = 0;
+#else
+    (void)i;
+#endif
+}
+
+static int before_start(const Instance *i) {
+    return ((unsigned)i->state.phase & (INSTANTIATED | INITIALIZATION)) != 0;
+}
+
 /* Life ---------------------------------------------------------------------------------------- */
 
 Instance *instance_create(Kind kind, const char *name, const char *token, const char *function,
@@ -138,6 +161,7 @@ void instance_reset(Instance *i) {
     s->tolerance = default_tolerance;
     memset(&s->memory, 0, sizeof s->memory);
     memcpy(s->value, model_start, (NX + NU + NP) * sizeof *s->value);
+    memset(s->given, 0, sizeof s->given);
     i->valid = 0;
     enter(i, INSTANTIATED);
 }
@@ -161,6 +185,7 @@ Status instance_setup(Instance *i, int tolerance_defined, double tolerance, doub
     i->state.time = start_time;
     i->state.stop_time = stop_time_defined ? stop_time : INFINITY;
     i->valid = 0;
+    start_states(i);
     return STATUS_OK;
 }
 
@@ -400,12 +425,20 @@ static Status set_any(Instance *i, const unsigned reference[], size_t n, const d
     if (changed != 0) {
         i->valid = 0;
     }
+    if (STARTS_FOLLOW && before_start(i)) {
+        for (size_t k = 0; k < n; k++) {
+            if (group_of(reference[k]) == GROUP_X) {
+                i->state.given[reference[k]] = 1;
+            }
+        }
+        start_states(i);
+    }
     return STATUS_OK;
 }
 
 Status instance_set(Instance *i, const unsigned reference[], size_t n, const double value[]) {
     /* All inputs in their order; see above for their phases. */
-    if (n == NU && reference != NULL && value != NULL &&
+    if (n == NU && !(STARTS_FOLLOW && before_start(i)) && reference != NULL && value != NULL &&
         memcmp(reference, i->columns + NX, NU * sizeof *reference) == 0) {
         return set_columns(i, NX, NU, value);
     }
@@ -437,6 +470,9 @@ static Status check_length(const Instance *i, const double *array, size_t n) {
 
 Status instance_set_states(Instance *i, const double x[], size_t n) {
     const Status status = check_length(i, x, n);
+    if (STARTS_FOLLOW && status == STATUS_OK && before_start(i)) {
+        memset(i->state.given, 1, NX);
+    }
     return status == STATUS_OK ? set_columns(i, 0, NX, x) : status;
 }
 

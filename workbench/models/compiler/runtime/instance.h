@@ -50,6 +50,7 @@ typedef struct {
     Memory memory;                    /* of the integrator */
     double value[NX + NU + NP + 1];   /* x, u, p as in model_start */
     int phase, kind;
+    unsigned char given[NX + 1]; /* 1 for each state that the importer has set before the start */
 } State;
 
 typedef struct Instance Instance;

@@ -15,8 +15,12 @@
 #ifndef MODEL_H
 #define MODEL_H
 
-/* MODEL_IDENTIFIER, MODEL_TOKEN (strings); NX, NU, NP, NW, NA, NNZ_XU, NNZ_P (integers). */
+/* MODEL_IDENTIFIER, MODEL_TOKEN (strings); NX, NU, NP, NW, NA, NNZ_XU, NNZ_P (integers);
+ * STARTS_FOLLOW, 1 if start values of states follow parameters, inputs or the start time. */
 #include "model_data.h"
+#ifndef STARTS_FOLLOW
+#define STARTS_FOLLOW 0
+#endif
 
 /* First value reference of every group of variables. */
 enum {
@@ -32,6 +36,9 @@ extern const double model_start[];           /* NX+NU+NP: start values of x, u, 
 extern const double model_nominal[];         /* NX: nominal values of x, positive */
 extern const unsigned char model_tunable[];  /* NP: 1 tunable, 0 fixed */
 extern const char *const model_assertion_text[]; /* NA */
+
+/* start: NX values. Only if STARTS_FOLLOW; x is not read. */
+int model_starts(double t, const double *x, const double *u, const double *p, double *start);
 
 /* xdot: NX values. */
 int model_derivatives(double t, const double *x, const double *u, const double *p, double *xdot);
