@@ -227,7 +227,8 @@ def _in_base_units(unit: str, where: str) -> tuple[dict[str, int], float, float]
         zero, one, two = (_REGISTRY.Quantity(v, parsed).to_base_units() for v in (0.0, 1.0, 2.0))
         if not math.isclose(two.magnitude - one.magnitude, one.magnitude - zero.magnitude):
             raise ValueError("a logarithm")  # as dB
-        exponents = {_BASE_UNITS[str(name)]: int(power) for name, power in one.unit_items()}
+        powers: Any = one.unit_items()
+        exponents = {_BASE_UNITS[str(name)]: int(power) for name, power in powers}
     except (pint.errors.PintError, AttributeError, KeyError, TypeError, ValueError) as error:
         raise InputError(
             where=where or f"unit '{unit}'",

@@ -276,7 +276,8 @@ def read_library(file: Path) -> Library:
         With file and line, if something is not Modelica, or not in its place; if a library that it
         uses is not found.
     """
-    own, installed = [], []
+    own: list[Path] = []
+    installed: list[Path] = []
     for package in packages(file):
         (installed if package != file and is_installed(package) else own).append(package)
     return Library(file, [cls for package in own for cls in _read(package, "")], installed)

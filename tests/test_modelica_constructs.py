@@ -1,0 +1,207 @@
+"""What compiles of Modelica: each construct computes what it means, or is refused by line.
+
+One small model for each construct, with its solution in closed form or the refusal that names file,
+line and construct. The lists in `docs/modelica.md` follow from the table: `python
+tests/test_modelica_constructs.py` writes them, a test holds them against it.
+"""
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+import fmpy
+import numpy as np
+import pytest
+from fmpy.validation import validate_fmu
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+
+from workbench.errors import InputError
+
+casadi = pytest.importorskip("casadi")
+pytest.importorskip("rumoca")
+
+from workbench.models import compiler  # noqa: E402  (needs the extra)
+from workbench.models.compiler.explicit import StateSpace, make_explicit  # noqa: E402
+from workbench.models.compiler.flat import flatten  # noqa: E402
+
+Series = NDArray[np.float64]
+PAGE = Path(__file__).parents[1] / "docs" / "modelica.md"
+TIMES = np.linspace(0.0, 1.0, 11)  # s
+# Far above the error of the integration (1e-9 a step), far below any other reading of the source;
+# where an expression switches without an event, the step of 0.01 s across it errs by up to 1e-3.
+TOLERANCE = 2e-3
+
+
+TABLE = Path(__file__).with_name("modelica_constructs.txt")
+
+
+class Construct(NamedTuple):
+    """A package body with a model M, and its first output over time, or its refusal."""
+
+    name: str
+    source: str
+    output: str
+    line: int
+    refusal: str
+
+
+def read_table() -> list[Construct]:
+    """Constructs of `modelica_constructs.txt`, which says how it is written."""
+    constructs = []
+    for text in re.split(r"^# ", TABLE.read_text(), flags=re.MULTILINE)[2:]:
+        name, *source, answer = text.strip().splitlines()
+        refusal = re.fullmatch(r"! (\d+): (.*)", answer)
+        line, words = (int(refusal[1]), refusal[2]) if refusal else (0, "")
+        output = "" if refusal else answer.removeprefix("= ")
+        constructs.append(Construct(name, "\n".join(source), output, line, words))
+    return constructs
+
+
+CONSTRUCTS = read_table()
+
+
+def write(folder: Path, body: str) -> Path:
+    """Write a package `Lib` of a body; returns its file."""
+    package = folder / "Lib" / "package.mo"
+    package.parent.mkdir(parents=True)
+    package.write_text(f"package Lib\n{body}\nend Lib;\n")
+    return package
+
+
+def first_output(model: StateSpace) -> Series:
+    """The first output, or the first state that is one, at TIMES, by an integrator of scipy."""
+    p, u = ([v.start for v in group] for group in (model.parameters, model.inputs))
+    equations = casadi.Function("m", [model.t, model.x, model.u, model.p], [model.f, model.w])
+
+    def rates(t: float, x: Series) -> Series:
+        return np.array(equations(t, x, u, p)[0]).ravel()
+
+    x0 = model.initial_states()
+    x = np.empty((0, TIMES.size))
+    if x0:
+        options = {"rtol": 1e-9, "atol": 1e-10, "max_step": 0.01}
+        x = solve_ivp(rates, (0.0, TIMES[-1]), x0, t_eval=TIMES, **options).y
+    if not model.outputs:
+        return np.array(x[[s.name for s in model.states].index(model.state_outputs[0])])
+    return np.array([float(equations(t, x[:, k], u, p)[1][0]) for k, t in enumerate(TIMES)])
+
+
+@pytest.mark.parametrize("construct", CONSTRUCTS, ids=lambda construct: construct.name)
+def test_a_construct_computes_what_it_means_or_is_refused_by_line(
+    construct: Construct, tmp_path: Path
+) -> None:
+    package = write(tmp_path, construct.source)
+    if construct.refusal:
+        with pytest.raises(InputError) as refusal:
+            make_explicit(flatten(package, "Lib.M"))
+        assert refusal.value.where == f"{package}:{construct.line}"
+        assert construct.refusal in refusal.value.found
+        assert refusal.value.remedy
+    else:
+        computed = first_output(make_explicit(flatten(package, "Lib.M")))
+        expected = eval(construct.output, {**vars(np), "t": TIMES})
+        np.testing.assert_allclose(computed, expected + 0 * TIMES, atol=TOLERANCE, rtol=0)
+
+
+FOLLOWING = (
+    "model M parameter Real x0=5; parameter Real k=2; input Real u(start=4); "
+    "output Real x(start=x0,fixed=true); output Real v; Real free(start=7,fixed=true); "
+    "initial equation der(v)=0; "
+    "equation der(x)=-x; der(v)=u-k*v; der(free)=0; end M;"
+)
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_starts_in_an_fmu_follow_what_is_set_and_yield_to_a_start_that_is_set(
+    fmi: int, tmp_path: Path
+) -> None:
+    fmu = tmp_path / "M.fmu"
+    package = write(tmp_path, FOLLOWING)
+    compiler.build(package, "Lib.M", fmu, fmi=fmi, platforms=[compiler.native()])
+    assert validate_fmu(str(fmu)) == []  # without any unit, too
+
+    def begin(start: Mapping[str, float], interface: str) -> list[float]:
+        result = fmpy.simulate_fmu(
+            str(fmu),
+            start_values=dict(start),
+            fmi_type=interface,
+            stop_time=1.0,
+            output=["x", "v", "free"],
+        )
+        return [float(result[name][0]) for name in ("x", "v", "free")]
+
+    for interface in ("ModelExchange", "CoSimulation"):
+        assert begin({}, interface) == [5.0, 2.0, 7.0]
+        assert begin({"x0": 2.0, "k": 8.0}, interface) == [2.0, 0.5, 7.0]
+        assert begin({"x0": 2.0, "x": 9.0}, interface) == [9.0, 2.0, 7.0]
+        assert begin({"x": 9.0, "x0": 2.0, "u": 6.0}, interface) == [9.0, 3.0, 7.0]
+
+
+def test_a_parameter_without_value_and_start_is_zero_and_said(tmp_path: Path) -> None:
+    body = "model M parameter Real a; output Real x(start=1,fixed=true); equation der(x)=a; end M;"
+    package = write(tmp_path, body)
+    model = make_explicit(flatten(package, "Lib.M"))
+    assert [v.start for v in model.parameters] == [0.0]
+    (note,) = model.notes
+    assert note.startswith(f"{package}:2: parameter 'a' has neither a value nor a start")
+
+
+def test_an_experiment_gives_start_stop_step_and_tolerance(tmp_path: Path) -> None:
+    body = (
+        'model M output Real x(start=0,fixed=true,unit="degC"); equation der(x)=1; '
+        "annotation(experiment(StartTime=50, Interval=0.25, Tolerance=1e-9)); end M;"
+    )
+    fmu = tmp_path / "M.fmu"
+    compiler.build(write(tmp_path, body), "Lib.M", fmu, platforms=[compiler.native()])
+    assert validate_fmu(str(fmu)) == []
+    description = fmpy.read_model_description(str(fmu))
+    experiment = description.defaultExperiment
+    assert [float(experiment.startTime), float(experiment.stopTime)] == [50.0, 51.0]
+    assert [float(experiment.stepSize), float(experiment.tolerance)] == [0.25, 1e-9]
+    celsius = next(unit for unit in description.unitDefinitions if unit.name == "degC").baseUnit
+    assert [float(celsius.factor), float(celsius.offset)] == [1.0, 273.15]
+
+
+def test_refusals_name_no_other_file_than_the_users(tmp_path: Path) -> None:
+    """The front end, the C compiler and the cache work in temporary folders of their own."""
+    for number, construct in enumerate(CONSTRUCTS):
+        if construct.refusal:
+            package = write(tmp_path / str(number), construct.source)
+            with pytest.raises(InputError) as refusal:
+                make_explicit(flatten(package, "Lib.M"))
+            paths = set(re.findall(r"/[\w./-]+\.mo\b", str(refusal.value)))
+            assert paths == {str(package)}, construct.name
+
+
+def listing() -> str:
+    """Lists of the page: what compiles, and what is refused."""
+    compiled = [c.name for c in CONSTRUCTS if not c.refusal]
+    refused = [c.name for c in CONSTRUCTS if c.refusal]
+    return "\n".join(
+        [
+            f"{len(compiled)} compile, and compute their solution in closed form:",
+            "; ".join(compiled) + ".",
+            "",
+            f"{len(refused)} are refused, with file, line and remedy:",
+            "; ".join(refused) + ".",
+            "",
+        ]
+    )
+
+
+BEGIN, END = "<!-- constructs -->\n", "<!-- end of constructs -->"
+
+
+def test_the_page_lists_what_the_compiler_takes() -> None:
+    before, _, rest = PAGE.read_text().partition(BEGIN)
+    assert before
+    listed = rest.partition(END)[0]
+    assert listed == listing(), f"write it again: python {Path(__file__).name}"
+
+
+if __name__ == "__main__":
+    text = PAGE.read_text()
+    before, _, rest = text.partition(BEGIN)
+    PAGE.write_text(before + BEGIN + listing() + END + rest.partition(END)[2])
