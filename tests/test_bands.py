@@ -1,5 +1,7 @@
 """Bands are checked by innovations, and what contradicts them is said at the top."""
 
+from pathlib import Path
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -8,6 +10,7 @@ from workbench import case_from_frame
 from workbench.observers import choose
 from workbench.observers.report import format_table, summarise_runs
 from workbench.observers.simulation import CaseResult, prepare
+from workbench.observers.trust import residual_tests
 from workbench.system.system import System
 
 from .built import declare
@@ -25,11 +28,11 @@ def vessel(tmp_path_factory: pytest.TempPathFactory) -> System:
     return declare(folder, VESSEL, SYSTEM)
 
 
-def result_of(system: System, noise: float, seed: int) -> CaseResult:
-    """A vessel that is filled, whose level sensor has so many times the noise that is declared."""
+def result_of(system: System, noise: float, seed: int, leak: float = 0.0) -> CaseResult:
+    """A vessel that is filled, whose sensors have so many times the noise that is declared."""
     time = np.arange(200.0)
     flow = np.where(time % 20.0 < 10.0, 1e-3, 0.0)
-    volume = np.append(0.0, np.cumsum(flow[:-1]))
+    volume = np.append(0.0, np.cumsum(flow[:-1] - leak))
     rng = np.random.default_rng(seed)
     volume += noise * 1e-5 * rng.standard_normal(time.size)
     through = flow + 1e-6 * rng.standard_normal(time.size)
@@ -62,3 +65,118 @@ def test_bands_that_innovations_contradict_are_told_at_the_top_of_all_that_is_re
     assert summary["cases"]["filled"]["contradicted"]["ekf"] == pytest.approx(
         result.surprise("ekf"), abs=5e-4
     )
+
+
+def test_bands_that_are_too_wide_are_told_as_well(vessel: System) -> None:
+    result = result_of(vessel, 0.2, 0)
+    (test,) = [t for t in result.contradictions["ekf"] if t.test == "variance"]
+    assert not test.narrow
+    assert not result.contradicted
+    assert "Bands of ekf are too wide in filled: innovations have 0." in result.summary()
+
+
+def test_a_start_that_is_farther_off_than_it_is_said_to_be_is_named(vessel: System) -> None:
+    """A leak of 20 standard deviations of what is known of it, to which the filter settles."""
+    result = result_of(vessel, 1.0, 0, leak=2e-4)
+    narrow = [test for test in result.contradictions["ekf"] if test.narrow]
+    assert narrow
+    assert all(test.reason.startswith("the start is farther off") for test in narrow)
+
+
+def innovations(
+    rng: np.random.Generator, walk: float, said: float, count: int = 400
+) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+    """Residuals and deviations of a filter on a walk, of which it says another, in unit noise."""
+    truth = np.cumsum(walk * rng.standard_normal(count))
+    samples = truth + rng.standard_normal(count)
+    x, P, values, deviations = 0.0, 1.0, [], []
+    for sample in samples:
+        P += said**2
+        gain = P / (P + 1.0)
+        x, P = x + gain * (sample - x), (1.0 - gain) * P
+        values.append(sample - x)
+        deviations.append(np.sqrt(P))
+    return {"y": np.array(values)[20:]}, {"y": np.array(deviations)[20:]}
+
+
+def test_residuals_of_a_right_filter_pass_both_tests() -> None:
+    rng = np.random.default_rng(1)
+    flagged = sum(bool(residual_tests(*innovations(rng, 0.3, 0.3))) for _ in range(1000))
+    # Chance makes one in a thousand; seven or more of a Poisson number of one, one in 12 000.
+    assert flagged < 7
+
+
+@pytest.mark.parametrize(("walk", "narrow"), [(1.5, True), (0.05, False)])
+def test_a_walk_that_is_wrong_shows_in_what_follows_from_sample_to_sample(
+    walk: float, narrow: bool
+) -> None:
+    rng = np.random.default_rng(2)
+    found = [residual_tests(*innovations(rng, walk, 0.3, count=4000)) for _ in range(20)]
+    assert all(any(t.test == "whiteness" and t.narrow is narrow for t in tests) for tests in found)
+
+
+def test_a_mean_shows_though_it_is_far_below_the_noise() -> None:
+    rng = np.random.default_rng(3)
+    residuals, deviations = innovations(rng, 0.05, 0.05, count=4000)
+    residuals["y"] += 0.2  # of the noise, whose estimate is sure to 0.22 of it
+    (test,) = residual_tests(residuals, deviations)
+    assert (test.test, test.signal, test.narrow) == ("mean", "y", True)
+    assert test.value == pytest.approx(0.2 / deviations["y"][-1], rel=0.2)
+
+
+COIL = """
+package Coil "A coil in which a switched voltage drives a current"
+  model Observer "Its current"
+    parameter Real r(unit="V") = 0.0 "What is lost";
+    input Real u(unit="V") "Voltage";
+    input Real dr(unit="V") "Correction of r";
+    output Real i(unit="A", start=0.0, fixed=true, nominal=5.0) "Current";
+  equation
+    0.006*der(i) = u - 2.0*i - (r + dr);
+  end Observer;
+end Coil;
+"""
+COIL_FILE = """
+title = "A coil"
+sample_time = "{step} s"
+models.observer = {{ class = "Observer" }}
+inputs.u = {{ unit = "V", noise = "0 V", scale = "12 V", held = true }}
+outputs.i = {{ unit = "A", noise = "0.02 A", scale = "5 A" }}
+
+[estimated.r]
+correction = "dr"
+unit = "V"
+range = ["-2 V", "2 V"]
+walk = "0.01 V"
+spread = "0.1 V"
+acts_on = "i"
+"""
+
+
+@pytest.mark.parametrize("step", [1e-4, 1e-3, 5e-3])
+@pytest.mark.parametrize("name", ["ekf", "ukf", "mhe"])
+def test_bands_hold_or_what_is_said_is_that_samples_are_too_far_apart(
+    tmp_path: Path, name: str, step: float
+) -> None:
+    """A sound coil, from a thirtieth to twice its time constant of 3 ms; nothing is lost in it."""
+    system = declare(tmp_path / "coil", COIL, COIL_FILE.format(step=step))
+    rng, count = np.random.default_rng(4), 2000
+    u = np.repeat(rng.uniform(-12.0, 12.0, count // 40), 40)
+    current = [0.0]
+    for voltage in u[:-1]:  # exact, for a voltage that is held
+        current.append(voltage / 2.0 + (current[-1] - voltage / 2.0) * np.exp(-step / 0.003))
+    measured = np.array(current) + 0.02 * rng.standard_normal(count)
+    columns = {"time [s]": step * np.arange(count), "u [V]": u, "i [A]": measured}
+    case = case_from_frame(system, pd.DataFrame(columns), name="switched")
+    result = prepare(system, choose(system, [name])).run(case)
+    run = result.runs[name]
+    truth = {"i": np.array(current), "r": np.zeros(count)}
+    half = count // 2
+    shares = [
+        np.mean(np.abs(run.signal(key) - values)[half:] < 1.96 * run.deviation(key)[half:])
+        for key, values in truth.items()
+    ]
+    if min(shares) < 0.93:
+        tests = result.contradictions[name]
+        assert any("samples are too far apart" in test.reason for test in tests if test.narrow)
+        assert any("do not resolve the model" in text for text in result.warnings())

@@ -355,8 +355,15 @@ def _simulate() -> Schema:
         "additionalProperties": False,
     }
     texts = {"title": TEXT, "doubts": listed(TEXT), "reference": or_null(TEXT)}
-    numbers = {"contradicted": by_name(NUMBER)}
-    case = closed({**texts, **numbers, "estimators": by_name(score)})
+    test = {"test": TEXT, "signal": TEXT, "value": NUMBER, "narrow": FLAG, "reason": TEXT}
+    trust = {
+        "warnings": listed(TEXT),
+        "guesses": listed(TEXT),
+        "inseparable": listed(closed({"names": listed(TEXT), "correlation": NUMBER})),
+        "contradicted": by_name(NUMBER),
+        "contradictions": by_name(listed(closed(test))),
+    }
+    case = closed({**texts, **trust, "estimators": by_name(score)})
     meanings = by_name(by_name(closed({"text": TEXT, "unit": TEXT})))
     provenance = {
         **closed({"run": RUN, **VERSIONS, "fmu": FMU, "meanings": meanings}),
@@ -522,7 +529,14 @@ def _observability() -> Schema:
     numbers = by_name(NUMBER)
     model = {name: or_null(numbers) for name in ("useful", "median_bound", "states_observable")}
     case = {
-        **closed({"title": TEXT, "judged_windows": WHOLE, "models": by_name(closed(model))}),
+        **closed(
+            {
+                "title": TEXT,
+                "judged_windows": WHOLE,
+                "models": by_name(closed(model)),
+                "warnings": listed(TEXT),
+            }
+        ),
         "patternProperties": {"^median_": ERROR},
     }
     state = closed({"at": NUMBER, "scale": NUMBER, "remaining": NUMBER})
@@ -541,6 +555,7 @@ def _observability() -> Schema:
         "noise": by_name(closed({"absolute": NUMBER, "relative": NUMBER})),
         "window_s": NUMBER,
         "stride_s": NUMBER,
+        "linear_s": NUMBER,
         "prior": numbers,
         "useful": numbers,
         "linear": by_name(closed(linear)),

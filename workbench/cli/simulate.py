@@ -176,7 +176,29 @@ def _run(
         print(
             f"error: {name} estimated nothing in any case; the reasons are above", file=sys.stderr
         )
-    return CommandResult(summary, units, 1 if failed else 0, page)
+    unsure = _unsure(results)
+    for text in unsure:
+        print(f"error: {text}", file=sys.stderr)
+    return CommandResult(summary, units, 1 if failed or unsure else 0, page)
+
+
+def _unsure(results: Sequence[CaseResult]) -> list[str]:
+    """Why estimates cannot be relied on: quantities that are nowhere told, and useless bands."""
+    guessed = set.intersection(*(set(result.guessed) for result in results))
+    texts = [
+        f"no recording tells {name}; its estimates are guesses, see above"
+        for name in sorted(guessed)
+    ]
+    useless = {
+        name: [result.case.name for result in results if result.useless(name)]
+        for name in results[0].runs
+    }
+    texts += [
+        f"bands of {name} miss more often than they hold in {', '.join(cases)}; the reason is above"
+        for name, cases in useless.items()
+        if cases
+    ]
+    return texts
 
 
 def _run_live(
@@ -187,7 +209,7 @@ def _run_live(
 
     for case in cases:
         with simulation.estimators() as running:
-            window.show(case, list(running.values()))
+            window.show(case, list(running.values()), simulation.warnings(case))
         yield from simulate(simulation, [case], 1, partial(_write, out))
 
 

@@ -3,6 +3,7 @@
 import time
 from collections.abc import Sequence
 from itertools import cycle
+from textwrap import wrap
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -16,6 +17,7 @@ from workbench.recordings.case import Case
 from workbench.system.system import System
 
 _PAUSE = 0.1  # [s] between two drawings
+_WIDTH = 110  # characters of a line above the figure
 
 
 class LiveWindow:
@@ -66,8 +68,13 @@ class LiveWindow:
             )
         plt.show(block=False)
 
-    def show(self, case: Case, estimators: Sequence[Estimator]) -> None:
-        """Step each estimator through a recording, one after the other, and draw what it says."""
+    def show(
+        self, case: Case, estimators: Sequence[Estimator], warnings: Sequence[str] = ()
+    ) -> None:
+        """Step each estimator through a recording, one after the other, and draw what it says.
+
+        Warnings stand above, such as quantities of which estimates are guesses.
+        """
         if not self._open():
             return
         reference, *quantities = self._axes
@@ -84,10 +91,11 @@ class LiveWindow:
             reference.plot(case.time, measured, color=LIGHT["raw"], lw=0.5, label="measured")
         for estimator, style in zip(estimators, cycle(ESTIMATORS), strict=False):
             name = estimator.label
-            lines = [axes.plot([], [], color=LIGHT[style], label=name)[0] for axes in self._axes]
+            curves = [axes.plot([], [], color=LIGHT[style], label=name)[0] for axes in self._axes]
             reference.legend(loc="lower center", ncols=4, fontsize=8)
-            self._figure.suptitle(f"{case.name}: {name}", fontsize=10)
-            self._step(case, estimator, lines)
+            lines = [line for text in warnings for line in wrap(text, _WIDTH)]
+            self._figure.suptitle("\n".join([f"{case.name}: {name}", *lines]), fontsize=10)
+            self._step(case, estimator, curves)
 
     def wait(self) -> None:
         """Keep the last picture until the window is closed."""

@@ -10,18 +10,19 @@ Sources: Krener and Ide (2009), Measures of unobservability, 48th IEEE CDC; Van 
 Detection, Estimation, and Modulation Theory I, section 2.4 (Cramer-Rao bound with a prior).
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from workbench.arrays import Matrix, Vector
-from workbench.errors import FMUError
+from workbench.errors import FMUError, InputError
 from workbench.models.fmu import FMU
 from workbench.observers.estimators.disturbance import DisturbanceObserver
-from workbench.observers.operating import settle
-from workbench.observers.replay import replay
+from workbench.observers.estimators.open_loop import OpenLoop
+from workbench.observers.operating import settle, start_spreads
+from workbench.observers.replay import quantities_with_rules, replay
 from workbench.observers.run import Ending, Run
 from workbench.observers.score import judged_window
 from workbench.recordings.case import Case
@@ -133,12 +134,22 @@ def remaining(scaled: Matrix) -> Matrix:
 WINDOW = 0.5  # [s] the time within which a control has to react
 
 
+STRIDE = 0.1  # [s] from one window to the next
+
+
+_SECOND = 200  # samples of the linear test at least, which are a second at 200 Hz
+
+
 _POINTS = 200  # of a recording at which it is linearised to tell quantities apart
+_NOTHING = 1e-6  # of a state's size: what rounding and differences leave where nothing moves it
 _PART = 0.1  # share of a direction that counts as part of it
+_TOGETHER = 0.3  # correlation of what acts together; of four of which one sum is known, a third
 _LEFT = 0.5  # share of what was unknown of a direction, of which nothing to speak of was learnt
 
 
-STRIDE = 0.1  # [s] from one window to the next
+def tested_span(system: System) -> float:
+    """Length of the linear test [s]: a second, and more where samples are far apart."""
+    return max(1.0, _SECOND * system.sample_time)
 
 
 def prior(system: System) -> Vector:
@@ -153,14 +164,15 @@ def prior(system: System) -> Vector:
 
 @dataclass(frozen=True)
 class LinearTest:
-    """Observability at an operating point from one second of samples.
+    """Observability at an operating point from samples of a second, see `tested_span`.
 
     Attributes
     ----------
     model : name of the model, without its library.
     states : (k,) names.
     x : (k,) operating point.
-    scale : (k,) largest deviation that a quantity off by its prior causes within the second.
+    scale : (k,) largest deviation that a quantity off by its prior causes within the second, or
+        what is not known of the state at the start, where no quantity moves it or that is declared.
     information : (k,) eigenvalues of the Gramian in units of `scale`, ascending [1]: squared ratio
         of signal to noise. Above 1 the samples say more than `scale` does.
     directions : (k, k) unit vectors in units of `scale`, one column per eigenvalue.
@@ -210,6 +222,7 @@ class WindowTest:
     model : name of the model, without its library.
     states : (k,) names.
     time : (m,) end of the window [s].
+    span : length of a window [s].
     remaining : (m, k) standard deviation left of each state at the window's begin, over its scale,
         with all estimated quantities unknown [1].
     bound : (m, q) Cramer-Rao bound of the estimated quantities [their unit].
@@ -219,6 +232,7 @@ class WindowTest:
     model: str
     states: tuple[str, ...]
     time: Vector
+    span: float
     remaining: Matrix
     bound: Matrix
     serving: Vector
@@ -234,6 +248,88 @@ class WindowTest:
 
 
 @dataclass(frozen=True)
+class Information:
+    """What a whole recording tells of constant quantities, and of the states at its end.
+
+    Attributes
+    ----------
+    states, quantities : (n,) and (q,) names.
+    left : (n + q, n + q) covariance that no estimator falls below, in units of what is known
+        before: standard deviations of states at the start, see `start_spreads`, and of quantities,
+        see `prior`.
+    ruled : quantities of which the machine says where they are told.
+    """
+
+    states: tuple[str, ...]
+    quantities: tuple[str, ...]
+    left: Matrix
+    ruled: frozenset[str] = frozenset()
+
+    @property
+    def inseparable(self) -> dict[tuple[str, ...], float]:
+        """What cannot be told apart, an estimated quantity among it, and the largest correlation.
+
+        Of a direction of several, half of what was unknown before is left.
+        """
+        names, groups = (*self.states, *self.quantities), {}
+        correlation = self._correlation
+        partners = (np.abs(correlation) > _TOGETHER) & self._unknown & self._unknown[:, None]
+        for i in range(len(self.states), len(names)):
+            members = {i}
+            while True:
+                reached = partners[sorted(members)].any(axis=0)
+                if more := {int(j) for j in np.flatnonzero(reached)} - members:
+                    members |= more
+                else:
+                    break
+            if self._unknown[i] and len(members) > 1:
+                within = sorted(members)
+                pairs = correlation[np.ix_(within, within)][np.triu_indices(len(within), 1)]
+                groups[tuple(names[j] for j in within)] = float(pairs[np.abs(pairs).argmax()])
+        return groups
+
+    @property
+    def untold(self) -> tuple[str, ...]:
+        """Estimated quantities of which a recording tells less than half, whatever others are."""
+        grouped = {*self.ruled, *(name for names in self.inseparable for name in names)}
+        unknown = self._unknown[len(self.states) :]
+        return tuple(
+            name
+            for name, left in zip(self.quantities, unknown, strict=True)
+            if left and name not in grouped
+        )
+
+    @property
+    def _correlation(self) -> Matrix:
+        deviations = np.sqrt(np.maximum(self.left.diagonal(), np.finfo(float).tiny))
+        correlation: Matrix = self.left / np.outer(deviations, deviations)
+        return correlation
+
+    @property
+    def _unknown(self) -> NDArray[np.bool_]:
+        """What takes part in a direction of which half is left, (n + q,)."""
+        variances, directions = np.linalg.eigh(self.left)
+        part: NDArray[np.bool_] = (directions[:, variances > _LEFT**2] ** 2).sum(axis=1) > _PART
+        return part
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """Where a recording leads a model: measured states, and others as the model has them.
+
+    Attributes
+    ----------
+    samples : (k,) places in the recording, some of many.
+    x : (k, n) states.
+    u : (k, m + q) measured inputs, and corrections, which are zero.
+    """
+
+    samples: NDArray[np.int_]
+    x: Matrix
+    u: Matrix
+
+
+@dataclass(frozen=True)
 class CaseObservability:
     """Tests of several models along one recording.
 
@@ -243,6 +339,7 @@ class CaseObservability:
     run : the estimate that makes the trajectory.
     judged : (m,) windows that end in the time that is judged.
     tests : one per model, with the same windows.
+    information : of the whole recording, by the observer's model; None where there is none.
     """
 
     system: System
@@ -250,12 +347,15 @@ class CaseObservability:
     run: Run
     judged: NDArray[np.bool_]
     tests: tuple[WindowTest, ...]
+    information: Information | None
 
 
 def case_observability(
     system: System, scales: Mapping[str, Vector], case: Case
 ) -> CaseObservability:
     """Test models along one recording, where the disturbance observer takes it to be.
+
+    Where outputs do not show all that it needs, at nominal quantities and measured outputs.
 
     Parameters
     ----------
@@ -267,16 +367,30 @@ def case_observability(
         If the observer fails.
     """
     with open_model(system, OBSERVER) as fmu:
-        gains = DisturbanceObserver.default_gains(fmu, system)
-        run = replay(case, DisturbanceObserver(fmu, system, gains))
+        whole = information(fmu, system, case)
+        try:
+            gains = DisturbanceObserver.default_gains(fmu, system)
+            run = replay(case, DisturbanceObserver(fmu, system, gains))
+        except InputError:
+            run = replay(case, OpenLoop(fmu, system, OpenLoop.default_gains(fmu, system)))
+            run = replace(run, estimate=_measured(case, system, run))
     if run.ending is not Ending.OK:
         raise FMUError(f"{case.name}: {run.ending.value} {run.message}".strip())
-    tests = []
+    tests, unknowns = [], max(map(len, scales.values())) + len(system.estimated)
     for role, scale in scales.items():
         with open_model(system, role) as fmu:
-            tests.append(window_test(fmu, system, case, run, scale))
+            tests.append(window_test(fmu, system, case, run, scale, unknowns))
     counted = np.isin(tests[0].time, case.time[judged_window(case, system)])
-    return CaseObservability(system, case, run, counted, tuple(tests))
+    return CaseObservability(system, case, run, counted, tuple(tests), whole)
+
+
+def _measured(case: Case, system: System, run: Run) -> Matrix:
+    """An open loop's estimate, (n, w), with outputs as measured; samples that are missing hold."""
+    columns = {name: run.signal(name) for name in run.columns}
+    for output in system.outputs:
+        known = np.isfinite(case[output.name])
+        columns[output.name] = np.interp(case.time, case.time[known], case[output.name][known])
+    return np.column_stack(list(columns.values()))
 
 
 def linear_test(fmu: FMU, system: System, point: OperatingPoint | None = None) -> LinearTest:
@@ -287,15 +401,19 @@ def linear_test(fmu: FMU, system: System, point: OperatingPoint | None = None) -
     Gramian are squared ratios of signal to noise.
     """
     x, u = settle(fmu, system, point or system.tested)
-    count, second = len(fmu.states), max(round(1.0 / system.sample_time), 1)
+    count, second = len(fmu.states), max(round(tested_span(system) / system.sample_time), 1)
     repeated = (second + 1, 1)
-    time = np.arange(second + 1) / second
+    time = tested_span(system) * np.arange(second + 1) / second
     model = linearise_along(fmu, system, time, np.tile(x, repeated), np.tile(u, repeated))
     response = np.vstack([np.zeros((count, len(system.estimated))), np.diag(prior(system))])
     scale = np.zeros(count)
     for Phi in model.Phi[:-1]:
         response = Phi @ response
-        scale = np.maximum(scale, np.abs(response[:count]).max(axis=1))
+        scale = np.maximum(scale, np.abs(response[:count]).max(axis=1, initial=0.0))
+    spreads = start_spreads(fmu, system)
+    still = scale <= _NOTHING * spreads
+    declared = np.array([name in system.spreads for name in fmu.states], bool)
+    scale = np.where(still | declared, np.maximum(scale, spreads), scale)
     gramian = gramians(model, np.zeros(1, int), second)[0, :count, :count]
     scaled = gramian * np.outer(scale, scale)
     information, directions = np.linalg.eigh(scaled)
@@ -310,85 +428,97 @@ def linear_test(fmu: FMU, system: System, point: OperatingPoint | None = None) -
     )
 
 
-def window_test(fmu: FMU, system: System, case: Case, run: Run, scale: Vector) -> WindowTest:
+def window_test(
+    fmu: FMU, system: System, case: Case, run: Run, scale: Vector, unknowns: int
+) -> WindowTest:
     """Test a model along a recording, in windows of WINDOW seconds.
+
+    Of more where few samples are in them: k samples can show k unknowns, and twice as many leave
+    some to average.
 
     Parameters
     ----------
     run : an estimate that follows the recording; its outputs and quantities make the trajectory.
         The tests hold there, and an estimate that errs may be at a place where more is known.
     scale : (k,) of the model's states, see LinearTest.
+    unknowns : states and quantities of the largest model that is tested beside it.
     """
     count = len(fmu.states)
     x, u = follow(fmu, system, case, run)
     model = linearise_along(fmu, system, case.time, x, u)
     step = (case.time[-1] - case.time[0]) / (case.time.size - 1)
-    length = min(max(round(WINDOW / step), 2), case.time.size)
-    starts = np.arange(0, case.time.size - length + 1, max(round(STRIDE / step), 1))
+    length = min(max(round(WINDOW / step), 2 * unknowns), case.time.size)
+    stride = max(round(STRIDE / step), 1)
+    starts = np.arange(0, case.time.size - length + 1, stride)
     before = np.concatenate([scale, prior(system)])
     scaled = gramians(model, starts, length) * np.outer(before, before)
     return WindowTest(
         model=fmu.name.rpartition(".")[2],
         states=fmu.states,
         time=case.time[starts + length - 1],
+        span=round(length * step, 9),
         remaining=remaining(scaled)[:, :count],
         bound=bounds(model, starts, length, before)[:, count:],
         serving=np.array([quantity.useful for quantity in system.estimated]),
     )
 
 
-def inseparable(fmu: FMU, system: System, case: Case) -> dict[tuple[str, ...], float]:
-    """Estimated quantities that a recording cannot tell apart, and their correlation.
-
-    By the Fisher information of the whole recording on starts and constant quantities, at nominal
-    quantities: a filter that linearises where its estimate is gains information that is none. Of
-    a direction of several quantities half of what was unknown before is left.
-    Source: S. Huang, G. Dissanayake (2007), IEEE Trans. Robotics 23, 1036-1049 (estimates of
-    filters that are too sure as they linearise at changing points).
-    """
-    q = len(system.estimated)
-    if q < 2 or case.time.size < 3:
-        return {}
-    kept = np.unique(np.linspace(0, case.time.size - 1, _POINTS).astype(int))
+def trajectory(fmu: FMU, system: System, case: Case) -> Trajectory | None:
+    """Lead a model along a recording, at nominal quantities; None where samples are missing."""
     held = [output.name for output in system.outputs if output.name in fmu.states]
-    values = np.column_stack([case[name][kept] for name in held]) if held else None
-    if values is not None and not np.isfinite(values).all():
-        return {}
-    places = [fmu.states.index(name) for name in held]
+    kept = np.unique(np.linspace(0, case.time.size - 1, _POINTS).astype(int))
+    u = np.column_stack([case.u[kept], np.zeros((kept.size, len(system.estimated)))])
+    values = np.column_stack([case[name][kept] for name in held]) if held else u[:, :0]
+    if not np.isfinite(values).all() or not np.isfinite(u).all():
+        return None
     fmu.begin_at(case.model_time)
-    fmu.start({} if values is None else dict(zip(held, values[0], strict=True)))
-    u = np.column_stack([case.u[kept], np.zeros((kept.size, q))])
-    inputs = fmu.variables(_inputs(system))
-    x = np.tile(fmu.get_states(), (kept.size, 1))
-    if values is not None:
-        x[:, places] = values
-    if len(fmu.states) > len(held):
-        for k, h in enumerate(np.diff(case.time[kept])):
-            fmu.set_time(fmu.start_time + case.time[kept[k]] - case.time[0])
-            fmu.set_states(x[k])
-            fmu.set(inputs, u[k])
-            free = fmu.step(h)
-            if values is not None:
-                free[places] = values[k + 1]
-            x[k + 1] = free
-    model = linearise_along(fmu, system, case.time[kept], x, u)
-    n = len(fmu.states)
-    sizes = {v.name: abs(v.nominal or 1.0) for v in fmu.description.variables}
-    states = [max(system.spreads.get(name, 0.0), sizes[name]) for name in fmu.states]
-    before = np.array([*states, *prior(system)])
-    share = case.time.size / kept.size  # each point stands for so many samples
-    gramian = share * gramians(model, np.zeros(1, int), kept.size)[0]
-    left = np.linalg.inv(np.eye(n + q) + gramian * np.outer(before, before))[n:, n:]
-    if not np.isfinite(left).all():
-        return {}
-    known_of = {}
-    variances, directions = np.linalg.eigh(left)
-    for variance, direction in zip(variances, directions.T, strict=True):
-        of = np.flatnonzero(direction**2 > _PART)
-        if variance > _LEFT**2 and of.size > 1:
-            known = left[of[0], of[1]] / np.sqrt(left[of[0], of[0]] * left[of[1], of[1]])
-            known_of[tuple(system.estimated[i].name for i in of)] = float(known)
-    return known_of
+    return Trajectory(kept, _led(fmu, system, case.time[kept], held, values, u), u)
+
+
+def information(fmu: FMU, system: System, case: Case) -> Information | None:
+    """Fisher information of a whole recording on states and quantities; None where none is told.
+
+    At nominal quantities: a filter that linearises where its estimate is gains information that is
+    none. Source: S. Huang, G. Dissanayake (2007), IEEE Trans. Robotics 23, 1036-1049.
+    """
+    path = trajectory(fmu, system, case) if case.time.size > 2 else None
+    if path is None or not system.estimated:
+        return None
+    model = linearise_along(fmu, system, case.time[path.samples], path.x, path.u)
+    before = np.array([*start_spreads(fmu, system), *prior(system)])
+    # In units of what is known before: an information of starts, summed over the recording, would
+    # grow beyond all numbers where a model is unstable, as a wheel near standstill is.
+    size = np.where(before > 0.0, before, 1.0)
+    Phi, C = model.Phi * size / size[:, None], model.C * size
+    R = model.R * path.samples.size / case.time.size  # each point stands for so many samples
+    P, identity = np.diag(np.sign(before)), np.eye(before.size)
+    for k in range(path.samples.size):
+        gain = np.linalg.solve(C[k] @ P @ C[k].T + np.diag(R[k]), C[k] @ P).T
+        kept = identity - gain @ C[k]
+        P = kept @ P @ kept.T + gain * R[k] @ gain.T
+        if k + 1 < path.samples.size:
+            P = Phi[k] @ P @ Phi[k].T
+    if not np.isfinite(P).all():
+        return None
+    quantities = tuple(quantity.name for quantity in system.estimated)
+    ruled = frozenset(quantities_with_rules(system))
+    return Information(fmu.states, quantities, P, ruled)
+
+
+def guesses(inseparable: Mapping[tuple[str, ...], float], untold: Sequence[str]) -> list[str]:
+    """What is said of quantities that a recording does not tell, see `Information`."""
+    together = [
+        f"{' and '.join(names)} cannot be told apart by this recording (correlation "
+        f"{correlation:.4f}): their estimates are guesses, and others fit as well. Estimate "
+        "one of them, or record what moves one of them alone"
+        for names, correlation in inseparable.items()
+    ]
+    alone = [
+        f"{name} is not shown by this recording, which tells less than half of what is not known "
+        "of it: its estimate is a guess. Record what moves it, or give it a known value"
+        for name in untold
+    ]
+    return together + alone
 
 
 def follow(fmu: FMU, system: System, case: Case, run: Run) -> tuple[Matrix, Matrix]:
@@ -402,25 +532,32 @@ def follow(fmu: FMU, system: System, case: Case, run: Run) -> tuple[Matrix, Matr
     u : (n, m + q) measured inputs, corrections.
     """
     held = [output.name for output in system.outputs if output.name in fmu.states]
-    places = [fmu.states.index(name) for name in held]
     values = np.column_stack([run.signal(name) for name in held]) if held else case.y[:, :0]
-    fmu.begin_at(case.model_time)
-    fmu.start(dict(zip(held, values[0], strict=True)))
     corrections = [
         run.signal(quantity.name) - fmu.defaults[quantity.name] for quantity in system.estimated
     ]
     u = np.column_stack([case.u, *corrections])
+    fmu.begin_at(case.model_time)
+    return _led(fmu, system, case.time, held, values, u), u
+
+
+def _led(
+    fmu: FMU, system: System, time: Vector, held: Sequence[str], values: Matrix, u: Matrix
+) -> Matrix:
+    """States, (n, k), of a model of which some are held at values, (n, h), and others follow."""
+    places = [fmu.states.index(name) for name in held]
+    fmu.start(dict(zip(held, values[0], strict=True)))
     inputs = fmu.variables(_inputs(system))
-    x = np.tile(fmu.get_states(), (case.time.size, 1))
+    x = np.tile(fmu.get_states(), (time.size, 1))
     x[:, places] = values
     if len(fmu.states) > len(held):
-        for k, h in enumerate(np.diff(case.time)):
-            fmu.set_time(fmu.start_time + case.time[k] - case.time[0])
+        for k, h in enumerate(np.diff(time)):
+            fmu.set_time(fmu.start_time + time[k] - time[0])
             fmu.set_states(x[k])
             fmu.set(inputs, u[k])
             x[k + 1] = fmu.step(h)
             x[k + 1, places] = values[k + 1]
-    return x, u
+    return x
 
 
 def linearise_along(fmu: FMU, system: System, time: Vector, x: Matrix, u: Matrix) -> SampledModel:

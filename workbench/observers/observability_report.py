@@ -9,11 +9,12 @@ import pandas as pd
 
 from workbench.observers.observability import (
     STRIDE,
-    WINDOW,
     CaseObservability,
     LinearTest,
     WindowTest,
+    guesses,
     prior,
+    tested_span,
 )
 from workbench.pages.answer import Answer, Measure, with_answer
 from workbench.pages.figures import CaseFigure, Curve, Panel, save_figure, styled
@@ -129,8 +130,9 @@ def write_observability(
             signal.name: {"absolute": signal.noise, "relative": signal.relative_noise}
             for signal in (*system.inputs, *system.outputs)
         },
-        "window_s": WINDOW,
-        "stride_s": STRIDE,
+        "window_s": done[0].tests[0].span,
+        "stride_s": max(STRIDE, system.sample_time),
+        "linear_s": tested_span(system),
         "prior": dict(zip(system.corrections, prior(system).tolist(), strict=True)),
         "useful": {quantity.correction: quantity.useful for quantity in system.estimated},
         "linear": {test.model: _linear(test) for test in linear},
@@ -138,6 +140,7 @@ def write_observability(
             result.case.name: {
                 "title": result.case.title,
                 "judged_windows": int(result.judged.sum()),
+                "warnings": _guesses(result),
                 **{f"median_{name}": value for name, value in _medians(result).items()},
                 "models": {test.model: _shares(test, result) for test in result.tests},
             }
@@ -145,6 +148,12 @@ def write_observability(
         },
     }
     write_json(path, with_answer(observed(system, summary), summary))
+
+
+def _guesses(result: CaseObservability) -> list[str]:
+    """What the whole recording does not tell, or not apart."""
+    known = result.information
+    return [] if known is None else guesses(known.inseparable, known.untold)
 
 
 def _linear(test: LinearTest) -> dict[str, Any]:
@@ -193,6 +202,7 @@ def format_observability(
     """Table for the terminal: linear test by model and state, shares of judged time by case."""
     return "\n".join(
         [
+            *(f"{result.case.name}: {text}." for result in done for text in _guesses(result)),
             *_linear_lines(system, linear),
             "",
             *_case_lines(system, done),
@@ -204,8 +214,9 @@ def format_observability(
 
 
 def _linear_lines(system: System, linear: Sequence[LinearTest]) -> list[str]:
+    span = tested_span(system)
     lines = [
-        f"Linear test: one second at {_point(system)}; left = standard deviation after it over "
+        f"Linear test: {span:g} s at {_point(system)}; left = standard deviation after it over "
         "before it"
     ]
     for test in linear:
@@ -240,9 +251,10 @@ def _case_lines(system: System, done: Sequence[CaseObservability]) -> list[str]:
     )
     hidden = [name for name in last.states if name not in first.states]
     header += "".join(f"{name:>11}" for name in hidden)
+    span = first.span
     lines = [
-        f"Share of time {system.objective.when or 'that is judged'} in which {WINDOW:g} s of "
-        f"samples tell: {', '.join(system.corrections)} ({first.model})"
+        f"Share of time {system.objective.when or 'that is judged'} in which {span:g} s of samples "
+        f"tell: {', '.join(system.corrections)} ({first.model})"
         + (f", states ({last.model})" if hidden else ""),
         header,
         "-" * len(header),
@@ -293,6 +305,9 @@ def write_observability_page(
         parts.insert(2, Part("others", "The other recordings", others))
     missing = planned - len(done)
     warnings = [f"Incomplete: {len(done)} of {planned} recordings, interrupted."] * bool(missing)
+    warnings += [
+        f"{name}: {text}." for name, c in summary["cases"].items() for text in c["warnings"]
+    ]
     title = f"What the measurements can tell: {names}"
     page = Page(title, parts, "observability.json", warnings=warnings)
     return page.write(summary, out / "index.html")
@@ -307,7 +322,7 @@ _EXPLAINED = (
 
 
 _LINEAR = (
-    "One second about one operating point: what is left of the standard deviation of a state after "
+    "Some time about one operating point: what is left of the standard deviation of a state after "
     "it, over that before it. A state that keeps nearly all of it cannot be observed there."
 )
 
@@ -411,7 +426,7 @@ def _states(summary: Mapping[str, Any]) -> list[Table]:
         ]
         columns = (
             "state",
-            Numbers("left after a second [%]"),
+            Numbers(f"left after {summary['linear_s']:g} s [%]"),
             Numbers("scale [unit of the state]"),
             "verdict",
         )
@@ -430,13 +445,14 @@ def _verdict(name: str, test: Mapping[str, Any]) -> str:
 def _terms(summary: Mapping[str, Any]) -> dict[str, str]:
     return {
         "Bound": "Cramer-Rao: no unbiased estimator has a smaller standard deviation, given the "
-        f"noise of the sensors and {WINDOW:g} s of samples, with what is known beforehand.",
+        f"noise of the sensors and {summary['window_s']:g} s of samples, with what is known "
+        "beforehand.",
         "Can be told": "The bound is below the value from which on an estimate serves, which the "
         "system file gives for each quantity ("
         + ", ".join(f"{name} {value:g}" for name, value in summary["useful"].items())
         + ").",
-        "Rank": "Number of directions in the space of states that one second of outputs shows "
-        "beyond their noise.",
+        "Rank": "Number of directions in the space of states that "
+        f"{summary['linear_s']:g} s of outputs show beyond their noise.",
     }
 
 
@@ -478,4 +494,6 @@ def observed(system: System, summary: Mapping[str, Any]) -> Answer:
     states = f"All states of {first} {seen} be observed in the linear test."
     if not test["observable"]:
         states = f"Not all states of {first} can be observed: {', '.join(test['unobservable'])}."
-    return Answer(f"{said[:1].upper()}{said[1:]}{states}", headline, details)
+    texts = dict.fromkeys(text for values in cases.values() for text in values["warnings"])
+    doubts = "".join(f"{text.partition(':')[0]}. " for text in texts)
+    return Answer(f"{doubts}{said[:1].upper()}{said[1:]}{states}", headline, details)

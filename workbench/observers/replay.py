@@ -79,7 +79,10 @@ def replay(case: Case, estimator: Estimator) -> Run:
         ending=ending,
         message=message,
         seconds=seconds,
-        claimed=validity or {name: np.zeros(case.time.size, bool) for name in _doubted(estimator)},
+        claimed=validity
+        or {
+            name: np.zeros(case.time.size, bool) for name in quantities_with_rules(estimator.system)
+        },
         probability=dict(zip(estimator.modes, np.asarray(estimate.probability).T, strict=True)),
     )
 
@@ -102,18 +105,16 @@ def with_indirect(system: System, values: Matrix, sigma: Matrix) -> tuple[Matrix
     return np.hstack(more), np.hstack(deviations)
 
 
-def _rules(estimator: Estimator) -> Mapping[str, object]:
+def _rules(system: System) -> Mapping[str, object]:
     """Rules of the system's plugin on when a quantity is shown, by its name."""
-    return load(find_plugin(estimator.system.plugin).validity) or {}
+    return load(find_plugin(system.plugin).validity) or {}
 
 
-def _doubted(estimator: Estimator) -> list[str]:
-    """Estimated quantities that are not always shown."""
-    rules = _rules(estimator)
+def quantities_with_rules(system: System) -> list[str]:
+    """Estimated quantities that are not always shown, and of which the machine says where."""
+    rules = _rules(system)
     return [
-        quantity.name
-        for quantity in estimator.system.estimated
-        if quantity.claimed or quantity.name in rules
+        quantity.name for quantity in system.estimated if quantity.claimed or quantity.name in rules
     ]
 
 
@@ -126,9 +127,9 @@ def _claims(
     linearised filter first sees a quantity, a noisy sample may lead it far off, and makes it sure.
     So the rule must be met for as long as the quantity takes to walk as far as is useful.
     """
-    rules, system = _rules(estimator), estimator.system
+    rules, system = _rules(estimator.system), estimator.system
     validity = {}
-    for name in _doubted(estimator):
+    for name in quantities_with_rules(estimator.system):
         quantity = next(quantity for quantity in system.estimated if quantity.name == name)
         met = all(
             key in estimator.finds or case.conditions[key] == value

@@ -12,7 +12,8 @@ from markupsafe import Markup
 from scipy.stats import t
 
 from workbench.observers import label
-from workbench.observers.simulation import CaseResult, narrow_bands
+from workbench.observers.simulation import CaseResult
+from workbench.observers.trust import Contradiction, contradiction_lines
 from workbench.pages.answer import Answer, Measure, recordings, with_answer
 from workbench.pages.figures import CaseFigure
 from workbench.pages.measures import percentage
@@ -68,8 +69,8 @@ def format_table(system: System, results: Sequence[CaseResult]) -> str:
     when = f" {objective.when}" if objective.when else ""
     limits = ", ".join(filter(None, (below(system), window(system))))
     lines = [f"Error of {objective.signal}, rms / mean{when} ({limits})"]
-    lines += [f"{result.case.name}: {guess}." for result in results for guess in result.guesses()]
-    lines += narrow_bands({result.case.name: result.contradicted for result in results})
+    lines += warning_lines({result.case.name: result.warnings() for result in results})
+    lines += contradiction_lines({result.case.name: result.contradictions for result in results})
     lines += [header, "-" * len(header)]
     for result in results:
         cells = [_percent(result.scores[name].nrmse) for name in names]
@@ -187,7 +188,7 @@ def simulated(system: System, summary: Mapping[str, Any]) -> Answer:
         for name, score in values["estimators"].items()
     }
     count = len(summary["cases"])
-    trust = "".join(f" {line.partition(' Either')[0]}" for line in _contradictions(summary))
+    trust = "".join(f" {line}" for line in _contradictions(summary))
     if best.worst is None:
         sentence = f"{len(ranking)} estimators ran on {recordings(count)}; none could be judged."
         return Answer(sentence + trust, headline, details)
@@ -254,11 +255,12 @@ def write_page(
         f"<strong>Incomplete:</strong> {len(order)} of {planned} cases, because the run was "
         "interrupted."
     )
+    warnings = {name: case["warnings"] for name, case in summary["cases"].items()}
     page = Page(
         title=f"{capital(quantity)} estimated on {recordings(len(order))}",
         parts=parts,
         warnings=[incomplete] * (missing > 0)
-        + [Markup.escape(line) for line in _contradictions(summary)],
+        + [Markup.escape(line) for line in warning_lines(warnings) + _contradictions(summary)],
         run=_run(system, summary),
     )
     page.write(summary, path)
@@ -347,7 +349,28 @@ def _cases(
 
 
 def _contradictions(summary: Mapping[str, Any]) -> list[str]:
-    return narrow_bands({name: case["contradicted"] for name, case in summary["cases"].items()})
+    tested = {
+        name: {
+            estimator: [Contradiction(**test) for test in tests]
+            for estimator, tests in case["contradictions"].items()
+        }
+        for name, case in summary["cases"].items()
+    }
+    return contradiction_lines(tested)
+
+
+def warning_lines(warnings: Mapping[str, Sequence[str]]) -> list[str]:
+    """What is said of recordings first, by recording: each sentence once, with where it holds."""
+    cases: dict[str, list[str]] = {}
+    for name, texts in warnings.items():
+        for text in texts:
+            cases.setdefault(text, []).append(name)
+    return [
+        f"{', '.join(names) if len(names) < len(warnings) else 'All recordings'}: {text}."
+        if len(warnings) > 1
+        else f"{names[0]}: {text}."
+        for text, names in cases.items()
+    ]
 
 
 def _doubts(system: System, summary: Mapping[str, Any], order: Sequence[str]) -> list[Text]:

@@ -2,14 +2,14 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, nullcontext
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
+from functools import cached_property
 from itertools import cycle
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
-from scipy.stats import chi2
 
 from workbench.arrays import Vector
 from workbench.errors import FMUError, InputError
@@ -17,7 +17,7 @@ from workbench.models.fmu import FMU
 from workbench.observers import Estimator, Gains, label
 from workbench.observers.estimators.smoother import Smoother
 from workbench.observers.gains_file import read_gains, usual_gains
-from workbench.observers.observability import inseparable
+from workbench.observers.observability import guesses, information
 from workbench.observers.replay import observed, replay
 from workbench.observers.run import (
     Ending,
@@ -34,6 +34,14 @@ from workbench.observers.score import (
     score,
     scored_column,
     with_readings,
+)
+from workbench.observers.trust import (
+    Contradiction,
+    contradiction_lines,
+    contradictions,
+    normalised_innovations,
+    sampling_doubt,
+    start_doubt,
 )
 from workbench.pages.figures import ESTIMATORS, CaseFigure, Curve, Panel
 from workbench.pages.views import (
@@ -55,13 +63,6 @@ from workbench.system.system import System
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-# A 95 % band of deviations that are too small by the root of this covers 93 %.
-OVERCONFIDENT = (1.960 / 1.812) ** 2
-
-
-_CHANCE = 1e-3  # of a recording whose innovations contradict bands that hold
-
-
 # [byte] that a smoother may take that nobody asked for; for each sample, it keeps five matrices.
 _MOST = 5e8
 
@@ -73,7 +74,11 @@ class CaseResult:
     Attributes
     ----------
     reference : the smoother's estimate, where no sensor is only there to judge by; else None.
-    inseparable : estimated quantities that the recording cannot tell apart, and their correlation.
+    inseparable : estimated quantities that the recording cannot tell apart, and states
+        among them, and their correlation.
+    untold : estimated quantities that it does not show, whatever others are.
+    doubts : what is said of its start, and of its samples beside the model's time constants.
+    resolved : whether its samples resolve the model, see `trust.sampling_doubt`.
     """
 
     system: System
@@ -82,6 +87,9 @@ class CaseResult:
     scores: Mapping[str, Score]
     reference: Run | None
     inseparable: Mapping[tuple[str, ...], float] = field(default_factory=dict)
+    untold: tuple[str, ...] = ()
+    doubts: tuple[str, ...] = ()
+    resolved: bool = True
 
     def measured(self) -> Vector | None:
         """The judged signal as it judges, below the bandwidth, (n,); None if not measured."""
@@ -105,47 +113,56 @@ class CaseResult:
 
         Of the whole recording where nothing is judged. The first sample has no innovation.
         """
-        return self._tested(name)[0]
+        nis, counts = normalised_innovations(self.case, self.runs[name], self.system)
+        return float(nis.sum() / counts.sum()) if counts.sum() else 0.0
+
+    @cached_property
+    def contradictions(self) -> dict[str, list[Contradiction]]:
+        """Tests of innovations that contradict the bands of estimators, see `trust`."""
+        tested = {
+            name: contradictions(self.case, run, self.system, self._reason)
+            for name, run in self.runs.items()
+        }
+        return {name: tests for name, tests in tested.items() if tests}
+
+    @property
+    def _reason(self) -> str:
+        """Why bands are too narrow, where the recording shows it by itself."""
+        if not self.resolved:
+            return "samples are too far apart for the model's fastest time constant"
+        guessed = " and ".join(self.guessed)
+        return f"estimates wander, as the recording does not tell {guessed}" if guessed else ""
 
     @property
     def contradicted(self) -> dict[str, float]:
-        """Estimators whose innovations contradict their bands, and `surprise` of each.
+        """Estimators whose innovations are larger than their bands allow, and `surprise` of each.
 
-        The sum of normalised innovations squared is larger than chance makes it once in a thousand
-        recordings, and their mean so large that a 95 % band would cover less than 93 %.
-        Source: Y. Bar-Shalom, X.-R. Li, T. Kirubarajan, Estimation with Applications to Tracking
-        and Navigation, Wiley 2001, section 5.4.
+        The other tests stand in `contradictions`.
         """
-        tested = {name: self._tested(name) for name in self.runs}
         return {
-            name: ratio
-            for name, (ratio, chance) in tested.items()
-            if ratio > OVERCONFIDENT and chance < _CHANCE
+            name: test.value
+            for name, tests in self.contradictions.items()
+            for test in tests
+            if test.test == "variance" and test.narrow
         }
 
     def guesses(self) -> list[str]:
-        """What is said of quantities that the recording cannot tell apart."""
-        return [
-            f"{' and '.join(names)} cannot be told apart by this recording (correlation "
-            f"{correlation:.4f}): their estimates are guesses, and others fit as well. Estimate "
-            "one of them, or record what moves one of them alone"
-            for names, correlation in self.inseparable.items()
-        ]
+        """What is said of quantities that the recording does not tell, or not apart."""
+        return guesses(self.inseparable, self.untold)
 
-    def _tested(self, name: str) -> tuple[float, float]:
-        """Mean of the NIS over that of chi-squared, and how likely chance makes it as large."""
-        window, run = judged_window(self.case, self.system), self.runs[name]
-        if window.stop == window.start:
-            window = slice(None)
-        known = np.isfinite(run.nis[window])
-        if run.ending is not Ending.OK or not known.any():
-            return 0.0, 1.0
-        nis = run.nis[window][known]
-        fed = [signal in run.columns for signal in (*self.case.outputs, *self.case.aids)]
-        counts = np.isfinite(self.case.y[window][:, fed]).sum(axis=1)[known]
-        if not counts.any():
-            return 0.0, 1.0
-        return float(nis.mean() / counts.mean()), float(chi2.sf(nis.sum(), counts.sum()))
+    def useless(self, name: str) -> bool:
+        """Whether 95 % bands of an estimator miss more often than they hold, by its innovations."""
+        return any(test.useless and test.narrow for test in self.contradictions.get(name, ()))
+
+    @property
+    def guessed(self) -> list[str]:
+        """Estimated quantities of which no estimate can be claimed."""
+        together = {name for names in self.inseparable for name in names}
+        return [q.name for q in self.system.estimated if q.name in {*together, *self.untold}]
+
+    def warnings(self) -> list[str]:
+        """What is said first of the recording: guesses, and doubts by the model."""
+        return [*self.guesses(), *self.doubts]
 
     def to_frame(self) -> pd.DataFrame:
         """All that the figure of the case shows: time, then `source.signal [unit]`.
@@ -179,8 +196,18 @@ class CaseResult:
         unit = self.system.unit(reference)
         return {
             "title": self.case.title,
-            "doubts": [*self.case.doubts, *self.guesses()],
+            "doubts": [*self.case.doubts, *self.warnings()],
+            "warnings": self.warnings(),
+            "guesses": self.guessed,
+            "inseparable": [
+                {"names": list(names), "correlation": round(correlation, 6)}
+                for names, correlation in self.inseparable.items()
+            ],
             "contradicted": {name: round(ratio, 3) for name, ratio in self.contradicted.items()},
+            "contradictions": {
+                name: [{**asdict(test), "value": round(test.value, 3)} for test in tests]
+                for name, tests in self.contradictions.items()
+            },
             "reference": None if self.reference is None else self.reference.estimator,
             "estimators": {
                 name: {
@@ -199,7 +226,7 @@ class CaseResult:
         """Scores by estimator, for people."""
         table = pd.DataFrame(self.to_dict()["estimators"]).T
         title = f"{self.case.name}: {self.case.title}"
-        lines = [*self.guesses(), *narrow_bands({self.case.name: self.contradicted})]
+        lines = [*self.warnings(), *contradiction_lines({self.case.name: self.contradictions})]
         return "\n".join([title, *lines, table.to_string(na_rep="n/a")])
 
     def plot(self) -> "Figure":
@@ -251,22 +278,44 @@ class Simulation:
         with self.estimators() as estimators:
             runs = {name: replay(case, estimator) for name, estimator in estimators.items()}
         scores = {name: score(case, run, self.system) for name, run in runs.items()}
-        inseparable, best = self._inseparable(case), self._reference(case, runs)
-        guessed = {name: np.zeros(case.time.size, bool) for names in inseparable for name in names}
+        result = CaseResult(self.system, case, runs, scores, self._reference(case, runs))
+        narrow = any(test.narrow for tests in result.contradictions.values() for test in tests)
+        result = replace(result, **self._knowledge(case, narrow))
+        guessed = {name: np.zeros(case.time.size, bool) for name in result.guessed}
         marked = {
             name: replace(run, claimed={**run.claimed, **guessed}) for name, run in runs.items()
         }
+        best = result.reference
         if best is not None:
             best = replace(best, claimed={**best.claimed, **guessed})
-        return CaseResult(self.system, case, marked, scores, best, inseparable)
+        return replace(result, runs=marked, reference=best)
 
-    def _inseparable(self, case: Case) -> dict[tuple[str, ...], float]:
-        """See `inseparable`; nothing where the model does not run along the recording."""
+    def warnings(self, case: Case) -> list[str]:
+        """What is said first of a recording, see `CaseResult.warnings`, before estimators run."""
+        return CaseResult(self.system, case, {}, {}, None, **self._knowledge(case)).warnings()
+
+    def _knowledge(self, case: Case, narrow: bool = False) -> dict[str, Any]:
+        """What a recording tells, by the model alone, as fields of the result.
+
+        Nothing where the model does not run along the recording.
+
+        Parameters
+        ----------
+        narrow : whether bands are too narrow, so that samples may be too far apart.
+        """
         try:
             with open_model(self.system) as fmu:
-                return inseparable(fmu, self.system, case)
+                known = information(fmu, self.system, case)
+                start = start_doubt(fmu, self.system, case)
+                sampling = sampling_doubt(fmu, self.system, case) if narrow else ""
         except (InputError, FMUError, np.linalg.LinAlgError):
             return {}
+        return {
+            "inseparable": {} if known is None else known.inseparable,
+            "untold": () if known is None else known.untold,
+            "doubts": tuple(doubt for doubt in (start, sampling) if doubt),
+            "resolved": not sampling,
+        }
 
     def _reference(self, case: Case, runs: Mapping[str, Run]) -> Run | None:
         """The smoother's estimate, where a recording has nothing that is only there to judge by."""
@@ -274,30 +323,6 @@ class Simulation:
         if any(signal.name in case for signal in self.system.reference_signals) or kept > _MOST:
             return None
         return runs.get(Smoother.name) or smoothed(case, self.system)
-
-
-def narrow_bands(contradicted: Mapping[str, Mapping[str, float]]) -> list[str]:
-    """What is said of bands that innovations contradict: a sentence for each estimator.
-
-    Parameters
-    ----------
-    contradicted : by recording, see `CaseResult.contradicted`.
-    """
-    cases: dict[str, list[str]] = {}
-    for case, ratios in contradicted.items():
-        for name in ratios:
-            cases.setdefault(name, []).append(case)
-    lines = []
-    for name, where in cases.items():
-        worst = max(where, key=lambda case: contradicted[case][name])
-        count = f"{len(where)} of {len(contradicted)} recordings, worst in {worst}"
-        lines.append(
-            f"Bands of {name} are too narrow in {count if len(contradicted) > 1 else worst}: "
-            f"innovations have {contradicted[worst][name]:.1f} times the variance that it says. "
-            "Either the model lacks something, or noise and walks are larger than the system file "
-            "says, or samples are too far apart for the model's fastest time constant."
-        )
-    return lines
 
 
 def hidden(system: System) -> tuple[str, ...]:
@@ -552,9 +577,7 @@ def _finding(result: CaseResult) -> str:
     share, first, rms = shares[0]
     others = ", ".join(f"{name} {percent(value)}" for value, name, _ in shares[1:])
     trust = "".join(
-        f" The {label(name, system)} is overconfident: its innovations have {ratio:.1f} times the "
-        "variance that it says."
-        for name, ratio in result.contradicted.items()
+        f" {line}" for line in contradiction_lines({result.case.name: result.contradictions})
     )
     return (
         f"The {first} errs least: {percent(share)} of the mean {called(system, signal)}, "

@@ -10,6 +10,7 @@ The paper leaves a physical model of g_D open: `target` is where deviations deca
 that has such a model moves it.
 """
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -172,6 +173,22 @@ def _loop(model, settings, state, steps, u, y, estimates):  # type: ignore[no-un
     return 0
 
 
+def _hidden(A: Matrix, C: Matrix, names: Sequence[str]) -> list[str]:
+    """Names in directions, (s,), that do not fade by themselves and that no output shows.
+
+    A v = lambda v and C v = 0. Source: Hautus (1969), Indagationes Mathematicae 72, 443-448.
+    """
+    hidden: set[int] = set()
+    for rate in np.linalg.eigvals(A):
+        pencil = np.vstack([A - rate * np.eye(len(A)), C])
+        _, sizes, directions = np.linalg.svd(pencil)
+        nothing = len(A) * np.sqrt(np.finfo(float).eps) * sizes.max()
+        if rate.real > -nothing:
+            for direction in directions[sizes <= nothing]:
+                hidden |= set(np.flatnonzero(np.abs(direction) > 0.1 * np.abs(direction).max()))
+    return [names[i] for i in sorted(hidden)]
+
+
 class DisturbanceObserver(Estimator):
     """A model with deviations of quantities as states, corrected by measured outputs.
 
@@ -323,11 +340,14 @@ class DisturbanceObserver(Estimator):
         try:
             covariance = solve_continuous_are(A.T, C.T, np.eye(s + q), np.eye(len(C)))
         except LinAlgError:
+            estimated = (*names, *(quantity.name for quantity in system.estimated))
+            hidden = " and ".join(_hidden(A, C, estimated)) or "a state or quantity"
             raise InputError(
                 where=f"{fmu.place}, {cls.name}",
-                found="a state or quantity that the outputs do not show at the design point",
+                found=f"{hidden}, which the outputs do not show, or not apart, at the design point",
                 expected="a model whose outputs show all that is estimated",
-                remedy="choose another [points.design], or run 'workbench observability'",
+                remedy="choose a [points.design] where each of them moves an output in its own "
+                "way, leave out what nothing shows, or estimate with a filter: --estimator ekf",
             ) from None
         gain = process[:, None] * (covariance @ C.T) / measurement
         L = np.hstack([gain, np.zeros_like(gain)])

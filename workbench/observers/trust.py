@@ -1,0 +1,353 @@
+"""Whether a run may be believed: innovations, start and samples are tested, without the truth.
+
+Where a filter's model, noise levels and start are right, its innovations are white, of mean zero,
+and of the covariance S that it says. So are its residuals after each sample, (n, l), measured less
+estimated outputs: they are R S^-1 times the innovations, where R is the noise of the samples.
+Sources: Y. Bar-Shalom, X.-R. Li, T. Kirubarajan, Estimation with Applications to Tracking and
+Navigation, Wiley 2001, section 5.4; R. K. Mehra (1970), IEEE Trans. Autom. Control 15, 175-184.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.stats import chi2, norm
+
+from workbench.arrays import Vector
+from workbench.models.fmu import FMU
+from workbench.observers import estimators_of
+from workbench.observers.estimators.kalman import ExtendedKalmanFilter
+from workbench.observers.estimators.open_loop import OpenLoop
+from workbench.observers.operating import start_spreads
+from workbench.observers.replay import replay
+from workbench.observers.run import Ending, Run
+from workbench.observers.score import judged_window
+from workbench.recordings.case import Case
+from workbench.system.system import System
+
+# A 95 % band of deviations that are too small by the root of this covers 93 %; of such that are
+# too large by the root of the other, 97 %.
+NARROW, WIDE = (1.960 / 1.812) ** 2, (1.960 / 2.170) ** 2
+
+
+_OFF = 0.335  # deviations; a 95 % band of an estimate that is off by so many covers 93 %
+
+
+# A 95 % band of deviations that are too small by the root of this misses more often than it holds.
+_USELESS = (1.960 / 0.674) ** 2
+
+
+_CHANCE = 1e-3  # of a recording in which a test contradicts what is right
+
+
+_LAGS = 10  # that a test of whiteness looks at; Hyndman and Athanasopoulos (2021), section 5.4
+
+
+_FINE = 4  # steps in place of one, which then errs by a quarter of it, or less
+
+
+@dataclass(frozen=True)
+class Contradiction:
+    """A test of innovations that contradicts the bands of an estimator.
+
+    Attributes
+    ----------
+    test : "variance", "mean" or "whiteness".
+    signal : output whose innovations say so; empty for all together.
+    value : variance of innovations over what the method says [1]; error of the output that stays,
+        in standard deviations of its estimate [1]; covariance of its errors in samples that follow
+        each other, over the variance that the method says [1].
+    narrow : whether bands are too narrow by it, else too wide.
+    reason : the likely one.
+    """
+
+    test: str
+    signal: str
+    value: float
+    narrow: bool
+    reason: str = ""
+
+    @property
+    def excess(self) -> float:
+        """Variance of errors over that which the method says [1]."""
+        return {"mean": 1.0 + self.value**2, "whiteness": max(1.0 + self.value, 0.0)}.get(
+            self.test, self.value
+        )
+
+    @property
+    def useless(self) -> bool:
+        """Whether 95 % bands miss more often than they hold."""
+        return self.excess > _USELESS
+
+    def __str__(self) -> str:
+        if self.test == "variance":
+            return f"innovations have {self.value:.1f} times the variance that it says"
+        of = f"innovations of {self.signal}"
+        if self.test == "mean":
+            return f"{of} have a mean, of {abs(self.value):.1f} standard deviations of its estimate"
+        return (
+            f"{of} follow each other: what they share is {abs(self.value):.1f} times the variance "
+            "that it says"
+        )
+
+
+def tested_window(case: Case, system: System) -> slice:
+    """Samples whose innovations are tested: those that are judged, all where none is.
+
+    Without the first, which has no innovation.
+    """
+    window = judged_window(case, system)
+    first, last = (window.start, window.stop) if window.stop > window.start else (0, case.time.size)
+    return slice(max(first, 1), last)
+
+
+def normalised_innovations(
+    case: Case, run: Run, system: System, window: slice | None = None
+) -> tuple[Vector, Vector]:
+    """Normalised innovations squared of a run, (k,), and of how many outputs each is, (k,)."""
+    window = tested_window(case, system) if window is None else window
+    fed = [signal in run.columns for signal in (*case.outputs, *case.aids)]
+    counts = np.isfinite(case.y[window][:, fed]).sum(axis=1)
+    known = np.isfinite(run.nis[window]) & (counts > 0) & (run.ending is Ending.OK)
+    return run.nis[window][known], counts[known]
+
+
+def contradictions(case: Case, run: Run, system: System, known: str = "") -> list[Contradiction]:
+    """Tests that contradict the bands of a run where it is judged, with likely reasons.
+
+    Parameters
+    ----------
+    known : reason for bands that are too narrow, where the recording shows one by itself.
+    """
+    window = tested_window(case, system)
+    results = _tests(case, run, system, window)
+    if not results:
+        return []
+    later = _tests(case, run, system, slice((window.start + window.stop) // 2, window.stop))
+    lasts = {test.narrow for test in later}
+    follows = any(test.test == "whiteness" for test in results)
+    return [
+        replace(test, reason=_reason(test, known, test.narrow in lasts, follows))
+        for test in results
+    ]
+
+
+def _reason(test: Contradiction, known: str, lasts: bool, follows: bool) -> str:
+    if known and test.narrow:
+        return known
+    if not lasts:
+        return "the start is farther off than it is said to be: later samples contradict nothing"
+    if not test.narrow:
+        return (
+            "walks are smaller than the system file says"
+            if test.test == "whiteness"
+            else "noise or walks are smaller than the system file says"
+        )
+    if test.test == "mean":
+        return "the model lacks something that stays, or a sensor is off"
+    if test.test == "whiteness" or follows:
+        return (
+            "the model lacks something, or what is estimated moves faster than its walk in the "
+            "system file"
+        )
+    return "the noise of the sensors is larger than the system file says"
+
+
+def _tests(case: Case, run: Run, system: System, window: slice) -> list[Contradiction]:
+    """All tests on a piece of a run; none for a method without bands."""
+    nis, counts = normalised_innovations(case, run, system, window)
+    if not nis.size:
+        return []
+    fed = [name for name in (*case.outputs, *case.aids) if name in run.columns]
+    kind = estimators_of(system).get(run.estimator)
+    if kind is not None and kind.offline:  # residuals of samples that it has seen before
+        fed = []
+    residuals = {name: (case[name] - run.signal(name))[window] for name in fed}
+    deviations = {name: run.deviation(name)[window] for name in fed}
+    return variance_test(nis, counts) + residual_tests(residuals, deviations)
+
+
+def variance_test(nis: Vector, counts: Vector) -> list[Contradiction]:
+    """Compare the normalised innovations squared, (n,), with chi-squared of so many outputs, (n,).
+
+    Contradicted where chance makes such a sum once in a thousand recordings, and its mean is such
+    that a 95 % band would cover less than 93 % or more than 97 %.
+    """
+    total, degrees = float(nis.sum()), float(counts.sum())
+    if not degrees:
+        return []
+    ratio = total / degrees
+    # Of two sides, each half of the chance.
+    if ratio > NARROW and chi2.sf(total, degrees) < 0.5 * _CHANCE:
+        return [Contradiction("variance", "", ratio, True)]
+    if ratio < WIDE and chi2.cdf(total, degrees) < 0.5 * _CHANCE:
+        return [Contradiction("variance", "", ratio, False)]
+    return []
+
+
+def residual_tests(
+    residuals: Mapping[str, Vector], deviations: Mapping[str, Vector]
+) -> list[Contradiction]:
+    """Test residuals of each output for a mean and for what follows from one sample to another.
+
+    Both tests norm by the residuals themselves, so that what the noise is called does not matter,
+    nor that it changes: the mean by Student's ratio, whiteness by the portmanteau test of Box and
+    Ljung in the form that allows for changing variances. Source: I. N. Lobato, J. C. Nankervis,
+    N. E. Savin (2001), J. Business & Economic Statistics 19, 198-205.
+
+    Contradicted where chance makes one of the tests so large once in a thousand recordings, and
+    bands that hold 95 % by what the method says would cover less than 93 %, or more than 97 %.
+
+    Parameters
+    ----------
+    residuals : (n,) by output, measured less estimated; NaN where not measured.
+    deviations : (n,) by output, standard deviations of the estimate.
+    """
+    found: list[Contradiction] = []
+    chance = _CHANCE / max(2 * len(residuals), 1)  # of one of so many tests
+    for name, values in residuals.items():
+        known = np.isfinite(values) & np.isfinite(deviations[name])
+        count = int(known.sum())
+        if count <= 2 * _LAGS:
+            continue
+        r, variance = np.where(known, values, 0.0), float(np.mean(deviations[name][known] ** 2))
+        scatter = float(r @ r)
+        if not scatter > 0.0 or not variance > 0.0:
+            continue  # taken as measured
+        off = float(r.sum()) / count / np.sqrt(variance)
+        if abs(off) > _OFF and 2.0 * norm.sf(abs(r.sum()) / np.sqrt(scatter)) < chance:
+            found.append(Contradiction("mean", name, off, True))
+        r = np.where(known, r - r.sum() / count, 0.0)
+        lags = range(1, _LAGS + 1)
+        products = [r[lag:] * r[:-lag] for lag in lags]
+        pairs = [max(int((known[lag:] & known[:-lag]).sum()), 1) for lag in lags]
+        norms = np.array([max(float(p @ p), np.finfo(float).tiny) for p in products])
+        sums = np.array([p.sum() for p in products])
+        statistic = float(np.sum(sums**2 / norms * (count + 2) / (count - np.array(lags))))
+        shared = (sums / pairs / variance)[np.argmax(np.abs(sums) / pairs)]
+        large = shared > NARROW - 1.0 or shared < WIDE - 1.0
+        if large and chi2.sf(statistic, _LAGS) < chance:
+            found.append(Contradiction("whiteness", name, float(shared), bool(shared > 0.0)))
+    return found
+
+
+def contradiction_lines(tested: Mapping[str, Mapping[str, Iterable[Contradiction]]]) -> list[str]:
+    """What is said of bands that innovations contradict: by estimator, a sentence for each side.
+
+    Parameters
+    ----------
+    tested : contradictions by recording and estimator.
+    """
+    cases: dict[tuple[str, bool], dict[str, Contradiction]] = {}
+    for case, estimators in tested.items():
+        for name, tests in estimators.items():
+            for test in tests:
+                worst = cases.setdefault((name, test.narrow), {})
+                if case not in worst or _farther(test, worst[case]):
+                    worst[case] = test
+    lines = []
+    for (name, narrow), worst in cases.items():
+        case = next(iter(worst))
+        for other, test in worst.items():
+            case = other if _farther(test, worst[case]) else case
+        count = f"{len(worst)} of {len(tested)} recordings, worst in {case}"
+        lines.append(
+            f"Bands of {name} are too {'narrow' if narrow else 'wide'} in "
+            f"{count if len(tested) > 1 else case}: {worst[case]}. "
+            f"Likely: {worst[case].reason}."
+        )
+    return lines
+
+
+def _farther(test: Contradiction, other: Contradiction) -> bool:
+    return test.excess > other.excess if test.narrow else test.excess < other.excess
+
+
+def sampling_doubt(fmu: FMU, system: System, case: Case) -> str:
+    """Say that samples are too far apart for the model's steps; empty if more steps change nothing.
+
+    A Kalman filter is run with some steps in place of each, between which nothing is measured. If
+    its innovations then exceed what it says by less than half, steps are the reason.
+    """
+    held = np.array([signal.held for signal in system.inputs], bool)
+    share = np.tile(np.arange(1, _FINE + 1) / _FINE, case.time.size - 1)[:, None]
+    before, after = (np.repeat(side, _FINE, axis=0) for side in (case.u[:-1], case.u[1:]))
+    # A held input has its new value from the sample on, where the last of the steps ends.
+    between = np.where(held & (share < 1.0), before, before + share * (after - before))
+    y = np.full((between.shape[0], case.y.shape[1]), np.nan)
+    y[_FINE - 1 :: _FINE] = case.y[1:]
+    steps = np.append(0.0, np.repeat(np.diff(case.time) / _FINE, _FINE))
+    samples = np.cumsum(steps), np.vstack([case.u[:1], between]), np.vstack([case.y[:1], y])
+    kind = ExtendedKalmanFilter
+    estimator = kind(fmu, system, kind.default_gains(fmu, system))
+    run, size = replay(case, estimator), len(system.columns)
+    fine = estimator.run(*samples)
+    coarse = run.estimate[:, :size], run.sigma[:, :size], run.nis
+    excesses = []
+    for values, sigma, nis in (
+        coarse,
+        (fine.values[::_FINE], fine.sigma[::_FINE], np.asarray(fine.nis)[::_FINE]),
+    ):
+        part = replace(run, columns=system.columns, estimate=values, sigma=sigma, nis=nis)
+        tests = _tests(case, part, system, tested_window(case, system))
+        excesses.append(max((test.excess for test in tests if test.narrow), default=1.0))
+    if run.ending is not Ending.OK or not np.isfinite(fine.values[-1]).any():
+        return ""
+    if not (excesses[0] > NARROW and excesses[1] - 1.0 < 0.5 * (excesses[0] - 1.0)):
+        return ""
+    fastest = np.abs(np.linalg.eigvals(fmu.state_jacobian())).max(initial=np.finfo(float).tiny)
+    return (
+        f"samples {np.median(np.diff(case.time)):.3g} s apart do not resolve the model, whose "
+        f"fastest time constant is {1.0 / fastest:.2g} s at their end: with {_FINE} steps in place "
+        f"of each, errors of a Kalman filter have {excesses[1]:.1f} times the variance that "
+        f"it says, and {excesses[0]:.1f} times without. Record more often"
+    )
+
+
+def start_doubt(fmu: FMU, system: System, case: Case) -> str:
+    """Say which first sample contradicts the start of the model; empty if none does.
+
+    Outputs that are states begin as they are measured. Of the others, what is not known of states
+    and quantities, P, and the noise R of samples say how far they may be: C P C' + R.
+    """
+    others = [
+        (output, float(case[output.name][0]))
+        for output in system.outputs
+        if output.name not in fmu.states and np.isfinite(case[output.name][0])
+    ]
+    if not others or not fmu.states:
+        return ""
+    estimator = OpenLoop(fmu, system, OpenLoop.default_gains(fmu, system))
+    estimator.set_conditions(case.conditions)
+    fmu.begin_at(case.model_time)
+    estimator.start(case.u[0], case.y[0])
+    inputs = [signal.name for signal in system.inputs]
+    fmu.set(fmu.variables(inputs), case.u[0])
+    outputs = fmu.variables([output.name for output, _ in others])
+    by_states, by_quantities, by_inputs = (
+        fmu.jacobian(outputs.references, fmu.variables(names))
+        for names in (list(fmu.states), list(system.corrections), inputs)
+    )
+    measured = {output.name: output.noise_at_scale for output in system.outputs}
+    known = [
+        measured.get(name, spread)
+        for name, spread in zip(fmu.states, start_spreads(fmu, system), strict=True)
+    ]
+    spreads = np.array([*known, *(quantity.spread for quantity in system.estimated)])
+    spreads = np.append(spreads, [signal.noise_at_scale for signal in system.inputs])
+    by_all = np.hstack([by_states, by_quantities, by_inputs]) * spreads
+    says, reads = fmu.get(outputs).copy(), np.array([value for _, value in others])
+    noise = np.array([output.deviation(value) for output, value in others])
+    covariance = by_all @ by_all.T + np.diag(noise**2)
+    off = reads - says
+    if not off @ np.linalg.solve(covariance, off) > chi2.isf(_CHANCE, off.size):
+        return ""
+    deviations = np.sqrt(covariance.diagonal())
+    worst = int(np.abs(off / deviations).argmax())
+    output = others[worst][0]
+    return (
+        f"the first sample of {output.name} is {reads[worst]:.4g} {output.unit}, where the model "
+        f"starts at {says[worst]:.4g} with a standard deviation of {deviations[worst]:.2g}. Check "
+        "unit and zero of the column; or start the model elsewhere, by a condition that sets its "
+        "parameters, or say in [states] spread how little is known of its start"
+    )
