@@ -1,15 +1,21 @@
 """Names and units as recorders write them above samples, and cells that are no numbers."""
 
+import datetime
+import zipfile
 from pathlib import Path
 
 import numpy as np
 import openpyxl
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 from numpy.testing import assert_allclose
 
+from workbench.errors import InputError
 from workbench.recordings.formats import read_recorded_file
 from workbench.recordings.formats.numbers import is_missing
 from workbench.recordings.formats.spelling import named
+from workbench.recordings.formats.stamps import iso
 
 
 def table(path: Path, lines: list[str]) -> Path:
@@ -218,6 +224,52 @@ def test_channels_may_be_rows(tmp_path: Path) -> None:
         ("inflow", "l/s"),
         ("h", "mm"),
     ]
+
+
+def test_a_row_for_each_value_is_read_by_tags(tmp_path: Path) -> None:
+    """As historians of plants export; each tag keeps its own times."""
+    rows = [f"h;2024-03-05 10:00:{k:02d};95{k % 7}.5;mm" for k in range(60)]
+    rows[1::2] = [row.replace("h;", "inflow;").replace(";mm", ";l/s") for row in rows[1::2]]
+    path = table(tmp_path / "a.csv", ["Tag;Time;Value;Unit", *rows])
+    found = {c.name: c for held in read_recorded_file(path).groups for c in held.channels[1:]}
+    assert {name: channel.unit for name, channel in found.items()} == {"h": "mm", "inflow": "l/s"}
+    assert found["h"].values.size == 30
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b'[{"time": 0, "h": 1}]', "text of JSON"),
+        (b"<html><table></table></html>", "text of HTML or XML"),
+        (b"\x93NUMPY\x01\0v\0", r"an array of NumPy \(.npy\)"),
+        (b"SQLite format 3\0", "a database of SQLite"),
+        (b"", "an archive"),
+    ],
+)
+def test_a_format_that_nobody_reads_is_called_by_its_name(
+    tmp_path: Path, content: bytes, words: str
+) -> None:
+    path = tmp_path / "a.dat"
+    path.write_bytes(content)
+    if words == "an archive":
+        with zipfile.ZipFile(path, "w") as archive:
+            archive.writestr("x.csv", "time;h")
+    with pytest.raises(InputError, match=rf"found {words}.*expected a recording as CSV, .xlsx"):
+        read_recorded_file(path)
+
+
+def test_texts_of_parquet_are_dates_times_and_numbers(tmp_path: Path) -> None:
+    moments = [datetime.datetime(2024, 3, 5, 10) + datetime.timedelta(seconds=k) for k in range(60)]
+    content = {
+        "date": [moment.date() for moment in moments],
+        "time": [moment.time() for moment in moments],
+        "h [mm]": [f"{k},5" for k in range(60)],
+    }
+    pq.write_table(pa.table(content), tmp_path / "a.parquet")
+    clock, level = read_recorded_file(tmp_path / "a.parquet").groups[0].channels
+    assert iso(clock.start) == "2024-03-05T10:00:00.000000"
+    assert_allclose(clock.values, np.arange(60.0))
+    assert_allclose(level.values, np.arange(60.0) + 0.5)
 
 
 @pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-16-be", "utf-32", "latin-1"])

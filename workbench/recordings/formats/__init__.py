@@ -9,6 +9,7 @@ import hashlib
 import io
 import struct
 import warnings
+import zipfile
 import zlib
 from collections.abc import Callable
 from contextlib import nullcontext, redirect_stdout
@@ -41,6 +42,19 @@ _PACKAGES = {
 _NATIVE = frozenset({"hdf5", "matlab5", "mdf", "parquet"})
 _MAT_4 = struct.Struct("<5i")  # type, rows, columns, imaginary, length of the name
 _START, _RATE = 60.0, 1e6  # [s] and [byte/s], a twentieth of what they read on a busy machine
+_UNREAD = {  # how files begin that are told, and not read
+    b"\xd0\xcf\x11\xe0": "a workbook of Excel 97 to 2003 (.xls)",
+    b"ARROW1": "a table of Arrow or Feather",
+    b"\x93NUMPY": "an array of NumPy (.npy)",
+    b"\x80\x04\x95": "an object of Python (pickle)",
+    b"SQLite format 3": "a database of SQLite",
+    b"BZh": "a file packed by bzip2",
+    b"7z\xbc\xaf": "an archive (.7z)",
+    b"%PDF": "a PDF",
+    b"<": "text of HTML or XML",
+    b"{": "text of JSON",
+    b"[{": "text of JSON",
+}
 _BEGINS = {  # how files begin, whatever their ending
     b"PAR1": "parquet",
     b"MDF     ": "mdf",
@@ -116,13 +130,7 @@ def _reader(path: Path, raw: bytes) -> _Reader:
     """The reader of a format, by how the file begins."""
     module = next((name for start, name in _BEGINS.items() if raw.startswith(start)), "")
     module = module or "matlab5" * _is_mat_4(raw)
-    if raw.startswith(b"\xd0\xcf\x11\xe0"):
-        raise InputError(
-            where=str(path),
-            found="a workbook of Excel 97 to 2003 (.xls)",
-            expected="a workbook (.xlsx), or a CSV",
-            remedy="save it as .xlsx",
-        )
+    _refuse_unread(path, raw, is_workbook=module == "excel")
     if not module:
         return read_as_text
     package, called = _PACKAGES[module]
@@ -137,6 +145,24 @@ def _reader(path: Path, raw: bytes) -> _Reader:
         ) from None
     reader = partial(_apart if module in _NATIVE else _here, module)
     return partial(_undamaged, reader, called)
+
+
+def _refuse_unread(path: Path, raw: bytes, *, is_workbook: bool) -> None:
+    """Refuse formats that are known, and that nobody reads here."""
+    begin = raw[:2000].lstrip(b"\xef\xbb\xbf \r\n\t")
+    kind = next((kind for start, kind in _UNREAD.items() if begin.startswith(start)), "")
+    if is_workbook and b"[Content_Types].xml" not in raw and zipfile.is_zipfile(io.BytesIO(raw)):
+        kind = "an archive (.zip) or a workbook of another program (.ods)"
+        kind = "arrays of NumPy (.npz)" if b".npy" in begin else kind
+    if kind:
+        raise InputError(
+            where=str(path),
+            found=kind,
+            expected="a recording as CSV, .xlsx, .mat, .h5, .parquet, .tdms or .mf4",
+            remedy="save it as .xlsx"
+            if ".xls)" in kind
+            else "unpack it, or save or export the recording in one of these formats",
+        )
 
 
 def _is_mat_4(raw: bytes) -> bool:

@@ -4,7 +4,7 @@ import math
 import re
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 from itertools import pairwise, zip_longest
 
@@ -75,6 +75,13 @@ _NO_UNIT = re.compile(
     r"|[A-Z]\d{4,}",  # of Graphtec's alarms
     re.IGNORECASE,
 )
+# Columns of a table with a row for each value: whose it is, the value, its unit.
+_PARTS_OF_TAGS = {
+    **dict.fromkeys(("tag", "tagname", "tag name", "signal", "variable", "channel", "name"), "tag"),
+    **dict.fromkeys(("kanal", "sensor", "point", "measurement", "_field", "messstelle"), "tag"),
+    **dict.fromkeys(("value", "wert", "_value", "messwert", "val"), "value"),
+    **dict.fromkeys(("unit", "units", "einheit", "uom"), "unit"),
+}
 # Columns that hold parts of a second beside time stamps, and digits of these.
 _PARTS = {
     **dict.fromkeys(("ms", "msec", "millisecond", "milliseconds", "millisekunden", "millis"), 3),
@@ -333,6 +340,39 @@ def _says_nothing(cell: str) -> bool:
 def _are_units(cells: Sequence[str]) -> bool:
     held = [cell for cell in cells if not _says_nothing(cell) and not is_number(cell)]
     return bool(held) and sum(map(is_unit, held)) >= 0.75 * len(held)
+
+
+def by_tag(table: Cells) -> list[tuple[str, Cells]]:
+    """A table for each signal, where rows hold one value of one signal that a column names.
+
+    So historians of plants export: a tag, a time and a value, perhaps with its unit. A table of any
+    other kind is one, without a name.
+    """
+    columns = [[cell.strip() for cell in column] for column in zip(*table.rows, strict=True)]
+    labels = [named(name)[0].casefold() for name in table.names]
+    at = {part: i for i, name in enumerate(labels) if (part := _PARTS_OF_TAGS.get(name))}
+    if not at.keys() >= {"tag", "value"}:
+        return [("", table)]
+    tags = list(dict.fromkeys(columns[at["tag"]]))
+    if not 1 < len(tags) <= len(table.rows) / _FEWEST or any(map(is_number, tags)):
+        return [("", table)]
+    tables = []
+    for tag in tags:
+        kept = [k for k, own in enumerate(columns[at["tag"]]) if own == tag]
+        names, units = list(table.names), list(table.units)
+        names[at["value"]], names[at["tag"]] = tag, "tag"
+        if "unit" in at:
+            own_units = {columns[at["unit"]][k] for k in kept}
+            units[at["value"]] = spelled(own_units.pop()) if len(own_units) == 1 else ""
+        own_table = replace(
+            table,
+            rows=[table.rows[k] for k in kept],
+            lines=[table.lines[k] for k in kept],
+            names=tuple(names),
+            units=tuple(units),
+        )
+        tables.append((tag, own_table))
+    return tables
 
 
 def read_group(

@@ -8,7 +8,7 @@ from typing import Any
 import openpyxl
 
 from workbench.errors import InputError
-from workbench.recordings.formats.cells import find_table, read_group
+from workbench.recordings.formats.cells import by_tag, find_table, read_group
 from workbench.recordings.formats.contents import Contents, Group
 
 _HOUR = timedelta(hours=1)
@@ -35,13 +35,14 @@ def read(path: Path, raw: bytes) -> Contents:
         filled = [i for i, row in enumerate(rows) if any(row)]
         try:
             table = find_table([rows[i] for i in filled], [i + 1 for i in filled], where)
-            group, _, own = read_group(table, title, where)
+            parts = [read_group(part, tag or title, where) for tag, part in by_tag(table)]
         except InputError as error:
             refusal = error
             if filled:
                 notes.append(f"sheet '{title}' was left out: {error.found}")
             continue
-        groups.append(group)
+        groups += [group for group, *_ in parts]
+        own = list(dict.fromkeys(note for *_, notes_of_part in parts for note in notes_of_part))
         notes += [f"sheet '{title}' is hidden"] * (title in hidden)
         notes += [f"sheet '{title}': {note}" for note in own]
         left = sum(i + 1 >= table.lines[0] for i in filled) - len(table.lines)

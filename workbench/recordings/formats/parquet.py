@@ -8,9 +8,9 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from workbench.recordings.formats.cells import Cells, read_group
 from workbench.recordings.formats.contents import Contents, FileChannel, Group
 from workbench.recordings.formats.spelling import named, spelled
-from workbench.recordings.formats.stamps import is_stamp, read_stamps
 
 _UNITS = (b"unit", b"units", b"Unit", b"Units", b"UNIT")
 _ABOUT = (b"description", b"comment", b"long_name")
@@ -18,9 +18,10 @@ _ABOUT = (b"description", b"comment", b"long_name")
 
 def read(path: Path, raw: bytes) -> Contents:
     """Kind, groups and notes of a Parquet file."""
-    table = pq.read_table(io.BytesIO(raw))
+    table = pq.ParquetFile(io.BytesIO(raw)).read()
     channels: list[FileChannel] = []
     notes: list[str] = []
+    texts: dict[str, list[str]] = {}
     for field, column in zip(table.schema, table.columns, strict=True):
         name, unit = named(field.name)
         known = field.metadata or {}
@@ -38,13 +39,16 @@ def read(path: Path, raw: bytes) -> Contents:
         elif pa.types.is_decimal(kind) or pa.types.is_boolean(kind):
             channels.append(FileChannel(name, unit, _numbers(column.cast(pa.float64())), about))
         else:
-            texts = [str(value) if value is not None else "" for value in column.to_pylist()]
-            stamps = read_stamps(name, texts) if any(map(is_stamp, texts[:100])) else None
-            if stamps is None:
-                notes.append(f"'{name}' holds {kind}")
-            else:
-                channels.append(stamps)
-    return Contents("Parquet", [Group("", tuple(channels))], notes)
+            texts[field.name] = ["" if cell is None else str(cell) for cell in column.to_pylist()]
+    left: tuple[FileChannel, ...] = ()
+    if texts:  # dates, times, or numbers as people write them
+        rows = list(map(list, zip(*texts.values(), strict=True)))
+        lines = list(range(1, len(rows) + 1))
+        cells = Cells(rows, lines, (), tuple(texts), ("",) * len(texts))
+        written, _, own = read_group(cells, "", str(path))
+        channels = [*written.channels, *channels]
+        left, notes = written.left, [*notes, *own]
+    return Contents("Parquet", [Group("", tuple(channels), left=left)], notes)
 
 
 def _first(known: dict[bytes, bytes], keys: tuple[bytes, ...]) -> str:
@@ -64,4 +68,11 @@ def _stamps(name: str, column: pa.ChunkedArray) -> FileChannel:
     if first is None:
         return FileChannel(name, "s", np.full(len(column), math.nan), stamp=True)
     since = pa.compute.subtract(counts, first)
-    return FileChannel(name, "s", _numbers(since) / units, start=first / units, stamp=True)
+    return FileChannel(
+        name,
+        "s",
+        _numbers(since) / units,
+        start=first / units,
+        stamp=True,
+        zoned=column.type.tz is not None,
+    )

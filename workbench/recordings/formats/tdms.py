@@ -12,6 +12,7 @@ from nptdms.log import log_manager
 
 from workbench.recordings.formats.contents import Contents, FileChannel, Group
 from workbench.recordings.formats.spelling import conversion, named, spelled
+from workbench.recordings.formats.stamps import read_stamps
 
 _UNITS = ("unit_string", "NI_UnitDescription", "unit", "Unit", "units")
 
@@ -55,6 +56,8 @@ def _groups(held: Any, notes: list[str]) -> list[Group]:
         elif values.dtype.kind in "fiub":
             about = str(stated.get("description", ""))
             channel = FileChannel(name, unit, np.asarray(values, dtype=np.float64), about)
+        elif (stamps := read_stamps(name, list(map(str, values)))) is not None:
+            channel = stamps
         else:
             notes.append(f"'{name}' holds texts")
             continue

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from workbench.errors import InputError
-from workbench.recordings.formats.cells import Cells, find_table, is_quantity, read_group
+from workbench.recordings.formats.cells import Cells, by_tag, find_table, is_quantity, read_group
 from workbench.recordings.formats.contents import Contents
 from workbench.recordings.formats.numbers import is_missing, is_number
 from workbench.recordings.formats.stamps import is_stamp
@@ -46,7 +46,9 @@ def read(path: Path, raw: bytes) -> Contents:
         table = _of_labview(table)
     # Between commas, a number has a comma only in quotation marks.
     commas = separator != "," or any("," in cell for row in table.rows for cell in row)
-    group, reading, notes = read_group(table, "", str(path), commas=commas)
+    parts = [read_group(own, tag, str(path), commas=commas) for tag, own in by_tag(table)]
+    groups, reading = [group for group, *_ in parts], parts[0][1]
+    notes = list(dict.fromkeys(note for *_, own in parts for note in own))
     words = ["CSV", _SEPARATORS[separator], reading, encoding]
     below = [number for number in numbers if number >= table.lines[0]]
     broken += max(0, len(below) - len(table.lines))
@@ -56,7 +58,7 @@ def read(path: Path, raw: bytes) -> Contents:
         at = f", the first in line {first}" if first else ""
         notes.append(f"{broken} lines that are no samples were left out{at}")
     words.append(f"samples from line {table.lines[0]}")
-    return Contents(", ".join(words), [group], notes)
+    return Contents(", ".join(words), groups, notes)
 
 
 def _decoded(path: Path, raw: bytes) -> tuple[str, str]:
