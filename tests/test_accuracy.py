@@ -16,7 +16,7 @@ from workbench.machines.wheelset.accuracy import (
     fall_delay,
     force_error,
     friction_error,
-    held,
+    held_by_bands,
     minimum_error,
     observe_stop,
     rise_delay,
@@ -100,7 +100,7 @@ def test_friction_of_the_pads_is_recovered(
 @pytest.mark.parametrize("filter_", ["ekf", "ukf", "mhe", "imm", "smoother"])
 def test_the_band_of_a_filter_holds_what_it_says(stops: dict[str, KnownStop], filter_: str) -> None:
     """Stops of seeds 8 to 14 say how wide they are; these are of seed 1."""
-    shares = [held(stop, filter_) for stop in stops.values()]
+    shares = [held_by_bands(stop, filter_) for stop in stops.values()]
     for quantity in COVERED:
         known = [share[quantity].share for share in shares if quantity in share]
         if quantity != "muWR":  # which is claimed in the few stops that use much of the adhesion
@@ -223,7 +223,7 @@ def test_friction_that_a_filter_passes_through_is_not_claimed(
     record(scenario, 7, ORDINARY_PADS, tmp_path / scenario.name)
     (case,), estimator = read_cases([tmp_path], SYSTEM), estimators[observer]
     run = replay(case, estimator)
-    passed = PeakForce(estimator.fmu, SYSTEM).claims(run.estimate)  # the rule alone claims it
+    passed = PeakForce(estimator.fmu, SYSTEM).valid(run.estimate)  # the rule alone claims it
     assert 0.03 < passed.sum() * 0.005 < 0.25
     assert run.signal("muWR")[passed].max() < 0.14
     assert not run.claimed["muWR"].any()

@@ -16,7 +16,7 @@ from workbench.arrays import Vector
 from workbench.machines.wheelset.accuracy import (
     ROWS,
     Accuracy,
-    Held,
+    BandCoverage,
     KnownStop,
     StopAccuracy,
     accuracy,
@@ -196,7 +196,9 @@ def test_an_estimator_that_failed_or_never_arrived_is_not_left_out_of_the_worst(
 
 def test_a_band_that_holds_little_in_one_stop_is_not_hidden_by_the_mean() -> None:
     stops = [
-        stop_of(name, False, False, Accuracy(force=0.01, bands={"Fx": Held(share, np.ones(2))}))
+        stop_of(
+            name, False, False, Accuracy(force=0.01, bands={"Fx": BandCoverage(share, np.ones(2))})
+        )
         for name, share in (("a", 0.98), ("b", 0.7))
     ]
     mean, least = (line.split() for line in format_accuracy(stops).splitlines() if line[:2] == "Fx")

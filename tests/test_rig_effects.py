@@ -193,7 +193,13 @@ def test_planted_film_leaves_with_the_energy_of_its_disc(
 
 def test_a_wet_disc_is_no_wetter_for_a_planted_film() -> None:
     effects = plant(CONSTANT_PADS, ["water_film=0.2"])
-    pads = Pads(effects, 1.0, ("wet", "dry", "wet"), 333.15, 0.0, 1e-3)
+    pads = Pads(
+        effects,
+        dataclasses.replace(SCENARIOS["03_dry_120_3.6"].conditions, discs=("wet", "dry", "wet")),
+        1.0,
+        0.0,
+        1e-3,
+    )
     expected = [0.12, 0.8 * 0.30 + 0.2 * 0.12, 0.12]
     assert pads.friction(10.0, 35e3, 0.0) == pytest.approx(expected, rel=1e-12)
 
@@ -347,7 +353,14 @@ def test_twice_the_roller_loss_is_what_the_drive_does_not_give_back() -> None:
 
 def test_friction_steps_at_90_degrees_of_the_disc() -> None:
     discs = ("dry", "dry", "dry")
-    pads = Pads(plant(CONSTANT_PADS, ["friction_step=-0.1"]), 1.0, discs, 333.15, 0.0, 1e-3)
+    effects = plant(CONSTANT_PADS, ["friction_step=-0.1"])
+    pads = Pads(
+        effects,
+        dataclasses.replace(SCENARIOS["03_dry_120_3.6"].conditions, discs=discs),
+        1.0,
+        0.0,
+        1e-3,
+    )
     pads.temperature = [80.0, 90.0, 100.0]
     # tanh(4) is 7e-4 short of 1, half of which is seen.
     assert pads.friction(10.0, 35e3, 0.0) == pytest.approx([0.30, 0.285, 0.27], abs=2e-5)

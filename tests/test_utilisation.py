@@ -84,7 +84,7 @@ def test_a_sliding_wheel_uses_all_adhesion_though_its_force_has_fallen(
     """A locked wheel at 44 m/s has 0.65 of the peak force; what it shows is the friction."""
     locked = estimates([0.55], [0.220 * 80e3], speed=44.4, slip=44.4)
     assert peak_force.utilisation(locked) == 1.0
-    assert peak_force.claims(locked)
+    assert peak_force.valid(locked)
 
 
 def test_direction_does_not_matter(peak_force: PeakForce) -> None:
@@ -100,19 +100,19 @@ def test_claims_begin_above_six_tenths(peak_force: PeakForce) -> None:
     """8 kN of 13.4 (0.60), at muWR 0.25, where 0.01 in muWR is worth some 100 N."""
     force = np.linspace(2e3, 14e3, 121)
     rows = estimates([0.25] * force.size, list(force))
-    used, claimed = peak_force.utilisation(rows), peak_force.claims(rows)
+    used, claimed = peak_force.utilisation(rows), peak_force.valid(rows)
     np.testing.assert_array_equal(claimed, used > 0.6)
     assert 0 < claimed.sum() < claimed.size
 
 
 def test_what_was_not_learned_is_not_claimed(peak_force: PeakForce) -> None:
-    assert peak_force.claims(estimates([NOMINAL + 0.001], [8e3]))
-    assert not peak_force.claims(estimates([NOMINAL], [8e3]))
-    assert not peak_force.claims(estimates([float("nan")], [8e3]))
+    assert peak_force.valid(estimates([NOMINAL + 0.001], [8e3]))
+    assert not peak_force.valid(estimates([NOMINAL], [8e3]))
+    assert not peak_force.valid(estimates([float("nan")], [8e3]))
 
 
 def test_nothing_is_claimed_at_walking_pace(peak_force: PeakForce) -> None:
-    assert not peak_force.claims(estimates([0.2], [20e3], speed=0.4))
+    assert not peak_force.valid(estimates([0.2], [20e3], speed=0.4))
 
 
 def made(fmu: FMU, system: System, name: str) -> Estimator:
@@ -137,7 +137,7 @@ def test_a_slide_uses_all_adhesion_throughout(peak_force: PeakForce, slide: Slid
     """Slip beyond 2 m/s is beyond the peak of any contact (at most 1 m/s with this law)."""
     case, run = slide
     sliding = RR * case["omegaR"] - 0.46 * case["omegaW"] > 2.0
-    claimed = peak_force.claims(run.estimate)
+    claimed = peak_force.valid(run.estimate)
     assert sliding.sum() > 50  # a quarter of a second of the recording
     assert claimed[sliding].all()
     assert not claimed[case.time < 2.0].any()  # coasting

@@ -1,4 +1,4 @@
-"""How near estimates come to the truth of the virtual rig: by stop, and the worst.
+"""Errors of estimates against the truth of the virtual rig: by stop, and the worst.
 
 The truth is what no sensor reads and no estimator sees; the rig writes it beside each recording.
 """
@@ -23,16 +23,22 @@ from workbench.system.system import System
 from workbench.system.units import BAND
 
 INNOVATIONS = "innovations"  # whose band is that of their normalised square, by chi-squared
-
-
 COVERED = ("Fx", "slip", "omegaW", "omegaR", "muDC", "muWR", INNOVATIONS)  # where there is a band
+# Share of the force: twice what noise of the sensors makes of an estimate below 5 Hz.
+NOISE = 0.03
 
+_BUILDING_UP = 2.0  # [s] after the first contact
+_SLIDING = 0.02  # creepage [1]; a wheel that keeps its grip stays below half of it
+_SLIDE = 4.0  # [s] by then wheel-slide protection has ended it, or the wheel is locked
+_BEFORE_FALL = 0.1  # [s] the force is not falling yet
+_FALL = 2.0  # [s]
+_AVERAGED = 0.05  # [s] longer than a period of the rig's structure, 15..35 Hz
 _RANKS = np.linspace(0.0, 1.0, 1001)  # a share of 95 % to a twentieth of it
 
 
 @dataclass(frozen=True, eq=False)
-class Held:
-    """What the band of a quantity holds in a stop.
+class BandCoverage:
+    """Coverage of the band of a quantity in a stop.
 
     Attributes
     ----------
@@ -44,22 +50,24 @@ class Held:
     errors: Vector
 
 
-def held(stop: "KnownStop", name: str) -> dict[str, Held]:
-    """What bands of an estimator hold, where that is judged and claimed, by quantity."""
+def held_by_bands(stop: "KnownStop", name: str) -> dict[str, BandCoverage]:
+    """Coverage by an estimator's bands of samples that are scored and valid, by quantity."""
     run, bands = stop.runs[name], {}
     window = np.zeros(stop.case.time.size, bool)
     window[judged_window(stop.case, stop.system)] = True
     for quantity in COVERED:
-        judged = window & run.claimed.get(quantity, True)
+        valid = window & run.claimed.get(quantity, True)
         if quantity == INNOVATIONS:
-            reach = np.full(judged.sum(), chi2.ppf(SURE, len(stop.system.outputs)))
-            errors = run.nis[judged]
+            reach = np.full(valid.sum(), chi2.ppf(SURE, len(stop.system.outputs)))
+            errors = run.nis[valid]
         else:
-            reach = BAND * run.deviation(quantity)[judged]
-            errors = np.abs(run.signal(quantity) - getattr(stop.truth, quantity))[judged]
+            reach = BAND * run.deviation(quantity)[valid]
+            errors = np.abs(run.signal(quantity) - getattr(stop.truth, quantity))[valid]
         if (reach > 0.0).any() and np.isfinite(errors + reach).all():
             shares = errors / reach
-            bands[quantity] = Held(float(np.mean(shares < 1.0)), np.quantile(shares, _RANKS))
+            bands[quantity] = BandCoverage(
+                float(np.mean(shares < 1.0)), np.quantile(shares, _RANKS)
+            )
     return bands
 
 
@@ -95,35 +103,14 @@ def needed_bands(stops: Sequence["StopAccuracy"]) -> dict[str, dict[str, float]]
     return {name: factor for name, factor in factors.items() if factor}
 
 
-def _of_stops(stops: Sequence["StopAccuracy"], name: str, quantity: str) -> list[Held]:
-    bands: list[Mapping[str, Held]] = [stop.estimators[name].bands for stop in stops]
+def _of_stops(stops: Sequence["StopAccuracy"], name: str, quantity: str) -> list[BandCoverage]:
+    bands: list[Mapping[str, BandCoverage]] = [stop.estimators[name].bands for stop in stops]
     return [band[quantity] for band in bands if quantity in band]
-
-
-# Share of the force: twice what noise of the sensors makes of an estimate below 5 Hz.
-NOISE = 0.03
-
-_BUILDING_UP = 2.0  # [s] after the first contact
-
-
-_SLIDING = 0.02  # creepage [1]; a wheel that keeps its grip stays below half of it
-
-
-_SLIDE = 4.0  # [s] by then wheel-slide protection has ended it, or the wheel is locked
-
-
-_BEFORE_FALL = 0.1  # [s] the force is not falling yet
-
-
-_FALL = 2.0  # [s]
-
-
-_AVERAGED = 0.05  # [s] longer than a period of the rig's structure, 15..35 Hz
 
 
 @dataclass(frozen=True, eq=False)
 class KnownStop:
-    """A stop whose truth is known, and what estimators make of it.
+    """A stop whose truth is known, and the runs of estimators on it.
 
     Attributes
     ----------
@@ -228,12 +215,12 @@ class Accuracy:
     muWR: float | None = _quantity(
         "1", "error of muWR over the truth, below which 95 % of the samples stay that claim it"
     )
-    bands: Mapping[str, Held] = field(default_factory=dict)
+    bands: Mapping[str, BandCoverage] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class StopAccuracy:
-    """How near all estimators come in one stop.
+    """Errors of all estimators in one stop.
 
     Attributes
     ----------
@@ -322,19 +309,24 @@ def accuracy(stop: KnownStop, name: str) -> Accuracy:
     too_high, too_low = contact_errors(stop, name)
     # A friction that never moves, as that of the nominal model, is no estimate.
     estimated = bool(np.ptp(run.signal("muDC")) > 0.0)
+    in_slide: dict[str, Any] = {}
+    if slides:
+        in_slide = {
+            "force_in_slide": slide_error(stop, name),
+            "force_in_slide_all_frequencies": slide_error(stop, name, all_frequencies=True),
+            "minimum_in_slide": minimum_error(stop, name),
+            "fall_delay": fall_delay(stop, name),
+        }
     return Accuracy(
         force=force_error(stop, name),
-        force_in_slide=slide_error(stop, name) if slides else None,
-        force_in_slide_all_frequencies=slide_error_all_frequencies(stop, name) if slides else None,
-        minimum_in_slide=minimum_error(stop, name) if slides else None,
         rise_delay=rise_delay(stop, name),
-        fall_delay=fall_delay(stop, name) if slides else None,
         contact_too_high=too_high,
         contact_too_low=too_low,
         oscillation=max(0.0, min(too_high, too_low)),
         muDC=friction_error(stop, name) if estimated else None,
         muWR=rail_error(stop, name),
-        bands=held(stop, name),
+        bands=held_by_bands(stop, name),
+        **in_slide,
     )
 
 
@@ -344,19 +336,10 @@ def force_error(stop: KnownStop, name: str) -> float:
     return _rms(stop.force_error(name)[window]) / float(np.abs(stop.truth.Fx[window]).mean())
 
 
-def slide_error(stop: KnownStop, name: str) -> float:
-    """Error of the force below 5 Hz, rms over mean, inside the slide [1]."""
-    return _rms(stop.force_error(name)[stop.slide]) / _sliding_force(stop)
-
-
-def slide_error_all_frequencies(stop: KnownStop, name: str) -> float:
-    """Error of the force inside the slide sample by sample, ringing included [1]."""
-    return _rms((stop.force(name) - stop.true_force)[stop.slide]) / _sliding_force(stop)
-
-
-def _sliding_force(stop: KnownStop) -> float:
-    """Mean force inside the slide [N]."""
-    return float(stop.smooth(stop.true_force)[stop.slide].mean())
+def slide_error(stop: KnownStop, name: str, *, all_frequencies: bool = False) -> float:
+    """Error of the force, rms over mean, inside the slide [1]; below 5 Hz, or with ringing."""
+    error = stop.force(name) - stop.true_force if all_frequencies else stop.force_error(name)
+    return _rms(error[stop.slide]) / float(stop.smooth(stop.true_force)[stop.slide].mean())
 
 
 def _rms(values: Vector) -> float:
@@ -431,12 +414,12 @@ def friction_error(stop: KnownStop, name: str) -> float:
 
 
 def rail_error(stop: KnownStop, name: str) -> float | None:
-    """Error of muWR over the truth, which 95 % of the claimed samples stay below; None without."""
-    claimed = stop.runs[name].claimed.get("muWR")
-    if claimed is None or not claimed.any():
+    """Error of muWR over the truth, which 95 % of the valid samples stay below; None without."""
+    valid = stop.runs[name].claimed.get("muWR")
+    if valid is None or not valid.any():
         return None
     error = stop.runs[name].signal("muWR") / stop.truth.muWR - 1.0
-    return float(np.quantile(np.abs(error[claimed]), SURE))
+    return float(np.quantile(np.abs(error[valid]), SURE))
 
 
 def worst(row: Row, stops: Sequence[StopAccuracy], estimator: str) -> Worst | None:

@@ -1,7 +1,7 @@
 """Accuracy against the truth of the virtual rig: files, table, and the page."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -65,7 +65,7 @@ def write_accuracy(
                 "title": stop.title,
                 "wet_discs": stop.wet,
                 "slides": stop.slides,
-                "estimators": {name: _plain(result) for name, result in stop.estimators.items()},
+                "estimators": {name: _numbers(result) for name, result in stop.estimators.items()},
             }
             for stop in stops
         },
@@ -98,7 +98,10 @@ def _answer(system: System, stops: Sequence[StopAccuracy]) -> Answer:
     for name in stops[0].estimators:
         for row in ROWS:
             if (worst_stop := worst(row, stops, name)) is not None:
-                unit, factor = _shown(row.quantity)
+                unit = str(_QUANTITIES[row.quantity]["unit"])
+                factor = 1.0
+                if unit == "1" and row.quantity != "muDC":
+                    unit, factor = "%", 100.0
                 value = _finite(factor * row.badness(worst_stop.value))
                 headline[f"{row.text}, {name}"] = Measure(value, unit, "lower")
         errors = [stop.estimators[name].force for stop in stops]
@@ -124,19 +127,13 @@ def _answer(system: System, stops: Sequence[StopAccuracy]) -> Answer:
     return Answer(sentence, headline, details)
 
 
-def _shown(quantity: str) -> tuple[str, float]:
-    """Unit in which a quantity is compared, and the factor to it."""
-    unit = str(_QUANTITIES[quantity]["unit"])
-    return ("%", 100.0) if unit == "1" and quantity != "muDC" else (unit, 1.0)
-
-
-def _plain(result: Accuracy) -> dict[str, Any]:
+def _numbers(result: Accuracy) -> dict[str, Any]:
     if result.failure:
         return {"failure": result.failure}
     values = {name: getattr(result, name) for name in _QUANTITIES}
-    plain = {name: _finite(value) for name, value in values.items() if value is not None}
+    numbers = {name: _finite(value) for name, value in values.items() if value is not None}
     shares = {name: band.share for name, band in result.bands.items()}
-    return plain | ({"covers": shares} if shares else {})
+    return numbers | ({"covers": shares} if shares else {})
 
 
 def _finite(value: float) -> float | None:
@@ -156,7 +153,7 @@ def format_accuracy(stops: Sequence[StopAccuracy]) -> str:
         )
         lines.append(f"{row.text:<{width}}{''.join(cells)}")
     lines.append("-" * len(header))
-    if any(covered(stops, name, quantity) is not None for name in names for quantity in COVERED):
+    if _have_bands(stops, names):
         lines += [
             "Share of samples in which a 95 % band holds the truth, mean of all stops",
             header,
@@ -165,13 +162,21 @@ def format_accuracy(stops: Sequence[StopAccuracy]) -> str:
         lines.append("The same of the stop in which it holds the truth least")
         lines += [f"{q:<{width}}{_covers(stops, names, q, least=True)}" for q in COVERED]
         lines.append("-" * len(header))
-    failures = [
-        f"{stop.name}, {name}: {result.failure}"
+    return "\n".join(lines + _failures(stops, {name: name for name in names}))
+
+
+def _have_bands(stops: Sequence[StopAccuracy], names: Iterable[str]) -> bool:
+    return any(covered(stops, name, quantity) is not None for name in names for quantity in COVERED)
+
+
+def _failures(stops: Sequence[StopAccuracy], names: Mapping[str, str]) -> list[str]:
+    """A line for each run that failed; `names` for people."""
+    return [
+        f"{stop.name}, {names[name]}: {result.failure}"
         for stop in stops
         for name, result in stop.estimators.items()
         if result.failure
     ]
-    return "\n".join(lines + failures)
 
 
 def _covers(
@@ -219,12 +224,6 @@ def write_accuracy_page(
     summary : as written to accuracy.json.
     """
     names = {name: label(name, system) for name in stops[0].estimators}
-    failures = [
-        f"{stop.name}, {names[name]}: {result.failure}"
-        for stop in stops
-        for name, result in stop.estimators.items()
-        if result.failure
-    ]
     shown = "Each dot is a stop: error of the estimated force, rms over the mean of the truth."
     terms = {
         name.replace("_", " "): f"{quantity['text']} [{quantity['unit']}]"
@@ -233,13 +232,13 @@ def write_accuracy_page(
     parts = [
         Part("shown", "Error of the force in every stop", [shown, _forces(stops, names)]),
         Part("worst", "Worst stop by quantity", [_worst(stops, names)], printed=True),
-        Part("stops", "Every stop", [_every_stop(stops, names)]),
+        Part("stops", "Every stop", [_stops(stops, names)]),
         Part("definitions", "Definitions", [Definitions(terms)]),
     ]
-    if any(covered(stops, name, quantity) is not None for name in names for quantity in COVERED):
+    if _have_bands(stops, names):
         parts.insert(2, Part("bands", "What the bands hold", [_bands(stops, names)]))
     title = f"Estimates against the truth of {len(stops)} stops"
-    page = Page(title, parts, "accuracy.json", warnings=failures)
+    page = Page(title, parts, "accuracy.json", warnings=_failures(stops, names))
     return page.write(summary, out / "index.html")
 
 
@@ -283,7 +282,7 @@ def _bands(stops: Sequence[StopAccuracy], names: Mapping[str, str]) -> Table:
     return Table("band-table", caption, columns, rows)
 
 
-def _every_stop(stops: Sequence[StopAccuracy], names: Mapping[str, str]) -> Table:
+def _stops(stops: Sequence[StopAccuracy], names: Mapping[str, str]) -> Table:
     rows = []
     for stop in stops:
         forces = (stop.estimators[name].force for name in names)

@@ -1,4 +1,4 @@
-"""What can be planted in stops of the virtual rig, and what the library calls it."""
+"""Effects that the virtual rig injects, with their names in the library."""
 
 import dataclasses
 import hashlib
@@ -11,6 +11,7 @@ from workbench.errors import InputError
 from workbench.machines.wheelset import rig
 from workbench.machines.wheelset.rig import (
     CONSTANT_PADS,
+    STANDARD,
     Effects,
     Scenario,
     StopTruth,
@@ -25,10 +26,7 @@ from workbench.studies.power.planting import Plantable, SheetError
 from workbench.system.system import System
 
 _RATE = 200  # [Hz] of the recordings
-_USUAL = (
-    *("01_dry_80_1.5", "02_dry_100_2.7", "03_dry_120_3.6", "04_dry_160_4.2"),
-    *("05_dry_120_2.7_rev", "06_dry_160_3.6_rev"),
-)
+_USUAL = STANDARD[:6]  # dry
 _FIELDS = {field.name: field.metadata for field in dataclasses.fields(Effects)}
 _FILM = {"E0": 0.45e6}
 

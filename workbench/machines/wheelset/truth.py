@@ -21,7 +21,7 @@ BUILT_UP = (3.0, 6.0)  # [s] after the first contact
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """What no sensor reads, at the times of a recording.
+    """True signals at the times of a recording.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What must not be claimed: friction that the creep force does not show.
+"""Validity of muWR: where the creep force shows the friction of the contact.
 
 A creep force well below its peak hardly depends on the friction coefficient (to first order of
 utilisation cubed, by Polach's law), so that any muWR explains it. Such a muWR is a guess.
@@ -90,13 +90,13 @@ class PeakForce:
         used = np.minimum(np.abs(force) / peak, 1.0)
         return np.where(np.abs(slip) > slip_at_peak, 1.0, used)
 
-    def claims(self, values: Matrix) -> NDArray[np.bool_]:
-        """Where muWR may be claimed: much of the adhesion is used, and the wheelset rolls.
+    def valid(self, values: Matrix) -> NDArray[np.bool_]:
+        """Where an estimate of muWR is valid: much of the adhesion is used, the wheelset rolls.
 
         A muWR that is still exactly the nominal one has not been estimated.
 
-        The condition is necessary, not sufficient: the claim is as good as the shape of the
-        model's creep law. Where that is the plant's, claims err by 2 to 4 % (rms; 6 % by the
+        The condition is necessary, not sufficient: the estimate is as good as the shape of the
+        model's creep law. Where that is the plant's, estimates err by 2 to 4 % (rms; 6 % by the
         parameter estimator at 0.12). On wet rails of the virtual rig, which the system file
         excludes, they would be 14 to 79 % too low (median of a stop), and 46 % too high in a slide,
         where wet friction falls less than that of the dry law.
@@ -107,13 +107,13 @@ class PeakForce:
         """
         speed = self._radii[1] * np.abs(values[:, self._columns.index("omegaR")])
         learned = values[:, self._columns.index("dmuWR")] != 0.0
-        used: NDArray[np.bool_] = self.utilisation(values) > LEAST_UTILISATION
-        claimed: NDArray[np.bool_] = used & learned & (speed > self._slowest)
-        return claimed
+        used = self.utilisation(values) > LEAST_UTILISATION
+        valid: NDArray[np.bool_] = used & learned & (speed > self._slowest)
+        return valid
 
 
 def _adhesion(fmu: FMU, system: System, values: Matrix) -> NDArray[np.bool_]:
-    return PeakForce(fmu, system).claims(values)
+    return PeakForce(fmu, system).valid(values)
 
 
 # By estimated quantity: where an estimate, (n, w), is one, (n,).

@@ -6,9 +6,11 @@ import sys
 import tempfile
 import zipfile
 from pathlib import Path
+from typing import Any
 
 import fmpy
 import numpy as np
+from numpy.typing import NDArray
 
 from workbench.arrays import Matrix, Vector
 from workbench.errors import InputError
@@ -53,10 +55,10 @@ class CLoop:
     def run(self, time: Vector, u: Matrix, y: Matrix) -> Matrix:
         """Estimates, (n, 8); arguments as of `Estimator.run`."""
         steps = np.diff(time, prepend=time[0])
-        arrays = [np.ascontiguousarray(a) for a in (steps, u, y)]
+        arrays: list[NDArray[Any]] = [np.ascontiguousarray(a) for a in (steps, u, y)]
         rows = np.empty((time.size, self._width))
-        every = (*arrays, self._settings, self._references, rows)
-        if self._run(time.size, *(ctypes.c_void_p(a.ctypes.data) for a in every)):
+        arrays += [self._settings, self._references, rows]
+        if self._run(time.size, *(ctypes.c_void_p(a.ctypes.data) for a in arrays)):
             raise ArithmeticError("c_loop.c: the implicit step has no solution at this point")
         return rows
 

@@ -69,24 +69,21 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
 
     system = load_system(options.system)
     # Of a wheelset, which has no like parts, the block filter is the extended one.
-    every = [name for name in estimators_of(system) if name != BlockKalmanFilter.name]
-    chosen = choose(system, options.estimator or every)
+    usual = [name for name in estimators_of(system) if name != BlockKalmanFilter.name]
+    chosen = choose(system, options.estimator or usual)
     cases = _stops(options, system)
-    # All of them before the first run, so that one that is missing is told at once.
+    # All of them before the first run, so that a missing one is refused at once.
     truths = [read_truth(case, system) for case in cases]
     stops: list[StopAccuracy] = []
     begin = time.perf_counter()
     with locked_folder(options.out), ExitStack() as stack:
         roles = dict.fromkeys(estimator.role for estimator in chosen.values())
         models = {role: stack.enter_context(open_model(system, role)) for role in roles}
-        gains = {
-            name: usual_gains(estimator, models[estimator.role], system)
-            for name, estimator in chosen.items()
-        }
-        ready = [
-            estimator(models[estimator.role], system, gains[name])
-            for name, estimator in chosen.items()
-        ]
+        gains, estimators = {}, []
+        for name, estimator in chosen.items():
+            fmu = models[estimator.role]
+            gains[name] = usual_gains(estimator, fmu, system)
+            estimators.append(estimator(fmu, system, gains[name]))
         provenance = {
             "run": run_of("accuracy", system, sources(cases)),
             "workbench": version("wheelset-workbench"),
@@ -99,7 +96,7 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
         }
         output.stage("preparing the observers' loops (compiled once, up to a minute)")
         for case, truth in zip(cases, truths, strict=True):
-            stops.append(stop_accuracy(observe_stop(case, truth, ready, system)))
+            stops.append(stop_accuracy(observe_stop(case, truth, estimators, system)))
             output.step(len(stops), len(cases), case.name, begin)
         output.result(format_accuracy(stops))
         write_accuracies(stops, options.out / "accuracy.csv")

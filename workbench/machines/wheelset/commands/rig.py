@@ -82,12 +82,6 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         help="friction of dry pads: with speed, temperature and force, or constant as in the "
         "nominal model (default: %(default)s)",
     )
-    _add_making(rig)
-    return rig
-
-
-def _add_making(rig: argparse.ArgumentParser) -> None:
-    """Add what says how recordings are made and written."""
     rig.add_argument(
         "--rate",
         type=positive,
@@ -105,9 +99,10 @@ def _add_making(rig: argparse.ArgumentParser) -> None:
     add_reference(rig, "that makes the recordings")
     add_system(rig)
     add_workers(rig)
+    return rig
 
 
-def _listed() -> str:
+def _format_list() -> str:
     """Scenarios and effects, for people."""
     from workbench.machines.wheelset.rig import ORDINARY_PADS, SCENARIOS, STANDARD, Effects
 
@@ -147,7 +142,7 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
     if find_plugin(system.plugin) is not PLUGIN:
         return _of_another(options, output, system)
     if options.list:
-        output.result(_listed())
+        output.result(_format_list())
         return CommandResult(
             {
                 "scenarios": {name: scenario.title for name, scenario in SCENARIOS.items()},
@@ -160,7 +155,7 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
     pads = ORDINARY_PADS if options.pads == "ordinary" else CONSTANT_PADS
     effects = plant(pads, options.effect)
     with locked_folder(options.out):
-        return _recorded(options, output, system, scenarios, effects)
+        return _make_recordings(options, output, system, scenarios, effects)
 
 
 def _of_another(options: argparse.Namespace, output: Output, system: System) -> CommandResult:
@@ -211,7 +206,7 @@ def _of_another(options: argparse.Namespace, output: Output, system: System) -> 
     return CommandResult({"out": options.out, "cases": count, "of": count})
 
 
-def _recorded(
+def _make_recordings(
     options: argparse.Namespace,
     output: Output,
     system: System,
@@ -228,17 +223,15 @@ def _recorded(
     with CoSimulation(fmu):
         pass  # a file that is no FMU is refused here, once
     begin = time.perf_counter()
-    made: list[str] = []
     interrupted = False
-    order = _Order(effects, options.seed, options.rate, options.truth_every, fmu, options.out)
+    setup = _Setup(effects, options.seed, options.rate, options.truth_every, fmu, options.out)
     # A stop that is under way at Ctrl-C is finished and kept, in a process even if it is alone.
     workers = min(options.workers, len(scenarios))
-    with Pool(workers, nullcontext, order, isolated=True) as pool:
+    with Pool(workers, nullcontext, setup, isolated=True) as pool:
         tasks = [pool.submit(_make, scenario) for scenario in scenarios]
         try:
-            for task in as_completed(tasks):
-                made.append(task.result())
-                output.step(len(made), len(tasks), made[-1], begin)
+            for count, task in enumerate(as_completed(tasks), 1):
+                output.step(count, len(tasks), task.result(), begin)
         except KeyboardInterrupt:
             interrupted = True
             pool.finish()
@@ -249,22 +242,23 @@ def _recorded(
 
 
 @dataclass(frozen=True)
-class _Order:
-    """What is made of every scenario; see `simulate` and `write_recording`."""
+class _Setup:
+    """How scenarios are made; see `simulate` and `write_recording`."""
 
     effects: Effects
     seed: int
     rate: int
-    every: int
+    truth_every: int
     fmu: Path
     out: Path
 
 
-def _make(order: _Order, scenario: Scenario) -> str:
+def _make(setup: _Setup, scenario: Scenario) -> str:
     """Make and write one case; returns a line for people."""
     from workbench.machines.wheelset.rig import simulate, write_recording
 
-    stop = simulate(scenario, order.seed, order.effects, order.fmu)
-    write_recording(stop, order.effects, order.rate, order.out / scenario.name, order.every)
+    stop = simulate(scenario, setup.seed, setup.effects, setup.fmu)
+    folder = setup.out / scenario.name
+    write_recording(stop, setup.effects, setup.rate, folder, setup.truth_every)
     seconds = stop.standstill - stop.drawn.coasting
     return f"{scenario.name:<26} stopped in {seconds:5.1f} s"

@@ -60,16 +60,16 @@ def check_files(folders: Iterable[Path], rate: int) -> None:
 
 
 def write_recording(
-    stop: StopTruth, effects: Effects, rate: int, folder: Path, every: int = 1
+    stop: StopTruth, effects: Effects, rate: int, folder: Path, truth_every: int = 1
 ) -> None:
-    """Write a case for estimators and the truth for judges.
+    """Write a case for estimators, and the truth for scores.
 
     Parameters
     ----------
     effects : as given to `simulate`.
     rate : [Hz] of the recording, a divisor of RATE.
     folder : of the case: case.toml, measured.csv, truth.csv, truth.json.
-    every : how many samples of the recording one line of truth.csv stands for.
+    truth_every : how many samples of the recording one line of truth.csv stands for.
     """
     recorded = np.flatnonzero(stop.time >= 0.0)[:: RATE // rate]
     time = stop.time[recorded]
@@ -81,7 +81,7 @@ def write_recording(
         if name in channels
     }
     truth = {
-        f"{name} [{unit}]": (stop.truth[name][recorded][kept][::every], "%.7g")
+        f"{name} [{unit}]": (stop.truth[name][recorded][kept][::truth_every], "%.7g")
         for name, unit in TRUTH.items()
     }
     planted = {name: gain for name, gain in dataclasses.asdict(effects).items() if gain}
@@ -90,7 +90,7 @@ def write_recording(
         for name, phase in dataclasses.asdict(stop.phases).items()
         if name in planted
     }
-    made = {
+    content = {
         "seed": stop.seed,
         "rate": rate,
         "fmu_sha256": stop.model,
@@ -99,8 +99,8 @@ def write_recording(
         "drawn": dataclasses.asdict(stop.drawn) | phases,
         "effects": planted,
     }
-    write_json(folder / "truth.json", made)
-    write_whole(folder / "truth.csv", _table(time[kept][::every], truth))
+    write_json(folder / "truth.json", content)
+    write_whole(folder / "truth.csv", _table(time[kept][::truth_every], truth))
     write_whole(folder / "measured.csv", _table(time[kept], measured))
     write_whole(folder / "case.toml", _case(stop.scenario))
 

@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 
 from workbench.machines.wheelset.rig.effects import Effects
-from workbench.machines.wheelset.rig.scenarios import Surface
+from workbench.machines.wheelset.rig.scenarios import Conditions
 
 FRICTION = 0.30  # at 22 m/s, 100 degC and 35 kN
 
@@ -31,9 +31,8 @@ class Pads:
     Parameters
     ----------
     effects : gains of the dependences.
+    conditions : of the discs at the start.
     level : friction over FRICTION, from rig to rig.
-    discs : state of each disc at the start.
-    temperature : [K] of all discs at the start.
     phase : [rad] of the discs' thickness.
     dt : [s] time between two steps.
 
@@ -44,19 +43,14 @@ class Pads:
     """
 
     def __init__(
-        self,
-        effects: Effects,
-        level: float,
-        discs: Sequence[Surface],
-        temperature: float,
-        phase: float,
-        dt: float,
+        self, effects: Effects, conditions: Conditions, level: float, phase: float, dt: float
     ) -> None:
-        self.temperature = [temperature - _ICE] * len(discs)
-        planted = [effects.water_film] * len(discs)
-        planted[1] = max(planted[1], effects.single_disc_film)
+        discs = conditions.discs
+        self.temperature = [conditions.disc_temperature - _ICE] * len(discs)
+        films = [effects.water_film] * len(discs)
+        films[1] = max(films[1], effects.single_disc_film)
         self.film = [
-            1.0 if disc == "wet" else film for disc, film in zip(discs, planted, strict=True)
+            1.0 if disc == "wet" else film for disc, film in zip(discs, films, strict=True)
         ]
         self._effects = effects
         self._level = level
@@ -86,7 +80,8 @@ class Pads:
             self._level
             * (common * (1.0 - e.fade * (T - _TEMPERATURE)) * (1.0 - film) + _WET_FRICTION * film)
             * varied
-            * (1.0 + e.friction_step * _step(T))
+            # From 0 below _STEP_AT to 1 above.
+            * (1.0 + e.friction_step * (0.5 + 0.5 * math.tanh(2.0 * (T - _STEP_AT) / _STEP_WIDTH)))
             for T, film in zip(self.temperature, self.film, strict=True)
         ]
 
@@ -108,8 +103,3 @@ class Pads:
         fall = self._speed - abs(speed) if not math.isnan(self._speed) else 0.0
         self._slowing += (fall - self._dt * self._slowing) / _SLOWING_LAG
         self._speed = abs(speed)
-
-
-def _step(temperature: float) -> float:
-    """From 0 below _STEP_AT [degC] to 1 above."""
-    return 0.5 + 0.5 * math.tanh(2.0 * (temperature - _STEP_AT) / _STEP_WIDTH)

@@ -63,23 +63,28 @@ def stop_of(experiment: Mapping[str, Any], system: System) -> Scenario:
     ValueError, KeyError, TypeError
         If it asks for what the rig cannot do.
     """
-    said, asked = experiment["conditions"], experiment["inputs"]["pB"]
+    settings, pressures = experiment["conditions"], experiment["inputs"]["pB"]
     if system.experiments is None:
         raise ValueError
     (varied,) = (profile for profile in system.experiments.varied if profile.name == "pB")
-    levels = tuple(map(float, asked["levels"]))
-    profile = Profile(varied, str(asked["profile"]), levels, float(asked["every"]))
+    levels = tuple(map(float, pressures["levels"]))
+    profile = Profile(varied, str(pressures["profile"]), levels, float(pressures["every"]))
     demand = profile.demand(_DEMAND + varied.begins)
     changes = np.flatnonzero(np.diff(demand)) + 1
     steps = tuple((float(_DEMAND[k]), float(demand[k])) for k in changes)
-    direction: Literal[1, -1] = 1 if said["direction"] > 0 else -1
-    rail, *discs = (_SURFACES[disc] for disc in (said["wheel_rail"], *said["discs"]))
+    direction: Literal[1, -1] = 1 if settings["direction"] > 0 else -1
+    rail, *discs = (_SURFACES[surface] for surface in (settings["wheel_rail"], *settings["discs"]))
     if len(discs) != system.condition("discs").count:
         raise ValueError
-    speed, pressure = float(said["initial_speed"]), float(demand[0])
-    load = float(said.get("wheel_load", WHEEL_LOAD))
-    warm = float(said.get("disc_temperature", DISC_TEMPERATURE))
-    conditions = Conditions(speed, pressure, rail, tuple(discs), direction, load, warm)
+    conditions = Conditions(
+        initial_speed=float(settings["initial_speed"]),
+        brake_pressure=float(demand[0]),
+        wheel_rail=rail,
+        discs=tuple(discs),
+        direction=direction,
+        wheel_load=float(settings.get("wheel_load", WHEEL_LOAD)),
+        disc_temperature=float(settings.get("disc_temperature", DISC_TEMPERATURE)),
+    )
     imitated = float(experiment["settings"].get("imitated", TRAIN_INERTIA))
     sensors = tuple(signal.name for signal in system.reference_signals if signal.name in FURTHER)
     # A roller that stops as fast as no train does is a slide to the protection, which would vent.

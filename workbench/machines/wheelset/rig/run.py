@@ -46,7 +46,11 @@ FELT = {"Fperp": "N"}
 
 _OUTPUTS = ("Fx", "FcellL", "FcellR", "slip", *(f"discPower[{i}]" for i in (1, 2, 3)))
 _INPUTS = (
-    *("pB", "tauR", "dmuWR", "actuation.kappa", "wheelsetLoss.c0"),
+    "pB",
+    "tauR",
+    "dmuWR",
+    "actuation.kappa",
+    "wheelsetLoss.c0",
     *(f"muDCunit[{i}]" for i in (1, 2, 3)),
 )
 _POLACH = {
@@ -56,12 +60,10 @@ _POLACH = {
 # Springs and dampers of the longitudinal mode, in series: with these powers of its frequency, its
 # shape and its share of the critical damping stay.
 MODE = {
-    name: power
+    f"{spring}[{i}].{parameter}": power
     for i in (1, 2)
-    for name, power in (
-        *((f"longitudinal[{i}].c", 2), (f"longitudinal[{i}].d", 1)),
-        *((f"axleBox[{i}].c[1]", 2), (f"axleBox[{i}].d[1]", 1)),
-    )
+    for spring, suffix in (("longitudinal", ""), ("axleBox", "[1]"))
+    for parameter, power in ((f"c{suffix}", 2), (f"d{suffix}", 1))
 }
 _RUN_IN = 1.0  # [s] before the recording, in which the model settles under the wheelset's drag
 _STANDSTILL = 0.05  # [m/s]
@@ -140,7 +142,8 @@ def simulate(scenario: Scenario, seed: int, effects: Effects, fmu_path: Path) ->
         If the FMU is not a model of the rig, or the wheelset does not stop in 300 s.
     """
     drawn = _draw(np.random.default_rng([seed, scenario.number, 0]), effects)
-    phases = _phases(np.random.default_rng([seed, scenario.number, 6]))
+    rng = np.random.default_rng([seed, scenario.number, 6])
+    phases = Phases(*rng.uniform(-np.pi, np.pi, 3).tolist())
     with CoSimulation(fmu_path) as fmu:
         rows, standstill = _brake_to_standstill(fmu, scenario, drawn, phases, effects)
         model = fmu.sha256
@@ -155,10 +158,6 @@ def _draw(rng: np.random.Generator, effects: Effects) -> Drawn:
     JW, JR, Fz, muDC, muWR = 1.0 + scatter
     coasting = round(rng.uniform(3.0, 5.0), 3)
     return Drawn(float(JW), float(JR), float(Fz), float(muDC), float(muWR), coasting)
-
-
-def _phases(rng: np.random.Generator) -> Phases:
-    return Phases(*rng.uniform(-np.pi, np.pi, 3).tolist())
 
 
 def _parameters(
@@ -188,41 +187,6 @@ def _parameters(
     return changed
 
 
-_Parts = tuple[Drive, Brake, Pads, OutOfRoundWheel, CleanedContact, WheelSlideProtection]
-
-
-def _parts(
-    nominal: Mapping[str, float],
-    parameters: Mapping[str, float],
-    scenario: Scenario,
-    drawn: Drawn,
-    phases: Phases,
-    effects: Effects,
-    omegaR: float,
-) -> _Parts:
-    """What stands beside the multibody model."""
-    rW = parameters["rW"]
-    dt = 1.0 / RATE
-    losses = Losses(*(nominal[f"rollerLoss.{c}"] for c in ("c0", "c1", "c2")))
-    drive = Drive(nominal["JR"], scenario.imitated, losses, omegaR, dt)
-    brake = Brake(effects.cylinder_lag, effects.caliper_hysteresis, dt)
-    set_ = scenario.conditions
-    pads = Pads(effects, drawn.muDC, set_.discs, set_.disc_temperature, phases.disc_thickness, dt)
-    wheel = OutOfRoundWheel(effects.out_of_round, phases.out_of_round, rW, parameters["JW"])
-    contact = CleanedContact(effects.adhesion_recovery, dt)
-    protection = WheelSlideProtection(scenario.conditions.initial_speed)
-    return drive, brake, pads, wheel, contact, protection
-
-
-def _endless(scenario: Scenario, speed: float) -> InputError:
-    return InputError(
-        where=scenario.name,
-        found=f"{speed:.1f} m/s after {_LONGEST:g} s",
-        expected="a brake that stops the train",
-        remedy="plant smaller effects",
-    )
-
-
 def _brake_to_standstill(
     fmu: CoSimulation, scenario: Scenario, drawn: Drawn, phases: Phases, effects: Effects
 ) -> tuple[list[tuple[float, ...]], float]:
@@ -232,16 +196,21 @@ def _brake_to_standstill(
     parameters = _parameters(nominal, scenario, drawn, effects)
     rW, rR = parameters["rW"], parameters["rR"]
     kappa, p0 = nominal["actuation.kappa"], parameters["actuation.p0"]
-    velocity = scenario.conditions.initial_speed * scenario.conditions.direction
+    conditions, dt = scenario.conditions, 1.0 / RATE
+    velocity = conditions.initial_speed * conditions.direction
     omegaW, omegaR, phiW, Fx, slip = velocity / rW, velocity / rR, 0.0, 0.0, 0.0
     states = [fmu.states.index(name) for name in ("omegaW", "omegaR", "wheelset.phi")]
     fmu.start({"omegaW": omegaW, "omegaR": omegaR}, parameters)
 
-    parts = _parts(nominal, parameters, scenario, drawn, phases, effects, omegaR)
-    drive, brake, pads, wheel, contact, protection = parts
-    dt = 1.0 / RATE
+    losses = Losses(*(nominal[f"rollerLoss.{c}"] for c in ("c0", "c1", "c2")))
+    drive = Drive(nominal["JR"], scenario.imitated, losses, omegaR, dt)
+    brake = Brake(effects.cylinder_lag, effects.caliper_hysteresis, dt)
+    pads = Pads(effects, conditions, drawn.muDC, phases.disc_thickness, dt)
+    wheel = OutOfRoundWheel(effects.out_of_round, phases.out_of_round, rW, parameters["JW"])
+    contact = CleanedContact(effects.adhesion_recovery, dt)
+    protection = WheelSlideProtection(conditions.initial_speed)
     valve = Valve.FILL
-    every = round(PROTECTION_PERIOD * RATE)
+    period = round(PROTECTION_PERIOD * RATE)
     rows: list[tuple[float, ...]] = []
     standstill = None
     for k in range(round((_RUN_IN + _LONGEST) * RATE)):
@@ -256,7 +225,7 @@ def _brake_to_standstill(
             if t >= standstill + _REST:
                 return rows, standstill
             valve = Valve.VENT
-        elif scenario.protected and k % every == 0:
+        elif scenario.protected and k % period == 0:
             valve = protection.step(abs(omegaW) * nominal["rW"])
 
         brake.step(scenario.demand(braking) if braking >= DEAD_TIME else 0.0, valve)
@@ -280,4 +249,9 @@ def _brake_to_standstill(
         contact.rub(0.5 * abs(Fx * slip))
         rim, omegaR, phiW = fmu.step(dt)[states].tolist()
         omegaW = wheel.speed(rim, phiW)
-    raise _endless(scenario, abs(omegaR) * rR)
+    raise InputError(
+        where=scenario.name,
+        found=f"{abs(omegaR) * rR:.1f} m/s after {_LONGEST:g} s",
+        expected="a brake that stops the train",
+        remedy="plant smaller effects",
+    )

@@ -2,8 +2,8 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Literal, TypeAlias
+from dataclasses import dataclass, replace
+from typing import Any, Literal, TypeAlias
 
 from workbench.errors import unknown_name
 from workbench.machines.wheelset.rig.drive import TRAIN_INERTIA
@@ -77,8 +77,8 @@ class Scenario:
 
     def demand(self, braking: float) -> float:
         """Brake pressure that is asked for [Pa], a time [s] after the first demand."""
-        asked = [pressure for begin, pressure in self.steps if braking >= begin]
-        return asked[-1] if asked else self.conditions.brake_pressure
+        begun = [pressure for begin, pressure in self.steps if braking >= begin]
+        return begun[-1] if begun else self.conditions.brake_pressure
 
     def friction(self, braking: float) -> float:
         """Friction of the contact at zero slip velocity, a time [s] after the first demand."""
@@ -96,8 +96,7 @@ class Scenario:
         """One line for reports."""
         c = self.conditions
         wet = [str(i) for i, disc in enumerate(c.discs, start=1) if disc == "wet"]
-        some = "wet:" + "+".join(wet)
-        discs = {0: "dry", len(c.discs): "wet"}.get(len(wet), some)
+        discs = {0: "dry", len(c.discs): "wet"}.get(len(wet), "wet:" + "+".join(wet))
         besides = f", wheel load {c.wheel_load / 1e3:g} kN" if c.wheel_load != WHEEL_LOAD else ""
         if c.disc_temperature != DISC_TEMPERATURE:
             besides += f", discs at {c.disc_temperature:g} K"
@@ -114,17 +113,13 @@ def _stop(
     wheel_rail: Surface,
     wet_discs: tuple[int, ...],
     direction: Literal[1, -1],
-    *,
-    muWR: float | None = None,
-    patch: Patch | None = None,
-    protected: bool = True,
-    steps: tuple[tuple[float, float], ...] = (),
+    **changes: Any,
 ) -> Scenario:
     """One row of the table: speed in km/h, pressure in bar, numbers of the wet discs."""
     discs: tuple[Surface, ...] = tuple("wet" if i in wet_discs else "dry" for i in (1, 2, 3))
     conditions = Conditions(speed / 3.6, pressure * 1e5, wheel_rail, discs, direction)
-    friction = FRICTION[wheel_rail] if muWR is None else muWR
-    return Scenario(name, conditions, friction, patch, protected, steps)
+    stop = Scenario(name, conditions, FRICTION[wheel_rail], patch=None, protected=True)
+    return replace(stop, **changes)
 
 
 def _stairs(*pressures: float) -> tuple[tuple[float, float], ...]:

@@ -92,7 +92,7 @@ def sample(stop: StopTruth, effects: Effects, time: Vector) -> Mapping[str, Vect
         readings["Fx"] = np.clip(readings["Fx"], -e.fx_limit, e.fx_limit)
     if e.spikes:
         for i, name in enumerate(MEASURED):
-            readings[name] = _corrupt(readings[name], e.spikes, time, _rng(stop, _SPIKES + i))
+            readings[name] = _spiked(readings[name], e.spikes, time, _rng(stop, _SPIKES + i))
     besides = {
         "arms": stop.at(time, "Fx"),
         "load": np.full(time.size, load),
@@ -135,7 +135,7 @@ def _struck(rate: float, time: Vector, rng: np.random.Generator) -> NDArray[np.b
     return struck
 
 
-def _corrupt(reading: Vector, rate: float, time: Vector, rng: np.random.Generator) -> Vector:
+def _spiked(reading: Vector, rate: float, time: Vector, rng: np.random.Generator) -> Vector:
     """Move single samples by 0.5 to 1.5 times the largest reading, up or down."""
     struck = _struck(rate, time, rng)
     struck[1:] &= ~struck[:-1]  # isolated
