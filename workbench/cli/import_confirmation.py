@@ -128,7 +128,7 @@ def _clocks(held: Sequence[ProposedRecording]) -> Iterator[str]:
             channel = f"{clock.channel} [{clock.unit}]" if clock.channel else "-"
             step = f"{float(np.median(np.diff(times))):.4g} s"
             rows.append(((channel, step, clock.reason), recording.name, times.size, times.size))
-    for (channel, step, reason), low, high, where in _merged(rows, len(held)):
+    for (channel, step, reason), low, high, where in _merge_alike(rows, len(held)):
         samples = f"{low:.0f}" if low == high else f"{low:.0f} to {high:.0f}"
         steps = f"{samples} samples, every {step}"
         yield f"  {TIME:<10} {channel:<28} {steps} ({reason}){where}"
@@ -146,14 +146,14 @@ def _channels(held: Sequence[ProposedRecording], system: System) -> Iterator[str
                 low = float(np.nanmin(assigned.values)) / scale
                 high = float(np.nanmax(assigned.values)) / scale
                 rows.append((key, recording.name, low, high))
-        for (channel, reason), low, high, where in _merged(rows, len(held)):
+        for (channel, reason), low, high, where in _merge_alike(rows, len(held)):
             yield (
                 f"  {signal.name:<10} {channel:<28} {signal.label}, {low:.4g} to {high:.4g} "
                 f"{signal.shown} ({reason}){where}"
             )
 
 
-def _merged(
+def _merge_alike(
     rows: Sequence[_Row], count: int
 ) -> Iterator[tuple[tuple[str, ...], float, float, str]]:
     """Rows with the same texts as one: these, their common range, and where, if not in all."""

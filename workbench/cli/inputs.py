@@ -157,15 +157,15 @@ def model_names(
     InputError
         If an entry cannot be read, names no variable of ours, or cases contradict each other.
     """
-    given = check_names(_mapped(mapped), "command line, --map", system)
+    typed = check_names(_mapped(mapped), "command line, --map", system)
     names: dict[str, str] = {}
     for case in cases:
         for ours, theirs in case.names.items():
-            if names.setdefault(ours, theirs) != theirs and ours not in given:
+            if names.setdefault(ours, theirs) != theirs and ours not in typed:
                 raise InputError(
                     where=f"{case.source.parent / 'case.toml'}, [model.names] {ours}",
                     found=f"'{theirs}', in a case before it '{names[ours]}'",
                     expected="the same name in all cases, because one FMU runs on all",
                     remedy=f"run these cases apart, or decide with --map {ours}=NAME",
                 )
-    return check_names(names | given, "--map and [model.names]", system)
+    return check_names(names | typed, "--map and [model.names]", system)

@@ -14,7 +14,7 @@ _OUTPUT = {  # of all commands, before their names or after them
 }
 
 
-def command_line(release: str, *asked: str) -> argparse.ArgumentParser:
+def command_line(release: str, *selected: str) -> argparse.ArgumentParser:
     """The parser of the command line.
 
     Parameters
@@ -31,11 +31,11 @@ def command_line(release: str, *asked: str) -> argparse.ArgumentParser:
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     known = {name: (f"workbench.cli.{name}", text) for name, text in COMMANDS.items()}
     known["bench"] = _BENCH
-    if not all(name in known for name in asked or [""]):  # else plugins have nothing to add
+    if not all(name in known for name in selected or [""]):  # else plugins have nothing to add
         for plugin in installed_plugins():
             known |= plugin.commands
     for name, (module, text) in known.items():
-        if asked and name not in asked:
+        if selected and name not in selected:
             commands.add_parser(name, help=text)
         else:
             import_module(module).add(commands, text).set_defaults(module=module)

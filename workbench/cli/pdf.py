@@ -49,10 +49,13 @@ def print_page(page: Path) -> Path:
         printed = Path(folder) / "report.pdf"
         # The sandbox of the browser does not work for root; the page is the workbench's own.
         free = ["--no-sandbox"] if os.name == "posix" and os.geteuid() == 0 else []
+        switches = "headless disable-gpu no-first-run disable-background-networking "
+        switches += "disable-component-update disable-sync no-pdf-header-footer "
+        switches += "virtual-time-budget=10000"
         command = [
-            *(program, "--headless", "--disable-gpu", "--no-first-run", *free),
-            *("--disable-background-networking", "--disable-component-update", "--disable-sync"),
-            *("--no-pdf-header-footer", "--virtual-time-budget=10000"),
+            program,
+            *free,
+            *(f"--{switch}" for switch in switches.split()),
             f"--user-data-dir={Path(folder) / 'profile'}",
             f"--print-to-pdf={printed}",
             page.resolve().as_uri(),

@@ -175,7 +175,7 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
     with locked_folder(options.out):
         output.progress(f"sets of {len(rig.recordings)} recordings")
         if options.check is None:
-            return _usual(options, output, study, _planned(options, study))
+            return _usual(options, output, study, _plan_sets(options, study))
         engine = Engine(options.workers, output.stage)
         check, interrupted = _CHECKS[options.check](options, study, engine)
         provenance = _provenance(options, study, interrupted)
@@ -185,7 +185,7 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
         return _result(path, interrupted)
 
 
-def _chosen(names: Sequence[str], rig: VirtualRig) -> tuple[Plantable, ...]:
+def _select(names: Sequence[str], rig: VirtualRig) -> tuple[Plantable, ...]:
     """Effects to plant, by the names of the library, or of the rig where the library has none."""
     known = {plantable.effect or plantable.name: plantable for plantable in rig.plantables}
     for name in names:
@@ -215,10 +215,10 @@ def _provenance(
     }
 
 
-def _planned(options: argparse.Namespace, study: PowerStudy) -> list[Group]:
+def _plan_sets(options: argparse.Namespace, study: PowerStudy) -> list[Group]:
     from workbench.studies.power import Repertoire, plan
 
-    repertoire = Repertoire(_chosen(options.effects, study.rig), tuple(study.effects))
+    repertoire = Repertoire(_select(options.effects, study.rig), tuple(study.effects))
     sizes = sorted(set(options.sizes))
     groups = plan(repertoire, options.clean, sizes, options.repeats, options.pairs, options.seed)
     if not groups:
@@ -272,7 +272,7 @@ def _check_left_out(
     from workbench.studies.power.report import left_out_check
 
     largest = argparse.Namespace(**vars(options) | {"sizes": [max(options.sizes)], "pairs": 0})
-    rows, interrupted = propose_left_out(_planned(largest, study), study, engine)
+    rows, interrupted = propose_left_out(_plan_sets(largest, study), study, engine)
     return left_out_check(rows), interrupted
 
 
@@ -284,7 +284,7 @@ def _check_thresholds(
     from workbench.studies.power.report import thresholds_check
     from workbench.studies.power.sensitivity import threshold_values, vary_sets
 
-    sets = draw_sets(_planned(options, study), options.sets, options.seed)
+    sets = draw_sets(_plan_sets(options, study), options.sets, options.seed)
     results, interrupted = vary_sets(sets, study, engine)
     usual = threshold_values(of_system(study.system.comparison, len(study.effects)))
     return thresholds_check(results, usual), interrupted
@@ -296,7 +296,7 @@ def _check_campaign(
     from workbench.studies.power.campaign import predict_campaign
     from workbench.studies.power.report import campaign_check, draw_chances
 
-    sizes, wanted = sorted(set(options.sizes)), _chosen(options.effects, study.rig)
+    sizes, wanted = sorted(set(options.sizes)), _select(options.effects, study.rig)
     engine.report("one set without any effect is made and diagnosed")
     rows = predict_campaign(study, wanted, sizes, options.seed)
     draw_chances(rows, sizes, options.out / "plan")
@@ -310,7 +310,7 @@ def _check_proposals(
     from workbench.studies.power.report import following_check
 
     alone = argparse.Namespace(**vars(options) | {"clean": 0, "pairs": 0})
-    rows, interrupted = follow_proposals(_planned(alone, study), study, engine)
+    rows, interrupted = follow_proposals(_plan_sets(alone, study), study, engine)
     return following_check(rows), interrupted
 
 

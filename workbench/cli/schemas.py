@@ -32,23 +32,11 @@ from workbench.tuning.validation import Fold
 Schema = dict[str, Any]
 
 TEXT: Schema = {"type": "string"}
-
-
 NAMED: Schema = {"type": "string", "minLength": 1}
-
-
 FLAG: Schema = {"type": "boolean"}
-
-
 WHOLE: Schema = {"type": "integer"}
-
-
 NUMBER: Schema = {"type": "number"}
-
-
 ANY: Schema = {}
-
-
 HASH: Schema = {"type": "string", "pattern": "^[0-9a-f]{64}$"}
 
 
@@ -80,10 +68,9 @@ def or_null(schema: Schema) -> Schema:
     return {"anyOf": [schema, {"type": "null"}]}
 
 
-def declared(kind: type, *, nullable: bool = False) -> Schema:
-    """A dataclass as JSON has it; with `nullable`, its numbers are null where there are none."""
-    hints = typing.get_type_hints(kind)
-    entries = {field.name: _typed(hints[field.name]) for field in dataclasses.fields(kind)}
+def declared(cls: type, *, nullable: bool = False) -> Schema:
+    """A dataclass or TypedDict as JSON has it; `nullable` numbers are null where there are none."""
+    entries = {name: _schema_of(hint) for name, hint in typing.get_type_hints(cls).items()}
     if nullable:
         entries = {
             name: or_null(entry) if entry == NUMBER else entry for name, entry in entries.items()
@@ -91,19 +78,20 @@ def declared(kind: type, *, nullable: bool = False) -> Schema:
     return closed(entries)
 
 
-def _typed(hint: Any) -> Schema:
+def _schema_of(hint: Any) -> Schema:
     origin, inside = typing.get_origin(hint), typing.get_args(hint)
     if origin in (Union, types.UnionType):
-        return or_null(_typed(next(kind for kind in inside if kind is not type(None))))
+        return or_null(_schema_of(next(part for part in inside if part is not type(None))))
     if origin is typing.Literal:
         return {"enum": list(inside)}
     if origin in (Mapping, dict):
-        return by_name(_typed(inside[1]))
+        return by_name(_schema_of(inside[1]))
     if origin in (Sequence, list) or (origin is tuple and inside[-1] is ...):
-        return listed(_typed(inside[0]))
+        return listed(_schema_of(inside[0]))
     if origin is tuple:
-        return {**listed(_typed(inside[0])), "minItems": len(inside), "maxItems": len(inside)}
-    if isinstance(hint, type) and dataclasses.is_dataclass(hint):
+        size = len(inside)
+        return {**listed(_schema_of(inside[0])), "minItems": size, "maxItems": size}
+    if typing.is_typeddict(hint) or dataclasses.is_dataclass(hint):
         return declared(hint)
     return {str: TEXT, float: NUMBER, int: WHOLE, bool: FLAG}[hint]
 
@@ -111,11 +99,7 @@ def _typed(hint: Any) -> Schema:
 # --- what summaries share ---
 
 VERSIONS = {"workbench": TEXT, "commit": or_null(TEXT), "python": TEXT, "packages": by_name(TEXT)}
-
-
 FMU = closed({"file": TEXT, "model": TEXT, "sha256": HASH})
-
-
 RUN = closed(
     {
         "command": TEXT,
@@ -127,23 +111,11 @@ RUN = closed(
         "data": by_name(or_null(HASH)),
     }
 )
-
-
 MEASURES = by_name(declared(Measure))
-
-
 ANSWER = closed({"sentence": NAMED, "headline": MEASURES, "details": MEASURES})
-
-
 ERROR = or_null(NUMBER)
-
-
 BOTH = closed({"before": NUMBER, "after": NUMBER})
-
-
 VALUE = closed({"value": NUMBER, "unit": TEXT})
-
-
 SHARE = closed({"hits": WHOLE, "of": WHOLE, "share": ERROR, "low": NUMBER, "high": NUMBER})
 
 
@@ -162,7 +134,7 @@ def _file(title: str, schema: Schema) -> Schema:
 
 def gains_schema(system: System) -> Schema:
     """Of a `gains.toml` for an estimator of a system."""
-    names = [name for name, kind in estimators_of(system).items() if kind.tunable]
+    names = [name for name, cls in estimators_of(system).items() if cls.tunable]
     entries = {
         "estimator": {"enum": names},
         "gains": {**by_name(NUMBER), "minProperties": 1},
@@ -281,39 +253,15 @@ def _sheet_error() -> Schema:
 
 
 def _left_out() -> Schema:
-    texts = {name: listed(TEXT) for name in ("left_out", "named", "late", "laws", "slots")}
-    ends = {
-        name: or_null(NUMBER) for name in ("before", "after", "after_with_it", "function_error")
-    }
-    row = {
-        "rig": TEXT,
-        "verdict": TEXT,
-        "error": TEXT,
-        **texts,
-        "asked": FLAG,
-        "slot_right": or_null(FLAG),
-        **dict.fromkeys(ends, or_null(NUMBER)),
-    }
     shares = {name: SHARE for name in left_out.SHARES}
-    return summary("power --leave-out-effect", _SETS, {**shares, "sets": listed(closed(row))})
+    rows = listed(declared(left_out.LeftOutRow))
+    return summary("power --leave-out-effect", _SETS, {**shares, "sets": rows})
 
 
 def _followed() -> Schema:
-    away = closed({"from": TEXT, "predicted": NUMBER, "shown": or_null(NUMBER)})
-    texts = {name: TEXT for name in ("experiment", "verdict")}
-    flags = {name: FLAG for name in ("foreseen", "parts")}
-    said = {**texts, **flags, "named": listed(TEXT), "separations": listed(away)}
-    made = closed(said)
-    row = {
-        **{name: TEXT for name in ("rig", "planted", "verdict", "sentence", "error")},
-        "multiple": NUMBER,
-        **{name: listed(TEXT) for name in ("group", "sensors")},
-        "proposed": or_null(made),
-        "drawn": listed(made),
-        "sensed": or_null(closed({"sensor": TEXT, **said})),
-    }
     shares = {name: SHARE for name in following.SHARES}
-    return summary("power --follow", _SETS, {**shares, "sets": listed(closed(row))})
+    rows = listed(declared(following.FollowingRow))
+    return summary("power --follow", _SETS, {**shares, "sets": rows})
 
 
 def _plan() -> Schema:

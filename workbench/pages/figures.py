@@ -141,7 +141,7 @@ def sheet(figure: CaseFigure) -> "Figure":
             1,
             sharex=True,
             squeeze=False,
-            gridspec_kw=_placed([panel.height for panel in figure.panels], len(figure.legend)),
+            gridspec_kw=_layout([panel.height for panel in figure.panels], len(figure.legend)),
         )[:, 0]
         drawn.suptitle(f"{figure.name}: {figure.title}", fontsize=10, y=1.0 - 0.1 / _SHEET[1])
         for axes, panel in zip(rows, figure.panels, strict=True):
@@ -177,7 +177,7 @@ def draw_case(figure: CaseFigure, paths: Iterable[Path]) -> None:
         save_figure(drawn, paths)
 
 
-def _placed(heights: Sequence[float], entries: int) -> dict[str, Any]:
+def _layout(heights: Sequence[float], entries: int) -> dict[str, Any]:
     """Where panels stand on a sheet above a legend; to have it found takes longer than to draw."""
     width, height = _SHEET
     bottom, top = 0.6 + 0.17 * -(-entries // _ENTRIES), height - 0.5  # [inch]

@@ -267,21 +267,21 @@ def _leaves(content: Any, path: str = "") -> Iterator[tuple[str, Any]]:
 
 def format_runs(runs: list[RunRecord]) -> str:
     """What a folder holds, for people."""
-    return "\n\n".join("\n".join(_told(run)) for run in runs)
+    return "\n\n".join("\n".join(_lines(run)) for run in runs)
 
 
-def _told(ran: RunRecord) -> Iterator[str]:
-    date = str(ran.run["date"]).replace("T", " ").replace("+00:00", " UTC")
-    version = f"workbench {ran.run['workbench']}" + f" ({ran.commit})" * bool(ran.commit)
-    count = len(ran.run["data"])
+def _lines(run: RunRecord) -> Iterator[str]:
+    date = str(run.run["date"]).replace("T", " ").replace("+00:00", " UTC")
+    version = f"workbench {run.run['workbench']}" + f" ({run.commit})" * bool(run.commit)
+    count = len(run.run["data"])
     data = f", {count} recording{'s' * (count != 1)}" if count else ""
-    yield f"{ran.folder}: {ran.run['command']}, {date}, {version}, {ran.run['system']}{data}"
-    yield f"  {ran.sentence}"
-    width = max(map(len, ran.headline), default=0)
-    for name, measure in ran.headline.items():
+    yield f"{run.folder}: {run.run['command']}, {date}, {version}, {run.run['system']}{data}"
+    yield f"  {run.sentence}"
+    width = max(map(len, run.headline), default=0)
+    for name, measure in run.headline.items():
         yield f"  {name:<{width}}  {_value(measure)}"
-    kinds = ", ".join(f"{count} {kind}" for kind, count in ran.files.items())
-    yield f"  files: {kinds}"
+    files = ", ".join(f"{count} {suffix}" for suffix, count in run.files.items())
+    yield f"  files: {files}"
 
 
 def format_changes(before: RunRecord, after: RunRecord, changes: list[Change]) -> str:

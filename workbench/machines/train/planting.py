@@ -91,8 +91,8 @@ class PlantedTrain:
     ) -> None:
         """Write what the train's computer records, read as that of any train."""
         with tempfile.TemporaryDirectory() as recorded:
-            for made, seed in simulated:
-                write_stop(made, seed, _faults(gains), Path(recorded) / made.stop.name)
+            for stop, seed in simulated:
+                write_stop(stop, seed, _faults(gains), Path(recorded) / stop.stop.name)
             write_cases("train", Path(recorded), folder)
 
 

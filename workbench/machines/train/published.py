@@ -58,7 +58,7 @@ def _recording(folder: Path) -> PublishedRecording:
     columns = {"time [s]": means["time"]}
     columns |= {f"{name} [{unit}]": means[name] for name, unit in signals.items()}
     if intermittent is not None:
-        values = _interpolated(read["time"], intermittent, means["time"])
+        values = _interpolate(read["time"], intermittent, means["time"])
         columns[f"{_INTERMITTENT} [m/s]"] = values
     masses = np.array([conditions.number(f"mass{k}", "kg") for k in (1, 2)])
     slopes, curves = _along(folder / document.table("track").take("file", str), means["s"])
@@ -101,7 +101,7 @@ def _means(values: Vector, size: int) -> Vector:
     return means
 
 
-def _interpolated(time: Vector, values: Vector, at: Vector) -> Vector:
+def _interpolate(time: Vector, values: Vector, at: Vector) -> Vector:
     """A signal that is new every 0.1 s and then held, (k,), in lines between its samples.
 
     A line from or to a sample that is missing is missing.

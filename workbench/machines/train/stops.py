@@ -231,10 +231,14 @@ def _line(rng: np.random.Generator, t: float) -> tuple[Matrix, Vector, Vector]:
     return np.column_stack([shown, wrong, radius]), true, curve
 
 
-def write_stop(made: SimulatedStop, seed: int, faults: Faults, folder: Path) -> None:
+def write_stop(simulated: SimulatedStop, seed: int, faults: Faults, folder: Path) -> None:
     """Write what the train's computer records, and the file of the track, into a new folder."""
-    rng, stop, n = np.random.default_rng([seed, made.stop.number, 2]), made.stop, 1.0 + faults.noise
-    result, tolerances = made.result, made.tolerances
+    rng, stop, n = (
+        np.random.default_rng([seed, simulated.stop.number, 2]),
+        simulated.stop,
+        1.0 + faults.noise,
+    )
+    result, tolerances = simulated.result, simulated.tolerances
     time = np.arange(0.0, result.time[-1], _PERIOD)
     columns: dict[str, Vector] = {"time [s]": time}
     for j in range(BOGIES):
@@ -248,7 +252,7 @@ def write_stop(made: SimulatedStop, seed: int, faults: Faults, folder: Path) -> 
         speeds[i] = np.where(true < 0.5, 0.0, true + deviation)
         columns[f"omega{i + 1} [rad/s]"] = speeds[i]
     felt = (
-        np.interp(time, result.time, _filtered(result.a)) * (1.0 + tolerances.gain)
+        np.interp(time, result.time, _low_pass(result.a)) * (1.0 + tolerances.gain)
         + tolerances.bias
     )
     columns["a [m/s2]"] = felt + n * 0.02 * rng.standard_normal(time.size)
@@ -257,9 +261,9 @@ def write_stop(made: SimulatedStop, seed: int, faults: Faults, folder: Path) -> 
     columns["s [m]"] = _START + rng.normal(0.0, 5.0) + rolled
     write_whole(folder / "measured.csv", _table(columns, "%.6g"))
     names = ("position [m]", "gradient [permille]", "radius [m]")
-    track = dict(zip(names, made.track.T, strict=True))
+    track = dict(zip(names, simulated.track.T, strict=True))
     write_whole(folder / "track.csv", _table(track, "%.2f"))
-    write_whole(folder / "case.toml", _case(stop, made))
+    write_whole(folder / "case.toml", _case(stop, simulated))
 
 
 def _satellites(result: StopResult, time: Vector, seed: int, number: int, n: float) -> Vector:
@@ -274,7 +278,7 @@ def _satellites(result: StopResult, time: Vector, seed: int, number: int, n: flo
     return held
 
 
-def _filtered(values: Vector) -> Vector:
+def _low_pass(values: Vector) -> Vector:
     """Behind a filter of first order at 5 Hz, (n,) every STEP."""
     share, filtered = 1.0 - np.exp(-2.0 * np.pi * 5.0 * STEP), values.copy()
     for k in range(1, filtered.size):
@@ -289,19 +293,19 @@ def _table(columns: dict[str, Vector], form: str) -> str:
     return "\n".join([",".join(columns), *lines]) + "\n"
 
 
-def _case(stop: AskedStop, made: SimulatedStop) -> str:
+def _case(stop: AskedStop, simulated: SimulatedStop) -> str:
     brake = "emergency" if stop.pressure > 3e5 else "service"
     return f"""\
 title = "{stop.speed * 3.6:.0f} km/h, {brake} brake, rail {stop.rail}"
 
 [conditions]
 initial_speed = "{stop.speed * 3.6:.0f} km/h"
-brake_command = "{made.command:.2f} s"
+brake_command = "{simulated.command:.2f} s"
 brake = "{brake}"
 pressure_full_load = "{stop.pressure / 1e5:g} bar"
 rail = "{stop.rail}"
-mass1 = "{made.weighed[0] / 1e3:.2f} t"
-mass2 = "{made.weighed[1] / 1e3:.2f} t"
+mass1 = "{simulated.weighed[0] / 1e3:.2f} t"
+mass2 = "{simulated.weighed[1] / 1e3:.2f} t"
 
 [measurement]
 file = "measured.csv"

@@ -32,24 +32,24 @@ class Profile:
     ----------
     levels : of a step or staircase, one after the other and again; of a sine its ends; of what is
         released, before it is [unit].
-    every : [s] that a stair lasts, and the period of a sine; after it, a demand is released.
+    period : [s] that a stair lasts, and the period of a sine; after it, a demand is released.
     """
 
     input: VariedInput
-    kind: str
+    shape: str
     levels: tuple[float, ...]
-    every: float
+    period: float
 
     def demand(self, time: Vector) -> Vector:
         """Demand at each time, (n,) [unit]."""
         begun = time - self.input.begins
-        if self.kind == SINE:
+        if self.shape == SINE:
             low, high = self.levels
-            wave = np.sin(2.0 * np.pi * begun / self.every)
+            wave = np.sin(2.0 * np.pi * begun / self.period)
             return np.where(begun >= 0.0, 0.5 * (low + high) + 0.5 * (high - low) * wave, 0.0)
-        if self.kind == RELEASE:
-            return np.where((begun >= 0.0) & (begun < self.every), self.levels[0], 0.0)
-        stair = np.floor(np.maximum(begun, 0.0) / self.every).astype(int) % len(self.levels)
+        if self.shape == RELEASE:
+            return np.where((begun >= 0.0) & (begun < self.period), self.levels[0], 0.0)
+        stair = np.floor(np.maximum(begun, 0.0) / self.period).astype(int) % len(self.levels)
         return np.where(begun >= 0.0, np.array(self.levels)[stair], 0.0)
 
     def signal(self, time: Vector) -> Vector:
@@ -66,13 +66,13 @@ class Profile:
         factor = si_factor(signal.shown, signal.unit, signal.name)
         unit = "" if signal.shown == "1" else f" {signal.shown}"
         shown = [f"{level / factor:.3g}" for level in self.levels]
-        if self.kind == SINE:
-            return f"{signal.name} sine {shown[0]} to {shown[1]}{unit}, period {self.every:g} s"
-        if self.kind == STEP:
+        if self.shape == SINE:
+            return f"{signal.name} sine {shown[0]} to {shown[1]}{unit}, period {self.period:g} s"
+        if self.shape == STEP:
             return f"{signal.name} step to {shown[0]}{unit}"
-        if self.kind == RELEASE:
-            return f"{signal.name} step to {shown[0]}{unit}, released after {self.every:g} s"
-        return f"{signal.name} staircase {', '.join(shown)}{unit}, {self.every:g} s each"
+        if self.shape == RELEASE:
+            return f"{signal.name} step to {shown[0]}{unit}, released after {self.period:g} s"
+        return f"{signal.name} staircase {', '.join(shown)}{unit}, {self.period:g} s each"
 
 
 @dataclass(frozen=True)

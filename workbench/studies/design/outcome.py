@@ -61,9 +61,9 @@ class RankedExperiment:
             "duration": float(prediction.case.time[-1] - prediction.case.time[0]),
             "inputs": {
                 profile.input.name: {
-                    "profile": profile.kind,
+                    "profile": profile.shape,
                     "levels": profile.levels,
-                    "every": profile.every,
+                    "every": profile.period,
                 }
                 for profile in prediction.candidate.profiles
             },

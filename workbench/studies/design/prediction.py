@@ -80,7 +80,7 @@ class Prediction:
         return tuple(tuple(np.flatnonzero(of == g).tolist()) for g in dict.fromkeys(of))
 
     @property
-    def _between(self) -> NDArray[np.bool_]:
+    def _parted_pairs(self) -> NDArray[np.bool_]:
         """(r, r) pairs that it parts; all of them where it parts none."""
         count = len(self.pairwise)
         pairs = ~np.eye(count, dtype=bool)
@@ -92,7 +92,7 @@ class Prediction:
     @property
     def separation(self) -> float:
         """Least distance of two rivals that it parts [standard deviations]; of any, if none."""
-        least = self.pairwise[self._between].min(initial=np.inf)
+        least = self.pairwise[self._parted_pairs].min(initial=np.inf)
         return float(np.sqrt(max(0.0, least))) if np.isfinite(least) else 0.0
 
     @property
@@ -102,7 +102,7 @@ class Prediction:
         At least that, each rival being as likely: chances of being mistaken for another add up
         (Bonferroni).
         """
-        missed = np.where(self._between, 1.0 - self.chance, 0.0).sum(axis=1)
+        missed = np.where(self._parted_pairs, 1.0 - self.chance, 0.0).sum(axis=1)
         return float(np.maximum(0.0, 1.0 - missed).mean())
 
 
@@ -246,7 +246,7 @@ def _compare(
     pairwise, chance = np.zeros((number, number)), np.ones((number, number))
     left = [np.zeros_like(first.own.errors(np.zeros(len(first.joint.shared))))]
     for i, (true, model) in enumerate(zip(points, rivals.models, strict=True)):
-        explained = model.explained + _explained(true)
+        explained = model.explained + _chi_squared_explained(true)
         for j, (other, rival) in enumerate(zip(points, rivals.models, strict=True)):
             if i == j:
                 continue
@@ -258,7 +258,7 @@ def _compare(
     return pairwise, chance, np.array(left)
 
 
-def _explained(true: _RivalPoint) -> float:
+def _chi_squared_explained(true: _RivalPoint) -> float:
     """Chi-squared that the causes explain in an experiment, beyond what levels do."""
     away = _away(true.bare, true.own).eliminated()
     at = [j for j, key in enumerate(true.joint.shared) if key in true.joint.levels]
@@ -334,7 +334,7 @@ class ExperimentPredictor:
         problem = self._problem
         if sensor is not None:
             problem = replace(problem, system=with_sensor(problem.system, sensor))
-        case = self._recorded(problem, candidate, problem.rivals.models[0], number)
+        case = self._record(problem, candidate, problem.rivals.models[0], number)
         if not counts(case, problem.system):
             return None
         return predict(problem, self._derived, candidate, case, in_full=in_full)
@@ -350,12 +350,12 @@ class ExperimentPredictor:
         if first is None:
             return None
         for rival in problem.rivals.models[1:]:
-            other = self._recorded(problem, prediction.candidate, rival, number)
+            other = self._record(problem, prediction.candidate, rival, number)
             if exclusion_reasons(other, problem.system) != first:
                 return None
         return predict(problem, self._derived, prediction.candidate, prediction.case, in_full=True)
 
-    def _recorded(
+    def _record(
         self, problem: DesignProblem, candidate: Experiment, rival: Rival, number: int
     ) -> Case:
         """A recording of an experiment as a rival predicts it."""
@@ -424,12 +424,12 @@ def with_sensor(system: System, sensor: Signal) -> System:
 
 def counts(case: Case, system: System) -> bool:
     """Whether a recording has enough that counts."""
-    return _counted(case, system, restarting=True) is not None
+    return _count_samples(case, system, restarting=True) is not None
 
 
 def exclusion_reasons(case: Case, system: System) -> set[str] | None:
     """Reasons why samples are excluded, but for the end; None if too few samples count."""
-    counted = _counted(case, system, restarting=False)
+    counted = _count_samples(case, system, restarting=False)
     if counted is None:
         return None
     reasons = [
@@ -438,7 +438,7 @@ def exclusion_reasons(case: Case, system: System) -> set[str] | None:
     return {reason for reason in reasons if counted.excluded[reason].any()}
 
 
-def _counted(case: Case, system: System, *, restarting: bool) -> CountedSamples | None:
+def _count_samples(case: Case, system: System, *, restarting: bool) -> CountedSamples | None:
     try:
         return count(case, system, tuple(case.signals), SOUND, restarting=restarting)
     except InputError:

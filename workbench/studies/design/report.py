@@ -133,8 +133,8 @@ def _figure(proposal: NextStop, experiment: RankedExperiment, place: int) -> Cas
         low, high = float(values.min()), float(values.max())
         room = 0.08 * (high - low) or 1.0
         title = f"{capital(signal.label)} {signal.name} [{signal.shown}]"
-        given = (Curve("measured", values),)
-        panels.append(Panel(title, signal.shown, low - room, high + room, 0.6, given))
+        curve = (Curve("measured", values),)
+        panels.append(Panel(title, signal.shown, low - room, high + room, 0.6, curve))
     for c, channel in enumerate(proposal.channels):
         curves = tuple(
             Curve(style, left[:, c])

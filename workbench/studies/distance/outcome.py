@@ -259,7 +259,9 @@ class Distance:
             near = _SEEN * (max(seen) - min(seen))
             value = self.stop.asked[asked.name]
             if not min(seen) - near <= value <= max(seen) + near:
-                low, high, here = (_shown(v, asked) for v in (min(seen), max(seen), value))
+                low, high, here = (
+                    _format_quantity(v, asked) for v in (min(seen), max(seen), value)
+                )
                 warnings.append(
                     f"{asked.label} {here} is beyond that of past stops, {low} to {high}"
                 )
@@ -281,7 +283,7 @@ class Distance:
         low, high = self.ahead.band
         middle = self.ahead.quantile(0.5)
         speed = next(q for q in stopping_of(self.system).asked if q.name == SPEED)
-        start = ", ".join([_shown(self.stop.asked[SPEED], speed), *self._conditions])
+        start = ", ".join([_format_quantity(self.stop.asked[SPEED], speed), *self._conditions])
         return (
             f"From {start}: {middle:.1f} m, 95 %: {low:.1f} to {high:.1f} m; deceleration "
             f"{self.rate(middle):.3f} m/s2 after {self.response:.2f} s."
@@ -295,7 +297,7 @@ class Distance:
         """The answer, what it rests on, and what it does not carry, for people."""
         lines = [self.sentence]
         quantities = [
-            f"{quantity.label} {_shown(self.stop.asked[quantity.name], quantity)}"
+            f"{quantity.label} {_format_quantity(self.stop.asked[quantity.name], quantity)}"
             for quantity in stopping_of(self.system).asked
         ]
         lines.append(f"asked for: {', '.join([*quantities, *self._conditions])}")
@@ -392,7 +394,7 @@ class Distance:
         return f"<p>{escape(self.sentence)}</p>{self.quantiles().to_html(index=False)}"
 
 
-def _shown(value: float, asked: AskedQuantity) -> str:
+def _format_quantity(value: float, asked: AskedQuantity) -> str:
     """A quantity for people."""
     unit = f" {asked.shown}" * (asked.shown != "1")
     return f"{value / si_factor(asked.shown, asked.unit, asked.name):.4g}{unit}"

@@ -104,7 +104,7 @@ def read_stop(case: Case, system: System, stopping: Stopping) -> RecordedStop:
         outside=tuple(
             exclusion.reason
             for exclusion in stopping.outside
-            if _excluded(exclusion, case.signals, system, time, h)[moving].any()
+            if _mask(exclusion, case.signals, system, time, h)[moving].any()
         ),
     )
 
@@ -140,12 +140,10 @@ def beyond(outputs: Mapping[str, Vector], system: System, stopping: Stopping) ->
     """Whether readings of a model's outputs, (n,) each, are outside its validity range."""
     h = system.sample_time
     time: Vector = h * np.arange(float(next(iter(outputs.values())).size))
-    return any(
-        _excluded(exclusion, outputs, system, time, h).any() for exclusion in stopping.outside
-    )
+    return any(_mask(exclusion, outputs, system, time, h).any() for exclusion in stopping.outside)
 
 
-def _excluded(
+def _mask(
     exclusion: Exclusion, signals: Mapping[str, Vector], system: System, time: Vector, h: float
 ) -> NDArray[np.bool_]:
     """Where a reason holds; at rest a ratio is undefined, and no reason holds."""

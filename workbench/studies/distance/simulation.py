@@ -83,15 +83,13 @@ def _set_inputs(drive, t, way, u):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _stop(model, x0, drive, limits, y, result, work):  # type: ignore[no-untyped-def]
+def _stop(model, drive, limits, y, result, work):  # type: ignore[no-untyped-def]
     """Fill `y` (n, l), as far as it goes, and `result` (distance, time, steps); returns a status.
 
     `limits` are the index of the speed, that at rest [m/s], a step [s] and the most steps. The way
     is the integral of the speed by trapezia, s += h (v_k + v_{k+1}) / 2.
     """
     state, rest, h, most = limits
-    for i in range(x0.size):
-        model.x[i] = x0[i]
     restart(work)
     _set_inputs(drive, 0.0, 0.0, model.u)
     if place(model):
@@ -159,12 +157,11 @@ class StopSimulation:
             If the model cannot be evaluated, or does not come to rest in time.
         """
         self._fmu.start(values)
-        self._model.u[:] = 0.0
+        self._model.x[:], self._model.u[:] = self._fmu.get_states(), 0.0
         y = self._y if stride == 1 else self._y[:0]
         inputs = drive.to, drive.delay, drive.lag, drive.along
         limits = self._state, self._stopping.rest, stride * self._h, len(self._y) // stride
-        x0 = self._fmu.get_states()
-        status = _stop(self._model, x0, inputs, limits, y, self._result, self._work)
+        status = _stop(self._model, inputs, limits, y, self._result, self._work)
         if status == _MOVING:
             raise FMUError(
                 f"{self._fmu.path.name}: not at rest after {self._stopping.longest:g} s; "

@@ -79,7 +79,7 @@ class StopConditions:
     resistance: float
 
 
-def nominal_rate(rate: float, made: StopConditions, mass: float) -> float:
+def nominal_rate(rate: float, conditions: StopConditions, mass: float) -> float:
     """Equivalent deceleration on a level, straight way with a nominal mass [m/s2].
 
     The force follows the weighed load: it is taken as that of the mass that was stopped.
@@ -89,9 +89,9 @@ def nominal_rate(rate: float, made: StopConditions, mass: float) -> float:
     rate : as it was [m/s2].
     mass : nominal [kg].
     """
-    turning = made.mass + made.rotating
-    level = rate - G * made.resistance * made.mass / turning
-    return level * turning / made.mass * mass / (mass + made.rotating)
+    turning = conditions.mass + conditions.rotating
+    level = rate - G * conditions.resistance * conditions.mass / turning
+    return level * turning / conditions.mass * mass / (mass + conditions.rotating)
 
 
 def percentage(distance: float, constants: tuple[float, float]) -> float:

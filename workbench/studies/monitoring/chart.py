@@ -195,7 +195,7 @@ class Chart:
         """
         if not self.values:
             return np.nan, np.nan
-        off = (value - self.level[0]) / self._expected(variance)
+        off = (value - self.level[0]) / self._deviation(variance)
         # The smaller tail, which rounding does not cut off.
         tail = stdtr(self.scatter.freedom, -abs(off) / np.sqrt(self.scatter.variance))
         return float(np.copysign(ndtri(tail), off)), float(off**2)
@@ -215,10 +215,10 @@ class Chart:
         """The estimate, or as far off the level as chance makes."""
         if not abs(surprise) > LARGEST:
             return value
-        reach, level = self.scatter.largest * self._expected(variance), self.level[0]
+        reach, level = self.scatter.largest * self._deviation(variance), self.level[0]
         return float(np.clip(value, level - reach, level + reach))
 
-    def _expected(self, variance: float) -> float:
+    def _deviation(self, variance: float) -> float:
         """Deviation of an estimate from the level, as stated."""
         return float(np.sqrt(variance + 1.0 / np.sum(1.0 / np.array(self.variances))))
 
@@ -242,14 +242,14 @@ class Chart:
         raised = self.numbers[-1]
         self.numbers, self.values = self.numbers[first:], self.values[first:]
         self.variances, self.up, self.down = self.variances[first:], 0.0, 0.0
-        self.kept = self._settled(before.level[0])
+        self.kept = self._bounded_since_change(before.level[0])
         change = LevelChange(
-            raised, last, earliest, latest, self._returned(), before.level, self.level
+            raised, last, earliest, latest, self._returns(), before.level, self.level
         )
         self.changes.append(change)
         return change
 
-    def _settled(self, old: float) -> list[float]:
+    def _bounded_since_change(self, old: float) -> list[float]:
         """Estimates since a change as they count: what was wild for the old level may be the new.
 
         The new level is about where half of them have moved less, and half more; of two, the one
@@ -260,7 +260,7 @@ class Chart:
         reach = largest * np.sqrt(self.variances)
         return [float(value) for value in np.clip(self.values, about - reach, about + reach)]
 
-    def _returned(self) -> bool:
+    def _returns(self) -> bool:
         """Whether the level is what it was before the last change, as far as is known."""
         if not self.changes:
             return False

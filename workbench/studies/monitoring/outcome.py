@@ -68,7 +68,7 @@ class MonitoringResult:
                 alarms = len(track.changes)
                 until = f", {alarms} alarms until {self.names[last.raised]}" * (alarms > 1)
                 sentences.append(
-                    f"{track.label} ({_named(track)}): {self._size(track)} since "
+                    f"{track.label} ({_quantity_name(track)}): {self._size(track)} since "
                     f"{self.names[first.last]}; told at {self.names[first.raised]}{until}"
                 )
         return sentences
@@ -95,7 +95,7 @@ class MonitoringResult:
             {
                 "recording": name,
                 "date": date,
-                "quantity": _named(track),
+                "quantity": _quantity_name(track),
                 "unit": track.unit,
                 "estimate": track.values[k],
                 "standard_error": track.scale * track.deviations[k],
@@ -119,7 +119,7 @@ class MonitoringResult:
         return {
             "told_at": self.names[change.raised],
             "date": self.dates[change.raised],
-            "quantity": _named(track),
+            "quantity": _quantity_name(track),
             "unit": track.unit,
             "changed_after": self.names[change.last],
             "earliest": self.names[change.earliest],
@@ -153,7 +153,7 @@ class MonitoringResult:
             "threshold": self.threshold,
             "alarms": [_without_nan(alarm) for alarm in self.alarms().to_dict("records")],
             "quantities": {
-                _named(track): _without_nan(
+                _quantity_name(track): _without_nan(
                     {
                         "label": track.label,
                         "unit": track.unit,
@@ -264,7 +264,7 @@ def conclude(
     )
 
 
-def _named(track: Track) -> str:
+def _quantity_name(track: Track) -> str:
     return f"{track.name} against the others" if track.against else track.name
 
 

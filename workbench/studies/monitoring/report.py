@@ -89,14 +89,14 @@ def _strips(tracks: Sequence[Track], result: MonitoringResult) -> list[Strip]:
     for members in arrays.values():
         if changed := [member.label for member in members.values() if member.changes]:
             entries = tuple(
-                (str(k), _moved(member, result)) for k, member in sorted(members.items())
+                (str(k), _change_text(member, result)) for k, member in sorted(members.items())
             )
             finding = capital(f"{', '.join(changed)}: changed; the others are as they were.")
             strips.append(Strip(finding, entries))
     return strips
 
 
-def _moved(track: Track, result: MonitoringResult) -> str:
+def _change_text(track: Track, result: MonitoringResult) -> str:
     """By how much a quantity is off its first level; empty where it is not."""
     if not track.changes:
         return ""
@@ -121,7 +121,7 @@ def _figure(track: Track, result: MonitoringResult) -> CaseFigure:
     if track.changes:
         first, last = track.changes[0], track.changes[-1]
         finding = (
-            f"Changed by {_moved(track, result)} after {result.names[first.last]}, told at "
+            f"Changed by {_change_text(track, result)} after {result.names[first.last]}, told at "
             f"{result.names[first.raised]}."
         )
     return CaseFigure(
@@ -148,18 +148,18 @@ def _levels(track: Track, count: int) -> tuple[Vector, Vector]:
 
 
 def _alarms(alarms: Sequence[Mapping[str, Any]]) -> Table:
-    columns = (
-        *("told at", "quantity", "changed after", "with 95 %, after"),
-        *(map(Numbers, ("change", "95 % from", "to", "of nominal [%]"))),
-        "unit",
-    )
+    texts = ("told at", "quantity", "changed after", "with 95 %, after")
+    numbers = map(Numbers, ("change", "95 % from", "to", "of nominal [%]"))
+    columns = (*texts, *numbers, "unit")
     rows = []
     for alarm in alarms:
         size, reach = alarm["change"], BAND * alarm["standard_error"]
         share = alarm["share_of_nominal"]
         between = dict.fromkeys((alarm["earliest"], alarm["latest"]))
         row = (
-            *(str(alarm["told_at"]), alarm["quantity"], alarm["changed_after"]),
+            str(alarm["told_at"]),
+            alarm["quantity"],
+            alarm["changed_after"],
             " to ".join(between),
             *(number(value, "+.3g") for value in (size, size - reach, size + reach)),
             number(None if share is None else 100.0 * share, "+.1f"),

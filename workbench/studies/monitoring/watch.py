@@ -104,7 +104,7 @@ class _Group:
         noise = np.diag(self.directions @ covariance @ self.directions.T)
         spread = noise + np.square(self.directions) @ self.usual
         shown = noise < (1.0 - _OBSERVED) * self.known
-        watched, surprises, squares = self._compared(values, spread, shown)
+        watched, surprises, squares = self._compare(values, spread, shown)
         self.rows.append((watched, np.where(shown, np.sqrt(spread), np.nan), surprises))
         for k in np.flatnonzero(np.isfinite(squares)):
             self.charts[k].scatter.add(squares[k])
@@ -116,7 +116,7 @@ class _Group:
             if self.against and k < len(self.members) and self.charts[k].changes:
                 self.moved[k] = self.charts[k].level[0] - self.charts[k].changes[0].before[0]
 
-    def _compared(
+    def _compare(
         self, values: Vector, spread: Vector, shown: NDArray[np.bool_]
     ) -> tuple[Vector, Vector, Vector]:
         """Estimates by direction, how far they are off their past, and that squared, (k,) each.

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from concurrent.futures import as_completed
 from contextlib import nullcontext
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
 
@@ -43,9 +43,62 @@ SHARES = {
 """Shares of `summarise_following`, by what they count."""
 
 
+Separation = TypedDict("Separation", {"from": str, "predicted": float, "shown": float | None})
+"""How far a rival is from the planted effect, as predicted and as recordings show it [sigma]."""
+
+
+class FollowingRecording(TypedDict):
+    """An experiment that was made, and the verdict on all recordings with it.
+
+    Attributes
+    ----------
+    foreseen : whether it was predicted to leave the planted effect alone.
+    named : causes, with those that are as good.
+    parts : whether the planted effect alone is named.
+    """
+
+    experiment: str
+    foreseen: bool
+    verdict: str
+    named: list[str]
+    parts: bool
+    separations: list[Separation]
+
+
+class SensedRecording(FollowingRecording):
+    """The same with a further sensor."""
+
+    sensor: str
+
+
+class FollowingRow(TypedDict):
+    """A set and the recordings that follow it, as followed.json has them.
+
+    Attributes
+    ----------
+    rig : options that make the set.
+    verdict, group : on the set: causes, with those that are as good.
+    sentence, sensors : of the proposal: its answer, and sensors that it names.
+    proposed, drawn, sensed : recordings as proposed, at random, with a sensor that is named.
+    error : why it failed.
+    """
+
+    rig: str
+    planted: str
+    multiple: float
+    verdict: str
+    group: list[str]
+    sentence: str
+    sensors: list[str]
+    proposed: FollowingRecording | None
+    drawn: list[FollowingRecording]
+    sensed: SensedRecording | None
+    error: str
+
+
 def follow_proposals(
     groups: Sequence[Group], study: PowerStudy, engine: Engine
-) -> tuple[list[dict[str, Any]], bool]:
+) -> tuple[list[FollowingRow], bool]:
     """Make sets with one cause each, make what is proposed next, and diagnose all of it.
 
     Parameters
@@ -54,8 +107,7 @@ def follow_proposals(
 
     Returns
     -------
-    rows : one for each set, as they are written to followed.json; sets whose cause is named alone
-        have no proposal.
+    rows : one for each set; sets whose cause is named alone have no proposal.
     interrupted : whether Ctrl-C ended the run; what was finished is in the rows.
 
     Raises
@@ -71,7 +123,7 @@ def follow_proposals(
             remedy="write it as workbench.studies.power.virtual_rig.FollowingRig says",
         )
     sets = [planting for group in groups for planting in group if planting.kind == "single"]
-    rows: dict[int, dict[str, Any]] = {}
+    rows: dict[int, FollowingRow] = {}
     progress = StepReporter(engine.report, len(sets))
     with (
         study.setup() as setup,
@@ -84,13 +136,12 @@ def follow_proposals(
                 try:
                     rows[k] = task.result()
                 except WorkerError as error:
-                    rows[k] = _empty_row(sets[k]) | {"error": repr(error)}
-                row, made = rows[k], rows[k]["proposed"]
+                    rows[k] = _empty_row(sets[k], repr(error))
+                row, proposed = rows[k], rows[k]["proposed"]
                 group = " or ".join(row["group"]) or row["verdict"]
-                then = (
-                    "" if made is None else f" -> {' or '.join(made['named']) or made['verdict']}"
-                )
-                progress.step(f"{row['planted']}: {group}{then}{row['error']}")
+                if proposed is not None:
+                    group += f" -> {' or '.join(proposed['named']) or proposed['verdict']}"
+                progress.step(f"{row['planted']}: {group}{row['error']}")
         except KeyboardInterrupt:
             return [rows[k] for k in sorted(rows)], True
     return [rows[k] for k in sorted(rows)], False
@@ -110,11 +161,11 @@ def summarise_following(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         "answered": share((group["sensed"] or group["proposed"])["parts"] for group in groups),
         "foreseen": share(recording["parts"] for recording in proposed if recording["foreseen"]),
         "never": share(recording["parts"] for recording in proposed if not recording["foreseen"]),
-        "separations": share(map(_as_predicted, separations)),
+        "separations": share(map(_agrees, separations)),
     }
 
 
-def _as_predicted(separation: Mapping[str, Any]) -> bool:
+def _agrees(separation: Mapping[str, Any]) -> bool:
     """Whether a separation is within a fifth, or what noise moves its square by: twice itself."""
     predicted, shown = separation["predicted"], separation["shown"]
     if shown is None:
@@ -124,7 +175,7 @@ def _as_predicted(separation: Mapping[str, Any]) -> bool:
     return bool(abs(shown * abs(shown) - predicted * abs(predicted)) <= max(near, noise))
 
 
-def _empty_row(planting: Planting) -> dict[str, Any]:
+def _empty_row(planting: Planting, error: str = "") -> FollowingRow:
     return {
         "rig": planting.options,
         "planted": planting.effects[0],
@@ -136,11 +187,11 @@ def _empty_row(planting: Planting) -> dict[str, Any]:
         "proposed": None,
         "drawn": [],
         "sensed": None,
-        "error": "",
+        "error": error,
     }
 
 
-def _row(setup: Setup, planting: Planting) -> dict[str, Any]:
+def _row(setup: Setup, planting: Planting) -> FollowingRow:
     """Diagnose a set, make the recording that is proposed, and diagnose all of it."""
     row = _empty_row(planting)
     try:
@@ -150,11 +201,11 @@ def _row(setup: Setup, planting: Planting) -> dict[str, Any]:
     return row
 
 
-def _follow(row: dict[str, Any], setup: Setup, planting: Planting) -> None:
+def _follow(row: FollowingRow, setup: Setup, planting: Planting) -> None:
     (planted,) = planting.effects
     cases = setup.record(planting, setup.rig.simulate(planting.seed, planting.gains))
     diagnosis, rivals = rivals_of_set(setup.system, setup.effects, setup.everything, cases)
-    row["verdict"], row["group"] = diagnosis.verdict, _named(diagnosis)
+    row["verdict"], row["group"] = diagnosis.verdict, _names(diagnosis)
     if rivals is None or len(rivals.models) == 1:
         return
     experiments = setup.system.experiments
@@ -166,11 +217,11 @@ def _follow(row: dict[str, Any], setup: Setup, planting: Planting) -> None:
     rng = np.random.default_rng(planting.seed)
     plan = [draw_experiment(experiments, rng) for _ in range(_DRAWN)]
 
-    def make(experiment: RankedExperiment, fitted: Setup = setup) -> dict[str, Any]:
+    def make(experiment: RankedExperiment, fitted: Setup = setup) -> FollowingRecording:
         return _diagnose_with(experiment, fitted, planting, rivals, cases)
 
-    row["proposed"] = make(proposal.tried[0])
-    if not row["proposed"]["foreseen"]:
+    row["proposed"] = proposed = make(proposal.tried[0])
+    if not proposed["foreseen"]:
         at = proposal.names.index(planted)
         for sensor in experiments.sensors:
             sensed = proposal.sensors.get(sensor.label)
@@ -187,7 +238,7 @@ def _diagnose_with(
     planting: Planting,
     rivals: Rivals,
     cases: Sequence[Case],
-) -> dict[str, Any]:
+) -> FollowingRecording:
     """Make an experiment, diagnose all recordings with it, and compare with its prediction."""
     assert isinstance(setup.rig, FollowingRig)
     (planted,) = planting.effects
@@ -200,7 +251,7 @@ def _diagnose_with(
     diagnosis, shown = distances_in_set(
         setup.system, setup.effects, setup.everything, recordings, planted, others
     )
-    named = _named(diagnosis)
+    named = _names(diagnosis)
     return {
         "experiment": experiment.text,
         "foreseen": (at,) in experiment.prediction.groups,
@@ -219,7 +270,7 @@ def _diagnose_with(
     }
 
 
-def _named(diagnosis: Diagnosis) -> list[str]:
+def _names(diagnosis: Diagnosis) -> list[str]:
     """Causes, with those that are as good."""
     return [
         name for cause in diagnosis.causes for name in (cause.effect.name, *cause.confusable_with)

@@ -4,7 +4,7 @@ import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
 
@@ -39,6 +39,38 @@ SHARES = {
 """Shares of `summarise_left_out`, by what they count."""
 
 
+class LeftOutRow(TypedDict):
+    """A set whose cause is left out of the catalogue, as left_out.json has it.
+
+    Attributes
+    ----------
+    rig : options that make the set.
+    left_out : effects that the catalogue lacks.
+    verdict, named, late : of the diagnosis without them: causes, and signals that are late.
+    asked : whether it asks for a law.
+    laws, slots : that are proposed, and slots of all laws that are as good.
+    slot_right : whether the cause acts in one of them; None without a cause.
+    before, after, after_with_it : held-out errors, without and with the law, with the true cause.
+    function_error : see `function_error`.
+    error : why it failed.
+    """
+
+    rig: str
+    left_out: list[str]
+    verdict: str
+    named: list[str]
+    late: list[str]
+    asked: bool
+    laws: list[str]
+    slots: list[str]
+    slot_right: bool | None
+    before: float | None
+    after: float | None
+    after_with_it: float | None
+    function_error: float | None
+    error: str
+
+
 def summarise_left_out(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Count shares, see `SHARES`; a set that other effects or clocks explain asks for no law."""
     asked = [row for row in rows if row["asked"] and row["slot_right"] is not None]
@@ -60,7 +92,7 @@ def summarise_left_out(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
 
 def propose_left_out(
     groups: Sequence[Group], study: PowerStudy, engine: Engine
-) -> tuple[list[dict[str, Any]], bool]:
+) -> tuple[list[LeftOutRow], bool]:
     """Make sets with one cause each, and diagnose them with a catalogue that lacks it.
 
     Parameters
@@ -69,11 +101,11 @@ def propose_left_out(
 
     Returns
     -------
-    rows : one for each set, as they are written to left_out.json.
+    rows : one for each set.
     interrupted : whether Ctrl-C ended the run; what was finished is in the rows.
     """
     sets = [group[0] for group in groups if group[0].kind != "pair"]
-    rows: list[dict[str, Any]] = []
+    rows: list[LeftOutRow] = []
     progress = StepReporter(engine.report, len(sets))
     try:
         for planting in sets:
@@ -85,7 +117,7 @@ def propose_left_out(
     return rows, False
 
 
-def _row(planting: Planting, study: PowerStudy, workers: int) -> dict[str, Any]:
+def _row(planting: Planting, study: PowerStudy, workers: int) -> LeftOutRow:
     system, library, rig, effects = study.system, study.library, study.rig, study.effects
     planted = [effect for effect in effects if effect.name in planting.effects]
     others = [effect for effect in effects if effect not in planted]
@@ -95,7 +127,7 @@ def _row(planting: Planting, study: PowerStudy, workers: int) -> dict[str, Any]:
         for plantable in rig.plantables
         if plantable.name in planting.gains and plantable.slot
     }
-    row: dict[str, Any] = {
+    row: LeftOutRow = {
         "rig": planting.options,
         "left_out": [effect.name for effect in planted],
         "verdict": "failed",
@@ -127,7 +159,12 @@ def _row(planting: Planting, study: PowerStudy, workers: int) -> dict[str, Any]:
             row["asked"] = needs_law(before)
             if row["asked"]:
                 proposal = propose(before, problem, engine)
-                row |= _laws_and_gain(proposal)
+                if proposal.laws:
+                    laws = [form.law for form in proposal.forms.values()]
+                    row["laws"] = [proposal.said(law) for law in proposal.laws]
+                    row["slots"] = list(dict.fromkeys(law.place.slot.name for law in laws))
+                    if proposal.outcome and (gain := proposal.outcome.diagnosis.gain):
+                        row["before"], row["after"] = gain.before, gain.after
                 if planted and proposal.laws:
                     known = diagnose(replace(problem, effects=effects), engine)
                     gain = known.diagnosis.gain
@@ -142,18 +179,6 @@ def _row(planting: Planting, study: PowerStudy, workers: int) -> dict[str, Any]:
     if acting:
         row["slot_right"] = bool(acting & {*row["slots"]})
     return row
-
-
-def _laws_and_gain(proposal: Proposal) -> dict[str, Any]:
-    """What is proposed; its slots are also those of laws that are as good."""
-    laws = [form.law for form in proposal.forms.values()] if proposal.laws else []
-    gain = proposal.outcome.diagnosis.gain if laws and proposal.outcome is not None else None
-    return {
-        "laws": [proposal.said(law) for law in proposal.laws],
-        "slots": list(dict.fromkeys(law.place.slot.name for law in laws)),
-        "before": None if gain is None else gain.before,
-        "after": None if gain is None else gain.after,
-    }
 
 
 def function_error(

@@ -141,10 +141,10 @@ def following_check(rows: Sequence[Mapping[str, Any]]) -> Check:
     lines = []
     for row in rows:
         text = " or ".join(row["group"]) or row["error"] or row["verdict"]
-        if (made := row["proposed"]) is not None:
-            then = " or ".join(made["named"]) or made["verdict"]
+        if (proposed := row["proposed"]) is not None:
+            then = " or ".join(proposed["named"]) or proposed["verdict"]
             drawn = ["parts" if other["parts"] else "does not" for other in row["drawn"]]
-            text += f" -> {then} (one that is drawn: {', '.join(drawn)}): {made['experiment']}"
+            text += f" -> {then} (one that is drawn: {', '.join(drawn)}): {proposed['experiment']}"
         if (sensed := row["sensed"]) is not None:
             then = " or ".join(sensed["named"]) or sensed["verdict"]
             text += f"; with a sensor of {sensed['sensor']}: {then}"
