@@ -168,3 +168,33 @@ def test_a_free_run_is_free_whatever_noise_an_input_declares(tmp_path: Path) -> 
     assert corrected[0] == free[0]
     assert free[1] == pytest.approx(free[0], rel=0.05)  # the first value read is fitted again
     assert np.all(np.array(corrected[1]) < 0.5 * np.array(free[1]))
+
+
+def test_a_level_that_hides_an_effect_is_said(tmp_path: Path) -> None:
+    """Losses half above their sheet: a draught has their signature, and is never found beside.
+
+    The data tell the sum of both conductances of the block, of which one is a level here.
+    """
+    frames = [recorded(1.5 * G, seed) for seed in range(3)]
+    own = "[diagnosis.tolerances]\nGa = 0.03\n\n[diagnosis.levels]\nGa = {}\n"
+    of = block(tmp_path / "block", own)
+    outcome = diagnosed(of, cases(of, frames), tmp_path)
+    assert outcome.diagnosis.verdict == "nothing"
+    (level,) = outcome.diagnosis.shifted
+    assert (level.name, level.hides) == ("Ga", ("Draught",))
+    assert level.value == pytest.approx(G, rel=0.03)
+    assert "100% above its sheet of 0.15 W/K" in level.text
+    assert "Draught" in outcome.to_dict()["not_visible"]
+    assert level.text in outcome.warnings
+    assert level.text in outcome.summary()
+    # As its sheet says, nothing is told of it, but still of what it hides.
+    sound = diagnosed(of, cases(of, [recorded(G, seed) for seed in range(3)]), tmp_path)
+    assert sound.warnings == []
+    assert "Draught" in sound.to_dict()["not_visible"]
+
+
+def test_a_level_of_known_spread_hides_nothing(tmp_path: Path) -> None:
+    of = block(tmp_path / "block", f"[diagnosis.levels]\n{HALVES}")
+    outcome = diagnosed(of, cases(of, [recorded(G, seed) for seed in range(3)]), tmp_path)
+    assert outcome.to_dict()["not_visible"] == {}
+    assert outcome.warnings == []

@@ -10,6 +10,7 @@ import typing
 from collections.abc import Mapping, Sequence
 from typing import Any, Union
 
+from workbench.diagnosis.inference.nuisance import ShiftedLevel
 from workbench.diagnosis.inference.residuals import Dependence
 from workbench.diagnosis.inference.sample_errors import Errors
 from workbench.diagnosis.inference.timing import LateSignals
@@ -419,6 +420,7 @@ def _diagnose() -> Schema:
         "candidates": listed(closed(candidate)),
         "steps": listed(closed(step)),
         "not_visible": by_name(TEXT),
+        "shifted_levels": listed(declared(ShiftedLevel)),
         "levels": by_name(VALUE),
         "deviations": by_name(by_name(NUMBER)),
         "set_aside": by_name(by_name(WHOLE)),

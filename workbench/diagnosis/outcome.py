@@ -144,13 +144,26 @@ class Outcome:
     @property
     def warnings(self) -> list[str]:
         """What makes the answer doubtful, and what to do."""
-        return [
+        bounds = [
             f"{cause.effect.name}: {name} {size.text}. "
             f"If physics allows it, widen the bounds of {name} in {cause.effect.model}."
             for cause in self.diagnosis.causes
             for name, size in cause.parameters.items()
             if size.limit
         ]
+        return [*bounds, *(level.text for level in self.diagnosis.shifted)]
+
+    @property
+    def not_visible(self) -> dict[str, str]:
+        """Why these recordings cannot show an effect, and what would, by its name."""
+        found = self.diagnosis
+        levels = {effect: name for name, effects in found.hidden.items() for effect in effects}
+        hidden = {
+            effect: f"the level {name} has the same signature; give its spread in "
+            "[diagnosis.levels], or take it out there"
+            for effect, name in levels.items()
+        }
+        return {**found.not_visible, **hidden}
 
     @property
     def next_steps(self) -> list[str]:
@@ -181,6 +194,9 @@ class Outcome:
     def summary(self) -> str:
         """The verdict, its causes and what they rest on, for people."""
         lines = [self.sentence, *(f"doubt: {warning}" for warning in self.warnings)]
+        if self.not_visible:
+            lines += ["", "not visible by these recordings:"]
+            lines += [f"  {effect}: {reason}" for effect, reason in self.not_visible.items()]
         for cause in self.diagnosis.causes:
             lines += ["", *_told(cause)]
         if self.diagnosis.verdict == "unexplained" and self.diagnosis.late is None:
@@ -275,7 +291,8 @@ class Outcome:
             "confusability": {"effects": list(found.names), "cosines": found.cosines.tolist()},
             "candidates": [_candidate(score) for score in found.scores],
             "steps": [_step(step) for step in found.steps],
-            "not_visible": dict(found.not_visible),
+            "not_visible": self.not_visible,
+            "shifted_levels": [asdict(level) for level in found.shifted],
             "levels": {
                 f"{name} {choice}": {"value": value, "unit": unit}
                 for (name, choice), (value, unit) in self.levels.items()

@@ -101,14 +101,24 @@ def write_diagnosis_page(
     page = Page(
         title=f"What the model lacks: diagnosis of {recordings(len(summary['cases']))}",
         parts=parts,
-        headline=Markup("<strong>{}.</strong> {}").format(
-            summary["verdict"].capitalize(), summary["sentence"]
+        headline=Markup("<strong>{}.</strong> {}{}").format(
+            summary["verdict"].capitalize(), summary["sentence"], _unseen(summary)
         ),
         warnings=_warnings(system, summary),
         related=related or {},
         run=[Provenance(), Definitions({"Recordings": ", ".join(summary["cases"])}, grid=True)],
     )
     return page.write(summary, folder / "index.html")
+
+
+def _unseen(summary: Mapping[str, Any]) -> Markup | str:
+    """What the headline says of effects that these recordings cannot show."""
+    if not (names := list(summary["not_visible"])):
+        return ""
+    text = Markup(
+        ' Not visible by these recordings: {}; <a href="#causes">why, and what would show them</a>.'
+    )
+    return text.format(", ".join(names))
 
 
 def _extended(summary: Mapping[str, Any]) -> list[str]:

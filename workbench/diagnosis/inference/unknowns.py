@@ -181,6 +181,24 @@ class Unknowns:
         deviation = point.deviations[k, list(self.local).index(name)]
         return float(1.0 + self._compare.tolerances[name] * deviation)
 
+    @property
+    def false_alarms(self) -> float:
+        """Rate of false alarms that the system allows."""
+        return self._compare.false_alarms
+
+    def sheet(self, key: Key) -> tuple[float, float]:
+        """What conditions or the model say of a level, and its relative standard deviation.
+
+        That of the level itself, or else from recording to recording; infinite where neither is
+        declared.
+        """
+        name, choice = key
+        case = next(c for c in self._simulations.cases if self.choice(name, c) == choice)
+        spread = self._compare.levels[name].spread
+        if not np.isfinite(spread):
+            spread = self._compare.tolerances.get(name, np.inf)
+        return self._usual(name, case), spread
+
     def expected(self, key: Key) -> tuple[float, float]:
         """What is expected of a level, and its standard deviation, infinite for anything."""
         name, choice = key

@@ -12,6 +12,7 @@ from workbench.arrays import Matrix, Vector
 from workbench.diagnosis.effects.catalogue import Effect
 from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.linearized import Point
+from workbench.diagnosis.inference.nuisance import ShiftedLevel, hidden_effects, shifted_levels
 from workbench.diagnosis.inference.score_test import CandidateScore
 from workbench.diagnosis.inference.search import (
     BEGUN,
@@ -173,6 +174,8 @@ class Diagnosis:
     scores : of the candidates about the nominal model, best first.
     names, cosines : effects, and the similarity of their signatures in these data, (e, e).
     not_visible : why these stops cannot show an effect, by its name.
+    hidden : by a nuisance parameter, effects that these data cannot tell from it.
+    shifted : nuisance parameters that are far from their sheet.
     """
 
     verdict: Verdict
@@ -190,6 +193,8 @@ class Diagnosis:
     names: tuple[str, ...]
     cosines: Matrix
     not_visible: Mapping[str, str]
+    hidden: Mapping[str, tuple[str, ...]]
+    shifted: tuple[ShiftedLevel, ...]
 
 
 def conclude(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnosis:
@@ -227,6 +232,7 @@ def conclude(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnos
     else:
         gain = None
     presence = fit.unknowns.presence
+    hidden = hidden_effects(fit, chosen.trial, catalogue)
     nearest: tuple[NearestCandidate, ...] = ()
     if verdict == "unexplained" and late is None:
         report("candidates that come nearest")
@@ -249,7 +255,13 @@ def conclude(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnos
         scores=chosen.steps[0].scores if chosen.steps else tuple(chosen.trial.scores()),
         names=chosen.names,
         cosines=chosen.cosines,
-        not_visible={effect.name: why for effect in catalogue if (why := presence.unseen(effect))},
+        not_visible={
+            effect.name: f"{why}; what would show it: {effect.separation}"
+            for effect in catalogue
+            if (why := presence.unseen(effect))
+        },
+        hidden={level: tuple(effects) for level, effects in hidden.items()},
+        shifted=shifted_levels(fit, best, chosen.trial, catalogue, hidden),
     )
 
 

@@ -1,0 +1,140 @@
+"""Nuisance parameters that are far from their sheet, and effects that they hide.
+
+A calibrated level takes whatever its signature takes: an effect with the same one is never found
+beside it. That is said, and where a level stands for more of such an effect than matters.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import chi2
+
+from workbench.arrays import Matrix
+from workbench.diagnosis.effects.catalogue import Effect, variant
+from workbench.diagnosis.inference.fit import Fit
+from workbench.diagnosis.inference.score_test import ScoreTest, shapes
+from workbench.diagnosis.inference.search import FittedModel
+from workbench.diagnosis.inference.unknowns import SENSOR
+from workbench.system.units import with_unit
+
+
+@dataclass(frozen=True)
+class ShiftedLevel:
+    """A nuisance parameter that is further from its sheet than declared, or that hides an effect.
+
+    Attributes
+    ----------
+    name, choice : of the parameter, and of the condition that it is calibrated by.
+    value, sheet : as calibrated, and as conditions or the model say, in `unit`.
+    declared : relative standard deviation by the system file; None where it declares none.
+    hides : effects that these recordings cannot tell from it.
+    """
+
+    name: str
+    choice: str
+    value: float
+    sheet: float
+    unit: str
+    declared: float | None
+    hides: tuple[str, ...]
+
+    @property
+    def text(self) -> str:
+        """What it is, how far from its sheet, and what follows, for people."""
+        away = self.value - self.sheet
+        way = "above" if away > 0.0 else "below"
+        by = f"{abs(away / self.sheet):.0%}" if self.sheet else with_unit(abs(away), self.unit)
+        declared = "" if self.declared is None else f", declared as ±{self.declared:.2g} of it"
+        told = f"{self.name} ({self.choice})" if self.choice not in ("all", "sensor") else self.name
+        text = (
+            f"{told} is {with_unit(self.value, self.unit)}, {by} {way} its sheet of "
+            f"{with_unit(self.sheet, self.unit)}{declared}"
+        )
+        if not self.hides:
+            return f"{text}. Check the sheet: no effect explains it as a calibrated level does."
+        effects = " and ".join(self.hides)
+        return (
+            f"{text}; {effects} cannot be told from it. Give its spread in [diagnosis.levels], or "
+            f"take it out there, and diagnose again."
+        )
+
+
+def hidden_effects(
+    fit: Fit, trial: ScoreTest, catalogue: Sequence[Effect]
+) -> dict[str, dict[str, float]]:
+    """Effects that a nuisance parameter hides: by it, how much of it one unit of their size is.
+
+    Of what recordings say of a size, all but that share of `twin` is lost when the parameter is
+    fitted beside all others; without it the size that matters would be significant.
+    """
+    joint, N = trial.joint, trial.joint.total().N
+    own: dict[str, list[int]] = {}
+    for key in trial.levels:
+        own.setdefault(key[0], []).append(joint.shared.index(key))
+    every = [j for at in own.values() for j in at]
+    sizes = [j for j, key in enumerate(joint.known) if key not in trial.levels]
+    hidden: dict[str, dict[str, float]] = {}
+    for effect in (effect for effect in catalogue if not effect.order_locked):
+        keys = [(variant(effect, shape), effect.size) for shape in shapes(effect)]
+        columns = [joint.shared.index(key) for key in keys if key in joint.shared]
+        if not columns or (effect.name, effect.label) in joint.known:
+            continue
+        for name, at in own.items():
+            others = [*sizes, *(j for j in every if j not in at)]
+            beside = [(_left(N, j, others), _left(N, j, [*sizes, *every]), j) for j in columns]
+            shows = (
+                max(before for before, _, _ in beside)
+                > (fit.decides.significant / effect.matters) ** 2
+            )
+            if shows and all(left < 2.0 * fit.decides.twin * before for before, left, _ in beside):
+                known = [*sizes, *every]
+                column = max(beside)[2]
+                taken = np.linalg.lstsq(N[np.ix_(known, known)], N[known, column], rcond=None)[0]
+                share = max((taken[known.index(j)] for j in at), key=abs)
+                hidden.setdefault(name, {})[effect.name] = float(share)
+    return hidden
+
+
+def _left(N: Matrix, column: int, known: Sequence[int]) -> float:
+    """Information on one unknown, where others are fitted freely."""
+    at = list(known)
+    solved = np.linalg.lstsq(N[np.ix_(at, at)], N[at, column], rcond=None)[0]
+    return float(N[column, column] - N[at, column] @ solved)
+
+
+def shifted_levels(
+    fit: Fit,
+    best: FittedModel,
+    trial: ScoreTest,
+    catalogue: Sequence[Effect],
+    hidden: dict[str, dict[str, float]],
+) -> tuple[ShiftedLevel, ...]:
+    """Nuisance parameters that are far from their sheet, beyond chance.
+
+    By chi-squared at the rate of false alarms that the system allows, all of them together; or by
+    more than matters of an effect that is hidden, and significantly.
+
+    Parameters
+    ----------
+    hidden : see `hidden_effects`.
+    """
+    matters = {effect.name: effect.matters for effect in catalogue}
+    sigmas = np.sqrt(np.diag(trial.covariance()))
+    levels = {key: v for key, v in best.point.levels.items() if key[1] != SENSOR}
+    limit = chi2.isf(fit.unknowns.false_alarms / max(1, len(levels)), 1)
+    shifted = []
+    for key, value in levels.items():
+        sheet, declared = fit.unknowns.sheet(key)
+        sigma = float(sigmas[trial.joint.known.index(key)])
+        away = float(value) - sheet
+        hides = tuple(hidden.get(key[0], {}))
+        far = np.isfinite(declared) and away**2 > limit * (sigma**2 + (declared * sheet) ** 2)
+        stands = abs(away) > fit.decides.significant * sigma and any(
+            abs(away) > abs(share) * matters[name] for name, share in hidden.get(key[0], {}).items()
+        )
+        if far or stands:
+            unit = fit.unknowns.level_unit(key)
+            known = float(declared) if np.isfinite(declared) else None
+            shifted.append(ShiftedLevel(*key, float(value), sheet, unit, known, hides))
+    return tuple(shifted)
