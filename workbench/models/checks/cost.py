@@ -30,7 +30,7 @@ _MEMORY_SHOWS = 500
 def endure(path: Path, instantiations: int) -> Iterator[int | CheckResult]:
     """Make instances one after the other, of one loaded library and each of its own."""
     growth = []
-    lot = max(instantiations // 10, 1)
+    batch = max(instantiations // 10, 1)
     with FMU(path) as fmu:
         for question, reload in ((INSTANCES, False), (LOADS, True)):
             memory = []
@@ -39,11 +39,11 @@ def endure(path: Path, instantiations: int) -> Iterator[int | CheckResult]:
                 fmu.start({})
                 fmu.derivatives()
                 yield n
-                if n % lot == 0:
+                if n % batch == 0:
                     memory.append(_resident_memory())
-            # A leak grows in every lot, while allocators take a megabyte once in a while.
+            # A leak grows in every batch, while allocators take a megabyte once in a while.
             growth += (
-                [float(np.median(np.diff(memory[-7:]))) * 1000 / lot] if len(memory) > 1 else []
+                [float(np.median(np.diff(memory[-7:]))) * 1000 / batch] if len(memory) > 1 else []
             )
             yield replace(question, passed=True, value=instantiations, limit=instantiations)
     if instantiations < _MEMORY_SHOWS:
