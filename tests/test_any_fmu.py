@@ -441,3 +441,52 @@ def test_what_co_simulation_alone_cannot_do_is_said_with_what_would_make_it_poss
             chosen(fmu, system, usual_gains(chosen, fmu, system))
         with pytest.raises(InputError, match="without derivatives"):
             fmu.state_jacobian()
+
+
+ARRAYS = """<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="3.0" modelName="Arrays" instantiationToken="arrays">
+<ModelExchange modelIdentifier="Arrays"/><DefaultExperiment stopTime="2"/>
+<ModelVariables>
+<Float64 name="time" valueReference="9" causality="independent"/>
+<Float64 name="x" valueReference="0" causality="local" initial="exact" start="1 2"><Dimension start="2"/></Float64>
+<Float64 name="der(x)" valueReference="1" causality="local" derivative="0"><Dimension start="2"/></Float64>
+<Float64 name="k" valueReference="2" causality="parameter" variability="fixed" start="1 2"><Dimension start="2"/></Float64>
+<Float64 name="y" valueReference="3" causality="output"><Dimension start="2"/></Float64>
+</ModelVariables>
+<ModelStructure><Output valueReference="3"/><ContinuousStateDerivative valueReference="1"/></ModelStructure>
+</fmiModelDescription>
+"""  # noqa: E501
+
+
+def test_the_open_loop_reads_and_sets_elements_of_arrays(tmp_path: Path) -> None:
+    """der(x[i]) = -k[i] x[i]: the second element with k[2] = 3 instead of 2."""
+    headers = Path(fmpy.__file__).parent / "c-code"
+    source = Path(__file__).with_name("arrays.c").read_text()
+    types = (headers / "fmi3FunctionTypes.h").read_text()
+    # FMPy looks for all functions of FMI.
+    others = sorted(
+        set(re.findall(r"(fmi3\w+)TYPE\b", types)) - set(re.findall(r"fmi3\w+", source))
+    )
+    source += "".join(f"int {name}(void) {{ return 3; }}\n" for name in others)
+    (tmp_path / "model.c").write_text(source)
+    library = tmp_path / f"Arrays{fmpy.sharedLibraryExtension}"
+    flags = ["-shared", "-fPIC", "-w", "-I", headers]
+    subprocess.run([str(COMPILER), *flags, tmp_path / "model.c", "-o", library], check=True)
+    with zipfile.ZipFile(tmp_path / "Arrays.fmu", "w") as archive:
+        archive.writestr("modelDescription.xml", ARRAYS)
+        archive.write(library, f"binaries/{fmpy.platform_tuple}/{library.name}")
+    (tmp_path / "system.toml").write_text(
+        'title = "Arrays"\nsample_time = "0.5 s"\nmodels.observer = { fmu = "Arrays.fmu" }\n'
+        'outputs."y[2]" = { unit = "1", noise = 0.1, scale = 1.0 }\n'
+        '[parameters]\n"k[2]" = 3.0\n'
+    )
+    assert compare_with_fmpy(tmp_path / "Arrays.fmu").verdict == RIGHT
+    system = load_system(tmp_path)
+    time, nothing = np.linspace(0.0, 2.0, 5), np.zeros((5, 0))
+    with open_model(system) as fmu:
+        kinds = estimators_of(system)
+        loop = kinds["open_loop"](fmu, system, usual_gains(kinds["open_loop"], fmu, system))
+        values = np.asarray(loop.run(time, nothing, np.full((5, 1), np.nan)).values)[:, 0]
+        with pytest.raises(InputError, match=r"an element of .x.|Float64"):
+            kinds["ukf"](fmu, system, usual_gains(kinds["ukf"], fmu, system))
+    np.testing.assert_allclose(values, 2.0 * np.exp(-3.0 * time), atol=1e-6)

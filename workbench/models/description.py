@@ -1,6 +1,7 @@
 """What an FMU says of itself, stage 2: identity, interfaces, platforms, variables."""
 
 import hashlib
+import itertools
 import math
 import re
 from collections.abc import Iterable, Mapping
@@ -41,6 +42,7 @@ class Variable:
     ----------
     real : a scalar of type Real (FMI 2.0) or Float64 (FMI 3.0).
     nominal, minimum, maximum : in `unit`, None where the description has none.
+    of, element, size : of an element of an array: its name, the place in it, how many it has.
     initial : "exact" and "approx" may be set before the start, "calculated" may not.
     """
 
@@ -58,6 +60,9 @@ class Variable:
     text: str
     array: bool = False
     initial: str | None = None
+    of: str = ""
+    element: int = 0
+    size: int = 1
 
     @property
     def holds_number(self) -> bool:
@@ -282,7 +287,16 @@ def _description(
         for key in ("index", "derivative"):
             if (element.get(key) or "1").startswith(("0", "-")) and description.fmiVersion == "2.0":
                 raise _WrongError(f"{key} = '{element.get(key)}' of an element <{element.tag}>")
-    variables = tuple(_variable(v) for v in description.modelVariables)
+    elements = {v.name: _elements(v) for v in description.modelVariables if v.dimensions}
+    variables = tuple(
+        variable
+        for v in description.modelVariables
+        for variable in (_variable(v), *elements.get(v.name, ()))
+    )
+
+    def scalars(name: str) -> tuple[str, ...]:
+        return tuple(v.name for v in elements[name]) if name in elements else (name,)
+
     _refuse_twice(v.name for v in variables)
     if any(unknown.variable.derivative is None for unknown in description.derivatives):
         raise _WrongError("a derivative in the model structure that is the derivative of nothing")
@@ -302,8 +316,10 @@ def _description(
         platforms=tuple(sorted({p[1] for p in places if p[0] == "binaries" and len(p) > 2})),
         binaries={name: size for name, size in files.items() if name.startswith("binaries/")},
         variables=variables,
-        states=tuple(unknown.variable.derivative.name for unknown in description.derivatives),
-        rates=tuple(unknown.variable.name for unknown in description.derivatives),
+        states=tuple(
+            name for u in description.derivatives for name in scalars(u.variable.derivative.name)
+        ),
+        rates=tuple(name for u in description.derivatives for name in scalars(u.variable.name)),
         dependencies={
             unknown.variable.name: tuple(known.name for known in unknown.dependencies)
             for unknown in (*description.derivatives, *description.outputs)
@@ -379,6 +395,29 @@ def _variable(variable: "fmpy.model_description.ModelVariable") -> Variable:
         text=variable.description or "",
         array=bool(variable.dimensions),
         initial=variable.initial,
+    )
+
+
+def _elements(variable: "fmpy.model_description.ModelVariable") -> tuple[Variable, ...]:
+    """Elements of an array, `x[1]` or `A[1,2]`, in the order in which FMI has their values."""
+    array = _variable(variable)
+    if not array.holds_number:
+        return ()
+    places = list(itertools.product(*(range(1, count + 1) for count in variable.shape)))
+    starts: list[str | None] = list((array.start or "").split())
+    if len(starts) != len(places):  # none, or one for all
+        starts = [array.start] * len(places)
+    return tuple(
+        replace(
+            array,
+            name=f"{array.name}[{','.join(map(str, place))}]",
+            array=False,
+            start=start,
+            of=array.name,
+            element=k,
+            size=len(places),
+        )
+        for k, (place, start) in enumerate(zip(places, starts, strict=True))
     )
 
 

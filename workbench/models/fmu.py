@@ -63,14 +63,18 @@ _NEEDED = {
     CO_SIMULATION: ("do_step", "set", "get"),
 }
 
-# Ends of FMPy's functions for numbers that are no Real or Float64, by type.
+# Ends of FMPy's functions for numbers that are no scalars of type Real or Float64, by type.
 _ACCESSORS = {
     "Integer": "Integer",
     "Enumeration": "Integer",
     "Boolean": "Boolean",
     **{
         name: name
-        for name in ("Float32", *(f"{sign}Int{n}" for sign in ("", "U") for n in (8, 16, 32, 64)))
+        for name in (
+            "Float32",
+            "Float64",
+            *(f"{sign}Int{n}" for sign in ("", "U") for n in (8, 16, 32, 64)),
+        )
     },
 }
 
@@ -329,13 +333,16 @@ class FMUInstance:
 
     def get_whole(self, variable: Variable) -> float:
         """Value of a variable whose type is not Real or Float64, as a number."""
+        return float(self._whole_values(variable)[variable.element])
+
+    def _whole_values(self, variable: Variable) -> list[float]:
+        """Values of a variable, or of the array that it is an element of."""
+        get = getattr(self._instance, f"get{self._accessor(variable)}")
+        several = {"nValues": variable.size} if variable.of else {}
         try:
-            (value,) = getattr(self._instance, f"get{self._accessor(variable)}")(
-                [variable.reference]
-            )
+            return list(get([variable.reference], **several))
         except FMICallException as error:
             raise self.refusal(error.function, error.status) from None
-        return float(value)
 
     def _accessor(self, variable: Variable) -> str:
         """End of the name of FMPy's functions for a type that holds whole numbers, or Float32."""
@@ -356,7 +363,7 @@ class FMUInstance:
             bool(value)
             if type_name == "Boolean"
             else value
-            if type_name == "Float32"
+            if type_name in ("Float32", "Float64")
             else int(value)
         )
         if number != value:
@@ -368,10 +375,10 @@ class FMUInstance:
                 else f"a whole number, of {type_name}",
                 remedy="correct the value",
             )
+        values = self._whole_values(variable) if variable.of else [number]
+        values[variable.element] = number
         try:
-            getattr(self._instance, f"set{self._accessor(variable)}")(
-                [variable.reference], [number]
-            )
+            getattr(self._instance, f"set{self._accessor(variable)}")([variable.reference], values)
         except FMICallException as error:
             raise self.refusal(error.function, error.status) from None
 
@@ -538,7 +545,9 @@ class FMU:
         self._real_names = {v.name for v in self.description.variables if v.real}
         self._calculated = {v.name for v in self.description.variables if v.initial == "calculated"}
         self._whole = [
-            v for v in self.description.variables if v.type in _ACCESSORS and not v.array
+            v
+            for v in self.description.variables
+            if v.type in _ACCESSORS and not v.array and not v.real
         ]
         self._rates = np.array([self._references[r] for r in self.description.rates], np.uint32)
         self.has_directional_derivatives = offered.directional_derivatives
@@ -550,9 +559,12 @@ class FMU:
         self.event_signs = np.zeros(self._z.size, np.bool_)
         self.time = np.full(1, self.start_time)
         self.next_event = np.full(1, np.inf)
-        self._state_variables = self.variables(self.states)
         self._loaded = FMUInstance(self.description, self.interface)
         self._variants: list[FMU] = []
+
+    @cached_property
+    def _state_variables(self) -> Variables:
+        return self.variables(self.states)
 
     @property
     def place(self) -> str:
@@ -614,7 +626,8 @@ class FMU:
                 raise InputError(
                     where=f"{self.place}, variable '{variable.name}'",
                     found=f"a variable of type {variable.type}"
-                    + (", an array" if variable.array else ""),
+                    + (", an array" if variable.array else "")
+                    + (f", an element of '{variable.of}'" if variable.of else ""),
                     expected="a scalar of type Real (FMI 2.0) or Float64 (FMI 3.0)",
                     remedy="export the model with a real variable in its place",
                 )

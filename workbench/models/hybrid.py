@@ -138,7 +138,7 @@ class HybridSimulation:
 
     def _jacobian(self, t: float, x: Vector) -> Matrix:
         self._place(t, x)
-        if self._fmu.has_directional_derivatives:
+        if self._fmu.has_directional_derivatives and all(map(self._fmu.is_real, self._fmu.states)):
             return self._fmu.state_jacobian()
         # Not SciPy's: its steps grow without bound for states that no derivative depends on.
         steps = 1e-6 * np.maximum(np.abs(x), self._nominal)
@@ -203,7 +203,7 @@ class CoSimulationRun:
     def __init__(self, fmu: CoSimulation, inputs: TypedVariables, held: NDArray[np.bool_]) -> None:
         self._fmu, self._inputs, self._held = fmu, inputs, held.copy()
         self._held[inputs.others_at] = True
-        self._states = fmu.variables(fmu.states)
+        self._states = fmu.typed(fmu.states)
         self._t = fmu.start_time
         self._before = fmu.get_typed(inputs)
 
@@ -227,4 +227,4 @@ class CoSimulationRun:
             self._t = t
         self._fmu.set_typed(self._inputs, u)
         self._before = u.copy()
-        return self._fmu.get(self._states).copy()
+        return self._fmu.get_typed(self._states)

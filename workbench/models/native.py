@@ -129,7 +129,7 @@ def instance(
     n, m, q, k = len(fmu.states), len(inputs), len(corrections), len(outputs)
     if not only_read:
         _refuse_discrete(fmu, [*inputs, *corrections])
-        fmu.variables([*inputs, *outputs])
+        fmu.variables([*inputs, *outputs, *fmu.states])
     return Instance(
         address=fmu.instance_address,
         set_states=fmu.function_address("set_states"),
@@ -156,7 +156,7 @@ def instance(
         inputs=fmu.references([*inputs, *corrections]),
         outputs=fmu.references(outputs),
         unknowns=np.concatenate([fmu.rate_references, fmu.references(outputs)]),
-        knowns=fmu.variables([*fmu.states, *corrections]).references,
+        knowns=fmu.references([*fmu.states, *corrections]),
     )
 
 

@@ -268,7 +268,8 @@ class Estimator(ABC):
         estimated = {quantity.name for quantity in self.system.estimated}
         held = {name: value for name, value in self._known.items() if name not in estimated}
         # What a model calculates at its start, and events there, may depend on inputs.
-        held |= dict(zip((signal.name for signal in self.system.inputs), u, strict=True))
+        # Samples of a wrong size are refused when they are fed.
+        held |= dict(zip((signal.name for signal in self.system.inputs), u, strict=False))
         self.fmu.start(begin, held)
         if shown := self._shown_states(u, y, begin.keys()):
             self.fmu.start({**begin, **shown}, held)
@@ -291,7 +292,8 @@ class Estimator(ABC):
         ]
         inputs = [signal.name for signal in system.inputs]
         alone = fmu.interface == CO_SIMULATION
-        if not unseen or not fmu.states or alone or not all(map(fmu.is_continuous, inputs)):
+        settable = all(map(fmu.is_continuous, inputs)) and all(map(fmu.is_real, fmu.states))
+        if not unseen or not fmu.states or alone or not settable:
             return {}
         fmu.set(fmu.variables(inputs), u)
         outputs = fmu.variables([output.name for output, _ in unseen])

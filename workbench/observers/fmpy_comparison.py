@@ -132,6 +132,8 @@ class _Problem:
             if v.causality == "output" and v.holds_number and not v.array
         ]
         self.outputs = outputs or list(description.states)
+        found = {v.name: v for v in description.variables}
+        self._places = {name: (found[name].of, found[name].element) for name in self.outputs}
         if not self.outputs:
             raise InputError(
                 where=str(description.path),
@@ -173,12 +175,16 @@ class _Problem:
                 start_time=self._begin,
                 stop_time=float(self.time[-1]),
                 output_interval=self._step / finer,
-                output=self.outputs,
+                output=list(dict.fromkeys(of or name for name, (of, _) in self._places.items())),
                 input=driven if self._inputs else None,
                 record_events=False,
                 timeout=_TIMEOUT,
             )
-        return np.column_stack([result[name][::finer] for name in self.outputs])
+        columns = [
+            result[of or name].reshape(len(result), -1)[::finer, element]
+            for name, (of, element) in self._places.items()
+        ]
+        return np.column_stack(columns)
 
     def by_workbench(self, noise: Vector | None) -> Matrix:
         """The same by the open loop; `noise` (l,) of the sensors that its steps must not exceed."""

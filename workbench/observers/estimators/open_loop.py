@@ -78,8 +78,10 @@ class OpenLoop(Estimator):
         unseen = [output.name for output in system.outputs if output.name not in fmu.states]
         self._read = fmu.typed([*system.reported, *unseen])
         # Whether the compiled loop can set and read all that there is.
-        self._plain = not self._read.others and all(
-            fmu.is_continuous(signal.name) for signal in system.inputs
+        self._plain = (
+            not self._read.others
+            and all(fmu.is_continuous(signal.name) for signal in system.inputs)
+            and all(map(fmu.is_real, fmu.states))
         )
         self._state = _State(np.zeros((n, n + 1)), np.zeros(m), np.zeros(m))
 
