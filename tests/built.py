@@ -1,10 +1,15 @@
-"""Machines that tests write; FMUs are built once for each state of sources and compiler.
+"""Machines and recordings that tests write; FMUs are built once for each state of the sources.
 
 A worker of the suite finds what another one has built, and so does the next run.
 """
 
+import re
+from collections.abc import Mapping
 from pathlib import Path
 
+import pandas as pd
+
+from workbench.arrays import Vector
 from workbench.models import compiler, fmu_cache
 from workbench.system.registry import load_system
 from workbench.system.system import System
@@ -18,6 +23,31 @@ def build_here(package: Path, model: str, path: Path, fmi: int = 2) -> None:
         path,
         lambda path: compiler.build(package, model, path, fmi=fmi, platforms=[here]),
     )
+
+
+def build_text(folder: Path, text: str, fmi: int = 2) -> Path:
+    """Write a model that stands alone, and build its FMU beside it."""
+    name = re.findall(r"^model (\w+)", text, re.MULTILINE)[0]
+    source, path = folder / f"{name}.mo", folder / f"{name}.fmu"
+    source.write_text(text)
+    build_here(source, name, path, fmi)
+    return path
+
+
+def write_case(folder: Path, columns: Mapping[str, Vector], title: str, digits: str = "") -> Path:
+    """Write a case folder of a machine without conditions.
+
+    Parameters
+    ----------
+    columns : by `signal [unit]`, with `time [s]`.
+    digits : format of the numbers; all digits unless given.
+    """
+    folder.mkdir(parents=True)
+    text = f'title = "{title}"\n[measurement]\nfile = "measured.csv"\n'
+    (folder / "case.toml").write_text(text)
+    table = pd.DataFrame(columns)
+    table.to_csv(folder / "measured.csv", index=False, float_format=digits or None)
+    return folder
 
 
 def declare(folder: Path, library: str, system: str, **fmus: str) -> System:

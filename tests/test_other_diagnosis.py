@@ -32,7 +32,7 @@ from workbench.runtime.engine import Engine
 from workbench.system.reader import with_model
 from workbench.system.system import System
 
-from .built import declare
+from .built import declare, write_case
 
 LIBRARY = """within ;
 package Fan "A fan on an electric motor"
@@ -189,17 +189,12 @@ def recorded(folder: Path, system: System, load: Torque) -> list[Case]:
         rng = np.random.default_rng(seed)
         voltage = np.repeat(rng.uniform(4.0, 16.0, round(SECONDS / HOLD)), round(HOLD / STEP))
         speed = simulated(time, voltage, DRAG * (1.0 + 0.02 * rng.standard_normal()), load)
-        case = folder / f"{seed:02}_steps"
-        case.mkdir(parents=True)
         columns = {
             "time [s]": time,
             "u [V]": voltage + 2e-3 * rng.standard_normal(time.size),
             "w [rad/s]": speed + 0.02 * rng.standard_normal(time.size),
         }
-        pd.DataFrame(columns).to_csv(case / "measured.csv", index=False)
-        (case / "case.toml").write_text(
-            'title = "Steps of the voltage"\n[measurement]\nfile = "measured.csv"\n'
-        )
+        write_case(folder / f"{seed:02}_steps", columns, "Steps of the voltage")
     return read_cases([folder], system)
 
 

@@ -29,7 +29,7 @@ from workbench.system.system import System
 pytest.importorskip("casadi")
 pytest.importorskip("rumoca")
 
-from .built import declare
+from .built import declare, write_case
 
 MODEL = """
 within ;
@@ -107,7 +107,6 @@ def boiler(tmp_path_factory: pytest.TempPathFactory) -> System:
 def case(boiler: System, tmp_path_factory: pytest.TempPathFactory) -> Case:
     """Ten minutes of heating a vessel that loses more than its model says."""
     folder = tmp_path_factory.mktemp("case") / "01_heating"
-    folder.mkdir()
     time = np.arange(0.0, 600.0, 0.5)
     power = np.where(time > 20.0, 800.0, 0.0)
     rows = []
@@ -121,10 +120,7 @@ def case(boiler: System, tmp_path_factory: pytest.TempPathFactory) -> Case:
     rng = np.random.default_rng(1)
     noisy = np.array(rows) + rng.normal(0.0, 0.02, (time.size, 2))
     columns = {"time [s]": time, "P [W]": power, "TSkin [K]": noisy[:, 0], "T [K]": noisy[:, 1]}
-    pd.DataFrame(columns).to_csv(folder / "measured.csv", index=False)
-    text = 'title = "Heating"\n[measurement]\nfile = "measured.csv"\n'
-    (folder / "case.toml").write_text(text)
-    return read_case(folder, boiler)
+    return read_case(write_case(folder, columns, "Heating"), boiler)
 
 
 @pytest.fixture(scope="module")

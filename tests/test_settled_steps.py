@@ -14,7 +14,7 @@ pytest.importorskip("rumoca")
 
 from workbench.diagnosis.data.motion import ModelSource
 
-from .built import build_here
+from .built import build_here, write_case
 
 H, NOISE, FADES = 2e-3, 1e-2, 3.0  # [s], [m], [1/s]
 LIBRARY = """package Swing "A mass on a spring"
@@ -58,11 +58,8 @@ def test_a_fading_swing_leaves_noise_alone(samples: int, fine: bool, tmp_path: P
     swing = np.exp(-FADES * time) * (np.cos(damped * time) + FADES / damped * np.sin(damped * time))
     read = swing + NOISE * np.random.default_rng(1).standard_normal(time.size)
     read[0] = swing[0]
-    rows = [f"{t},0.0,{y}" for t, y in zip(time, read, strict=True)]
-    case = tmp_path / "swing"
-    case.mkdir()
-    (case / "measured.csv").write_text("\n".join(["time [s],f [m/s2],y [m]", *rows]))
-    (case / "case.toml").write_text('title = "Swing"\n[measurement]\nfile = "measured.csv"\n')
+    columns = {"time [s]": time, "f [m/s2]": np.zeros(time.size), "y [m]": read}
+    case = write_case(tmp_path / "swing", columns, "Swing")
     system = load_system(str(tmp_path))
     path = tmp_path / "Mass.fmu"
     build_here(tmp_path / "package.mo", "Swing.Mass", path)

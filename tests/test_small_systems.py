@@ -25,7 +25,7 @@ from workbench.system.registry import load_system, open_model
 from workbench.system.system import System
 from workbench.system.units import quantity
 
-from .built import build_here
+from .built import build_here, write_case
 
 pytest.importorskip("casadi", reason="needs the extra [compiler]")
 pytest.importorskip("rumoca", reason="needs the extra [compiler]")
@@ -192,10 +192,7 @@ def written(folder: Path, library: str, file: str) -> Path:
 
 
 def recorded(folder: Path, name: str, columns: dict[str, np.ndarray]) -> None:
-    case = folder / "recordings" / name
-    case.mkdir(parents=True)
-    (case / "case.toml").write_text(f'title = "{name}"\n[measurement]\nfile = "measured.csv"\n')
-    pd.DataFrame(columns).to_csv(case / "measured.csv", index=False, float_format="%.8g")
+    write_case(folder / "recordings" / name, columns, name, "%.8g")
 
 
 @pytest.fixture(scope="module")

@@ -14,7 +14,7 @@ from workbench.models.native import instance
 pytest.importorskip("casadi")
 pytest.importorskip("rumoca")
 
-from workbench.models import compiler  # needs the extra
+from .built import build_text  # needs the extra
 
 MODEL = """
 within ;
@@ -35,11 +35,7 @@ H = 0.005
 
 @pytest.fixture(scope="module")
 def block(tmp_path_factory: pytest.TempPathFactory) -> Iterator[FMU]:
-    folder = tmp_path_factory.mktemp("block")
-    (folder / "Block.mo").write_text(MODEL)
-    path = folder / "Block.fmu"
-    compiler.build(folder / "Block.mo", "Block", path, platforms=[compiler.native()])
-    with FMU(path) as fmu:
+    with FMU(build_text(tmp_path_factory.mktemp("block"), MODEL)) as fmu:
         yield fmu
 
 

@@ -14,7 +14,7 @@ from workbench.models.native import instance
 pytest.importorskip("casadi")
 pytest.importorskip("rumoca")
 
-from workbench.models import compiler  # needs the extra
+from .built import build_text  # needs the extra
 
 MODEL = """
 within ;
@@ -37,12 +37,7 @@ END = 2.0  # [s]
 
 @pytest.fixture(scope="module", params=[2, 3])
 def tank(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[FMU]:
-    folder = tmp_path_factory.mktemp("tank")
-    (folder / "Tank.mo").write_text(MODEL)
-    path = folder / "Tank.fmu"
-    here = [compiler.native()]
-    compiler.build(folder / "Tank.mo", "Tank", path, fmi=request.param, platforms=here)
-    with FMU(path) as fmu:
+    with FMU(build_text(tmp_path_factory.mktemp("tank"), MODEL, request.param)) as fmu:
         yield fmu
 
 
