@@ -135,7 +135,7 @@ def labelled(sets: Mapping[str, str], *summaries: Summary) -> Table:
     ----------
     sets : what was planted, by name.
     """
-    error = "error on held-out stops, times the noise"
+    error = "error in cross-validation, times the noise"
     rows: Table = [["recordings", "what is said", "planted", "estimate, 95 % interval", error]]
     for (name, planted), summary in zip(sets.items(), summaries, strict=True):
         found, gain = summary["causes"], summary["gain"]
@@ -216,7 +216,7 @@ def _of(summary: Summary) -> str:
 def laws(summary: Summary) -> Table:
     """What is said of a cause that nothing else explains, and which law is proposed for it."""
     rows: Table = [["planted", "without a law", "proposed", "where the cause acts"]]
-    rows[0] = [*rows[0], "error on held-out stops, times the noise", "with the true form"]
+    rows[0] = [*rows[0], "error in cross-validation, times the noise", "with the true form"]
     rows[0] = [*rows[0], "off what the cause does"]
     for one in summary["sets"]:
         if not one["asked"]:

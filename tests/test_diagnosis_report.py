@@ -194,7 +194,7 @@ def test_a_size_is_told_with_what_noise_alone_allows_and_what_its_error_goes_wit
 
 def test_each_candidate_has_one_row_the_best_first(page: Any, summary: dict[str, Any]) -> None:
     table = data(page.get_element_by_id("candidate-table"))
-    falls = table["fall, held out"].astype(float)
+    falls = table["fall, cross-validated"].astype(float)
     assert sorted(table.index) == sorted(
         {candidate["effect"] for candidate in summary["candidates"]}
     )

@@ -115,6 +115,10 @@ def test_errors_are_told_on_recordings_that_were_held_out(heater: System, tmp_pa
             error.rms[1] * np.sqrt(2.0 / np.pi), rel=0.05
         )
     assert "2 recordings held out" in outcome.summary()
+    # Cross-validation inside the fitted ones is never called so.
+    assert "in cross-validation its error falls from" in outcome.sentence
+    assert "and on 2 held-out recordings that of" in outcome.sentence
+    assert outcome.sentence.count("held-out") == 1
 
 
 def test_another_tool_starts_the_extended_model_as_a_recording_does(
@@ -201,6 +205,7 @@ def test_page_tells_errors_of_fitted_and_of_held_out_recordings(
     assert list(table["recording"]) == ["00", "01", "02"]
     shown = [float(cell) for cell in rows[2].xpath("td[@class='number']/@data-value")]
     names = ["rms_before", "mean_absolute_before", "rms_after", "mean_absolute_after"]
+    names += ["free_run_before", "free_run_after"]
     assert shown == pytest.approx(table[names].iloc[2].to_list(), rel=1e-4)
 
 

@@ -114,7 +114,7 @@ def test_what_wanders_is_uncertain_by_as_much_as_it_moves_means(tmp_path: Path) 
 def test_a_state_at_the_start_is_no_further_off_than_chance_makes_it(tmp_path: Path) -> None:
     """A casing that is warm already, of which the file says that it is as the room within 1 K."""
     of = block(tmp_path / "block", "")
-    known = replace(of, state_noise=(StateNoise("Tc", walk=None, spread=1.0),))
+    known = replace(of, state_noise=(StateNoise("Tc", "Tc", walk=None, spread=1.0),))
     warm = recorded(G, 1).iloc[360:].reset_index(drop=True)
     warm["time [s]"] -= warm["time [s]"][0]
     effects, path = library_effects(of), tmp_path / "all.fmu"

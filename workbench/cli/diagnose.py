@@ -38,7 +38,7 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         help=text,
         description="Compare recordings with the observer model: show where the simulation is "
         "wrong, name the physical cause, say what cannot be told apart, extend the Modelica "
-        "model, and measure the gain on recordings that were held out. Writes a page to read "
+        "model, and measure the gain in cross-validation. Writes a page to read "
         "(index.html), summary.json, data (CSV), figures (PNG, SVG) and the extended model. Needs "
         "the extra [compiler]. Ctrl-C ends the search for more causes and keeps those that were "
         "found. Exit status 0 for any verdict.",

@@ -35,8 +35,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _MEASURE = (
-    "root mean square of prediction errors, in means over {span}, on recordings that were held "
-    "out, in units of the noise of such a mean; 1 is noise alone"
+    "root mean square of prediction errors, in means over {span}, in cross-validation: each "
+    "recording predicted by a fit to the others, in units of the noise of such a mean; 1 is noise "
+    "alone"
 )
 
 
@@ -137,9 +138,38 @@ class Outcome:
                 rest = "a size beyond its bound explains more"
             more = f" This is a part: {rest}."
         return (
-            f"The model lacks {'; and '.join(names)}; on held-out recordings its error falls from "
-            f"{found.gain.before:.1f} to {found.gain.after:.1f} times the noise.{more}{cost}"
+            f"The model lacks {'; and '.join(names)}; in cross-validation its error falls from "
+            f"{found.gain.before:.1f} to {found.gain.after:.1f} times the noise{self._held_out}."
+            f"{more}{cost}"
         )
+
+    @property
+    def _held_out(self) -> str:
+        """What the sentence says of recordings that were named as held out: nothing of none."""
+        held_out = [error for error in self.errors if error.held_out]
+        if not held_out:
+            return ""
+        count = len({error.recording for error in held_out})
+        by_channel = {
+            channel: self._rms([e for e in held_out if e.channel == channel.name])
+            for channel in self.channels
+        }
+        # The channel that is most wrong of what the last model leaves there.
+        channel = max(by_channel, key=lambda c: by_channel[c][0] / max(by_channel[c][1], 1e-300))
+        factor = si_factor(channel.shown, channel.unit, channel.name)
+        before, after = (f"{rms / factor:.3g}" for rms in by_channel[channel])
+        recordings = f"{count} held-out recording{'s' * (count > 1)}"
+        change = f"from {before} to {after} {channel.shown}"
+        return f", and on {recordings} that of {channel.label} {change}"
+
+    @staticmethod
+    def _rms(errors: Sequence[Errors]) -> tuple[float, float]:
+        """Root mean square of samples of some recordings, of both models; 0 of none."""
+        counts = [error.samples for error in errors]
+        if not sum(counts):
+            return 0.0, 0.0
+        before, after = np.average(np.square([e.rms for e in errors]), axis=0, weights=counts)
+        return float(np.sqrt(before)), float(np.sqrt(after))
 
     @property
     def warnings(self) -> list[str]:
@@ -200,7 +230,7 @@ class Outcome:
         for cause in self.diagnosis.causes:
             lines += ["", *_told(cause)]
         if self.diagnosis.verdict == "unexplained" and self.diagnosis.late is None:
-            lines += ["", "nearest candidates, on held-out recordings:"]
+            lines += ["", "nearest candidates, in cross-validation:"]
             nearest = [candidate.text for candidate in self.diagnosis.nearest]
             lines += [f"  {text}" for text in nearest or ["none removes any of it"]]
         if self.next_steps:
@@ -233,7 +263,7 @@ class Outcome:
                 ends = zip(np.sqrt(squares) / factor, means / factor, strict=True)
                 before, after = (f"{rms:.3g} and {mean:.3g} {channel.shown}" for rms, mean in ends)
                 change = f"{before}, now {after}" if self.diagnosis.best.active else before
-                fate = "of --held-out" if held_out else "fitted"
+                fate = "held out" if held_out else "fitted"
                 run = f" ({own[0].corrected} correct the run)" if own[0].corrected else ""
                 lines.append(f"  {channel.label}, {len(own)} recordings {fate}{run}: {change}")
                 if own[0].corrected:
@@ -428,7 +458,7 @@ def _told(cause: Cause) -> list[str]:
         f"  {name}: {p.text}" if p.limit else f"  {name} = {p.text}"
         for name, p in cause.parameters.items()
     ]
-    lines.append(f"  explains {cause.explained:.1%} of what can be, on held-out recordings")
+    lines.append(f"  explains {cause.explained:.1%} of what can be, in cross-validation")
     if cause.confusable_with:
         lines.append(
             f"  cannot be told from {', '.join(cause.confusable_with)} in these data; "
@@ -676,7 +706,7 @@ def draw_confusability(
 
 
 def draw_gain(gain: Mapping[str, Any], paths: Iterable[Path]) -> None:
-    """Draw the error of each recording, held out of the fit, before and after."""
+    """Draw the error of each recording by fits to the others, before and after."""
     recordings: Mapping[str, Mapping[str, float]] = gain["recordings"]
     rows = [*recordings, "all recordings"]
     before = [*(recording["before"] for recording in recordings.values()), gain["before"]]
@@ -695,7 +725,7 @@ def draw_gain(gain: Mapping[str, Any], paths: Iterable[Path]) -> None:
         axes.set_xscale("log")
         axes.set_yticks(heights, rows)
         axes.invert_yaxis()
-        axes.set_xlabel("error on recordings held out, in units of the noise")
+        axes.set_xlabel("error in cross-validation, in units of the noise")
         sheet.legend(loc="outside lower center", ncols=3, fontsize=8, frameon=False)
         save_figure(sheet, paths)
 

@@ -85,7 +85,7 @@ def write_diagnosis_page(
         Part("dependences", "What the errors go with", _dependences(summary)),
         Part("causes", "Causes, strongest first", [*_causes(summary)], printed=True),
         Part("confusability", "What cannot be told apart", _confusable(summary)),
-        Part("gain", "Gain on held-out recordings", [*_gain(system, summary)]),
+        Part("gain", "Gain in cross-validation", [*_gain(system, summary)]),
     ]
     if estimate is not None:
         title = f"The best estimate of {summary['smoothed']['recording']}"
@@ -268,7 +268,7 @@ def _causes(summary: Mapping[str, Any]) -> list[Block]:
                 for n in summary["nearest"]
             ]
             caption = "Candidates that come nearest, and why they are not accepted."
-            columns = ("effects", Numbers("removed on held-out recordings"), "why not")
+            columns = ("effects", Numbers("removed in cross-validation"), "why not")
             blocks.append(Table("nearest-table", caption, columns, rows, sortable=False))
     elif verdict == "partly explained":
         blocks.append(
@@ -326,8 +326,7 @@ def _cause(cause: Mapping[str, Any], certainty: Mapping[str, Any] | None) -> lis
         "Parameters of {}, with intervals that hold the true value in 95 of 100 diagnoses{}."
     ).format(effect, noise)
     explains = Markup(
-        "Explains <strong>{:.1f} %</strong> of what can be explained, on recordings that were held "
-        "out."
+        "Explains <strong>{:.1f} %</strong> of what can be explained, in cross-validation."
     ).format(100 * cause["explained"])
     parameters = f"parameters-{anchor(effect)}"
     blocks: list[Block] = [explains, Table(parameters, caption, columns, rows, sortable=False)]
@@ -441,8 +440,8 @@ def _candidates(summary: Mapping[str, Any]) -> Table:
             "by how much chi-squared falls on recordings that the effect was fitted to",
         ),
         Numbers(
-            "fall, held out",
-            "by how much chi-squared falls on recordings that were not fitted",
+            "fall, cross-validated",
+            "by how much chi-squared falls on each recording by a fit to the others",
             sorted="descending",
         ),
         "shape",
@@ -451,7 +450,7 @@ def _candidates(summary: Mapping[str, Any]) -> Table:
     caption = (
         "All candidates about the nominal model, each alone and in its best variant. Errors are "
         "weighed by all that the nominal model leaves; chi-squared falls on recordings that the "
-        "effect was fitted to, and on recordings held out."
+        "effect was fitted to, and in cross-validation."
     )
     return Table("candidate-table", caption, columns, rows, marked=found)
 
@@ -502,9 +501,9 @@ def _gain(system: System, summary: Mapping[str, Any]) -> list[Block]:
         blocks.append("Nothing was extended, so that there is no gain to measure.")
     else:
         told = Markup(
-            "Each recording was predicted from a fit to the other recordings. Its error falls from "
-            "<strong>{:.2f}</strong> to <strong>{:.2f}</strong> (95 %: {:.2f} to {:.2f}). Measured "
-            "is the {}."
+            "Cross-validation: each recording was predicted from a fit to the others. Its error "
+            "falls from <strong>{:.2f}</strong> to <strong>{:.2f}</strong> (95 %: {:.2f} to "
+            "{:.2f}). Measured is the {}."
         )
         ends = (gain[key] for key in ("before", "after", "low", "high"))
         blocks += [told.format(*ends, gain["measure"]), _dots(gain)]
@@ -554,7 +553,7 @@ def _errors(system: System, summary: Mapping[str, Any]) -> Table:
         unit = shown[error["channel"]]
         factor = si_factor(unit, error["unit"], error["channel"])
         sizes = (error[key][i] for i in range(len(models)) for key in ("rms", "mean_absolute"))
-        fitted = "--held-out" if error["held_out"] else "yes"
+        fitted = "held out" if error["held_out"] else "yes"
         channel = f"{error['channel']} [{unit}]"
         cells = [number(size / factor, ".3g") for size in sizes]
         free = error["free_run"][: len(models)]
@@ -718,10 +717,12 @@ def _terms(
             "are for the eye; the search uses prediction errors."
         )
     terms |= {
-        "Held out": "A recording is judged with parameters fitted to the other recordings only. An "
-        "effect that merely bends to noise gains nothing there.",
+        "Cross-validation": "Each recording is judged with parameters fitted to the other "
+        "recordings only. An effect that merely bends to noise gains nothing there.",
+        "Held-out recordings": "Those named by --held-out. Nothing common was ever fitted to them, "
+        "and no effect chosen by them.",
         "Chi-squared": "Sum of squared errors in units of their standard deviation. An effect is "
-        "considered if its size and the fall on held-out recordings are both significant, and if "
+        "considered if its size and the fall in cross-validation are both significant, and if "
         "it is larger than what tolerances of the machine explain.",
     }
     if summary["certainty"]:
@@ -733,5 +734,5 @@ def _terms(
         )
     return terms | {
         "Explained": "Share of the mean square of lasting errors, less that of noise, which "
-        "disappears on held-out recordings when the cause is added to the others.",
+        "disappears in cross-validation when the cause is added to the others.",
     }

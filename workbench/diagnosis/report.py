@@ -155,8 +155,8 @@ def diagnosed(summary: Mapping[str, Any]) -> Answer:
     headline, details = {}, {}
     if (gain := summary["gain"]) is not None:
         low, high = gain["low"], gain["high"]
-        headline["error on held-out recordings, nominal"] = Measure(gain["before"], "1", "lower")
-        headline["error on held-out recordings, extended"] = Measure(
+        headline["error in cross-validation, nominal"] = Measure(gain["before"], "1", "lower")
+        headline["error in cross-validation, extended"] = Measure(
             gain["after"], "1", "lower", low, high
         )
     for cause in summary["causes"]:

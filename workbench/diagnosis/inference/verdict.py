@@ -361,7 +361,7 @@ def _objections(
     # Beside the others, each must explain what a right cause does of what it is to explain.
     shares = [validation.explained(less, best, fast=fast)[0] for less in chosen.less.values()]
     if not whole or not (noise or min(shares) >= 1.0 - fit.decides.left):
-        left.append(f"{gain.after:.1f} times the noise remains on held-out recordings")
+        left.append(f"{gain.after:.1f} times the noise remains in cross-validation")
     return worse, left
 
 

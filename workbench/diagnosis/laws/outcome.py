@@ -93,7 +93,7 @@ class Proposal:
         others = list(dict.fromkeys(law.law.short for law in self.tied[1:]))
         where = first.text + f" (or {', '.join(others)})" * bool(others)
         if not self.laws or self.outcome is None or (gain := self.outcome.diagnosis.gain) is None:
-            why = "no closed form of it holds on recordings that were held out"
+            why = "no closed form of it holds on recordings that it was not fitted to"
             if self.before.diagnosis.verdict == "found":
                 why = "with none of its closed forms is the description shorter"
             return f"{_NONE}: what is missing may be {where}, but {why}."
@@ -106,8 +106,8 @@ class Proposal:
         part = ", a part of what is missing" * (self.outcome.system.comparison.left == 1.0)
         errors = f"{self._error_before(gain):.1f} to {gain.after:.1f}"
         return (
-            f"{MARK.capitalize()}{part}: {'; and '.join(map(self.said, self.laws))}{beside}. On "
-            f"held-out recordings the error falls from {errors} times the noise. As a "
+            f"{MARK.capitalize()}{part}: {'; and '.join(map(self.said, self.laws))}{beside}. In "
+            f"cross-validation the error falls from {errors} times the noise. As a "
             f"free function it is {where}."
         )
 
@@ -133,7 +133,7 @@ class Proposal:
                 f"95 %: {parameter.low:.4g} to {parameter.high:.4g}"
                 for name, parameter in cause.parameters.items()
             ]
-            lines.append(f"  explains {cause.explained:.1%} of what can be, on held-out recordings")
+            lines.append(f"  explains {cause.explained:.1%} of what can be, in cross-validation")
         if self.laws and self.outcome is not None and self.outcome.extension is not None:
             extension = self.outcome.extension
             lines += ["", f"extended model: {extension.modelica}, {extension.fmu}"]
