@@ -17,7 +17,14 @@ from workbench.models.fmu import CoSimulation
 from workbench.recordings.case import Case
 from workbench.recordings.datasets import write_cases
 from workbench.studies.distance import Distance, Effort
-from workbench.studies.distance.forecast import Forecaster, Question, dimension, open_forecaster
+from workbench.studies.distance.forecast import (
+    Forecaster,
+    Question,
+    dimension,
+    open_forecaster,
+    stopping_of,
+)
+from workbench.studies.distance.outcome import Forecast
 from workbench.studies.distance.past import MachineLevels
 from workbench.studies.distance.plain import quantile
 from workbench.studies.distance.rare_events import Tail
@@ -431,6 +438,14 @@ def test_bands_hold_forty_stops_of_months(train: System, tmp_path: Path) -> None
         assert one.forecast.width < 1.3
     assert len(held) == 40
     assert np.mean(held) >= 0.93
+
+
+def test_the_old_name_of_valid_stops_warns(train: System) -> None:
+    forecast = Forecast(np.ones(2), np.ones(2), 0.0)
+    stop = asked_stop({}, train, stopping_of(train))
+    empty = Distance(train, stop, forecast, 1.0, (), None, None, interrupted=False)
+    with pytest.warns(DeprecationWarning, match="now called valid"):
+        assert empty.claimed == empty.valid == []
 
 
 # --- what a system file says of stops ---

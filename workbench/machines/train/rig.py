@@ -261,7 +261,7 @@ def _turn(train, way, state, i, v, s):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _simulate(train, way, state, places, v, command, rows):  # type: ignore[no-untyped-def]
+def _simulate(train, way, state, v, command, rows):  # type: ignore[no-untyped-def]
     """Fill rows of t, v, s, a, speeds, forces, loads, pressures; number of the last that moves.
 
     Rows are (n, 4 + 3*8 + 4).
@@ -276,8 +276,8 @@ def _simulate(train, way, state, places, v, command, rows):  # type: ignore[no-u
             _protect(train, state, v)
         total = 0.0
         for i in range(state.omega.size):
-            energy = _turn(train, way, state, i, v, s - places[i])
-            _clean(way.mu0, s - places[i], v * STEP, 0.5 * energy)
+            energy = _turn(train, way, state, i, v, s - PLACES[i])
+            _clean(way.mu0, s - PLACES[i], v * STEP, 0.5 * energy)
             total += state.force[i]
         first, second = _at(way.gradient, s - 10.75), _at(way.gradient, s - 37.15)
         hill = _GRAVITY * (train.mass[0] * first + train.mass[1] * second)
@@ -336,7 +336,7 @@ def simulate(
         force=np.zeros(AXLES),
         loads=np.zeros(AXLES),
     )
-    last = _simulate(train, way, state, PLACES, speed, command, rows)
+    last = _simulate(train, way, state, speed, command, rows)
     if last < 0:
         raise InputError(
             where=stop.name,
