@@ -21,9 +21,8 @@ from workbench.diagnosis.outcome import (
 )
 from workbench.observers import label
 from workbench.observers.simulation import CaseResult
-from workbench.pages.answer import recordings
+from workbench.pages.answer import recordings, unit_suffix
 from workbench.pages.figures import CaseFigure
-from workbench.pages.measures import unit_suffix
 from workbench.pages.parts import (
     Article,
     Block,

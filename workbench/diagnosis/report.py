@@ -23,9 +23,8 @@ from workbench.diagnosis.outcome import (
 )
 from workbench.diagnosis.page import write_diagnosis_page
 from workbench.observers.report import write_estimates, write_numbers
-from workbench.pages.answer import Answer, Measure, with_answer
+from workbench.pages.answer import Answer, Measure, percentage, with_answer
 from workbench.pages.figures import draw_case
-from workbench.pages.measures import percentage
 from workbench.runtime.files import write_json, write_whole
 from workbench.runtime.pool import Pool
 

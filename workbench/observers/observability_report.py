@@ -16,9 +16,15 @@ from workbench.observers.observability import (
     prior,
     tested_span,
 )
-from workbench.pages.answer import Answer, Measure, with_answer
+from workbench.pages.answer import (
+    Answer,
+    Measure,
+    percentage,
+    unit_suffix,
+    whole_percent,
+    with_answer,
+)
 from workbench.pages.figures import CaseFigure, Curve, Panel, save_figure, styled
-from workbench.pages.measures import percentage, unit_suffix, whole_percent
 from workbench.pages.parts import Definitions, Numbers, Page, Part, Table, number, zoomable
 from workbench.pages.views import called, capital, named, per_shown, shown_unit
 from workbench.runtime.files import write_json, write_whole

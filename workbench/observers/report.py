@@ -14,9 +14,8 @@ from scipy.stats import t
 from workbench.observers import label
 from workbench.observers.simulation import CaseResult
 from workbench.observers.trust import Contradiction, contradiction_lines
-from workbench.pages.answer import Answer, Measure, recordings, with_answer
+from workbench.pages.answer import Answer, Measure, percentage, recordings, with_answer
 from workbench.pages.figures import CaseFigure
-from workbench.pages.measures import percentage
 from workbench.pages.parts import (
     Block,
     Cell,

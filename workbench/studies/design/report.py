@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from workbench.pages.answer import Answer, Measure, with_answer
+from workbench.pages.answer import Answer, Measure, percentage, whole_percent, with_answer
 from workbench.pages.figures import (
     ESTIMATORS,
     LIGHT,
@@ -16,7 +16,6 @@ from workbench.pages.figures import (
     save_figure,
     styled,
 )
-from workbench.pages.measures import percentage, whole_percent
 from workbench.pages.parts import Definitions, Numbers, Page, Part, Table, number, zoomable
 from workbench.pages.views import capital
 from workbench.runtime.files import write_json, write_whole

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from workbench.diagnosis.outcome import draw_heat
-from workbench.pages.answer import Answer, Measure, with_answer
+from workbench.pages.answer import Answer, Measure, share_measure, share_with_interval, with_answer
 from workbench.pages.figures import LIGHT, in_style, save_figure, styled
-from workbench.pages.measures import share_measure, share_with_interval
 from workbench.pages.parts import (
     Cell,
     Definitions,
