@@ -165,7 +165,12 @@ class Description:
         if interface not in self.interfaces:
             raise InputError(
                 where=str(self.path),
-                found=f"FMI {self.version}, {', '.join(self.interfaces) or 'no interface'} only",
+                found=f"FMI {self.version}, "
+                + (
+                    f"{', '.join(self.interfaces)} only"
+                    if self.interfaces
+                    else "neither Model Exchange nor Co-Simulation"
+                ),
                 expected=f"{interface} of FMI 2.0 or 3.0"
                 + (", whose states an observer can set" if interface == MODEL_EXCHANGE else ""),
                 remedy=f"export the model for {interface}"

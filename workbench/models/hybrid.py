@@ -178,7 +178,10 @@ class HybridSimulation:
         self._events += 1
         if self._events > _MOST_EVENTS:
             raise self._error(f"has {_MOST_EVENTS} events between two samples")
-        update = self._fmu.handle_event(self._inputs, u)
+        try:
+            update = self._fmu.handle_event(self._inputs, u)
+        except FMUError as error:
+            raise FMUError(f"{error}; at {self._t:.9g} s of its time") from None
         if update.states_changed:
             self._x = self._fmu.get_states()
         if update.nominals_changed:
