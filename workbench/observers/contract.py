@@ -323,6 +323,7 @@ class Estimator(ABC):
     def init(self, t: float, u: Vector, y: Vector) -> Estimate:
         """Start at time t [s] with the first sample: measured states, nominal quantities."""
         self._t = t
+        self._check_shapes(1, np.atleast_2d(u), np.atleast_2d(self._measured(y)))
         self.start(u, y)
         return self._take(0.0, u, y)
 
@@ -344,6 +345,7 @@ class Estimator(ABC):
         FMUError
             If the FMU refuses a call.
         """
+        self._check_shapes(time.size, u, self._measured(y))
         self.start(u[0], y[0])
         return self.advance(np.diff(time, prepend=time[0]), u, y)
 
@@ -378,21 +380,18 @@ class Estimator(ABC):
         return rows
 
     def _samples(self, steps: Vector, u: Matrix, y: Matrix) -> tuple[Matrix, Matrix]:
-        """Inputs with the model's time, (n, m + 1), as `measure` sets them, and outputs, (n, l).
-
-        Raises
-        ------
-        ValueError
-            If there are not as many inputs as the system has, or rows as steps: compiled code
-            would read and write beyond them.
-        """
+        """Inputs with the model's time, (n, m + 1), as `measure` sets them, and outputs, (n, l)."""
         y = self._measured(y)
-        for array, columns in ((u, len(self.system.inputs)), (y, len(self.system.outputs))):
-            if array.shape != (steps.size, columns):
-                raise ValueError(f"samples of shape {array.shape}, not {(steps.size, columns)}")
+        self._check_shapes(steps.size, u, y)
         time = self._model_time + np.cumsum(steps)
         self._model_time = float(time[-1]) if time.size else self._model_time
         return read_only(np.column_stack([u, time])), read_only(y)
+
+    def _check_shapes(self, count: int, u: Matrix, y: Matrix) -> None:
+        """Refuse samples of other sizes than compiled code reads, which would go beyond them."""
+        for array, columns in ((u, len(self.system.inputs)), (y, len(self.system.outputs))):
+            if array.shape != (count, columns):
+                raise ValueError(f"samples of shape {array.shape}, not {(count, columns)}")
 
     def _measured(self, y: Any) -> Any:
         """Outputs that the estimator takes of those given, (l,) or (n, l), NaN for more."""
