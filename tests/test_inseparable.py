@@ -98,6 +98,7 @@ def test_a_mass_and_a_resistance_are_told_apart_as_the_power_changes(tmp_path: P
     assert "m" not in result.runs["ekf"].claimed
 
 
+@pytest.mark.filterwarnings("ignore:.*found values up to 1 W")  # as it is meant here
 def test_a_quantity_that_nothing_moves_is_a_guess_by_itself(tmp_path: Path) -> None:
     """While a tram rolls with next to no power, the efficiency acts on nothing."""
     result = ran(tmp_path / "rolls", "e", power=1.0)

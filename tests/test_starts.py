@@ -1,5 +1,6 @@
 """What is known of states at the start: by samples, by the system file, or by their size alone."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -9,8 +10,10 @@ import pytest
 from workbench import case_from_frame
 from workbench.observers import choose
 from workbench.observers.run import Run
-from workbench.observers.simulation import prepare
+from workbench.observers.simulation import CaseResult, prepare
 from workbench.system.registry import load_system
+
+from .built import declare
 
 pytest.importorskip("rumoca", reason="needs the extra [compiler]")
 pytest.importorskip("ziglang", reason="needs the extra [compiler]")
@@ -59,7 +62,7 @@ spread = "2 W/K"
 BODY, WATER = 60.0, 35.0  # K, where the recordings begin
 
 
-def ran(folder: Path, name: str, step: float, more: str = "") -> tuple[Run, np.ndarray]:
+def ran(folder: Path, name: str, step: float, more: str = "") -> tuple[CaseResult, Run, np.ndarray]:
     """A filter on the kettle, which begins elsewhere than its model; and the truth of the body."""
     folder.mkdir()
     (folder / "package.mo").write_text(KETTLE)
@@ -77,7 +80,8 @@ def ran(folder: Path, name: str, step: float, more: str = "") -> tuple[Run, np.n
     power = np.full(time.size, 500.0) + rng.standard_normal(time.size)
     columns = {"time [s]": time, "P [W]": power, "reading [K]": reading}
     case = case_from_frame(system, pd.DataFrame(columns), name="run")
-    return prepare(system, choose(system, [name])).run(case).runs[name], body
+    result = prepare(system, choose(system, [name])).run(case)
+    return result, result.runs[name], body
 
 
 @pytest.mark.parametrize("step", [0.2, 1.0, 5.0])
@@ -85,7 +89,7 @@ def ran(folder: Path, name: str, step: float, more: str = "") -> tuple[Run, np.n
 def test_a_hidden_state_is_found_from_wherever_it_is(
     tmp_path: Path, name: str, step: float
 ) -> None:
-    run, body = ran(tmp_path / "kettle", name, step)
+    _, run, body = ran(tmp_path / "kettle", name, step)
     error, sigma = run.signal("body") - body, run.deviation("body")
     # Its nominal value is what is not known of it, until outputs show it.
     assert sigma[0] == pytest.approx(50.0, rel=1e-6)
@@ -95,17 +99,118 @@ def test_a_hidden_state_is_found_from_wherever_it_is(
 
 
 def test_what_is_said_of_a_start_is_what_is_not_known_of_it(tmp_path: Path) -> None:
-    run, _ = ran(tmp_path / "kettle", "ekf", 1.0, '[states.body]\nspread = "3 K"\n')
+    _, run, _ = ran(tmp_path / "kettle", "ekf", 1.0, '[states.body]\nspread = "3 K"\n')
     assert run.deviation("body")[0] == pytest.approx(3.0, rel=1e-6)
 
 
 def test_an_output_starts_the_state_that_it_shows_under_another_name(tmp_path: Path) -> None:
-    run, _ = ran(tmp_path / "kettle", "open_loop", 1.0)
+    _, run, _ = ran(tmp_path / "kettle", "open_loop", 1.0)
     # What is read is the water's temperature with another zero.
     assert run.signal("water")[0] == pytest.approx(WATER, abs=0.5)
     assert run.signal("body")[0] == 0.0  # of this, nothing is known
 
 
 def test_a_start_of_which_the_system_says_how_sure_it_is_stays(tmp_path: Path) -> None:
-    run, _ = ran(tmp_path / "kettle", "open_loop", 1.0, '[states.water]\nspread = "1 K"\n')
+    _, run, _ = ran(tmp_path / "kettle", "open_loop", 1.0, '[states.water]\nspread = "1 K"\n')
     assert run.signal("water")[0] == 10.0
+
+
+ROOM = """
+package Room "A room that a heater warms"
+  model Observer "Its temperature and the pressure of its air"
+    parameter Real G(unit="W/K") = 50.0 "To the outside";
+    input Real P(unit="W") "Heating";
+    input Real dG(unit="W/K") "Correction of G";
+    output Real T(unit="K", start=293.15, fixed=true, nominal=300.0, min=200.0) "Temperature";
+    output Real p(unit="Pa") = 101325.0*T/293.15 "Pressure";
+  equation
+    1e5*der(T) = P - (G + dG)*(T - 273.15);
+  end Observer;
+end Room;
+"""
+ROOM_FILE = """
+title = "A room"
+sample_time = "10 s"
+models.observer = { class = "Observer" }
+inputs.P = { unit = "W", noise = "5 W", scale = "1 kW" }
+outputs.T = { unit = "K", noise = "0.05 K", scale = "300 K" }
+outputs.p = { unit = "Pa", noise = "50 Pa", scale = "1e5 Pa" }
+
+[estimated.G]
+correction = "dG"
+unit = "W/K"
+range = ["10 W/K", "200 W/K"]
+walk = "1e-2 W/K"
+spread = "10 W/K"
+acts_on = "T"
+"""
+
+
+def recorded_room(step: float = 10.0, **factors: float) -> pd.DataFrame:
+    """A room at work, with a column in another unit: T in degrees Celsius, others by a factor."""
+    rng, time = np.random.default_rng(6), np.arange(0.0, 3600.0, 10.0)
+    power = np.where(time % 1200.0 < 600.0, 2000.0, 200.0)
+    T = [293.15]
+    for P in np.repeat(power[:-1], 10):
+        T.append(T[-1] + 1e-5 * (P - 50.0 * (T[-1] - 273.15)))
+    values = {"P": power, "T": np.array(T[::10]), "p": 101325.0 * np.array(T[::10]) / 293.15}
+    noise = {"P": 5.0, "T": 0.05, "p": 50.0}
+    columns = {"time [s]": time * step / 10.0}
+    for name, unit in {"P": "W", "T": "K", "p": "Pa"}.items():
+        scattered = values[name] + noise[name] * rng.standard_normal(time.size)
+        columns[f"{name} [{unit}]"] = scattered * factors.get(name, 1.0) - factors.get(
+            f"{name}0", 0
+        )
+    return pd.DataFrame(columns)
+
+
+@pytest.mark.parametrize(
+    ("factors", "said"),
+    [
+        ({"T0": 273.15}, "273.15 K below that of the model"),
+        ({"T": 1e3}, "1000 times that of the model"),
+        ({"p": 1e-3}, "as 'scale' of p says"),
+        ({"p": 1e-5}, "as 'scale' of p says"),
+        ({"P": 1e3}, "as 'scale' of P says"),
+        ({"P": 1e-3}, "as 'scale' of P says"),
+        ({"T": -1.0}, "what the model allows, from 200 K"),
+    ],
+)
+def test_another_unit_of_a_column_is_asked_about(
+    tmp_path: Path, factors: dict[str, float], said: str
+) -> None:
+    system = declare(tmp_path / "room", ROOM, ROOM_FILE)
+    with pytest.warns(UserWarning, match=re.escape(said)):
+        case = case_from_frame(system, recorded_room(**factors))
+    assert all("check the unit of the column" in doubt for doubt in case.doubts if said in doubt)
+
+
+def test_nothing_is_asked_of_a_recording_in_its_units(tmp_path: Path) -> None:
+    system = declare(tmp_path / "room", ROOM, ROOM_FILE)
+    assert not case_from_frame(system, recorded_room()).doubts
+    assert (
+        not prepare(system, choose(system, ["ekf"]))
+        .run(case_from_frame(system, recorded_room()))
+        .warnings()
+    )
+
+
+@pytest.mark.parametrize("factor", [1e3, 1e-6])
+def test_times_in_another_unit_are_asked_about_by_the_models_time_constants(
+    tmp_path: Path, factor: float
+) -> None:
+    """Though `sample_time` is wrong with them: the room forgets in 2000 s."""
+    text = ROOM_FILE.replace('"10 s"', f'"{10.0 * factor:g} s"')
+    system = declare(tmp_path / "room", ROOM, text)
+    case = case_from_frame(system, recorded_room(step=10.0 * factor))
+    result = prepare(system, choose(system, ["ekf"])).run(case)
+    assert any("motion of the model" in text for text in result.warnings())
+
+
+def test_a_first_sample_that_contradicts_the_start_is_told_first(tmp_path: Path) -> None:
+    """The kettle's water is 35 K above the room, its model says 10 K, and how sure that is."""
+    result, _, _ = ran(tmp_path / "kettle", "ekf", 1.0, '[states.water]\nspread = "1 K"\n')
+    assert result.warnings()[0].startswith("the first sample of reading is 7")
+    # 25 of its deviations off, which later samples correct.
+    narrow = [test for test in result.contradictions["ekf"] if test.narrow]
+    assert all("the start" in test.reason for test in narrow)

@@ -17,7 +17,7 @@ from workbench.models.fmu import FMU
 from workbench.observers import Estimator, Gains, label
 from workbench.observers.estimators.smoother import Smoother
 from workbench.observers.gains_file import read_gains, usual_gains
-from workbench.observers.observability import guesses, information
+from workbench.observers.observability import guesses, information, trajectory
 from workbench.observers.replay import observed, replay
 from workbench.observers.run import (
     Ending,
@@ -42,6 +42,7 @@ from workbench.observers.trust import (
     normalised_innovations,
     sampling_doubt,
     start_doubt,
+    time_doubt,
 )
 from workbench.pages.figures import ESTIMATORS, CaseFigure, Curve, Panel
 from workbench.pages.views import (
@@ -306,6 +307,8 @@ class Simulation:
         try:
             with open_model(self.system) as fmu:
                 known = information(fmu, self.system, case)
+                path = trajectory(fmu, self.system, case)
+                clock = "" if path is None else time_doubt(fmu, self.system, case, path)
                 start = start_doubt(fmu, self.system, case)
                 sampling = sampling_doubt(fmu, self.system, case) if narrow else ""
         except (InputError, FMUError, np.linalg.LinAlgError):
@@ -313,7 +316,7 @@ class Simulation:
         return {
             "inseparable": {} if known is None else known.inseparable,
             "untold": () if known is None else known.untold,
-            "doubts": tuple(doubt for doubt in (start, sampling) if doubt),
+            "doubts": tuple(doubt for doubt in (clock, start, sampling) if doubt),
             "resolved": not sampling,
         }
 

@@ -18,6 +18,7 @@ from workbench.models.fmu import FMU
 from workbench.observers import estimators_of
 from workbench.observers.estimators.kalman import ExtendedKalmanFilter
 from workbench.observers.estimators.open_loop import OpenLoop
+from workbench.observers.observability import Trajectory
 from workbench.observers.operating import start_spreads
 from workbench.observers.replay import replay
 from workbench.observers.run import Ending, Run
@@ -41,6 +42,12 @@ _CHANCE = 1e-3  # of a recording in which a test contradicts what is right
 
 
 _LAGS = 10  # that a test of whiteness looks at; Hyndman and Athanasopoulos (2021), section 5.4
+
+
+_PASSED = np.log(20.0)  # time constants after which a twentieth is left of a motion
+
+
+_APART = 20  # points of a trajectory from one where a model is linearised to the next
 
 
 _FINE = 4  # steps in place of one, which then errs by a quarter of it, or less
@@ -302,6 +309,34 @@ def sampling_doubt(fmu: FMU, system: System, case: Case) -> str:
         f"of each, errors of a Kalman filter have {excesses[1]:.1f} times the variance that "
         f"it says, and {excesses[0]:.1f} times without. Record more often"
     )
+
+
+def time_doubt(fmu: FMU, system: System, case: Case, path: Trajectory) -> str:
+    """Say where samples and span of a recording are none for the model's time constants.
+
+    From one sample to the next a twentieth is left of the slowest motion, or nothing moves by a
+    twentieth of the fastest in all of it: another unit of the time, most likely.
+    """
+    inputs, moments = fmu.variables([s.name for s in system.inputs]), range(0, len(path.x), _APART)
+    rates = []
+    for k in moments:
+        fmu.set_states(path.x[k])
+        fmu.set(inputs, path.u[k, : len(system.inputs)])
+        rates.append(np.abs(np.linalg.eigvals(fmu.state_jacobian())))
+    step, span = float(np.median(np.diff(case.time))), float(case.time[-1] - case.time[0])
+    slowest = float(np.min(rates, initial=np.inf))
+    fastest = float(np.max(rates, initial=0.0))
+    if np.isfinite(slowest) and step * slowest > _PASSED:
+        return (
+            f"samples {step:.3g} s apart show no motion of the model, whose slowest time constant "
+            f"is {1.0 / slowest:.2g} s. Check the unit of the time, and sample_time"
+        )
+    if fastest > 0.0 and span * fastest < np.exp(-_PASSED):
+        return (
+            f"a recording of {span:.3g} s shows no motion of the model, whose fastest time "
+            f"constant is {1.0 / fastest:.2g} s. Check the unit of the time"
+        )
+    return ""
 
 
 def start_doubt(fmu: FMU, system: System, case: Case) -> str:

@@ -13,13 +13,16 @@ import numpy as np
 
 from workbench.arrays import Vector
 from workbench.errors import InputError
+from workbench.models.description import read_description
 from workbench.system.parts import FIRST, Condition, Redundancy, Signal, Tolerance
-from workbench.system.system import System
+from workbench.system.system import OBSERVER, System
 from workbench.system.units import si_factor
 
 _FEW = 5  # samples that tell a value, whatever one or two of them read
 _CONTRADICTS = 300.0  # times the usual step: the unit of the time is another one
 _OTHER_UNITS = 60.0, 3600.0  # minutes and hours that are taken for seconds
+_CELSIUS = 273.15  # K
+_ALIKE = 0.05  # share by which a machine at its usual start is off that of its model
 _ROUNDED = 1.0 + 1e-6  # times are written with some digits
 
 
@@ -96,6 +99,8 @@ def doubts(
         ):
             findings += check
     _refuse(findings)
+    # What contradicts a redundancy or a range is asked about once.
+    findings = findings or list(_sizes(signals, system, origin))
     return (*origin.doubts, *(str(finding.refusal()) for finding in findings))
 
 
@@ -127,6 +132,81 @@ def _ranges(
                 f"'{'possible' if impossible else 'plausible'}' of {name} in {system.source}",
             )
             break  # what is impossible is unlikely too
+
+
+def _sizes(signals: Mapping[str, Vector], system: System, origin: Origin) -> Iterator[_Finding]:
+    """Signals of a size, or with a first value, that another unit of the column would explain.
+
+    Against `scale`, and against limits and start of the variable in the observer's model.
+    """
+    try:
+        path = system.model(OBSERVER).path
+        described = [] if path is None else read_description(path).renamed(system.names).variables
+    except (InputError, KeyError):  # whoever opens the model says what is wrong with it
+        described = []
+    variables = {variable.name: variable for variable in described}
+    for signal in (*system.inputs, *system.outputs):
+        values = signals.get(signal.name, np.zeros(0))
+        values = values[np.isfinite(values)]
+        if not values.size or signal.scale <= 0.0:
+            continue
+        noise = 5.0 * float(signal.deviation(np.abs(values).max()))
+        size = float(
+            np.sort(np.abs(values))[-min(_FEW, values.size)]
+        )  # whatever single samples are
+        moves = float(np.median(np.abs(np.diff(values)))) if values.size > 1 else 0.0
+        # Of a signal at rest the noise is left; in another unit, that is smaller too.
+        faint = 0.0 < size < signal.scale / _CONTRADICTS and moves < signal.noise / _CONTRADICTS
+        variable = variables.get(signal.name)
+        finding = None
+        if variable is not None and variable.holds_number:
+            low = -np.inf if variable.minimum is None else variable.minimum
+            high = np.inf if variable.maximum is None else variable.maximum
+            outside = np.flatnonzero((values < low - noise) | (values > high + noise))
+            begins = float(np.median(values[:_FEW]))
+            if factor := _other_unit(begins, variable.start, signal):
+                finding = (
+                    f"{_shown(signal, begins)} at the start, {factor} that of the model",
+                    f"about {_shown(signal, float(variable.start or 0.0))}",
+                )
+            elif outside.size >= _FEW:
+                finding = (
+                    f"{_shown(signal, values[outside[0]])}, and {outside.size - 1} more such "
+                    "samples",
+                    f"what the model allows, from {_shown(signal, low)} to {_shown(signal, high)}",
+                )
+        if finding is None and (size > _CONTRADICTS * signal.scale or faint):
+            finding = (
+                f"values up to {_shown(signal, size)}",
+                f"values of the size of {_shown(signal, signal.scale)}, as 'scale' of "
+                f"{signal.name} says in {system.source}",
+            )
+        if finding is not None:
+            yield _Finding(
+                False,
+                origin.at(0, signal.name),
+                *finding,
+                "check the unit of the column, and what it holds",
+            )
+
+
+def _other_unit(begins: float, start: str | None, signal: Signal) -> str:
+    """By what a first value is off the model's start, if another unit explains it; else empty."""
+    try:
+        expected = float(start or "nan")
+    except ValueError:
+        return ""
+    if signal.unit == "K":
+        for offset in (_CELSIUS, -_CELSIUS):
+            # Nearer than a machine may be off by what is between the two zeros.
+            if abs(begins + offset - expected) < 0.25 * _CELSIUS < 0.5 * abs(begins - expected):
+                return f"{abs(offset)} K {'below' if offset > 0.0 else 'above'}"
+    ratio = begins / expected if expected else 0.0
+    for factor in (1e3, 1e5, *_OTHER_UNITS):
+        for times in (factor, 1.0 / factor):
+            if abs(ratio / times - 1.0) < _ALIKE:
+                return f"{times:.4g} times"
+    return ""
 
 
 def _shown(signal: Signal, value: float) -> str:
