@@ -328,11 +328,12 @@ def test_a_cause_beyond_its_bound_is_told_with_it(bounded: tuple[Outcome, Path])
     # As sure as a size within its bounds is, in the test of a bearing that rubs.
     assert friction.beyond == pytest.approx(FRICTION, rel=0.15)
     page = write_diagnosis(outcome, {"run": run_of("diagnose", outcome.system, {})}, out, 1)
-    (doubt,) = json.loads((out / "summary.json").read_text())["warnings"]
+    doubt, *others = json.loads((out / "summary.json").read_text())["warnings"]
     warnings = lxml.html.fromstring(page.read_bytes()).find_class("warning")
     assert doubt in [" ".join(one.text_content().split()) for one in warnings]
     assert f"doubt: {doubt}" in outcome.summary()
     assert "at its limit of 0.03 N.m" in doubt
+    assert any("widens the intervals" in other for other in others)
 
 
 def windy(t: float, w: float) -> float:
@@ -361,6 +362,29 @@ def test_a_part_is_told_with_its_size_and_what_remains(diagnosed: Diagnosed) -> 
     summary = json.loads((out / "summary.json").read_text())
     assert summary["partial"] == [cause.effect.name]
     assert summary["model"]["partial"] is True
+
+
+def bent(t: float, w: float) -> float:
+    """A bearing whose friction is off by a tenth, up and down between 5 and 30 rad/s."""
+    return rubbing(t, w) * (1.0 + 0.1 * np.cos(2.0 * np.pi * (w - 5.0) / 12.5))
+
+
+def test_an_interval_is_widened_where_a_law_is_wrong_in_form(diagnosed: Diagnosed) -> None:
+    """Alone in the catalogue, so that no other effect stands for what its form leaves."""
+    outcome, out = diagnosed(bent)
+    system, cases = outcome.system, list(outcome.cases)
+    library = read_library(system.library)
+    effects = [e for e in catalogue(system, library) if e.name == "BearingFriction"]
+    alone = diagnose(Problem(system, cases, library, effects), Engine(out=out))
+    assert not alone.diagnosis.noise_alone
+    (cause,) = alone.diagnosis.causes
+    friction = cause.parameters["tau_c"]
+    # The mean over the range, which the fit misses by more than noise would let it.
+    assert friction.low <= FRICTION <= friction.high
+    assert any("wrong in form" in warning for warning in alone.warnings)
+    page = write_diagnosis(alone, {"run": run_of("diagnose", system, {})}, out, 1).read_text()
+    assert "95 of 100" not in page
+    assert "widened because what remains is no noise" in page
 
 
 def test_where_nothing_is_accepted_the_nearest_candidates_say_why(diagnosed: Diagnosed) -> None:

@@ -411,6 +411,7 @@ def _diagnose() -> Schema:
         "gain": or_null(closed(gain)),
         "model": closed(model),
         "partial": listed(TEXT),
+        "noise_alone": FLAG,
         "nearest": listed(declared(NearestCandidate)),
         "next_steps": listed(TEXT),
         "late": or_null(declared(LateSignals)),

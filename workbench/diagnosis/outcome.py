@@ -174,14 +174,24 @@ class Outcome:
     @property
     def warnings(self) -> list[str]:
         """What makes the answer doubtful, and what to do."""
-        bounds = [
-            f"{cause.effect.name}: {name} {size.text}. "
-            f"If physics allows it, widen the bounds of {name} in {cause.effect.model}."
-            for cause in self.diagnosis.causes
+        found = self.diagnosis
+        limits = [
+            f"{cause.effect.name}: {name} {size.text}."
+            + f" If physics allows it, widen the bounds of {name} in {cause.effect.model}."
+            * size.open
+            for cause in found.causes
             for name, size in cause.parameters.items()
             if size.limit
         ]
-        return [*bounds, *(level.text for level in self.diagnosis.shifted)]
+        shifted = [level.text for level in found.shifted]
+        if found.noise_alone or found.gain is None:
+            return [*limits, *shifted]
+        return [
+            *limits,
+            *shifted,
+            f"What remains in cross-validation, {found.gain.after:.1f} times the noise, widens "
+            "the intervals: a law may be wrong in form.",
+        ]
 
     @property
     def not_visible(self) -> dict[str, str]:
@@ -313,6 +323,7 @@ class Outcome:
             "gain": None if found.gain is None else self._gain(found.gain),
             "model": _model(self.extension, partial=found.verdict == "partly explained"),
             "partial": list(found.partial),
+            "noise_alone": found.noise_alone,
             "nearest": [asdict(candidate) for candidate in found.nearest],
             "next_steps": self.next_steps,
             "late": None if found.late is None else asdict(found.late),

@@ -280,7 +280,13 @@ def _causes(summary: Mapping[str, Any]) -> list[Block]:
         blocks.append(f"What to do: {'; '.join(summary['next_steps'])}.")
     for place, cause in enumerate(summary["causes"], 1):
         title = f"{place}. {cause['effect']}: {cause['text']}"
-        blocks.append(Article(f"cause-{place}", title, _cause(cause, certainty)))
+        blocks.append(
+            Article(
+                f"cause-{place}",
+                title,
+                _cause(cause, certainty, noise_alone=summary["noise_alone"]),
+            )
+        )
     if certainty:
         blocks.append(_starts(certainty["starts"]))
     blocks += [_step(place, step) for place, step in enumerate(summary["steps"], 1)]
@@ -289,7 +295,9 @@ def _causes(summary: Mapping[str, Any]) -> list[Block]:
     return [*blocks, *(hidden(name, reason) for name, reason in summary["not_visible"].items())]
 
 
-def _cause(cause: Mapping[str, Any], certainty: Mapping[str, Any] | None) -> list[Block]:
+def _cause(
+    cause: Mapping[str, Any], certainty: Mapping[str, Any] | None, *, noise_alone: bool
+) -> list[Block]:
     """One cause: its parameters, what makes up for them, and what cannot be told from it."""
     effect = cause["effect"]
     columns = [
@@ -321,9 +329,13 @@ def _cause(cause: Mapping[str, Any], certainty: Mapping[str, Any] | None) -> lis
             ends = certainty["likelihood"][f"{effect} {name}"]
             row += [number(ends["low"], ".4g"), number(ends["high"], ".4g")]
         rows.append(row)
-    caption = Markup(
-        "Parameters of {}, with intervals that hold the true value in 95 of 100 diagnoses{}."
-    ).format(effect, noise)
+    held = (
+        "intervals that hold the true value in 95 of 100 diagnoses"
+        if noise_alone
+        else "intervals that are widened because what remains is no noise: the law may be wrong in "
+        "form"
+    )
+    caption = Markup("Parameters of {}, with {}{}.").format(effect, held, noise)
     explains = Markup(
         "Explains <strong>{:.1f} %</strong> of what can be explained, in cross-validation."
     ).format(100 * cause["explained"])

@@ -7,6 +7,7 @@ Each recording is left out in turn; of a single recording, each of its parts. So
 from functools import partial
 
 import numpy as np
+from scipy.stats import chi2
 
 from workbench.arrays import Matrix, Vector
 from workbench.diagnosis.data.cleaning import Mask
@@ -47,19 +48,34 @@ class CrossValidation:
 
         Estimates of noise may be wrong by what `excess` says.
         """
-        span = 1 if fast else fitted.linearised.lasting
-        told, parts = self._told(fitted), self._fit.parts if self._fit.unknowns.count == 1 else 1
-        blocks = [len(one.errors) for one in fitted.linearised.residuals for _ in range(parts)]
-        counts = [
-            max(1, n // parts // span) * int(one.sum()) for n, one in zip(blocks, told, strict=True)
-        ]
+        counts = self._counts(fitted, fast=fast)
         decides = self._fit.decides
         most = [decides.fall_of(n) / n for n in (*counts, sum(counts))]
         each = (1.0 + decides.excess) * np.array(most)
         return each[:-1], float(each[-1])
 
+    def noise_alone(self, fitted: FittedModel, *, fast: bool) -> bool:
+        """Whether a fit leaves no more than noise does in 95 of 100 sets."""
+        count = sum(self._counts(fitted, fast=fast))
+        most = (1.0 + self._fit.decides.excess) * float(chi2.isf(0.05, count)) / count
+        return float(self.squares(fitted, fast=fast).mean()) <= most
+
+    def _counts(self, fitted: FittedModel, *, fast: bool) -> list[int]:
+        """Number of means of which `squares` are, of each recording or part."""
+        span = 1 if fast else fitted.linearised.lasting
+        told, parts = self._told(fitted), self._fit.parts if self._fit.unknowns.count == 1 else 1
+        blocks = [len(one.errors) for one in fitted.linearised.residuals for _ in range(parts)]
+        return [
+            max(1, n // parts // span) * int(own.sum()) for n, own in zip(blocks, told, strict=True)
+        ]
+
     def worsened(self, before: FittedModel, after: FittedModel, *, fast: bool) -> list[str]:
-        """Recordings that a fit predicts worse than another one does, and not to their noise."""
+        """Recordings that a fit predicts worse than another one does, and not to their noise.
+
+        Parts of a single recording are none.
+        """
+        if self._fit.unknowns.count == 1:
+            return []
         was, now = self.squares(before, fast=fast), self.squares(after, fast=fast)
         worse = now > np.maximum(was, self.chance(after, fast=fast)[0])
         return [name for name, one in zip(self._fit.tests, worse, strict=True) if one]

@@ -10,9 +10,11 @@ from scipy.stats import bootstrap
 
 from workbench.arrays import Matrix, Vector
 from workbench.diagnosis.effects.catalogue import Effect
+from workbench.diagnosis.inference.discrepancy import correlated_deviations, share_by_form
 from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.linearized import Point
 from workbench.diagnosis.inference.nuisance import ShiftedLevel, hidden_effects, shifted_levels
+from workbench.diagnosis.inference.quadratic import Key
 from workbench.diagnosis.inference.score_test import CandidateScore
 from workbench.diagnosis.inference.search import (
     BEGUN,
@@ -54,7 +56,8 @@ class Interval:
 
     Attributes
     ----------
-    low, high : ends; infinite to the side of a bound at which the fit stopped.
+    low, high : ends; infinite to the side of a bound at which the fit stopped, but for a bound that
+        nature sets.
     limit : that bound, "least" or "greatest": then the value is no estimate.
     beyond : where a fit ends that may pass the bound and leaves clearly less; NaN if none does.
     alone : whether that fit needs no other cause.
@@ -82,7 +85,13 @@ class Interval:
         if np.isfinite(self.beyond):
             alone = ", alone" * self.alone
             return f"{with_unit(self.beyond, self.unit)}, beyond it, fits better{alone}"
-        return f"{'smaller' if self.limit == 'least' else 'larger'} may fit better"
+        more = "smaller" if self.limit == "least" else "larger"
+        return f"{more} may fit better" if self.open else f"nothing is {more}"
+
+    @property
+    def open(self) -> bool:
+        """Whether there may be values beyond the limit."""
+        return not (np.isfinite(self.low) and np.isfinite(self.high))
 
     def to_dict(self) -> dict[str, float | str | None]:
         """As plain numbers and texts; None of an end that is open."""
@@ -166,6 +175,8 @@ class Diagnosis:
     gain : None when nothing was extended.
     partial : effects that explain a part; empty unless something remains unexplained.
     nearest : candidates that come nearest where none is accepted, the nearest first.
+    noise_alone : whether causes leave no more than noise on held-out recordings; if not, what they
+        leave widens their intervals.
     late : signals that are late by themselves, as the system file does not say of any logger, and
         that explain clearly more; it is then unexplained.
     base, best : the nominal model and the last one, fitted.
@@ -184,6 +195,7 @@ class Diagnosis:
     gain: Gain | None
     partial: tuple[str, ...]
     nearest: tuple[NearestCandidate, ...]
+    noise_alone: bool
     late: LateSignals | None
     base: FittedModel
     best: FittedModel
@@ -211,7 +223,7 @@ def conclude(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnos
             chosen, late = _selected_with(fit, catalogue, chosen, begun, report), None
         verdict = _verdict(fit, chosen) if late is None else "unexplained"
     base, best = chosen.base, chosen.best
-    gain, objections = None, list[str]()
+    gain, objections, noise_alone = None, list[str](), True
     if best.active and late is None:
         report("held-out recordings")
         gain = _gain(fit, chosen)
@@ -224,8 +236,11 @@ def conclude(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnos
     causes: list[Cause] = []
     rivals: tuple[FittedModel, ...] = ()
     if verdict in ("found", "partly explained"):
+        fast = any(effect.order_locked for effect in best.active)
+        noise_alone = chosen.validation.noise_alone(best, fast=fast)
         causes = [
-            _cause(fit, chosen, effect) for effect in _strongest_first(fit, chosen, catalogue)
+            _cause(fit, chosen, effect, noise_alone=noise_alone)
+            for effect in _strongest_first(fit, chosen, catalogue)
         ]
         twins = [fits.values() for fits in chosen.twins.values()]
         rivals = (best, *(fit for fits in twins for fit in fits))
@@ -247,6 +262,7 @@ def conclude(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnos
         gain=gain,
         partial=best.names if part_of else (),
         nearest=nearest,
+        noise_alone=noise_alone,
         late=late,
         base=base,
         best=best,
@@ -312,9 +328,11 @@ def _fewest(
     if len(best.active) < 2 or chosen.interrupted:
         return chosen
     for effect in best.active:
-        if (limit := _limit(fit, best, effect, effect.label)) and (
-            _passed(fit, best, effect, effect.label, limit)[1]
-        ):
+        size = best.point.sizes[effect.name, effect.label]
+        limit = _limit(fit, best, effect, effect.label)
+        if not limit or _set_by_nature(size, fit.unknowns.unit(effect, effect.size)):
+            continue
+        if _passed(fit, best, effect, effect.label, limit)[1]:
             report(f"{effect.name} alone, which is at its bound")
             start = fit.tried(_only(best, effect))
             if start is None:
@@ -507,12 +525,9 @@ def _passed(
 ) -> tuple[float, bool]:
     """Where a fit ends that may pass a bound, and whether it needs no other cause; NaN: no better.
 
-    Beside a cause that is held at its bound, others stand for the rest of it. A bound of zero is a
-    sign, which physics gives.
+    Beside a cause that is held at its bound, others stand for the rest of it.
     """
     key = (effect.name, label)
-    if best.point.sizes[key] == 0.0:
-        return np.nan, False
     other = fit.opened(effect, effect.size if label == effect.label else label, limit)
     start = replace(best.linearised, settled=False)
     wide = differentiable(partial(fitted, other, start, best.active))
@@ -525,9 +540,23 @@ def _passed(
     return float(wide.point.sizes[key]), False
 
 
-def _cause(fit: Fit, chosen: Selection, effect: Effect) -> Cause:
+def _set_by_nature(value: float, unit: str) -> bool:
+    """Whether a bound is a sign, or the whole of a share, beyond which there is nothing."""
+    return value == 0.0 or (unit == "1" and abs(value) == 1.0)
+
+
+def _cause(fit: Fit, chosen: Selection, effect: Effect, *, noise_alone: bool) -> Cause:
+    """A cause with intervals, which what is left widens unless that is noise alone."""
     best, trial, unknowns = chosen.best, chosen.trial, fit.unknowns
     sigma = np.sqrt(np.diag(trial.covariance()))
+    fast, form_share, correlated = effect.order_locked, _FORM, dict[Key, float]()
+    if not noise_alone:
+        left, explained = (
+            float(chosen.validation.squares(model, fast=fast).mean()) - 1.0
+            for model in (best, chosen.less[effect])
+        )
+        form_share = max(_FORM, share_by_form(left, explained))
+        correlated = correlated_deviations(fit, best)
     parameters = {}
     for key, value in best.point.sizes.items():
         if key[0] != effect.name:
@@ -535,18 +564,22 @@ def _cause(fit: Fit, chosen: Selection, effect: Effect) -> Cause:
         parameter = effect.size if key[1] == effect.label else key[1]
         low, high = unknowns.bounds(effect, parameter)
         # Beside the noise: forms of laws that differ in detail, and immaterial companions.
-        form = np.hypot(_FORM * value, _COMPANY * effect.matters * (key[1] == effect.label))
-        reach = float(BAND * np.hypot(sigma[trial.joint.known.index(key)], form))
+        of_size = key[1] == effect.label
+        share = form_share if of_size else _FORM
+        form = np.hypot(share * value, _COMPANY * effect.matters * of_size)
+        noise = np.hypot(sigma[trial.joint.known.index(key)], correlated.get(key, 0.0))
+        reach = float(BAND * np.hypot(noise, form))
         limit = _limit(fit, best, effect, key[1])
-        # A value at a bound says nothing of the side beyond.
-        ends = (
-            -np.inf if limit == "least" else max(value - reach, low),
-            np.inf if limit == "greatest" else min(value + reach, high),
-        )
-        further = _passed(fit, best, effect, key[1], limit) if limit else (np.nan, False)
         unit = unknowns.unit(effect, parameter)
+        least, greatest = max(value - reach, low), min(value + reach, high)
+        further = (np.nan, False)
+        # A value at a bound says nothing of the side beyond.
+        if limit and not _set_by_nature(value, unit):
+            least = -np.inf if limit == "least" else least
+            greatest = np.inf if limit == "greatest" else greatest
+            further = _passed(fit, best, effect, key[1], limit)
+        ends = float(least), float(greatest)
         parameters[key[1]] = Interval(value, *ends, unit, limit, *further)
-    fast = effect.order_locked
     return Cause(
         effect=effect,
         parameters=parameters,
