@@ -140,6 +140,7 @@ def test_a_zone_that_is_said_tells_the_hours_of_a_changing_clock(
         ("%Y-%jT%H:%M:%S", "2024-03-01"),
         ("%Y-%m-%dT%H:%M:%S+00:00[Europe/London]", "2024-03-01"),
         ("%Y-%m-%d %H:%M:%S IST", "2024-03-01"),
+        ("DT#%Y-%m-%d-%H:%M:%S", "2024-03-01"),
     ],
 )
 def test_dates_of_any_order_are_read_as_times_go_on(

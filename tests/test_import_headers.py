@@ -162,6 +162,11 @@ TOA5 = ['"TOA5","Station","CR6","1234","CR6.Std.09","CPU:prog.CR6","5678","Fast"
             [("Time", "s"), ("inflow", "l/s"), ("h", "mm")],
         ),
         (
+            ["   Time   inflow       h", "    (s)    (l/s)    (mm)"],
+            "{0:6d} 4.{0:<6d} 950.{0}",
+            [("Time", "s"), ("inflow", "l/s"), ("h", "mm")],
+        ),
+        (
             ["Time inflow [l/s] h [mm]"],
             "2024-03-05 10:00:{0:02d} 4.{0} 950.{0}",
             [("Time", "s"), ("inflow", "l/s"), ("h", "mm")],
@@ -170,7 +175,13 @@ TOA5 = ['"TOA5","Station","CR6","1234","CR6.Std.09","CPU:prog.CR6","5678","Fast"
     ids=[
         *("TOA5", "parts of a second", "numbered", "two rows of names", "channel numbers"),
         *("Graphtec", "DIAdem", "DEWESoft", "catman", "labels", "LabVIEW", "Yokogawa"),
-        *("units above", "folded", "units behind numbers", "a name over date and time"),
+        *(
+            "units above",
+            "folded",
+            "units behind numbers",
+            "units in brackets",
+            "a name over date and time",
+        ),
     ],
 )
 def test_names_and_units_stand_in_rows_of_their_own(

@@ -135,6 +135,12 @@ def test_signals_over_common_times_are_those_of_a_test_stand(tmp_path: Path) -> 
     ]
 
 
+def test_a_table_of_inputs_beside_an_output_is_not_lost(tmp_path: Path) -> None:
+    inputs = np.column_stack([FLOW, 2.0 * FLOW])
+    found = group(tmp_path / "a.mat", {"z": {"u": inputs, "y": column(LEVEL), "Ts": 0.5}})
+    assert [channel.name for channel in found.channels] == ["u(1)", "u(2)", "y"]
+
+
 def test_times_may_be_texts(tmp_path: Path) -> None:
     stamps = np.array([f"2024-03-05 10:00:{t:06.3f}" for t in TIME], dtype=object)
     found = group(tmp_path / "a.mat", {"t": stamps, "h": column(LEVEL)})

@@ -147,6 +147,20 @@ def test_a_unit_that_is_wrong_by_a_thousand_is_asked_about(tmp_path: Path, tank:
     assert "a thousandth of it would be usual" in problem
 
 
+def test_a_thousandth_in_the_own_unit_is_asked_about(tmp_path: Path, tank: System) -> None:
+    """An inflow in m3/s that is declared in l/s: it moves by less than its noise."""
+    path = write(tmp_path / "a.csv", LEVEL)
+    lines = path.read_text().split("\n")
+    rows = [line.split(";") for line in lines[1:]]
+    small = [f"{t};{float(inflow) / 1000:.6f};{h}" for t, inflow, h in rows]
+    path.write_text("\n".join([lines[0], *small]))
+    (doubt,) = proposed(path, tank).doubts
+    assert "inflow: its largest value" in doubt
+    resting = [f"{t};0;{h}" for t, _, h in rows]
+    path.write_text("\n".join([lines[0], *resting]))
+    assert not proposed(path, tank).doubts
+
+
 @pytest.mark.parametrize(
     ("scale", "label", "values", "unit", "first"),
     [

@@ -122,11 +122,11 @@ def _ranges(
                 continue
             first = int(outside[0])
             many = f", and {outside.size - 1} more such samples" if outside.size > 1 else ""
-            limits = f"from {_shown(signal, low)} to {_shown(signal, high)}"
+            limits = f"from {_value_text(signal, low)} to {_value_text(signal, high)}"
             yield _Finding(
                 impossible,
                 origin.at(first, name),
-                f"{_shown(signal, values[first])} at {time[first]:.9g} s{many}",
+                f"{_value_text(signal, values[first])} at {time[first]:.9g} s{many}",
                 f"what {'is possible' if impossible else 'is likely'}, {limits}",
                 f"correct the values or the unit of the column; if they are right, widen "
                 f"'{'possible' if impossible else 'plausible'}' of {name} in {system.source}",
@@ -166,19 +166,20 @@ def _sizes(signals: Mapping[str, Vector], system: System, origin: Origin) -> Ite
             begins = float(np.median(values[:_FEW]))
             if factor := _other_unit(begins, variable.start, signal):
                 finding = (
-                    f"{_shown(signal, begins)} at the start, {factor} that of the model",
-                    f"about {_shown(signal, float(variable.start or 0.0))}",
+                    f"{_value_text(signal, begins)} at the start, {factor} that of the model",
+                    f"about {_value_text(signal, float(variable.start or 0.0))}",
                 )
             elif outside.size >= _FEW:
                 finding = (
-                    f"{_shown(signal, values[outside[0]])}, and {outside.size - 1} more such "
+                    f"{_value_text(signal, values[outside[0]])}, and {outside.size - 1} more such "
                     "samples",
-                    f"what the model allows, from {_shown(signal, low)} to {_shown(signal, high)}",
+                    f"what the model allows, from {_value_text(signal, low)} to "
+                    f"{_value_text(signal, high)}",
                 )
         if finding is None and (size > _CONTRADICTS * signal.scale or faint):
             finding = (
-                f"values up to {_shown(signal, size)}",
-                f"values of the size of {_shown(signal, signal.scale)}, as 'scale' of "
+                f"values up to {_value_text(signal, size)}",
+                f"values of the size of {_value_text(signal, signal.scale)}, as 'scale' of "
                 f"{signal.name} says in {system.source}",
             )
         if finding is not None:
@@ -209,7 +210,7 @@ def _other_unit(begins: float, start: str | None, signal: Signal) -> str:
     return ""
 
 
-def _shown(signal: Signal, value: float) -> str:
+def _value_text(signal: Signal, value: float) -> str:
     """A value in the unit that people read."""
     return f"{value / si_factor(signal.shown, signal.unit, signal.name):.6g} {signal.shown}"
 
@@ -226,8 +227,8 @@ def _still(signals: Mapping[str, Vector], system: System, origin: Origin) -> Ite
             # Steps coarser than noise may hide it; an input may rest.
             name in outputs and signal.resolution <= signal.noise,
             origin.at(0, name),
-            f"{_shown(signal, values[0])} in all {values.size} samples",
-            f"readings that scatter by {_shown(signal, signal.deviation(values[0]))}, as the "
+            f"{_value_text(signal, values[0])} in all {values.size} samples",
+            f"readings that scatter by {_value_text(signal, signal.deviation(values[0]))}, as the "
             "sensor's noise does",
             "check the sensor, and what its column holds",
         )
@@ -279,7 +280,7 @@ def _redundancies(
     """Signals that contradict each other while they ought to agree."""
     named: set[str] = set()  # of several that tell the same of one, the first
     for redundancy in system.redundancies:
-        names = _named(redundancy)
+        names = _needed_names(redundancy)
         if redundancy.formula.text in named or not _has(names, signals, system):
             continue
         left, right = _sides(redundancy, time, signals, system)
@@ -298,7 +299,7 @@ def _redundancies(
             continue
         named.add(redundancy.formula.text)
         first = int(chosen[shares > redundancy.tolerance.likely][0])
-        columns = [name for name in signals if name in _compared(redundancy)]
+        columns = [name for name in signals if name in _compared_names(redundancy)]
         told_by = [
             name for name in columns if redundancy.store is None or name in redundancy.formula.names
         ]
@@ -318,7 +319,7 @@ def _redundancies(
         )
 
 
-def _compared(redundancy: Redundancy) -> Set[str]:
+def _compared_names(redundancy: Redundancy) -> Set[str]:
     """Names in the formulas that are compared."""
     stored: Set[str] = (
         redundancy.store.formula.names if redundancy.store is not None else frozenset()
@@ -326,14 +327,14 @@ def _compared(redundancy: Redundancy) -> Set[str]:
     return redundancy.formula.names | redundancy.other.names | stored
 
 
-def _named(redundancy: Redundancy) -> Set[str]:
+def _needed_names(redundancy: Redundancy) -> Set[str]:
     """All names that a redundancy needs."""
     limits = [
         limit.signal
         for limit in (redundancy.while_below, redundancy.while_above)
         if limit is not None
     ]
-    return _compared(redundancy) | set(limits)
+    return _compared_names(redundancy) | set(limits)
 
 
 def _sides(
@@ -390,9 +391,9 @@ def _conditions(
         yield _Finding(
             share > condition.agrees.tolerance.possible,
             f"{origin.conditions} {condition.name}",
-            f"{_worded(condition, said)} where the record has "
+            f"{_condition_text(condition, said)} where the record has "
             f"{condition.agrees.formula.text} = "
-            f"{_worded(condition, shown)} "
+            f"{_condition_text(condition, shown)} "
             f"({where}{', at the start' if at_start else ', its largest'})",
             f"the same within {condition.agrees.tolerance.likely:.0%}",
             "correct the condition, or the unit or the sign of the column",
@@ -421,5 +422,5 @@ def _apart(first: float, other: float, tolerance: Tolerance) -> float:
     return difference / max(abs(first), abs(other)) if difference > tolerance.slack else 0.0
 
 
-def _worded(condition: Condition, value: float) -> str:
+def _condition_text(condition: Condition, value: float) -> str:
     return f"{value:.6g} {condition.unit}".rstrip()

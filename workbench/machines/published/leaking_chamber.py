@@ -73,7 +73,7 @@ def _recordings(name: str, columns: Columns, file: str) -> list[PublishedRecordi
     return [above, until(pressure.size, "below", float(time[middle]))]
 
 
-def _theirs(path: Path) -> Columns:
+def _publisher_columns(path: Path) -> Columns:
     rows = [line.split(";") for line in path.read_text().splitlines()]
     # Time in ms, "3.066.000": all points but the last stand between thousands.
     time = np.array([float(row[0].replace(".", "")) / 1e6 for row in rows])
@@ -89,7 +89,7 @@ PUBLISHED = PublishedSet(
     "shows below, to which what is above leads without being counted; three of them never fall so "
     "far.",
     layouts=layouts(
-        ("appendix_compressed-air_chamber/data", _theirs),
+        ("appendix_compressed-air_chamber/data", _publisher_columns),
         (
             "one folder for each chamber, with one sample a second",
             "chamber",

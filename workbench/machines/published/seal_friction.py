@@ -74,8 +74,8 @@ def rate(time: Vector, stroke: Vector) -> Vector:
 
 def _slope(t: Vector, s: Vector) -> Vector:
     """Slope of a line through each row."""
-    apart = t - t.mean(axis=1, keepdims=True)
-    slopes: Vector = (apart * s).sum(axis=1) / np.square(apart).sum(axis=1)
+    centred = t - t.mean(axis=1, keepdims=True)
+    slopes: Vector = (centred * s).sum(axis=1) / np.square(centred).sum(axis=1)
     return slopes
 
 
@@ -107,7 +107,7 @@ def _recordings(name: str, columns: Columns, file: str) -> list[PublishedRecordi
     return [recording]
 
 
-def _theirs(path: Path) -> Columns:
+def _publisher_columns(path: Path) -> Columns:
     # Time in ms; three voltages of sensors; stroke in mm, pressure in bar, force in N.
     time, _, _, _, stroke, pressure, force = np.loadtxt(path).T
     return {"time": time / 1e3, "stroke": stroke, "pressure": pressure, "force": force}
@@ -123,7 +123,7 @@ PUBLISHED = PublishedSet(
     "Pressure and force are as the publisher converted them; force is that which pushes the piston "
     "in.",
     layouts=layouts(
-        ("results_pneumatic-actuator/data/friction", _theirs),
+        ("results_pneumatic-actuator/data/friction", _publisher_columns),
         (
             "one folder for each recording",
             "friction",

@@ -118,7 +118,7 @@ def _read_clock(
         own = (*group.channels, *group.left)
         channel_of_time = next((channel for channel in own if channel.name == named.channel), None)
         if channel_of_time is not None:
-            return _going_on(_named(channel_of_time, named, system, where), where)
+            return _going_on(_named_clock(channel_of_time, named, system, where), where)
     if group.time is not None:
         time = group.time
         said = "the file says it"
@@ -183,16 +183,16 @@ def _beside_stated(clock: Clock, step: float, where: str) -> Clock:
     ratio = max(usual, step) / min(usual, step)
     if not ratio > _FACTOR:
         return clock
-    said = f"times every {usual:.6g} s, and the file states a sample every {step:.6g} s"
-    if any(abs(ratio / apart - 1.0) < 0.02 for apart in _UNITS_APART):
+    statement = f"times every {usual:.6g} s, and the file states a sample every {step:.6g} s"
+    if any(abs(ratio / factor - 1.0) < 0.02 for factor in _UNITS_APART):
         raise InputError(
             where=f"{where}, '{clock.channel}'",
-            found=f"{said}, {ratio:.4g} times apart",
+            found=f"{statement}, {ratio:.4g} times apart",
             expected="one time between samples",
             remedy=f"say which is right, --column '{TIME}={clock.channel} [UNIT]', or "
             f"--sample-rate '{1.0 / step:.6g} Hz'",
         )
-    return replace(clock, corrections=(*clock.corrections, f"{said}; the times are taken"))
+    return replace(clock, corrections=(*clock.corrections, f"{statement}; the times are taken"))
 
 
 def _no_time(group: Group, system: System, where: str) -> InputError:
@@ -222,7 +222,7 @@ def _no_time(group: Group, system: System, where: str) -> InputError:
     )
 
 
-def _named(channel: FileChannel, named: NamedChannel, system: System, where: str) -> Clock:
+def _named_clock(channel: FileChannel, named: NamedChannel, system: System, where: str) -> Clock:
     """The channel that the user says is the time, in the unit or the format that is said."""
     if channel.texts:
         return _named_stamps(channel, named.unit, system, where)
@@ -240,8 +240,8 @@ def _named(channel: FileChannel, named: NamedChannel, system: System, where: str
             expected="a unit of time",
             remedy=f"give it, --column '{TIME}={channel.name} [UNIT]'",
         )
-    reason = "named" if own else f"named; {_concluded(unit)}"
-    clock = _counting(channel, unit, scale.factor, reason)
+    reason = "named" if own else f"named; {_unit_reason(unit)}"
+    clock = _count_clock(channel, unit, scale.factor, reason)
     start = channel.start if math.isfinite(channel.start) else clock.start
     return replace(clock, start=start, certain=bool(own))
 
@@ -251,7 +251,7 @@ def _named_stamps(channel: FileChannel, unit: str, system: System, where: str) -
     how = unit if is_said(unit) else ""
     read = read_stamps(channel.name, channel.texts, how) if how else channel
     if read is not None and not read.doubt and np.isfinite(read.values).any():
-        clock = replace(_stamped(read), stated=how)
+        clock = replace(_stamp_clock(read), stated=how)
         return clock if how else _minutes_or_hours(clock, channel, system)
     text = next(filter(None, channel.texts), "")
     none = f"which are none of [{how}]" if how else "no date that is known"
@@ -264,7 +264,7 @@ def _named_stamps(channel: FileChannel, unit: str, system: System, where: str) -
     )
 
 
-def _stamped(channel: FileChannel) -> Clock:
+def _stamp_clock(channel: FileChannel) -> Clock:
     return Clock(
         channel=channel.name,
         times=channel.values,
@@ -280,13 +280,13 @@ def _stamped(channel: FileChannel) -> Clock:
 def _candidate(channel: FileChannel, group: Group, system: System) -> Clock | None:
     """A channel that may be the time, by its name, its unit and its place."""
     if channel.stamp:
-        return None if channel.doubt else _minutes_or_hours(_stamped(channel), channel, system)
+        return None if channel.doubt else _minutes_or_hours(_stamp_clock(channel), channel, system)
     scale = conversion(channel.unit, "s") if channel.unit else None
     days = channel.unit == "d" and is_time(channel.name)
     if days and (since := _since(channel, system)) is not None:
         return since
     if scale is not None and (is_time(channel.name) or channel is group.channels[0]):
-        return _counting(channel, channel.unit, scale.factor, "name and unit")
+        return _count_clock(channel, channel.unit, scale.factor, "name and unit")
     if not channel.unit and is_time(channel.name):
         if (since := _since(channel, system)) is not None:
             return since
@@ -295,7 +295,7 @@ def _candidate(channel: FileChannel, group: Group, system: System) -> Clock | No
         likely = _unstated(channel.values, system)
         scale = conversion(likely[0], "s") if len(likely) == 1 else None
         if scale is not None:
-            clock = _counting(channel, likely[0], scale.factor, _concluded(likely[0]))
+            clock = _count_clock(channel, likely[0], scale.factor, _unit_reason(likely[0]))
             return replace(clock, certain=False)
     return None
 
@@ -313,7 +313,7 @@ def _minutes_or_hours(clock: Clock, channel: FileChannel, system: System) -> Clo
         return clock
     reason = f"minutes and seconds, as samples are {usual / 60.0:.4g} s apart then"
     return replace(
-        _stamped(other), certain=False, reason=reason, unit=MINUTES, channel=channel.name
+        _stamp_clock(other), certain=False, reason=reason, unit=MINUTES, channel=channel.name
     )
 
 
@@ -355,7 +355,7 @@ def _unevenness(times: Vector) -> float:
     return math.inf if (steps <= 0.0).any() else float(steps.max() / np.median(steps))
 
 
-def _counting(channel: FileChannel, unit: str, factor: float, reason: str) -> Clock:
+def _count_clock(channel: FileChannel, unit: str, factor: float, reason: str) -> Clock:
     """Times that are numbers; a counter that goes round goes on."""
     values, rounds = _unwrapped(channel.values)
     start = channel.start
@@ -386,15 +386,15 @@ def _unwrapped(values: Vector) -> tuple[Vector, tuple[str, ...]]:
     if not back.size or back.size > 0.5 * steps.size:
         return values, ()
     usual = float(np.median(ahead))
-    apart = {
+    residual = {
         period: float(np.abs(steps[back] + period - usual).max()) / usual
         for period in _ROUNDS
         if period > 2.0 * usual
     }
-    best, *others = sorted(apart, key=lambda period: apart[period])[:2] or [math.nan]
+    best, *others = sorted(residual, key=lambda period: residual[period])[:2] or [math.nan]
     # Of periods that are near each other, one must fit clearly better.
-    rival = min((apart[period] for period in others), default=math.inf)
-    if not apart.get(best, math.inf) <= 0.5 or rival <= max(2.0 * apart[best], 0.05):
+    rival = min((residual[period] for period in others), default=math.inf)
+    if not residual.get(best, math.inf) <= 0.5 or rival <= max(2.0 * residual[best], 0.05):
         return values, ()
     rounds = np.zeros(known.size)
     rounds[back + 1] = best
@@ -415,7 +415,7 @@ def _since(channel: FileChannel, system: System) -> Clock | None:
     clock = None
     for unit, factor in (("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)):
         if _UNIX[0] <= held.min() * factor and held.max() * factor <= _UNIX[1]:
-            clock = _counting(channel, unit, factor, f"{unit} since 1970")
+            clock = _count_clock(channel, unit, factor, f"{unit} since 1970")
             if "gps" in words(channel.name):
                 clock = replace(clock, start=clock.start + _GPS, reason="s of GPS")
     for reason, (zero, factor) in _EPOCHS.items():
@@ -447,7 +447,7 @@ def _since(channel: FileChannel, system: System) -> Clock | None:
     return clock if 1.0 / _LIKE < ratio < _LIKE else None
 
 
-def _concluded(unit: str) -> str:
+def _unit_reason(unit: str) -> str:
     return f"no unit in the file; in {unit} it is sampled as is usual"
 
 
@@ -477,17 +477,17 @@ def _going_on(clock: Clock, where: str) -> Clock:
         return clock
     held = clock.times[np.isfinite(clock.times)]
     late = int(np.argmin(np.diff(held) > 0)) if held.size > 1 else -1
-    found = f"{held[late + 1]:.9g} s after {held[late]:.9g} s" if late >= 0 else "no times"
+    fault = f"{held[late + 1]:.9g} s after {held[late]:.9g} s" if late >= 0 else "no times"
     count = int((np.diff(held) <= 0).sum()) if held.size > 1 else 0
-    found += f" in sample {late + 2}" + (f", and {count - 1} more" if count > 1 else "")
+    fault += f" in sample {late + 2}" + (f", and {count - 1} more" if count > 1 else "")
     remedy = "if samples are evenly spaced say how, --sample-rate '200 Hz'; else export more digits"
     if held.size > 1 and count >= 0.3 * held.size and not (np.diff(held) < 0).any():
         rate = (held.size - 1) / (held[-1] - held[0]) if held[-1] > held[0] else math.nan
-        found += ": stamps are coarser than samples"
+        fault += ": stamps are coarser than samples"
         remedy = f"say the rate, about --sample-rate '{rate:.4g} Hz', or export more digits"
     raise InputError(
         where=f"{where}, '{clock.channel}'" if clock.channel else where,
-        found=found,
+        found=fault,
         expected="times that go on",
         remedy=remedy,
     )

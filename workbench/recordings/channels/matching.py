@@ -149,9 +149,10 @@ def size_doubt(values: Vector, unit: str, signal: Signal, column: str) -> str:
     largest, middle = float(held.max()), float(np.median(held))
     ratio = largest / signal.scale
     confirms = f"--column '{column} [{unit}]' confirms [{unit}]"
-    # A sensor at rest scatters by its noise, and no less; the system's own unit is no mistake.
+    # A sensor at rest scatters by its noise, and no less; a small signal may be in its own unit.
     other = unit not in (signal.unit, signal.shown)
-    moves = other and (largest > 5.0 * signal.noise or 0.0 < float(held.std()) < 0.2 * signal.noise)
+    fine = 0.0 < float(held.std()) < 0.2 * signal.noise
+    moves = fine or (other and largest > 5.0 * signal.noise)
     if ratio > _THOUSANDFOLD or (1e-7 < ratio < 1.0 / _THOUSANDFOLD and moves):
         return (
             f"its largest value, {largest:.4g} {signal.unit}, is {ratio:.3g} times the typical "

@@ -128,7 +128,7 @@ def propose_recordings(
     InputError
         As `propose`; or if it cannot be told whether parts of a file are recordings of their own.
     """
-    whole = _tried("", files, system, stored, options)
+    whole = _propose_part("", files, system, stored, options)
     settled = isinstance(whole, ProposedRecording) and not whole.proposal.problems
     single = options.apart is False or len(files) > 1 or settled or _names_a_group(options, files)
     parts = None if single else _apart(files[0], system, stored, options)
@@ -137,13 +137,13 @@ def propose_recordings(
         if not doubt:
             return parts
         if not parts.problems:
-            whole = _doubted(whole, doubt, files)
+            whole = _with_doubt(whole, doubt, files)
     if isinstance(whole, InputError):
         raise whole
     return ProposedRecordings((whole,))
 
 
-def _tried(
+def _propose_part(
     name: str,
     files: Sequence[RecordedFile],
     system: System,
@@ -166,7 +166,7 @@ def _names_a_group(options: RecordingOptions, files: Sequence[RecordedFile]) -> 
     return any(column.channel in full - names for column in options.columns.values())
 
 
-def _doubted(
+def _with_doubt(
     whole: ProposedRecording | InputError, doubt: str, files: Sequence[RecordedFile]
 ) -> ProposedRecording | InputError:
     """Files as one recording, where parts of them may be recordings of their own."""
@@ -192,18 +192,22 @@ def _apart(
         parts: dict[tuple[str, ...], list[Group]] = {}
         for group in file.groups:
             parts.setdefault(group.within[:depth], []).append(group)
-        tried: dict[str, ProposedRecording | InputError] = {}
+        outcomes: dict[str, ProposedRecording | InputError] = {}
         held: dict[str, RecordedFile] = {}
         for path, groups in parts.items():
             name = "/".join(path) or file.path.name  # what stands outside of all others
             held[name] = replace(file, groups=tuple(groups))
-            tried[name] = _tried(name, [held[name]], system, stored, options)
+            outcomes[name] = _propose_part(name, [held[name]], system, stored, options)
         alike = _alike(
-            [recording for recording in tried.values() if isinstance(recording, ProposedRecording)],
+            [
+                recording
+                for recording in outcomes.values()
+                if isinstance(recording, ProposedRecording)
+            ],
             system,
         )
         if alike:
-            return _sorted_out(alike, tried, held, system)
+            return _sorted_out(alike, outcomes, held, system)
     return None
 
 
@@ -211,10 +215,10 @@ def _needed(system: System) -> list[str]:
     return [signal.name for signal in (*system.inputs, *system.outputs)]
 
 
-def _alike(tried: Sequence[ProposedRecording], system: System) -> list[ProposedRecording]:
+def _alike(outcomes: Sequence[ProposedRecording], system: System) -> list[ProposedRecording]:
     """Most of those that hold the same channels, at least two; those without problems first."""
     classes: dict[_Signature, list[ProposedRecording]] = {}
-    for recording in tried:
+    for recording in outcomes:
         # A part with fewer channels than a recording has signals is that of one logger.
         if not recording.proposal.problems or len(_names(recording.files[0])) >= len(
             _needed(system)
@@ -242,7 +246,7 @@ def _names(file: RecordedFile) -> frozenset[str]:
 
 def _sorted_out(
     alike: Sequence[ProposedRecording],
-    tried: Mapping[str, ProposedRecording | InputError],
+    outcomes: Mapping[str, ProposedRecording | InputError],
     held: Mapping[str, RecordedFile],
     system: System,
 ) -> ProposedRecordings:
@@ -251,7 +255,7 @@ def _sorted_out(
     taken = {first.assigned[name].channel.name for name in _needed(system) if name in first.named}
     refused: list[InputError] = []
     beside: list[str] = []
-    for name, outcome in tried.items():
+    for name, outcome in outcomes.items():
         if outcome in alike:
             continue
         names = _names(held[name])
@@ -349,17 +353,17 @@ def _span(recording: ProposedRecording) -> _Span | None:
     for key, clock in recording.proposal.clocks.items():
         group = recording.files[key[0]].groups[key[1]]
         shown = [c for c in (group.time, *group.channels) if c is not None and _is_dated(c)]
-        times, zero, kind = clock.times, 0.0, _CLOCK
+        times, zero, scale = clock.times, 0.0, _CLOCK
         if shown:
             dated = np.isfinite(shown[0].start)
-            times, kind = shown[0].values, _DATE if dated else _CLOCK
+            times, scale = shown[0].values, _DATE if dated else _CLOCK
             zero = shown[0].start if dated else shown[0].shown
         held = np.sort(times[np.isfinite(times)]) + zero
         if held.size > 1:
             begin, end = float(held[0]), float(held[-1])
             own_zero = begin <= _NEAR * (end - begin) and end >= 0.0
-            if kind == _DATE or not own_zero:
-                return _Span(kind, begin, end)
+            if scale == _DATE or not own_zero:
+                return _Span(scale, begin, end)
     return None
 
 

@@ -150,17 +150,19 @@ def _reader(path: Path, raw: bytes) -> _Reader:
 def _refuse_unread(path: Path, raw: bytes, *, is_workbook: bool) -> None:
     """Refuse formats that are known, and that nobody reads here."""
     begin = raw[:2000].lstrip(b"\xef\xbb\xbf \r\n\t")
-    kind = next((kind for start, kind in _UNREAD.items() if begin.startswith(start)), "")
+    format_name = next(
+        (format_name for start, format_name in _UNREAD.items() if begin.startswith(start)), ""
+    )
     if is_workbook and b"[Content_Types].xml" not in raw and zipfile.is_zipfile(io.BytesIO(raw)):
-        kind = "an archive (.zip) or a workbook of another program (.ods)"
-        kind = "arrays of NumPy (.npz)" if b".npy" in begin else kind
-    if kind:
+        format_name = "an archive (.zip) or a workbook of another program (.ods)"
+        format_name = "arrays of NumPy (.npz)" if b".npy" in begin else format_name
+    if format_name:
         raise InputError(
             where=str(path),
-            found=kind,
+            found=format_name,
             expected="a recording as CSV, .xlsx, .mat, .h5, .parquet, .tdms or .mf4",
             remedy="save it as .xlsx"
-            if ".xls)" in kind
+            if ".xls)" in format_name
             else "unpack it, or save or export the recording in one of these formats",
         )
 
@@ -169,9 +171,9 @@ def _is_mat_4(raw: bytes) -> bool:
     """Whether a file begins as MAT files of version 4 do: with what its first matrix is."""
     if len(raw) <= _MAT_4.size:
         return False
-    kind, rows, columns, imaginary, length = _MAT_4.unpack_from(raw)
+    code, rows, columns, imaginary, length = _MAT_4.unpack_from(raw)
     name = raw[_MAT_4.size : _MAT_4.size + length] if 1 < length < 64 else b""
-    known = 0 <= kind < 100 and kind // 10 in range(6) and kind % 10 in range(3)
+    known = 0 <= code < 100 and code // 10 in range(6) and code % 10 in range(3)
     named = name[:1].isalpha() and name[-1:] == b"\0" and name.isascii()
     return known and rows >= 0 and columns >= 0 and imaginary in (0, 1) and named
 

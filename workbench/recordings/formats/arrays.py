@@ -51,7 +51,7 @@ def _collect(
     notes: list[str],
     step: float = math.nan,
 ) -> None:
-    content = _identified(_displayed(content))
+    content = _with_own_names(_plotted_signals(content))
     units, step = _units(content), _step(content, step)
     by_size: dict[int, list[FileChannel]] = {}
     for key, value in content.items():
@@ -112,7 +112,7 @@ def _element(name: str, content: Mapping[str, Any]) -> tuple[str, Mapping[str, A
     return label, content if values is None else values
 
 
-def _displayed(content: Mapping[str, Any]) -> Mapping[str, Any]:
+def _plotted_signals(content: Mapping[str, Any]) -> Mapping[str, Any]:
     """Signals `Y` over the times `X`, as test stands store what they plot, by their names."""
     parts = {key.lower(): value for key, value in content.items()}
     times, signals = parts.get("x"), parts.get("y")
@@ -131,13 +131,13 @@ def _displayed(content: Mapping[str, Any]) -> Mapping[str, Any]:
     return found
 
 
-def _identified(content: Mapping[str, Any]) -> Mapping[str, Any]:
+def _with_own_names(content: Mapping[str, Any]) -> Mapping[str, Any]:
     """Arrays of inputs and outputs by the names beside them, as of System Identification.
 
     `InputName` and `InputUnit` are those of `InputData` or `u`, `OutputName` those of `OutputData`
     or `y`.
     """
-    found = dict(content)
+    members = dict(content)
     for side, letter in (("Input", "u"), ("Output", "y")):
         key = next((key for key in (f"{side}Data", letter) if key in content), "")
         values, names = content.get(key), content.get(f"{side}Name")
@@ -151,11 +151,11 @@ def _identified(content: Mapping[str, Any]) -> Mapping[str, Any]:
         if table.shape[1] != len(names) or "" in names:
             continue
         for part in (key, f"{side}Name", f"{side}Unit"):
-            found.pop(part, None)
+            members.pop(part, None)
         for i, name in enumerate(names):
-            found[name] = table[:, i]
-            found[f"{name}_unit"] = units[i] if i < len(units) else ""
-    return found
+            members[name] = table[:, i]
+            members[f"{name}_unit"] = units[i] if i < len(units) else ""
+    return members
 
 
 def _step(content: Mapping[str, Any], outer: float) -> float:
@@ -241,7 +241,10 @@ def _single(name: str, content: Mapping[str, Any]) -> FileChannel | None:
     values = _real(values)
     clock, _ = _entry(content, _TIMES)
     others = [held for other, held in content.items() if other not in (key, clock)]
-    if any(isinstance(held, np.ndarray) and held.size == values.size > 1 for held in others):
+    if any(
+        isinstance(held, np.ndarray) and max(held.shape, default=0) == values.size > 1
+        for held in others
+    ):
         return None  # one of several channels
     _, unit = _entry(content, ("unit", "units", "einheit"))
     _, about = _entry(content, _TEXTS)

@@ -140,7 +140,7 @@ def find_table(rows: Sequence[Sequence[str]], lines: Sequence[int], where: str) 
     InputError
         If there are no two columns of samples, or their names do not reach as far as they do.
     """
-    if turned := _turned(rows):
+    if turned := _rows_of_channels(rows):
         return find_table(turned, range(1, len(turned) + 1), where)
     samples = _samples(rows, lines, _is_data)
     if len(samples) < _FEWEST:  # numbers may have units behind them
@@ -209,7 +209,7 @@ def _has_quantities(row: Sequence[str]) -> bool:
     return _is_data([match["number"] if (match := _WITH_UNIT.fullmatch(c)) else c for c in row])
 
 
-def _turned(rows: Sequence[Sequence[str]]) -> list[list[str]]:
+def _rows_of_channels(rows: Sequence[Sequence[str]]) -> list[list[str]]:
     """Columns as rows, where each channel is a row with its name first; empty: they are none."""
     data = [row for row in rows if _is_data(row)] if len(rows) < _MOST_TURNED else []
     width = max(map(len, data), default=0)
@@ -394,7 +394,7 @@ def read_group(
     numbers: dict[int, list[str]] = {}
     notes: list[str] = []
     labels = [_label(table, i) for i in range(len(columns))]
-    labels, columns = _with_parts(*_joined(*_assembled(labels, columns)))
+    labels, columns = _with_parts(*_join_day_and_clock(*_join_date_parts(labels, columns)))
     left: list[FileChannel] = []
     for i, cells in enumerate(columns):
         how = labels[i][1] if is_said(labels[i][1]) else ""
@@ -403,7 +403,7 @@ def read_group(
             notes += [f"'{labels[i][0]}' holds {channel.doubt}"] * bool(channel.doubt)
         elif _mostly(cells, is_number):
             numbers[i] = all_plain(cells)
-        elif (bare := _bare(cells, labels[i][1])) is not None:
+        elif (bare := _numbers_within(cells, labels[i][1])) is not None:
             numbers[i] = all_plain(bare[0])
             labels[i] = labels[i][0], bare[1]
         elif any(cells):
@@ -443,7 +443,7 @@ def read_group(
     return group, reading, notes
 
 
-def _bare(cells: Sequence[str], unit: str) -> tuple[list[str], str] | None:
+def _numbers_within(cells: Sequence[str], unit: str) -> tuple[list[str], str] | None:
     """Numbers of cells that hold their unit, too, or are written as no other; and the unit.
 
     Texts of a spreadsheet (="1.5"), exponents of Fortran (1.5D+02), and what is on or off.
@@ -467,7 +467,7 @@ def _bare(cells: Sequence[str], unit: str) -> tuple[list[str], str] | None:
     return bare, spelled(own)
 
 
-def _assembled(
+def _join_date_parts(
     labels: list[tuple[str, str]], columns: list[list[str]]
 ) -> tuple[list[tuple[str, str]], list[list[str]]]:
     """The same columns, with those of years, days, hours, or dates and times in figures, as one.
@@ -533,7 +533,7 @@ def _of_year(year: str, day: str) -> str:
     return f"{moment:%Y%m%d}"
 
 
-def _joined(
+def _join_day_and_clock(
     labels: list[tuple[str, str]], columns: list[list[str]]
 ) -> tuple[list[tuple[str, str]], list[list[str]]]:
     """The same columns, with one of days and one of times of day as one."""
@@ -606,17 +606,17 @@ def stated_step(head: Sequence[str]) -> tuple[float, str]:
             before = line[max(0, match.start() - _ABOUT) : match.start()]
             about = re.split(r"\d", before)[-1]
             value, unit = match["value"].strip(), match["unit"].casefold()
-            kind = _RATE if unit in _PER_SECOND else _INTERVAL
-            wanted = kind.search(about) and _SAMPLES.search(about)
+            meaning = _RATE if unit in _PER_SECOND else _INTERVAL
+            wanted = meaning.search(about) and _SAMPLES.search(about)
             if not wanted or _OTHERS.search(about) or not is_number(value):
                 continue
             number, doubt = _number(value)
             if doubt:
                 return math.nan, doubt
             if number > 0.0:
-                said = f"'{about.strip()} {value} {match['unit']}'"
+                statement = f"'{about.strip()} {value} {match['unit']}'"
                 rate = unit in _PER_SECOND
-                steps[said] = (
+                steps[statement] = (
                     1.0 / (number * _PER_SECOND[unit]) if rate else number * _SECONDS[unit]
                 )
     if not steps:

@@ -50,10 +50,10 @@ def read(path: Path, raw: bytes) -> Contents:
             notes.append(f"sheet '{title}': {left} rows that are no samples were left out")
     if refusal is not None and not groups:
         raise refusal
-    return Contents(f"Excel, {_counted(len(groups), 'sheet')} with samples", groups, notes)
+    return Contents(f"Excel, {_count_text(len(groups), 'sheet')} with samples", groups, notes)
 
 
-def _counted(count: int, noun: str) -> str:
+def _count_text(count: int, noun: str) -> str:
     return f"{count} {noun}{'s' * (count != 1)}"
 
 

@@ -36,13 +36,13 @@ def _members(group: h5py.Group, file: h5py.File) -> dict[str, Any]:
 
 def _stated(item: Any, keys: Collection[str]) -> dict[str, Any]:
     """Texts and numbers that attributes of an entry state under some names."""
-    found: dict[str, Any] = {}
+    statements: dict[str, Any] = {}
     for key, value in item.attrs.items():
         if key.lower() in keys:
-            found[key] = value.decode() if isinstance(value, bytes) else value
-            if np.size(value) == 1 and not isinstance(found[key], str):
-                found[key] = np.ravel(value)[0]
-    return found
+            statements[key] = value.decode() if isinstance(value, bytes) else value
+            if np.size(value) == 1 and not isinstance(statements[key], str):
+                statements[key] = np.ravel(value)[0]
+    return statements
 
 
 def _entries(items: Mapping[str, Any], file: h5py.File) -> dict[str, Any]:
@@ -89,16 +89,16 @@ def _refers(item: Any) -> bool:
 
 def _class_of(item: Any) -> str:
     """What MATLAB says that an entry is; empty where it says nothing."""
-    kind = item.attrs.get(_CLASS, b"")
-    return kind.decode() if isinstance(kind, bytes) else str(kind)
+    matlab_class = item.attrs.get(_CLASS, b"")
+    return matlab_class.decode() if isinstance(matlab_class, bytes) else str(matlab_class)
 
 
 def _value(item: h5py.Dataset, file: h5py.File) -> Any:
-    kind = _class_of(item)
+    matlab_class = _class_of(item)
     if _DECODED in item.attrs:
         return Opaque(
-            f"an object of MATLAB ({kind}), which only MATLAB reads: save it as a structure, "
-            "table2struct(X, 'ToScalar', true), or by writetable or writetimetable as CSV"
+            f"an object of MATLAB ({matlab_class}), which only MATLAB reads: save it as a "
+            "structure, table2struct(X, 'ToScalar', true), or as CSV, writetable or writetimetable"
         )
     if item.dtype.names:  # rows of a table
         rows = item[()]
@@ -107,7 +107,7 @@ def _value(item: h5py.Dataset, file: h5py.File) -> Any:
         entries = [_value(file[reference], file) for reference in np.ravel(item[()])]
         return [entry for entry in entries if isinstance(entry, str)]
     value = item[()]
-    if kind == "char":
+    if matlab_class == "char":
         return "".join(map(chr, np.ravel(np.asarray(value).T, order="F").astype(int)))
     if isinstance(value, np.ndarray) and value.dtype.kind in "SO":
         return [

@@ -78,15 +78,15 @@ def markers(values: Vector) -> tuple[dict[float, int], dict[float, int]]:
             rest = left[left != extreme]
             if not _is_varied(rest):
                 continue
-            apart, at = _apart(extreme, rest), left == extreme
+            distance, at = _apart(extreme, rest), left == extreme
             count = left.size - rest.size
             # Far outside of all others, or out and back at once, as no machine moves.
             rare = count <= max(1.0, _RARE * left.size)
-            alone = apart > _FARTHER or not (at[1:-1] & at[2:] & at[:-2]).any()
-            if apart > _FAR and (
+            alone = distance > _FARTHER or not (at[1:-1] & at[2:] & at[:-2]).any()
+            if distance > _FAR and (
                 abs(extreme) in _MAYBE
                 or (rare and alone and count > 1)
-                or (rare and apart > _FARTHER)
+                or (rare and distance > _FARTHER)
             ):
                 others[extreme] = count
                 left = rest

@@ -27,16 +27,16 @@ def read(path: Path, raw: bytes) -> Contents:
         known = field.metadata or {}
         unit = unit or spelled(_first(known, _UNITS))
         about = _first(known, _ABOUT)
-        kind = field.type
-        if pa.types.is_timestamp(kind):
+        arrow_type = field.type
+        if pa.types.is_timestamp(arrow_type):
             channels.append(_stamps(name, column))
-        elif pa.types.is_duration(kind):
-            steps = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}[kind.unit]
+        elif pa.types.is_duration(arrow_type):
+            steps = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}[arrow_type.unit]
             values = _numbers(column.cast(pa.int64())) * steps
             channels.append(FileChannel(name, "s", values, about, stamp=True))
-        elif pa.types.is_floating(kind) or pa.types.is_integer(kind):
+        elif pa.types.is_floating(arrow_type) or pa.types.is_integer(arrow_type):
             channels.append(FileChannel(name, unit, _numbers(column), about))
-        elif pa.types.is_decimal(kind) or pa.types.is_boolean(kind):
+        elif pa.types.is_decimal(arrow_type) or pa.types.is_boolean(arrow_type):
             channels.append(FileChannel(name, unit, _numbers(column.cast(pa.float64())), about))
         else:
             texts[field.name] = ["" if cell is None else str(cell) for cell in column.to_pylist()]

@@ -76,6 +76,7 @@ _DURATION = re.compile(  # PT1H15M, 1h 15m 0s
     r"((?P<s>\d+)([.,](?P<f>\d{1,12}))?\s*s(ec)?)?",
     re.IGNORECASE,
 )
+_OF_CONTROLLERS = re.compile(r"^(DATE_AND_TIME|DT|TIME_OF_DAY|TOD|TIME|T)#", re.IGNORECASE)
 _TIMES_ALONE = (_OF_DAY, _OF_HOUR, _OF_MINUTES, _DURATION)
 _EPOCH = date(1970, 1, 1).toordinal()
 _START = datetime(1970, 1, 1)
@@ -106,9 +107,15 @@ def is_stamp(cell: str) -> bool:
 
 
 def _match(text: str) -> re.Match[str] | None:
+    text = _plc(text)
     patterns = (_DAY, _OF_DAY, _OF_HOUR, _COMPACT, _COMPACT_SHORT, _CALLED_FIRST, _DURATION)
     found = next((match for pattern in patterns if (match := pattern.fullmatch(text))), None)
     return found if found is None or _zone_known(found.groupdict().get("zone")) else None
+
+
+def _plc(text: str) -> str:
+    """A time without what controllers write before it: DT#2024-03-30-22:00:00, T#1m30s."""
+    return _OF_CONTROLLERS.sub("", text) if "#" in text else text
 
 
 def _zone_known(zone: str | None) -> bool:
@@ -137,19 +144,19 @@ def read_stamps(name: str, cells: Sequence[str], how: str = "") -> FileChannel |
         %d/%m/%y %H:%M; and a zone such as Europe/Berlin; "min:s" of what is no time of day. Empty:
         nothing.
     """
-    texts = [cell.strip() for cell in cells]
-    order, stated, zone = _said(how)
+    texts = [_plc(cell.strip()) for cell in cells]
+    order, stated, zone = _read_statement(how)
     if stated in (MINUTES, HOURS):
         pattern = _OF_MINUTES if stated == MINUTES else _OF_DAY
         return _of_day(name, texts, pattern) if any(map(pattern.fullmatch, texts)) else None
     if stated:
-        return _formatted(name, texts, stated, zone)
+        return _by_format(name, texts, stated, zone)
     first = next((match for text in texts if (match := _match(text))), None)
     if first is None:
         return None
     if first.re in _TIMES_ALONE:
         return _of_day(name, texts, first.re)
-    return _dated(name, texts, first.re, order, zone)
+    return _by_date(name, texts, first.re, order, zone)
 
 
 def is_said(how: str) -> bool:
@@ -158,11 +165,11 @@ def is_said(how: str) -> bool:
     >>> is_said("DMY Europe/Berlin"), is_said("%H:%M"), is_said("min:s"), is_said("ms")
     (True, True, True, False)
     """
-    order, stated, zone = _said(how)
+    order, stated, zone = _read_statement(how)
     return bool(order or stated or zone)
 
 
-def _said(how: str) -> tuple[str, str, ZoneInfo | None]:
+def _read_statement(how: str) -> tuple[str, str, ZoneInfo | None]:
     """Order of dates, their format, and their zone, of what a user says."""
     words = how.split()
     named = [word for word in words if word in ("UTC", "GMT") or ("/" in word and "%" not in word)]
@@ -214,7 +221,7 @@ def _of_day(name: str, texts: Sequence[str], pattern: re.Pattern[str]) -> FileCh
     back = np.diff(times[known]) < -period / 2
     times[known] += np.concatenate([[0], np.cumsum(back)]) * period
     if pattern is _OF_DAY and not any(match and match["zone"] for match in matches):
-        times[known], mended = _mended(times[known], dated=False)
+        times[known], mended = _mend_changes(times[known], dated=False)
         words += mended
     shown = float(times[known][0])
     values = _from_first(times, known)
@@ -233,7 +240,7 @@ def _twelve_hours(matches: Sequence[re.Match[str] | None]) -> bool:
     return within and any(a == 12 and b == 1 for a, b in pairwise(hours))
 
 
-def _formatted(
+def _by_format(
     name: str, texts: Sequence[str], stated: str, zone: ZoneInfo | None
 ) -> FileChannel | None:
     """Times in a format that the user states."""
@@ -254,7 +261,7 @@ def _formatted(
     return _channel(name, texts, known, (whole, parts, shift), zone, zoned=any(offset))
 
 
-def _dated(
+def _by_date(
     name: str, texts: Sequence[str], pattern: re.Pattern[str], order: str, zone: ZoneInfo | None
 ) -> FileChannel | None:
     matches = [pattern.fullmatch(text) for text in texts]
@@ -276,7 +283,7 @@ def _dated(
         zoned = bool(zones) and not local
         channel = _channel(name, texts, known, (whole, parts, shift), zone, zoned=zoned)
         readings[reading] = channel
-    return _chosen(name, texts, readings, matches)
+    return _choose_reading(name, texts, readings, matches)
 
 
 def _channel(
@@ -298,7 +305,7 @@ def _channel(
     elif zoned:
         local -= shift
     else:
-        mended, corrections = _mended(local[known] + parts[known], dated=True)
+        mended, corrections = _mend_changes(local[known] + parts[known], dated=True)
         local[known] = np.round(mended - parts[known])
     begin = local[known][0]
     start = float(begin + parts[known][0])
@@ -334,7 +341,7 @@ def _readings(matches: Sequence[re.Match[str] | None]) -> list[str]:
     return ["dmy", "mdy"] if years == {4} else ["dmy", "mdy", "ymd"]
 
 
-def _chosen(
+def _choose_reading(
     name: str,
     texts: Sequence[str],
     readings: dict[str, FileChannel],
@@ -415,7 +422,7 @@ def _utc_offset(moment: datetime, zone: ZoneInfo, fold: int) -> float:
     return offset.total_seconds() if offset is not None else 0.0
 
 
-def _mended(times: Vector, *, dated: bool) -> tuple[Vector, tuple[str, ...]]:
+def _mend_changes(times: Vector, *, dated: bool) -> tuple[Vector, tuple[str, ...]]:
     """Local times that go on through changes of the clock, and what was changed, in words.
 
     A step back by an hour is the end of summer time; a step that is an hour too long is its begin

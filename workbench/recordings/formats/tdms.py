@@ -31,13 +31,13 @@ def read(path: Path, raw: bytes) -> Contents:
 @contextmanager
 def _heard(doubts: list[str]) -> Iterator[None]:
     """Take down what the library only prints, such as an end that is missing."""
-    said = io.StringIO()
-    before = log_manager.console_handler.setStream(said)
+    printed = io.StringIO()
+    before = log_manager.console_handler.setStream(printed)
     try:
         yield
     finally:
         log_manager.console_handler.setStream(before)
-        doubts += dict.fromkeys(line[:200] for line in said.getvalue().splitlines())
+        doubts += dict.fromkeys(line[:200] for line in printed.getvalue().splitlines())
 
 
 def _groups(held: Any, notes: list[str]) -> list[Group]:
@@ -48,7 +48,7 @@ def _groups(held: Any, notes: list[str]) -> list[Group]:
         stated: Mapping[str, Any] = recorded.properties
         unit = unit or spelled(str(next((stated[key] for key in _UNITS if key in stated), "")))
         values = recorded[:]
-        step, offset = _counted(stated)
+        step, offset = _waveform_clock(stated)
         begun = stated.get("wf_start_time")
         start = _since_1970(begun) if begun is not None and step > 0.0 else np.nan
         if values.dtype.kind == "M":
@@ -75,7 +75,7 @@ def _groups(held: Any, notes: list[str]) -> list[Group]:
     return groups
 
 
-def _counted(stated: Mapping[str, Any]) -> tuple[float, float]:
+def _waveform_clock(stated: Mapping[str, Any]) -> tuple[float, float]:
     """Step and begin of a waveform [s]; zeros where it is none, or none over time."""
     step = float(stated.get("wf_increment", 0.0) or 0.0)
     # Without a unit LabVIEW means seconds; a spectrum has Hz.

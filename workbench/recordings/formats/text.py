@@ -17,7 +17,7 @@ from workbench.recordings.formats.stamps import is_stamp
 
 _SEPARATORS = {";": "semicolons", "\t": "tabs", "|": "bars", ",": "commas", " ": "spaces"}
 _COMMENT = re.compile(r"\s*\"?(#+|%+|//+|!+|\*+)\s*")
-_BEFORE_UNIT = re.compile(r"\s+(?=[\[(])")  # between a name and its unit
+_BEFORE_UNIT = re.compile(r"(?<=[^\s\])])\s+(?=[\[(])")  # between a name and its unit
 _SAMPLED = 200  # lines from the middle of a file, which tell how it is laid out
 _FOLDED = 5  # lines over which a name in quotation marks may go
 _UNEVEN = 0.9  # of lines with as many cells as most have; fewer, and columns are at fixed places
@@ -91,11 +91,11 @@ def _separator(path: Path, lines: Sequence[str]) -> str:
     """The separator with which most cells in the middle of the file are numbers or times."""
     middle = [line for line in lines if line.strip() and not _COMMENT.match(line)]
     begin = max(0, (len(middle) - _SAMPLED) // 2)
-    some = middle[begin : begin + _SAMPLED]
+    middle_lines = middle[begin : begin + _SAMPLED]
     scores: dict[str, float] = {}
     for mark in _SEPARATORS:
         split = _splitter(mark)
-        rows = [split(line) for line in some]
+        rows = [split(line) for line in middle_lines]
         widths = [len(row) for row in rows]
         if not widths or max(widths) < 2:
             continue
@@ -173,13 +173,13 @@ def _edges(lines: Sequence[str]) -> list[int]:
     """
     middle = [line for line in lines if line.strip() and not _COMMENT.match(line)]
     begin = max(0, (len(middle) - _SAMPLED) // 2)
-    some = [line for line in middle[begin : begin + _SAMPLED] if _is_numeric(line)]
-    widths = [len(line.split()) for line in some]
+    numeric_lines = [line for line in middle[begin : begin + _SAMPLED] if _is_numeric(line)]
+    widths = [len(line.split()) for line in numeric_lines]
     if not widths or widths.count(max(set(widths), key=widths.count)) >= _UNEVEN * len(widths):
         return []
     length = max(map(len, middle))
     filled = np.zeros(length + 2, dtype=bool)
-    for line in some:
+    for line in numeric_lines:
         for place, character in enumerate(line, 1):
             filled[place] |= not character.isspace()
     # A column ends behind its last figure: numbers of fixed columns stand at their right ends.
