@@ -1,10 +1,12 @@
 """What compiles of Modelica: each construct computes what it means, or is refused by line.
 
 One small model for each construct, with its solution in closed form or the refusal that names file,
-line and construct. The lists in `docs/modelica.md` follow from the table: `python
-tests/test_modelica_constructs.py` writes them, a test holds them against it.
+line and construct; blocks of the standard library likewise, where it is at hand. The lists in
+`docs/modelica.md` follow from the tables: `python tests/test_modelica_constructs.py` writes them, a
+test holds them against it.
 """
 
+import os
 import re
 from collections.abc import Mapping
 from pathlib import Path
@@ -27,14 +29,14 @@ from workbench.models.compiler.explicit import StateSpace, make_explicit  # noqa
 from workbench.models.compiler.flat import flatten  # noqa: E402
 
 Series = NDArray[np.float64]
-PAGE = Path(__file__).parents[1] / "docs" / "modelica.md"
 TIMES = np.linspace(0.0, 1.0, 11)  # s
 # Far above the error of the integration (1e-9 a step), far below any other reading of the source;
 # where an expression switches without an event, the step of 0.01 s across it errs by up to 1e-3.
 TOLERANCE = 2e-3
 
 
-TABLE = Path(__file__).with_name("modelica_constructs.txt")
+FOLDER = Path(__file__).parent
+PAGE = FOLDER.parent / "docs" / "modelica.md"
 
 
 class Construct(NamedTuple):
@@ -43,23 +45,24 @@ class Construct(NamedTuple):
     name: str
     source: str
     output: str
-    line: int
+    place: str
     refusal: str
 
 
-def read_table() -> list[Construct]:
-    """Constructs of `modelica_constructs.txt`, which says how it is written."""
+def read_table(file: str) -> list[Construct]:
+    """Constructs of a file, which says at its top how it is written."""
     constructs = []
-    for text in re.split(r"^# ", TABLE.read_text(), flags=re.MULTILINE)[2:]:
+    for text in re.split(r"^# ", (FOLDER / file).read_text(), flags=re.MULTILINE)[2:]:
         name, *source, answer = text.strip().splitlines()
-        refusal = re.fullmatch(r"! (\d+): (.*)", answer)
-        line, words = (int(refusal[1]), refusal[2]) if refusal else (0, "")
+        refusal = re.fullmatch(r"! (\S+): (.*)", answer)
+        place, words = (refusal[1], refusal[2]) if refusal else ("", "")
         output = "" if refusal else answer.removeprefix("= ")
-        constructs.append(Construct(name, "\n".join(source), output, line, words))
+        constructs.append(Construct(name, "\n".join(source), output, place, words))
     return constructs
 
 
-CONSTRUCTS = read_table()
+CONSTRUCTS = read_table("modelica_constructs.txt")
+LIBRARY = read_table("modelica_library.txt")
 
 
 def write(folder: Path, body: str) -> Path:
@@ -96,9 +99,29 @@ def test_a_construct_computes_what_it_means_or_is_refused_by_line(
     if construct.refusal:
         with pytest.raises(InputError) as refusal:
             make_explicit(flatten(package, "Lib.M"))
-        assert refusal.value.where == f"{package}:{construct.line}"
+        assert refusal.value.where == f"{package}:{construct.place}"
         assert construct.refusal in refusal.value.found
         assert refusal.value.remedy
+    else:
+        computed = first_output(make_explicit(flatten(package, "Lib.M")))
+        expected = eval(construct.output, {**vars(np), "t": TIMES})
+        np.testing.assert_allclose(computed, expected + 0 * TIMES, atol=TOLERANCE, rtol=0)
+
+
+@pytest.mark.skipif(
+    not any((Path(f) / "Modelica").is_dir() for f in os.environ.get("MODELICAPATH", "").split(":")),
+    reason="needs the Modelica Standard Library in a folder of MODELICAPATH",
+)
+@pytest.mark.parametrize("construct", LIBRARY, ids=lambda construct: construct.name)
+def test_a_block_of_the_standard_library_computes_what_it_means_or_is_refused(
+    construct: Construct, tmp_path: Path
+) -> None:
+    package = write(tmp_path, construct.source)
+    if construct.refusal:
+        with pytest.raises(InputError) as refusal:
+            make_explicit(flatten(package, "Lib.M"))
+        assert re.search(rf"/{construct.place}:\d+$", refusal.value.where)
+        assert construct.refusal in refusal.value.found
     else:
         computed = first_output(make_explicit(flatten(package, "Lib.M")))
         expected = eval(construct.output, {**vars(np), "t": TIMES})
@@ -175,10 +198,10 @@ def test_refusals_name_no_other_file_than_the_users(tmp_path: Path) -> None:
             assert paths == {str(package)}, construct.name
 
 
-def listing() -> str:
+def listing(constructs: list[Construct]) -> str:
     """Lists of the page: what compiles, and what is refused."""
-    compiled = [c.name for c in CONSTRUCTS if not c.refusal]
-    refused = [c.name for c in CONSTRUCTS if c.refusal]
+    compiled = [c.name for c in constructs if not c.refusal]
+    refused = [c.name for c in constructs if c.refusal]
     return "\n".join(
         [
             f"{len(compiled)} compile, and compute their solution in closed form:",
@@ -191,17 +214,19 @@ def listing() -> str:
     )
 
 
-BEGIN, END = "<!-- constructs -->\n", "<!-- end of constructs -->"
+def page(text: str) -> str:
+    """Text of the page with its lists written anew."""
+    for name, constructs in (("constructs", CONSTRUCTS), ("library", LIBRARY)):
+        begin, end = f"<!-- {name} -->\n", f"<!-- end of {name} -->"
+        before, _, rest = text.partition(begin)
+        text = before + begin + listing(constructs) + end + rest.partition(end)[2]
+    return text
 
 
 def test_the_page_lists_what_the_compiler_takes() -> None:
-    before, _, rest = PAGE.read_text().partition(BEGIN)
-    assert before
-    listed = rest.partition(END)[0]
-    assert listed == listing(), f"write it again: python {Path(__file__).name}"
+    text = PAGE.read_text()
+    assert text == page(text), f"write it again: python {Path(__file__).name}"
 
 
 if __name__ == "__main__":
-    text = PAGE.read_text()
-    before, _, rest = text.partition(BEGIN)
-    PAGE.write_text(before + BEGIN + listing() + END + rest.partition(END)[2])
+    PAGE.write_text(page(PAGE.read_text()))

@@ -143,6 +143,16 @@ REWRITE = (
 )
 
 
+def _defined(owners: Sequence[Mapping[str, Any]]) -> dict[int, int]:
+    """Expressions of discrete variables that hold always, by the variable's number."""
+    return {
+        target: value["value"]
+        for owner in owners
+        if [branch["activation"] for branch in owner["branches"]] == ["always"]
+        for target, value in zip(owner["targets"], owner["branches"][0]["values"], strict=True)
+    }
+
+
 def _matrix(value: Value) -> Value:
     """Promote to rank 2 as `cat` inside `[...]` does: a vector becomes a column."""
     return value if value.ndim == 2 else value.reshape(-1, 1)
@@ -164,6 +174,7 @@ class Arena:
     time : symbol of time.
     symbols : value of each variable, by its number; filled by the reader of variables.
     rates : value of the time derivative of each differentiated variable.
+    defined : expression of each Boolean or Integer variable that no event changes, by its number.
     """
 
     def __init__(self, dae: Mapping[str, Any], model_place: str) -> None:
@@ -183,6 +194,7 @@ class Arena:
         self.symbols: list[Value] = []
         self.rates: dict[int, Value] = {}
         self.binders: dict[tuple[int, int], int] = {}
+        self.defined = _defined(storage["discrete_value_owners"])
         self._depth = 0  # of the function call that is being evaluated
 
     def _deal_arenas(self, expressions: Mapping[str, Any]) -> None:
@@ -323,6 +335,8 @@ class Arena:
                 return self.symbols[int(content)]
             case "derivative":
                 return self.rates[content]
+            case "discrete_value" if content in self.defined:
+                return self.value(self.defined[content])
             case "binder":
                 return lift(self.binders[content["domain"], content["ordinal"]])
             case "function_parameter":
@@ -446,6 +460,12 @@ class Arena:
                 return np.stack([lift(a[i] * b[j] - a[j] * b[i]) for i, j in rows])
             case "transpose":
                 return first.T
+            case "vector":
+                return first.reshape(-1)
+            case "matrix":
+                return _matrix(first)
+            case "scalar":
+                return first.reshape(())
             case "promoted_cat1" | "promoted_cat2":
                 matrices = [_matrix(o) for o in operands]
                 return np.concatenate(matrices, axis=int(name[-1]) - 1)

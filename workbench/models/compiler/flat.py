@@ -302,7 +302,8 @@ class _Reader:
         """Read variables, then equations."""
         self._refuse_events()
         for number, entry in enumerate(self.variables):
-            self._refuse_type(entry)
+            if number not in self.arena.defined or _is_interface(entry):
+                self._refuse_type(entry)
             shape = tuple(self.arena.types[entry["value_type"]]["dimensions"])
             symbol: Value = np.empty(shape, object)
             for index in np.ndindex(shape):
@@ -606,6 +607,13 @@ class _Reader:
                     remedy="write the number",
                 ) from None
         return numbers
+
+
+def _is_interface(entry: Mapping[str, Any]) -> bool:
+    """Whether a variable is an input or output of the model itself."""
+    attributes = entry["attributes"]
+    top_level = len(attributes["component_ref"]["parts"]) == 1
+    return top_level and attributes["causality"] in ("input", "output")
 
 
 def _assertion(kind: Mapping[str, Any]) -> bool:

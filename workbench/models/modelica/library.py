@@ -61,10 +61,10 @@ class _Classes(dict[str, Class]):
                 if file not in places:
                     return
                 self._take(file, enclosing)
-            elif (file.parent / part / PACKAGE).is_file() and file.name == PACKAGE:
-                file = file.parent / part / PACKAGE
-            elif (file.parent / f"{part}.mo").is_file() and file.name == PACKAGE:
-                file = file.parent / f"{part}.mo"
+            else:
+                file = Path(self[dotted].where.rpartition(":")[0])
+                if part not in (file.stem, file.parent.name):
+                    return  # a class within a file has all others within it in that file, too
             enclosing = dotted
 
     def _take(self, file: Path, enclosing: str) -> None:
