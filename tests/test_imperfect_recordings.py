@@ -80,8 +80,11 @@ def test_a_single_recording_without_a_cause_lacks_nothing(heater: System, tmp_pa
 
 def test_a_single_recording_is_refused_where_recordings_differ(tmp_path: Path) -> None:
     differing = system(tmp_path / "heaters", "[diagnosis.tolerances]\nGc = 0.05")
-    with pytest.raises(InputError, match="two or more"):
-        diagnosed(differing, cases(differing, [simulated(1, LOSS, 0.0)]), tmp_path)
+    recordings = cases(differing, [simulated(k, LOSS, 0.0) for k in range(4)])
+    with pytest.raises(InputError, match=r"two or more to fit, because what .*tolerances.*Gc"):
+        diagnosed(differing, recordings[:1], tmp_path)
+    with pytest.raises(InputError, match="1 to fit, beside 3 held out"):
+        diagnosed(differing, recordings[:1], tmp_path, recordings[1:])
 
 
 def test_a_single_recording_too_short_for_two_parts_is_refused(tmp_path: Path) -> None:

@@ -13,9 +13,12 @@ from workbench.observers import choose
 from workbench.observers.run import Ending, Run
 from workbench.observers.score import judged_window, low_pass, score
 from workbench.observers.simulation import prepare
-from workbench.recordings.case import Case
+from workbench.recordings.case import Case, read_cases
 from workbench.system.registry import load_system
 from workbench.system.system import System
+from workbench.tuning.cost import evaluators
+from workbench.tuning.recipe import pose
+from workbench.tuning.validation import evaluate_gains
 
 from . import heater
 
@@ -169,3 +172,13 @@ def test_a_sensor_that_rectifies_is_scored_by_its_reading(tmp_path: Path) -> Non
     error = result.error("open_loop")
     assert error is not None
     assert np.sqrt(np.mean(error**2)) == pytest.approx(score.rms, rel=0.01)
+
+
+def test_tuning_and_simulation_have_one_z(system: System, root: Path) -> None:
+    """Of the same gains on the same recording, to all digits."""
+    cases = read_cases([root / "cases" / "08_wet_120_3.6"], system)
+    problem = pose(system, "ekf", cases, scale_errors={})
+    with evaluators(problem.job, 1) as pool:
+        ((tuned,),) = evaluate_gains(pool, problem.job, [problem.job.gains.values])
+    simulated = prepare(system, choose(system, ["ekf"]), tuned=False).run(cases[0])
+    assert simulated.scores["ekf"].z == tuned

@@ -58,7 +58,7 @@ def diagnose(
         compiled, or the model is none of this library.
     """
     system, effects, report = problem.system, problem.effects, engine.report
-    refuse_too_few(problem.cases, system)
+    refuse_too_few(problem.cases, system, len(problem.held_out))
     with tempfile.TemporaryDirectory() as scratch:
         everything = Path(scratch) / f"{EVERYTHING}.fmu"
         report(f"compiling {len(effects)} effects")

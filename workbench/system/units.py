@@ -241,12 +241,15 @@ def said(values: Sequence[float], unit: str) -> tuple[list[float], str]:
 
     >>> said([7.07e-4], "1/K"), said([0.0021, 0.002], "m")
     (([7.07], '% per 100 K'), ([2.1, 2.0], 'mm'))
+    >>> said([1.06], "1/s"), said([1.2], "1/K")
+    (([1.06], '1/s'), ([1.2], '1/K'))
     >>> said([150.0], "N"), said([12e3], "Pa"), said([4.05e-4], "m2/s")
     (([150.0], 'N'), ([120.0], 'mbar'), ([0.000405], 'm2/s'))
     """
     size = abs(values[0])
     numerator, _, divisor = unit.partition("/")
-    if numerator == "1" and divisor:
+    # A rate is no share of anything, and neither is what is larger than all of it.
+    if numerator == "1" and divisor and divisor != "s" and size < 1.0:
         step = next((n for n in _STEPS if size * n >= _WHOLE), _STEPS[-1])
         per = divisor if step == 1 else f"{step} {divisor}"
         return [round(100.0 * step * value, 12) for value in values], f"% per {per}"

@@ -118,8 +118,12 @@ def count(
     return CountedSamples(clean, wrong, deviation, excluded, spans, applied, blocks, missing)
 
 
-def refuse_too_few(cases: Sequence[Case], system: System) -> None:
-    """Refuse recordings of which none can be held out.
+def refuse_too_few(cases: Sequence[Case], system: System, held_out: int = 0) -> None:
+    """Refuse recordings of which none can be predicted by a fit to others.
+
+    Parameters
+    ----------
+    held_out : number of recordings beside, to which nothing is fitted.
 
     Raises
     ------
@@ -128,11 +132,19 @@ def refuse_too_few(cases: Sequence[Case], system: System) -> None:
     """
     compare = system.comparison
     if not cases or (len(cases) == 1 and (compare.tolerances or compare.begins is not None)):
+        why = (
+            "what [diagnosis.tolerances] says to differ from recording to recording "
+            f"({', '.join(compare.tolerances)}) cannot be told from a cause in one"
+            if compare.tolerances
+            else "a cause is judged on those it was not fitted to"
+        )
         raise InputError(
             where="recordings",
-            found=str(len(cases)),
-            expected="two or more, because a cause is judged on those it was not fitted to",
-            remedy="give the folder that holds all recordings of one machine",
+            found=f"{len(cases)} to fit" + f", beside {held_out} held out" * bool(held_out),
+            expected=f"two or more to fit, because {why}",
+            remedy="hold out one fewer"
+            if held_out > 1
+            else "give the folder that holds all recordings of one machine",
         )
 
 
