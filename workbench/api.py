@@ -137,8 +137,8 @@ def case_from_frame(
         if signal in units:
             factor = si_factor(unit or "", units[signal], f"{where}, column '{column}'")
             signals[signal] = frame[column].to_numpy(float, copy=True) * factor
-    asked = ["time", *(signal.name for signal in (*system.inputs, *system.outputs))]
-    if missing := [signal for signal in asked if signal not in signals]:
+    required = ["time", *(signal.name for signal in (*system.inputs, *system.outputs))]
+    if missing := [signal for signal in required if signal not in signals]:
         raise InputError(
             where=where,
             found=f"no column '{missing[0]}' among {', '.join(map(str, frame.columns))}",
@@ -147,9 +147,9 @@ def case_from_frame(
         )
     time = signals.pop("time")
     check_recording(time, system, f"{where}, column 'time'", None)
-    given = read_conditions(Table(conditions or {}, f"{where}, conditions"), system)
+    values = read_conditions(Table(conditions or {}, f"{where}, conditions"), system)
     origin = Origin(where, None, {}, f"{where}, conditions")
-    case = make_case(name, (time, signals), given, system, origin)
+    case = make_case(name, (time, signals), values, system, origin)
     _warn([case])
     return case
 
