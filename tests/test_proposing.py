@@ -19,6 +19,7 @@ from workbench.diagnosis.data.motion import ModelSource
 from workbench.diagnosis.effects.extension import variables
 from workbench.diagnosis.effects.slots import read_slots
 from workbench.diagnosis.inference.fit import Fit
+from workbench.diagnosis.laws.forms import SIGNED
 from workbench.diagnosis.laws.outcome import _falls
 from workbench.diagnosis.laws.periods import strongest_period
 from workbench.diagnosis.laws.places import LawInfluence, places, turning
@@ -41,6 +42,28 @@ pytest.importorskip("ziglang", reason="needs the extra [compiler]")
 
 THRESHOLD, RATE = 1.2, 3e-3  # [m], [m2/s] of a leak that begins at a level
 PERIOD = 1.885  # [m] of way
+
+
+Q = np.linspace(-4.0, 4.0, 81)
+
+
+@pytest.mark.parametrize(
+    ("name", "law"),
+    [
+        ("Rectifier", np.abs(Q)),
+        ("Above", np.maximum(Q, 0.0)),
+        ("Below", np.minimum(Q, 0.0)),
+        ("DeadZone", np.sign(Q) * np.maximum(np.abs(Q) - 1.5, 0.0)),
+        ("Limiter", 4.0 * np.tanh(Q / 1.5)),
+    ],
+)
+def test_forms_of_signed_quantities_are_what_they_are_called(name: str, law: Vector) -> None:
+    """But for kinks, which are rounded over a hundredth of the range: half of that at most."""
+    (form,) = (form for form in SIGNED if form.name == name)
+    shape = {form.shape: 1.5} if form.shape else {}
+    text = form.expression.format(q="q", Q="4.0", w="0.04").replace("^", "**")
+    values = eval(text, {"sqrt": np.sqrt, "tanh": np.tanh, "q": Q, **shape})
+    assert_allclose(4.0 * values, law, atol=0.04)
 
 
 def test_evidence_is_the_density_of_what_was_measured() -> None:

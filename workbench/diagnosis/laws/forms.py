@@ -73,7 +73,30 @@ FORMS = (
         values=(0.2, 0.4, 0.6, 0.8),
     ),
 )
-SIDES = Form("Sides", "by its sign alone, as hysteresis does", "tanh({q}/{w})")
+SIGNED = (
+    Form("Sides", "by its sign alone, as hysteresis does", "tanh({q}/{w})"),
+    Form("Rectifier", "with its size, whatever its sign", "sqrt({q}^2 + {w}^2)/{Q}"),
+    Form(
+        "Above", "in proportion to it where it is positive", "0.5*({q} + sqrt({q}^2 + {w}^2))/{Q}"
+    ),
+    Form(
+        "Below", "in proportion to it where it is negative", "0.5*({q} - sqrt({q}^2 + {w}^2))/{Q}"
+    ),
+    Form(
+        name="DeadZone",
+        text="in proportion to what of it is beyond a dead zone",
+        expression="({q} + 0.5*(sqrt(({q} - zone)^2 + {w}^2) - sqrt(({q} + zone)^2 + {w}^2)))/{Q}",
+        shape="zone",
+        values=(0.1, 0.3, 0.6),
+    ),
+    Form(
+        name="Limiter",
+        text="with it up to a limit to both sides",
+        expression="tanh({q}/limit)",
+        shape="limit",
+        values=(0.1, 0.3, 1.0),
+    ),
+)
 HARMONIC = Form("Harmonic", "as a harmonic", "cosine*cos({a}) + sine*sin({a})")
 CONSTANT = Form("Constant", "always alike", "1.0")
 
@@ -106,10 +129,12 @@ def candidates(law: Law, knots: Knots | None, scale: float) -> Iterator[ClosedFo
     if knots is None or law.influence is None:
         yield ClosedForm(law, CONSTANT, _written(law, CONSTANT, Knots(0.0, 1.0), scale))
         return
-    signed = (SIDES,) if knots.low < 0.0 < knots.high else ()
-    for form in (*FORMS, *signed):
+    for form in FORMS:
         # What has a scale or a threshold has no sign.
         if not form.shape or knots.low >= 0.0:
+            yield ClosedForm(law, form, _written(law, form, knots, scale))
+    if knots.low < 0.0 < knots.high:
+        for form in SIGNED:
             yield ClosedForm(law, form, _written(law, form, knots, scale))
 
 
@@ -167,8 +192,10 @@ def _written(law: Law, form: Form, knots: Knots, scale: float) -> LawClass:
     if form.shape:
         own = form.unit.format(unit="" if law.influence is None else law.influence.unit)
         powers = form.shape == "n"
-        values = form.values if powers else _rounded(knots, form.values)
-        low, high = (0.1, 6.0) if powers else (min(values) / 20.0, 2.0 * knots.high)
+        # A zone or a limit is the same to both sides.
+        sizes = knots if knots.low >= 0.0 else Knots(0.0, largest)
+        values = form.values if powers else _rounded(sizes, form.values)
+        low, high = (0.1, 6.0) if powers else (min(values) / 20.0, 2.0 * sizes.high)
         shapes = {form.shape: values}
         given = _bounded(own, low, high)
         lines.append(f'parameter Real {form.shape}({given}) = {number(values[0])} "Of its form";')
