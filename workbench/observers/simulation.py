@@ -79,7 +79,7 @@ class CaseResult:
         among them, and their correlation.
     untold : estimated quantities that it does not show, whatever others are.
     doubts : what is said of its start, and of its samples beside the model's time constants.
-    resolved : whether its samples resolve the model, see `trust.sampling_doubt`.
+    resolved : whether its samples resolve the model, see `sampling_doubt` and `time_doubt`.
     """
 
     system: System
@@ -317,7 +317,7 @@ class Simulation:
             "inseparable": {} if known is None else known.inseparable,
             "untold": () if known is None else known.untold,
             "doubts": tuple(doubt for doubt in (clock, start, sampling) if doubt),
-            "resolved": not sampling,
+            "resolved": not (sampling or clock),
         }
 
     def _reference(self, case: Case, runs: Mapping[str, Run]) -> Run | None:
