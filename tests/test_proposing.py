@@ -20,7 +20,7 @@ from workbench.diagnosis.effects.extension import variables
 from workbench.diagnosis.effects.slots import read_slots
 from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.laws.forms import SIGNED
-from workbench.diagnosis.laws.outcome import _falls
+from workbench.diagnosis.laws.outcome import _falls, worse_everywhere
 from workbench.diagnosis.laws.periods import strongest_period
 from workbench.diagnosis.laws.places import LawInfluence, places, turning
 from workbench.diagnosis.laws.splines import COEFFICIENTS, Knots, kernel, smoothest
@@ -453,6 +453,23 @@ def test_a_law_is_worth_a_tenth_of_an_error(rms: list[tuple[float, float]], fall
         for k, pair in enumerate(rms)
     ]
     assert _falls(errors) is falls
+
+
+@pytest.mark.parametrize(
+    ("law", "effect", "worse"),
+    [((3.0, 2.0), (2.5, 1.5), True), ((3.0, 1.0), (2.5, 1.5), False), ((3.0, 2.0), (), False)],
+)
+def test_a_law_is_no_worse_than_effects_on_every_recording_held_out(
+    law: tuple[float, ...], effect: tuple[float, ...], worse: bool
+) -> None:
+    with_law, with_effect = (
+        [
+            Errors(f"{k}", "w", "m", True, 9, (9.0, rms), (9.0, rms), "", (9.0, rms))
+            for k, rms in enumerate(left)
+        ]
+        for left in (law, effect)
+    )
+    assert worse_everywhere(with_law, with_effect) is worse
 
 
 @pytest.mark.long

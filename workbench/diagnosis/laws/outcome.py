@@ -68,6 +68,8 @@ class Proposal:
         held_out = [error for error in outcome.errors if error.held_out]
         if held_out and not _falls(held_out):
             return False
+        if worse_everywhere(held_out, self.before.errors):
+            return False
         squares = np.square(list(gain.recordings.values()))
         chance = ttest_rel(squares[:, 0], squares[:, 1], alternative="greater").pvalue
         if not held_out and not chance < _CHANCE:
@@ -212,6 +214,17 @@ class Proposal:
         from workbench.diagnosis.laws.report import functions_figure
 
         return functions_figure(self)
+
+
+def worse_everywhere(errors: Sequence[Errors], earlier: Sequence[Errors]) -> bool:
+    """Whether effects that were there before predict every held-out recording better."""
+    known = {(e.recording, e.channel): e.rms[1] for e in earlier if e.held_out}
+    pairs = [
+        (error.rms[1], known[error.recording, error.channel])
+        for error in errors
+        if (error.recording, error.channel) in known
+    ]
+    return bool(pairs) and all(after > before for after, before in pairs)
 
 
 def _falls(errors: Sequence[Errors]) -> bool:
