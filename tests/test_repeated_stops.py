@@ -78,7 +78,7 @@ def coasting() -> Experiment:
         if all(one.settings[name].value == value for name, value in fixed.items())
     )
     profiles = other_profiles(SYSTEM.experiments, one)
-    return next(profile for profile in profiles if profile.profiles[0].kind == RELEASE)
+    return next(profile for profile in profiles if profile.profiles[0].shape == RELEASE)
 
 
 def losses(omega: np.ndarray, c0: float, c1: float, c2: float) -> np.ndarray:
