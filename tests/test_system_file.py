@@ -124,9 +124,9 @@ MISTAKES = {
         ("MinimalObserver.fmu", f"{'9' * 300}.fmu"),
         "9999.fmu: found no such file",
     ),
-    "role without a class": (
-        ('{ class = "FullObserver", fmu', "{ fmu"),
-        r"\[models\.full\]: found no 'class'; expected a text 'class'",
+    "role without a class and an FMU": (
+        ('class = "FullObserver", fmu = "', '} # "'),
+        r"\[models\.full\]: found neither 'class' nor 'fmu'; expected a Modelica class",
     ),
     "no observer": (
         ("\nobserver = {", "\nobservers = {"),

@@ -112,7 +112,12 @@ class Model:
     def check(self, table: Table, scope: Scope) -> None:
         """Refuse a model of nothing."""
         if not self.modelica and self.path is None:
-            raise table.wrong("class", "a Modelica class, or fmu = FILE")
+            raise InputError(
+                where=table.where,
+                found="neither 'class' nor 'fmu'",
+                expected="a Modelica class, the file of an FMU, or both",
+                remedy="add class = NAME, or fmu = FILE",
+            )
 
     @property
     def name(self) -> str:
