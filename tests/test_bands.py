@@ -180,3 +180,77 @@ def test_bands_hold_or_what_is_said_is_that_samples_are_too_far_apart(
         tests = result.contradictions[name]
         assert any("samples are too far apart" in test.reason for test in tests if test.narrow)
         assert any("do not resolve the model" in text for text in result.warnings())
+
+
+SWING = """
+package Swing "A mass on a spring"
+  model Observer "Its place"
+    parameter Real w(unit="rad/s") = 6.283185307179586 "Angular frequency";
+    input Real f(unit="m/s2") "Force over mass";
+    input Real db(unit="m/s2") "Correction of b";
+    parameter Real b(unit="m/s2") = 0.0 "Force that is not measured";
+    output Real s(unit="m", start=0.5, fixed=true, nominal=0.5) "Place";
+    output Real v(unit="m/s", start=0.0, fixed=true, nominal=3.0) "Speed";
+  equation
+    der(s) = v;
+    der(v) = f + b + db - w^2*s;
+  end Observer;
+end Swing;
+"""
+SWING_FILE = """
+title = "A swing"
+sample_time = "{step} s"
+
+[models]
+observer = {{ class = "Observer" }}
+
+[inputs.f]
+unit = "m/s2"
+noise = "0 m/s2"
+scale = "1 m/s2"
+
+[outputs.s]
+unit = "m"
+noise = "1e-3 m"
+scale = "0.5 m"
+
+[estimated.b]
+correction = "db"
+unit = "m/s2"
+range = ["-1 m/s2", "1 m/s2"]
+walk = "1e-3 m/s2"
+spread = "1e-2 m/s2"
+acts_on = "v"
+"""
+
+
+def swing(folder: Path, samples: int, mistuned: float = 1.0) -> CaseResult:
+    """Ten undamped periods by their closed form, with so many samples a period."""
+    step = 1.0 / samples
+    system = declare(folder, SWING, SWING_FILE.format(step=step))
+    time = step * np.arange(10 * samples + 1)
+    noise = 1e-3 * np.random.default_rng(5).standard_normal(time.size)
+    place = 0.5 * np.cos(2.0 * np.pi * mistuned * time) + noise
+    columns = {"time [s]": time, "f [m/s2]": 0.0 * time, "s [m]": place}
+    case = case_from_frame(system, pd.DataFrame(columns), name="swing")
+    return prepare(system, choose(system, ["open_loop"])).run(case)
+
+
+def test_an_error_that_steps_make_is_not_put_down_to_the_model(tmp_path: Path) -> None:
+    result = swing(tmp_path / "coarse", samples=200)
+    # Euler's implicit step of a swing: a period of n samples leaves exp(-2 pi^2 / n) of it.
+    time = result.case.time
+    left = 0.5 * (np.exp(-2.0 * np.pi**2 * time / 200.0) - 1.0) * np.cos(2.0 * np.pi * time)
+    assert result.runs["open_loop"].signal("s") - 0.5 * np.cos(2.0 * np.pi * time) == pytest.approx(
+        left, abs=0.02
+    )
+    assert result.step_share > 0.9
+    (said,) = [text for text in result.warnings() if "steps, not by the model" in text]
+    assert said in format_table(result.system, [result])
+
+
+def test_an_error_that_the_model_makes_is_not_put_down_to_steps(tmp_path: Path) -> None:
+    """A spring that is softer by a fifth: steps leave 0.91 of the swing, and its phase is lost."""
+    result = swing(tmp_path / "fine", samples=2000, mistuned=0.9)
+    assert result.step_share == 0.0
+    assert not any("steps" in text for text in result.warnings())

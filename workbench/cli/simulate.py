@@ -183,7 +183,9 @@ def _run(
 
 
 def _unsure(results: Sequence[CaseResult]) -> list[str]:
-    """Why estimates cannot be relied on: quantities that are nowhere told, and useless bands."""
+    """Why estimates cannot be relied on: quantities nowhere told, useless bands, coarse steps."""
+    from workbench.observers.trust import MOSTLY
+
     guessed = set.intersection(*(set(result.guessed) for result in results))
     texts = [
         f"no recording tells {name}; its estimates are guesses, see above"
@@ -198,6 +200,11 @@ def _unsure(results: Sequence[CaseResult]) -> list[str]:
         for name, cases in useless.items()
         if cases
     ]
+    damped = [result.case.name for result in results if result.step_share > MOSTLY]
+    if damped:
+        texts.append(
+            f"steps make the open loop's error in {', '.join(damped)}, not the model; see above"
+        )
     return texts
 
 

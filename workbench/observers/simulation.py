@@ -15,6 +15,7 @@ from workbench.arrays import Vector
 from workbench.errors import FMUError, InputError
 from workbench.models.fmu import FMU
 from workbench.observers import Estimator, Gains, label
+from workbench.observers.estimators.open_loop import OpenLoop
 from workbench.observers.estimators.smoother import Smoother
 from workbench.observers.gains_file import read_gains, usual_gains
 from workbench.observers.observability import guesses, information, trajectory
@@ -42,6 +43,7 @@ from workbench.observers.trust import (
     normalised_innovations,
     sampling_doubt,
     start_doubt,
+    step_doubt,
     time_doubt,
 )
 from workbench.pages.figures import ESTIMATORS, CaseFigure, Curve, Panel
@@ -80,6 +82,8 @@ class CaseResult:
     untold : estimated quantities that it does not show, whatever others are.
     doubts : what is said of its start, and of its samples beside the model's time constants.
     resolved : whether its samples resolve the model, see `sampling_doubt` and `time_doubt`.
+    step_share : of the open loop's error that is its step's, see `step_doubt`; 0 where it did not
+        run.
     """
 
     system: System
@@ -91,6 +95,7 @@ class CaseResult:
     untold: tuple[str, ...] = ()
     doubts: tuple[str, ...] = ()
     resolved: bool = True
+    step_share: float = 0.0
 
     def measured(self) -> Vector | None:
         """The judged signal as it judges, below the bandwidth, (n,); None if not measured."""
@@ -152,8 +157,15 @@ class CaseResult:
         return guesses(self.inseparable, self.untold)
 
     def useless(self, name: str) -> bool:
-        """Whether 95 % bands of an estimator miss more often than they hold, by its innovations."""
-        return any(test.useless and test.narrow for test in self.contradictions.get(name, ()))
+        """Whether 95 % bands of an estimator miss more often than they hold, by its innovations.
+
+        What residuals share in time may be the sensor's own, as a reading that is old: it counts
+        where the samples do not resolve the model.
+        """
+        return any(
+            test.useless and test.narrow and (test.test == "variance" or not self.resolved)
+            for test in self.contradictions.get(name, ())
+        )
 
     @property
     def guessed(self) -> list[str]:
@@ -281,7 +293,7 @@ class Simulation:
         scores = {name: score(case, run, self.system) for name, run in runs.items()}
         result = CaseResult(self.system, case, runs, scores, self._reference(case, runs))
         narrow = any(test.narrow for tests in result.contradictions.values() for test in tests)
-        result = replace(result, **self._knowledge(case, narrow))
+        result = replace(result, **self._knowledge(case, narrow, OpenLoop.name in runs))
         guessed = {name: np.zeros(case.time.size, bool) for name in result.guessed}
         marked = {
             name: replace(run, claimed={**run.claimed, **guessed}) for name, run in runs.items()
@@ -295,7 +307,9 @@ class Simulation:
         """What is said first of a recording, see `CaseResult.warnings`, before estimators run."""
         return CaseResult(self.system, case, {}, {}, None, **self._knowledge(case)).warnings()
 
-    def _knowledge(self, case: Case, narrow: bool = False) -> dict[str, Any]:
+    def _knowledge(
+        self, case: Case, narrow: bool = False, open_loop: bool = False
+    ) -> dict[str, Any]:
         """What a recording tells, by the model alone, as fields of the result.
 
         Nothing where the model does not run along the recording.
@@ -303,6 +317,7 @@ class Simulation:
         Parameters
         ----------
         narrow : whether bands are too narrow, so that samples may be too far apart.
+        open_loop : whether its error is shown.
         """
         try:
             with open_model(self.system) as fmu:
@@ -311,13 +326,15 @@ class Simulation:
                 clock = "" if path is None else time_doubt(fmu, self.system, case, path)
                 start = start_doubt(fmu, self.system, case)
                 sampling = sampling_doubt(fmu, self.system, case) if narrow else ""
+                share, step = step_doubt(fmu, self.system, case) if open_loop else (0.0, "")
         except (InputError, FMUError, np.linalg.LinAlgError):
             return {}
         return {
             "inseparable": {} if known is None else known.inseparable,
             "untold": () if known is None else known.untold,
-            "doubts": tuple(doubt for doubt in (clock, start, sampling) if doubt),
+            "doubts": tuple(doubt for doubt in (clock, start, sampling, step) if doubt),
             "resolved": not (sampling or clock),
+            "step_share": share,
         }
 
     def _reference(self, case: Case, runs: Mapping[str, Run]) -> Run | None:

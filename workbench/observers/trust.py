@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import chi2, norm
 
-from workbench.arrays import Vector
+from workbench.arrays import Matrix, Vector
 from workbench.models.fmu import FMU
 from workbench.observers import estimators_of
 from workbench.observers.estimators.kalman import ExtendedKalmanFilter
@@ -51,6 +51,11 @@ _APART = 20  # points of a trajectory from one where a model is linearised to th
 
 
 _FINE = 4  # steps in place of one, which then errs by a quarter of it, or less
+
+
+# Shares of the open loop's error that are its steps'. From the first on they are said; from the
+# second on steps make more of the error than the model does.
+_NOTED, MOSTLY = 0.1, 0.5
 
 
 @dataclass(frozen=True)
@@ -276,19 +281,10 @@ def sampling_doubt(fmu: FMU, system: System, case: Case) -> str:
     A Kalman filter is run with some steps in place of each, between which nothing is measured. If
     its innovations then exceed what it says by less than half, steps are the reason.
     """
-    held = np.array([signal.held for signal in system.inputs], bool)
-    share = np.tile(np.arange(1, _FINE + 1) / _FINE, case.time.size - 1)[:, None]
-    before, after = (np.repeat(side, _FINE, axis=0) for side in (case.u[:-1], case.u[1:]))
-    # A held input has its new value from the sample on, where the last of the steps ends.
-    between = np.where(held & (share < 1.0), before, before + share * (after - before))
-    y = np.full((between.shape[0], case.y.shape[1]), np.nan)
-    y[_FINE - 1 :: _FINE] = case.y[1:]
-    steps = np.append(0.0, np.repeat(np.diff(case.time) / _FINE, _FINE))
-    samples = np.cumsum(steps), np.vstack([case.u[:1], between]), np.vstack([case.y[:1], y])
     kind = ExtendedKalmanFilter
     estimator = kind(fmu, system, kind.default_gains(fmu, system))
     run, size = replay(case, estimator), len(system.columns)
-    fine = estimator.run(*samples)
+    fine = estimator.run(*_finer(case, system))
     coarse = run.estimate[:, :size], run.sigma[:, :size], run.nis
     excesses = []
     for values, sigma, nis in (
@@ -309,6 +305,53 @@ def sampling_doubt(fmu: FMU, system: System, case: Case) -> str:
         f"of each, errors of a Kalman filter have {excesses[1]:.1f} times the variance that "
         f"it says, and {excesses[0]:.1f} times without. Record more often"
     )
+
+
+def _finer(case: Case, system: System) -> tuple[Vector, Matrix, Matrix]:
+    """Time [s], inputs, outputs with some steps in place of each; nothing is measured between."""
+    held = np.array([signal.held for signal in system.inputs], bool)
+    share = np.tile(np.arange(1, _FINE + 1) / _FINE, case.time.size - 1)[:, None]
+    before, after = (np.repeat(side, _FINE, axis=0) for side in (case.u[:-1], case.u[1:]))
+    # A held input has its new value from the sample on, where the last of the steps ends.
+    between = np.where(held & (share < 1.0), before, before + share * (after - before))
+    y = np.full((between.shape[0], case.y.shape[1]), np.nan)
+    y[_FINE - 1 :: _FINE] = case.y[1:]
+    steps = np.append(0.0, np.repeat(np.diff(case.time) / _FINE, _FINE))
+    return np.cumsum(steps), np.vstack([case.u[:1], between]), np.vstack([case.y[:1], y])
+
+
+def step_doubt(fmu: FMU, system: System, case: Case) -> tuple[float, str]:
+    """Share of the open loop's error that is its step's, not the model's, and what is said of it.
+
+    A step of first order in N parts errs by an N-th: e(h) - e(h/N) is (1 - 1/N) of e(h). Below a
+    tenth of the sensor's noise it is nothing. A model with events is integrated otherwise.
+    Source: L. F. Richardson (1911), Philosophical Transactions A 210, 307-357.
+    """
+    estimator = OpenLoop(fmu, system, OpenLoop.default_gains(fmu, system))
+    run = replay(case, estimator)
+    if run.ending is not Ending.OK or fmu.has_events:
+        return 0.0, ""
+    fine = np.asarray(estimator.run(*_finer(case, system)).values)[::_FINE]
+    share, sentence = 0.0, ""
+    for output in system.outputs:
+        column = list(system.columns).index(output.name)
+        values, measured = run.estimate[:, column], case[output.name]
+        known = np.isfinite(measured)
+        off = _rms(values - fine[:, column]) * _FINE / (_FINE - 1.0)
+        error = _rms((values - measured)[known]) if known.any() else 0.0
+        if off > _NOTED * output.noise_at_scale and off > max(_NOTED, share) * error > 0.0:
+            share = min(off / error, 1.0)
+            sentence = (
+                f"{100 * share:.0f} % of the open loop's error of {output.name} is made by its "
+                f"steps, not by the model: {off:.3g} {output.unit} rms with one step from sample "
+                "to sample. Such steps damp what swings, also in observers without bands. Record "
+                "more often"
+            )
+    return share, sentence
+
+
+def _rms(values: Vector) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))
 
 
 def time_doubt(fmu: FMU, system: System, case: Case, path: Trajectory) -> str:
