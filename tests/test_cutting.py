@@ -138,7 +138,7 @@ def test_times_that_do_not_go_on_are_refused(
 ) -> None:
     time = np.arange(0.0, 5.0, 0.01)
     signals = rolling(system, time, np.full(time.size, 20.0))
-    held = file(group("", times, pB=time, **signals))
+    held = file(group("", times, pB=1e5 * time, **signals))
     with pytest.raises(InputError, match=match):
         propose([held], system, {}, rate)
     assert propose([held], system, {}, 0.01).certain  # a given rate wins

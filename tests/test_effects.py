@@ -237,7 +237,7 @@ def test_a_foreign_library_is_extended_and_flattened(tmp_path: Path) -> None:
     flat = flatten(package, "Tank.Extended")
     names = {parameter.name for parameter in flat.parameters}
     assert {variables(effect, effect.size)[0] for effect in effects} <= names
-    assert [state.name for state in flat.states] == ["h"]
+    assert [state.name for state in flat.differentiated] == ["h"]
 
 
 def test_effects_in_a_chain_follow_one_another_and_others_add_up(tmp_path: Path) -> None:

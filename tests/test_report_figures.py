@@ -167,8 +167,8 @@ def test_pages_of_fourteen_cases_and_six_noisy_estimators_stay_below_3_MB(
         )
     )
     estimators = {name: {**SCORE, "Fx_nrmse": 0.1} for name in names}
-    case = {"title": "", "estimators": estimators, "doubts": []}
-    cases = {f"case_{k}": {**case, "contradicted": {}} for k in range(14)}
+    case = {"title": "", "estimators": estimators, "doubts": [], "warnings": []}
+    cases = {f"case_{k}": {**case, "contradicted": {}, "contradictions": {}} for k in range(14)}
     figures = [replace(figure, name=name) for name in cases]
     answer = {"answer": {"sentence": "Six estimators."}}
     summary = {**answer, "provenance": PROVENANCE, "weights": {"Fx": 1}, "cases": cases}

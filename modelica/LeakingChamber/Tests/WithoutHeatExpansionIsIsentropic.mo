@@ -1,11 +1,14 @@
 within LeakingChamber.Tests;
 model WithoutHeatExpansionIsIsentropic "T/T0 = (p/p0)^((kappa - 1)/kappa), whatever the law of the leak"
+  model Insulated "Walls that give no heat"
+    extends Effects.ExpansionCooling(tau(max=1e9));
+  end Insulated;
   Chamber laminar(
     dconductance=0.0, redeclare Effects.LaminarLeak leak(conductance=1e-9),
-    redeclare Effects.ExpansionCooling heat(share=1.0, tau=1e9));
+    redeclare Insulated heat(share=1.0, tau=1e9));
   Chamber hole(
     dconductance=0.0, redeclare Effects.OrificeLeak leak(C=1e-9),
-    redeclare Effects.ExpansionCooling heat(share=1.0, tau=1e9));
+    redeclare Insulated heat(share=1.0, tau=1e9));
 protected
   Real T[2](each unit="1") "Temperature over that at the start, by the air that is left";
   Real left[2](each start=1.0, each fixed=true, each unit="1") "Share of the air that is left";

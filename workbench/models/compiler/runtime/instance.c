@@ -471,7 +471,9 @@ static Status check_length(const Instance *i, const double *array, size_t n) {
 Status instance_set_states(Instance *i, const double x[], size_t n) {
     const Status status = check_length(i, x, n);
     if (STARTS_FOLLOW && status == STATUS_OK && before_start(i)) {
-        memset(i->state.given, 1, NX);
+        for (int k = 0; k < NX; k++) { // memset of no states is an error to compilers
+            i->state.given[k] = 1;
+        }
     }
     return status == STATUS_OK ? set_columns(i, 0, NX, x) : status;
 }
