@@ -112,7 +112,7 @@ def test_servo_has_viscous_friction_and_more_under_load(run: Callable[..., Names
     assert {"LoadStribeck", "SupplyResistance"} <= set(named)
     assert "Stribeck" not in named
     first = found.diagnosis.steps[0].rivals[0].active[0].name
-    assert first in ("DryFriction", "ViscousFriction")
+    assert first == "LoadFriction"  # the one friction that leaves least, as published: 47 mrad
     # Published, fitted to the same records: 128 mrad without friction, 59 with dry and viscous
     # friction and 59 with a Stribeck curve beside, 47 where it grows with the load.
     fitted = [error.mean_absolute for error in found.errors if not error.held_out]
