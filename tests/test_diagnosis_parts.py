@@ -12,7 +12,7 @@ pytest.importorskip("rumoca")
 
 from workbench.arrays import Matrix, Vector
 from workbench.diagnosis import build_everything, choose, given_values, read_effects
-from workbench.diagnosis.data.cleaning import outliers, smooth
+from workbench.diagnosis.data.cleaning import outliers, smooth, uneven_steps
 from workbench.diagnosis.data.clocks import in_time
 from workbench.diagnosis.data.counting import count
 from workbench.diagnosis.data.motion import ModelSource, OpenModel, motion, opened
@@ -253,6 +253,11 @@ def test_blocks_span_equal_times_where_steps_do_not(tmp_path: Path) -> None:
     held = smooth(time, signals["inflow"], (5.0, 10.0), 0.5, SOUND.held)
     resting = (np.diff(time, prepend=0.0) > 1.0) & (np.diff(time, append=np.inf) > 1.0)
     assert (held[resting] == signals["inflow"][resting]).all()
+
+
+def test_samples_that_are_lost_at_random_are_no_other_rate() -> None:
+    kept = np.random.default_rng(1).random(20_000) > 0.3
+    assert not uneven_steps(np.flatnonzero(kept) * 0.01, 0.01).any()
 
 
 def test_a_gap_is_in_no_block_and_leaves_others_as_they_are(tmp_path: Path) -> None:
