@@ -10,7 +10,7 @@ from workbench import case_from_frame
 from workbench.observers import choose
 from workbench.observers.report import format_table, summarise_runs
 from workbench.observers.simulation import CaseResult, prepare
-from workbench.observers.trust import residual_tests
+from workbench.observers.trust import likely_reason, residual_tests
 from workbench.system.system import System
 
 from .built import declare
@@ -65,6 +65,14 @@ def test_bands_that_innovations_contradict_are_told_at_the_top_of_all_that_is_re
     assert summary["cases"]["filled"]["contradicted"]["ekf"] == pytest.approx(
         result.surprise("ekf"), abs=5e-4
     )
+
+
+def test_innovations_that_turn_say_that_walks_are_smaller_and_not_that_the_start_is_off() -> None:
+    turning = (-1.0) ** np.arange(400) + np.random.default_rng(2).standard_normal(400)
+    (test,) = residual_tests({"V": turning}, {"V": np.ones(400)})
+    assert not test.narrow
+    assert "turn from sample to sample: what they share is -1." in str(test)
+    assert likely_reason(test, "", False, True) == "walks are smaller than the system file says"
 
 
 def test_bands_that_are_too_wide_are_told_as_well(vessel: System) -> None:

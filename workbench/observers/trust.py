@@ -97,10 +97,8 @@ class Contradiction:
         of = f"innovations of {self.signal}"
         if self.test == "mean":
             return f"{of} have a mean, of {abs(self.value):.1f} standard deviations of its estimate"
-        return (
-            f"{of} follow each other: what they share is {abs(self.value):.1f} times the variance "
-            "that it says"
-        )
+        way = "follow each other" if self.narrow else "turn from sample to sample"
+        return f"{of} {way}: what they share is {self.value:.1f} times the variance that it says"
 
 
 def tested_window(case: Case, system: System) -> slice:
@@ -139,15 +137,23 @@ def contradictions(case: Case, run: Run, system: System, known: str = "") -> lis
     lasts = {test.narrow for test in later}
     follows = any(test.test == "whiteness" for test in results)
     return [
-        replace(test, reason=_reason(test, known, test.narrow in lasts, follows))
+        replace(test, reason=likely_reason(test, known, test.narrow in lasts, follows))
         for test in results
     ]
 
 
-def _reason(test: Contradiction, known: str, lasts: bool, follows: bool) -> str:
+def likely_reason(test: Contradiction, known: str, lasts: bool, follows: bool) -> str:
+    """Why bands do not hold, most likely.
+
+    Parameters
+    ----------
+    known : reason that the recording shows by itself; empty for none.
+    lasts : whether later samples contradict the bands, too.
+    follows : whether innovations follow from one sample to the next.
+    """
     if known and test.narrow:
         return known
-    if not lasts:
+    if not lasts and test.narrow:
         return "the start is farther off than it is said to be: later samples contradict nothing"
     if not test.narrow:
         return (
