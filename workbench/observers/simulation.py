@@ -293,7 +293,7 @@ class Simulation:
         scores = {name: score(case, run, self.system) for name, run in runs.items()}
         result = CaseResult(self.system, case, runs, scores, self._reference(case, runs))
         narrow = any(test.narrow for tests in result.contradictions.values() for test in tests)
-        result = replace(result, **self._knowledge(case, narrow, OpenLoop.name in runs))
+        result = replace(result, **self._knowledge(case, narrow, runs.get(OpenLoop.name)))
         guessed = {name: np.zeros(case.time.size, bool) for name in result.guessed}
         marked = {
             name: replace(run, claimed={**run.claimed, **guessed}) for name, run in runs.items()
@@ -308,7 +308,7 @@ class Simulation:
         return CaseResult(self.system, case, {}, {}, None, **self._knowledge(case)).warnings()
 
     def _knowledge(
-        self, case: Case, narrow: bool = False, open_loop: bool = False
+        self, case: Case, narrow: bool = False, open_loop: Run | None = None
     ) -> dict[str, Any]:
         """What a recording tells, by the model alone, as fields of the result.
 
@@ -317,7 +317,7 @@ class Simulation:
         Parameters
         ----------
         narrow : whether bands are too narrow, so that samples may be too far apart.
-        open_loop : whether its error is shown.
+        open_loop : its run, where its error is shown.
         """
         try:
             with open_model(self.system) as fmu:
@@ -326,7 +326,9 @@ class Simulation:
                 clock = "" if path is None else time_doubt(fmu, self.system, case, path)
                 start = start_doubt(fmu, self.system, case)
                 sampling = sampling_doubt(fmu, self.system, case) if narrow else ""
-                share, step = step_doubt(fmu, self.system, case) if open_loop else (0.0, "")
+                share, step = 0.0, ""
+                if open_loop is not None:
+                    share, step = step_doubt(fmu, self.system, case, open_loop)
         except (InputError, FMUError, np.linalg.LinAlgError):
             return {}
         return {

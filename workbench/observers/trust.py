@@ -326,16 +326,24 @@ def _finer(case: Case, system: System) -> tuple[Vector, Matrix, Matrix]:
     return np.cumsum(steps), np.vstack([case.u[:1], between]), np.vstack([case.y[:1], y])
 
 
-def step_doubt(fmu: FMU, system: System, case: Case) -> tuple[float, str]:
+def step_doubt(fmu: FMU, system: System, case: Case, run: Run) -> tuple[float, str]:
     """Share of the open loop's error that is its step's, not the model's, and what is said of it.
 
     A step of first order in N parts errs by an N-th: e(h) - e(h/N) is (1 - 1/N) of e(h). Below a
     tenth of the sensor's noise it is nothing. A model with events is integrated otherwise.
     Source: L. F. Richardson (1911), Philosophical Transactions A 210, 307-357.
+
+    Parameters
+    ----------
+    run : of the open loop on the case.
     """
+    if run.ending is not Ending.OK:
+        return 0.0, ""
     estimator = OpenLoop(fmu, system, OpenLoop.default_gains(fmu, system))
-    run = replay(case, estimator)
-    if run.ending is not Ending.OK or fmu.has_events:
+    estimator.set_conditions(case.conditions)
+    fmu.begin_at(case.model_time)
+    estimator.start(case.u[0], case.y[0])
+    if fmu.has_events:
         return 0.0, ""
     fine = np.asarray(estimator.run(*_finer(case, system)).values)[::_FINE]
     share, sentence = 0.0, ""
