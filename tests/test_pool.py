@@ -209,7 +209,8 @@ def worked(pool):
     while not tasks[0].running():
         time.sleep(0.01)
     print("under way", flush=True)
-    tasks[0].result()
+    while not tasks[0].done():  # Python does not hear what comes just before a wait without end
+        time.sleep(0.01)
 
 with Pool(2, nullcontext, 600.0) as pool:
     try:
