@@ -63,18 +63,18 @@ def system() -> System:
 
 
 @pytest.fixture
-def minimal(minimal_path: Path) -> Iterator[FMU]:
+def minimal(minimal_path) -> Iterator[FMU]:
     with FMU(minimal_path) as fmu:
         yield fmu
 
 
 @pytest.fixture(scope="session")
-def dry_case(system: System) -> Case:
+def dry_case(system) -> Case:
     return read_case(ROOT / "cases" / "03_dry_120_3.6", system)
 
 
 @pytest.fixture(scope="session")
-def published(root: Path) -> Callable[[str], Path]:
+def published(root) -> Callable[[str], Path]:
     """Finds the folder of a published set; without it the test is skipped."""
 
     def found(name: str) -> Path:
@@ -87,9 +87,7 @@ def published(root: Path) -> Callable[[str], Path]:
 
 
 @pytest.fixture(scope="session")
-def published_cases(
-    published: Callable[[str], Path], tmp_path_factory: pytest.TempPathFactory
-) -> Callable[[str, str], Path]:
+def published_cases(published, tmp_path_factory) -> Callable[[str, str], Path]:
     """Makes the case folders of a system from a published set, once."""
 
     @cache
@@ -119,14 +117,14 @@ def ctrl_c() -> Iterator[None]:
 
 
 @pytest.fixture(scope="session")
-def stop_beginnings(system: System) -> list[Case]:
+def stop_beginnings(system) -> list[Case]:
     """6 s each of three stops: first pressure and what follows."""
     names = ("03_dry_120_3.6", "08_wet_120_3.6", "10_wet_100_2.7_rev")
     return [read_case(ROOT / "cases" / n, system).part(slice(700, 1900)) for n in names]
 
 
 @pytest.fixture(scope="session")
-def prepare(system: System) -> Callable[[str, Sequence[Case]], Problem]:
+def prepare(system) -> Callable[[str, Sequence[Case]], Problem]:
     """Prepares the tuning of an estimator over cases as they were recorded."""
 
     def prepared(name: str, cases: Sequence[Case]) -> Problem:
@@ -140,9 +138,7 @@ def prepare(system: System) -> Callable[[str, Sequence[Case]], Problem]:
 
 
 @pytest.fixture(scope="session")
-def problem(
-    prepare: Callable[[str, Sequence[Case]], Problem], stop_beginnings: list[Case]
-) -> Problem:
+def problem(prepare, stop_beginnings) -> Problem:
     """Tuning of the disturbance observer."""
     return prepare("disturbance_observer", stop_beginnings)
 
@@ -155,7 +151,7 @@ def inline() -> Iterator[Callable[[Job], Pool[Evaluator]]]:
 
 
 @pytest.fixture
-def pool(inline: Callable[[Job], Pool[Evaluator]], problem: Problem) -> Pool[Evaluator]:
+def pool(inline, problem) -> Pool[Evaluator]:
     return inline(problem.job)
 
 
@@ -163,7 +159,7 @@ def pool(inline: Callable[[Job], Pool[Evaluator]], problem: Problem) -> Pool[Eva
 
 
 @pytest.fixture(scope="session")
-def hostile_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def hostile_path(tmp_path_factory) -> Path:
     """An FMU that does what HOSTILE in the environment says."""
     return hostile(tmp_path_factory.mktemp("hostile") / "evil.fmu")
 
@@ -172,7 +168,7 @@ def hostile_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="session")
-def open_fmu(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Fmu]:
+def open_fmu(tmp_path_factory) -> Callable[..., Fmu]:
     """Opens an instance of a model; compiles each library once."""
     root = tmp_path_factory.mktemp("runtime")
 
@@ -191,7 +187,7 @@ def open_fmu(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Fmu]:
 
 
 @pytest.fixture(scope="session")
-def stops(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def stops(tmp_path_factory) -> Path:
     """Three stops of the virtual rig, whose load cells have a wrong zero."""
     folder = tmp_path_factory.mktemp("stops")
     effects = plant(CONSTANT_PADS, [f"fx_offset={PLANTED}"])
@@ -224,7 +220,7 @@ document.body.append(answer);
 
 
 @pytest.fixture(scope="session")
-def probe(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., dict[str, Any]]:
+def probe(tmp_path_factory) -> Callable[..., dict[str, Any]]:
     """Opens a page as a file in headless Chromium, with a script that fills `told`.
 
     What needs the samples of figures goes into a function `then`. A window is 500 px wide at least.
@@ -280,7 +276,7 @@ then = () => {
 
 
 @pytest.fixture(scope="session")
-def narrow(probe: Callable[..., dict[str, Any]]) -> Callable[[Path], None]:
+def narrow(probe) -> Callable[[Path], None]:
     """Asks that a screen of 320 px shows all of a page, in letters of the usual size."""
 
     def asked(page: Path) -> None:

@@ -65,7 +65,7 @@ def estimators() -> Iterator[dict[str, Estimator]]:
 
 
 @pytest.fixture(scope="module")
-def stops(estimators: dict[str, Estimator]) -> dict[str, KnownStop]:
+def stops(estimators) -> dict[str, KnownStop]:
     made = list(estimators.values())
     return {
         case.name: observe_stop(case, read_truth(case, SYSTEM), made, SYSTEM)
@@ -79,9 +79,7 @@ def stops(estimators: dict[str, Estimator]) -> dict[str, KnownStop]:
     [(DRY, 0.006), ([name for name in WET if name != SLIDE], 0.015), ([SLIDE], 0.025)],
     ids=["dry", "wet", "slide"],
 )
-def test_force_error_is_small(
-    stops: dict[str, KnownStop], observer: str, names: list[str], limit: float
-) -> None:
+def test_force_error_is_small(stops, observer, names, limit):
     """Error of the contact force itself, which no sensor reads: rms over mean, below 5 Hz."""
     for name in names:
         assert force_error(stops[name], observer) < limit, name
@@ -89,16 +87,14 @@ def test_force_error_is_small(
 
 @pytest.mark.parametrize("observer", OBSERVERS)
 @pytest.mark.parametrize(("names", "limit"), [(DRY, 0.01), (WET, 0.02)], ids=["dry", "wet"])
-def test_friction_of_the_pads_is_recovered(
-    stops: dict[str, KnownStop], observer: str, names: tuple[str, ...], limit: float
-) -> None:
+def test_friction_of_the_pads_is_recovered(stops, observer, names, limit):
     """From 1 s after the first contact to 1 m/s, below 5 Hz, at every time."""
     for name in names:
         assert friction_error(stops[name], observer) < limit, name
 
 
 @pytest.mark.parametrize("filter_", ["ekf", "ukf", "mhe", "imm", "smoother"])
-def test_the_band_of_a_filter_holds_what_it_says(stops: dict[str, KnownStop], filter_: str) -> None:
+def test_the_band_of_a_filter_holds_what_it_says(stops, filter_):
     """Stops of seeds 8 to 14 say how wide they are; these are of seed 1."""
     shares = [held_by_bands(stop, filter_) for stop in stops.values()]
     for quantity in COVERED:
@@ -113,7 +109,7 @@ def test_the_band_of_a_filter_holds_what_it_says(stops: dict[str, KnownStop], fi
 
 
 @pytest.mark.parametrize("observer", OBSERVERS)
-def test_force_is_followed_within_half_a_second(stops: dict[str, KnownStop], observer: str) -> None:
+def test_force_is_followed_within_half_a_second(stops, observer):
     """Nine tenths of what is reached 2 s after the first contact, and of the fall in the slide.
 
     The answer to a step proper is in `test_observers`.
@@ -134,9 +130,7 @@ OSCILLATING = {
 
 
 @pytest.mark.parametrize("observer", OBSERVERS)
-def test_no_oscillation_at_the_first_contact_of_the_pads(
-    stops: dict[str, KnownStop], observer: str
-) -> None:
+def test_no_oscillation_at_the_first_contact_of_the_pads(stops, observer):
     """The error swings to both sides by less than 3 % of the force that is being built up.
 
     3 % is twice what noise of the sensors makes of an estimate below 5 Hz. An error to one side
@@ -149,15 +143,13 @@ def test_no_oscillation_at_the_first_contact_of_the_pads(
 
 
 @pytest.mark.parametrize("observer", OBSERVERS)
-def test_dry_pads_are_followed_from_the_first_contact_on(
-    stops: dict[str, KnownStop], observer: str
-) -> None:
+def test_dry_pads_are_followed_from_the_first_contact_on(stops, observer):
     for name in DRY:
         assert max(contact_errors(stops[name], observer)) < 0.03, name  # 3 % as above
 
 
 @pytest.mark.parametrize("observer", OBSERVERS)
-def test_the_slide_is_followed_to_its_minimum(stops: dict[str, KnownStop], observer: str) -> None:
+def test_the_slide_is_followed_to_its_minimum(stops, observer):
     """The paper's disturbance observer misses the minimum."""
     stop = stops[SLIDE]
     # 15 % is what is asked inside a slide.
@@ -167,7 +159,7 @@ def test_the_slide_is_followed_to_its_minimum(stops: dict[str, KnownStop], obser
 
 
 @pytest.fixture(scope="module")
-def slippery(tmp_path_factory: pytest.TempPathFactory) -> list[Case]:
+def slippery(tmp_path_factory) -> list[Case]:
     """Stops near the limit of adhesion of a contact that has the law of a dry one."""
     folder = tmp_path_factory.mktemp("slippery")
     for name in ("03_dry_120_3.6", "04_dry_160_4.2", "06_dry_160_3.6_rev"):
@@ -180,8 +172,8 @@ def slippery(tmp_path_factory: pytest.TempPathFactory) -> list[Case]:
 @pytest.mark.long
 @pytest.mark.parametrize("observer", OBSERVERS)
 def test_friction_of_the_rail_is_recovered_near_the_limit_of_adhesion(
-    estimators: dict[str, Estimator], slippery: list[Case], observer: str
-) -> None:
+    estimators, slippery, observer
+):
     """Within a tenth from 70 % of the adhesion on, where the law of the contact is right.
 
     Braking presses the wheels of the multibody model down by 4 to 5 %, in reverse it lifts them;
@@ -200,9 +192,7 @@ def test_friction_of_the_rail_is_recovered_near_the_limit_of_adhesion(
 
 
 @pytest.mark.parametrize(("name", "low"), [("07", 0.79), ("08", 0.41), ("09", 0.14), ("10", 0.58)])
-def test_a_model_of_the_dry_contact_finds_too_little_friction_on_wet_rails(
-    estimators: dict[str, Estimator], name: str, low: float
-) -> None:
+def test_a_model_of_the_dry_contact_finds_too_little_friction_on_wet_rails(estimators, name, low):
     """Median of the EKF where a dry contact would be claimed; the share is of the README."""
     (stop,) = (ROOT / "cases").glob(f"{name}_*")
     (case,) = read_cases([stop], SYSTEM)
@@ -215,9 +205,7 @@ def test_a_model_of_the_dry_contact_finds_too_little_friction_on_wet_rails(
 
 
 @pytest.mark.parametrize("observer", ["ekf", "ukf", "mhe"])
-def test_friction_that_a_filter_passes_through_is_not_claimed(
-    estimators: dict[str, Estimator], tmp_path: Path, observer: str
-) -> None:
+def test_friction_that_a_filter_passes_through_is_not_claimed(estimators, tmp_path, observer):
     """A dry rail, 0.40, that noise makes slippery for 0.04 to 0.2 s as the force builds up."""
     (scenario,) = select(["06_dry_160_3.6_rev"])
     record(scenario, 7, ORDINARY_PADS, tmp_path / scenario.name)
@@ -270,9 +258,7 @@ MISLED = {
         for name in OBSERVERS
     ],
 )
-def test_force_is_followed_whatever_is_wrong_with_the_plant(
-    estimators: dict[str, Estimator], name: str, recordings: str
-) -> None:
+def test_force_is_followed_whatever_is_wrong_with_the_plant(estimators, name, recordings):
     """Dry stops of a rig that lags, fades, or has a wrong radius or an eccentric pole ring."""
     folder = RECORDINGS / "labelled" / recordings
     if not folder.is_dir():
@@ -282,9 +268,7 @@ def test_force_is_followed_whatever_is_wrong_with_the_plant(
 
 @pytest.mark.parametrize("name", OBSERVERS)
 @pytest.mark.parametrize(("pattern", "limit"), [("_dry_", 0.02), ("wet", 0.04)])
-def test_force_on_the_standard_recordings(
-    estimators: dict[str, Estimator], name: str, pattern: str, limit: float
-) -> None:
+def test_force_on_the_standard_recordings(estimators, name, pattern, limit):
     folder = RECORDINGS / "standard"
     if not folder.is_dir():
         pytest.skip("the recordings are not at hand")

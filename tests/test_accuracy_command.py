@@ -38,7 +38,6 @@ from workbench.observers.estimators.kalman import ExtendedKalmanFilter
 from workbench.observers.run import Ending, Run
 from workbench.recordings.case import Case, read_case
 from workbench.system.registry import load_system, open_model
-from workbench.system.system import System
 
 from .page_rules import check_page
 from .schemas import check
@@ -97,7 +96,7 @@ def estimated(force: Vector, muDC: Vector, ending: Ending = Ending.OK) -> KnownS
     return KnownStop(CASE, TRUTH, {"one": run}, SYSTEM)
 
 
-def test_a_force_that_is_too_large_by_a_constant() -> None:
+def test_a_force_that_is_too_large_by_a_constant():
     stop = estimated(FORCE + 100.0, TRUTH.muDC)
     braking = TIME > 4.0
     assert force_error(stop, "one") == pytest.approx(100.0 / FORCE[braking].mean())
@@ -109,7 +108,7 @@ def test_a_force_that_is_too_large_by_a_constant() -> None:
     assert accuracy(stop, "one").oscillation == 0.0
 
 
-def test_a_force_that_is_late() -> None:
+def test_a_force_that_is_late():
     late = np.interp(TIME - 0.1, TIME, FORCE)
     found = accuracy(estimated(late, TRUTH.muDC), "one")
     assert found.rise_delay == pytest.approx(0.1)
@@ -118,13 +117,13 @@ def test_a_force_that_is_late() -> None:
     assert rise_delay(never, "one") == math.inf
 
 
-def test_a_force_that_oscillates_at_the_first_contact() -> None:
+def test_a_force_that_oscillates_at_the_first_contact():
     swing = np.where(TIME < 6.0, 500.0 * np.sin(2 * np.pi * TIME), 0.0)
     found = accuracy(estimated(FORCE + swing, TRUTH.muDC), "one")
     assert found.oscillation == pytest.approx(500.0 / 20e3, rel=0.01)
 
 
-def test_friction_is_judged_from_a_second_after_the_first_contact() -> None:
+def test_friction_is_judged_from_a_second_after_the_first_contact():
     error = np.where(TIME < 4.5, 0.1, 0.003)
     stop = estimated(FORCE, TRUTH.muDC + error)
     assert friction_error(stop, "one") == pytest.approx(0.003, rel=0.01)
@@ -132,7 +131,7 @@ def test_friction_is_judged_from_a_second_after_the_first_contact() -> None:
     assert accuracy(estimated(FORCE, TRUTH.muDC), "one").muDC is None
 
 
-def test_friction_of_the_rail_is_judged_where_it_is_claimed() -> None:
+def test_friction_of_the_rail_is_judged_where_it_is_claimed():
     stop = estimated(FORCE, TRUTH.muDC)
     run, wrong = stop.runs["one"], np.where(TIME < 12.0, 0.1, 0.318)
     run.estimate[:, list(SYSTEM.columns).index("muWR")] = wrong
@@ -141,7 +140,7 @@ def test_friction_of_the_rail_is_judged_where_it_is_claimed() -> None:
     assert accuracy(claiming, "one").muWR == pytest.approx(0.06)
 
 
-def test_only_the_first_slide_counts_and_creep_is_none() -> None:
+def test_only_the_first_slide_counts_and_creep_is_none():
     stop = estimated(FORCE, TRUTH.muDC)
     assert np.array_equal(stop.slide, SLIDING)
     later = replace(TRUTH, slip=np.where(TIME > 15.0, -0.05 * SPEED, TRUTH.slip))
@@ -160,7 +159,7 @@ def stop_of(name: str, wet: bool, slides: bool, result: Accuracy) -> StopAccurac
     return StopAccuracy(name, name, wet, slides, {"one": result})
 
 
-def test_the_worst_is_taken_over_the_stops_that_a_row_concerns() -> None:
+def test_the_worst_is_taken_over_the_stops_that_a_row_concerns():
     stops = [
         stop_of("dry", False, False, Accuracy(force=0.01, rise_delay=-0.3, muDC=0.002)),
         stop_of("wet", True, False, Accuracy(force=0.03, rise_delay=0.1, muDC=0.004)),
@@ -183,7 +182,7 @@ def test_the_worst_is_taken_over_the_stops_that_a_row_concerns() -> None:
     ]
 
 
-def test_an_estimator_that_failed_or_never_arrived_is_not_left_out_of_the_worst() -> None:
+def test_an_estimator_that_failed_or_never_arrived_is_not_left_out_of_the_worst():
     never = Accuracy(force=0.01, rise_delay=math.inf)
     failed = accuracy(estimated(FORCE, TRUTH.muDC, Ending.NOT_FINITE), "one")
     stops = [stop_of("a", False, False, never), stop_of("b", True, False, failed)]
@@ -194,7 +193,7 @@ def test_an_estimator_that_failed_or_never_arrived_is_not_left_out_of_the_worst(
     assert f"b, one: {Ending.NOT_FINITE.value}" in format_accuracy(stops)
 
 
-def test_a_band_that_holds_little_in_one_stop_is_not_hidden_by_the_mean() -> None:
+def test_a_band_that_holds_little_in_one_stop_is_not_hidden_by_the_mean():
     stops = [
         stop_of(
             name, False, False, Accuracy(force=0.01, bands={"Fx": BandCoverage(share, np.ones(2))})
@@ -206,7 +205,7 @@ def test_a_band_that_holds_little_in_one_stop_is_not_hidden_by_the_mean() -> Non
 
 
 @pytest.mark.parametrize("scale", [0.4, 1.7])
-def test_bands_that_are_multiplied_by_what_they_need_hold_95_percent(scale: float) -> None:
+def test_bands_that_are_multiplied_by_what_they_need_hold_95_percent(scale):
     """Of stops alike whose errors have heavier tails than any normal distribution."""
     rng, sigma = np.random.default_rng(3), 80.0
 
@@ -232,13 +231,7 @@ def test_bands_that_are_multiplied_by_what_they_need_hold_95_percent(scale: floa
 # --- the command ---
 
 
-def test_command_writes_every_stop_and_the_worst(
-    system: System,
-    root: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_command_writes_every_stop_and_the_worst(system, root, tmp_path, monkeypatch, capsys):
     """On cases that keep the truth of every fourth sample."""
     monkeypatch.chdir(root)
     cases = [f"cases/{name}" for name in (DRY, SLIDE)]
@@ -289,9 +282,7 @@ def test_command_writes_every_stop_and_the_worst(
     assert "muDC, dry discs" not in summary["worst"]["open_loop"]
 
 
-def test_command_refuses_recordings_without_truth(
-    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_command_refuses_recordings_without_truth(root, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(root)
     shutil.copytree(root / "cases" / DRY, tmp_path / "measured")
     (tmp_path / "measured" / "truth.csv").unlink()
@@ -303,9 +294,7 @@ def test_command_refuses_recordings_without_truth(
     assert not out.exists()
 
 
-def test_command_refuses_a_truth_in_other_units(
-    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_command_refuses_a_truth_in_other_units(root, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(root)
     folder = tmp_path / "case"
     shutil.copytree(root / "cases" / DRY, folder)
@@ -315,9 +304,7 @@ def test_command_refuses_a_truth_in_other_units(
     assert "column 'pads': found unit [bar]; expected [Pa]" in capsys.readouterr().err
 
 
-def test_command_refuses_a_stop_in_which_no_force_is_built_up(
-    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_command_refuses_a_stop_in_which_no_force_is_built_up(root, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(root)
     folder = tmp_path / "coasting"
     shutil.copytree(root / "cases" / DRY, folder)
@@ -332,9 +319,7 @@ def test_command_refuses_a_stop_in_which_no_force_is_built_up(
     assert "ends before its force is built up" in capsys.readouterr().err
 
 
-def test_stops_of_several_rigs_are_told_apart_by_their_folders(
-    root: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_stops_of_several_rigs_are_told_apart_by_their_folders(root, tmp_path, capsys):
     for rig in ("one", "two"):
         shutil.copytree(root / "cases" / DRY, tmp_path / rig / DRY)
     rigs = [str(tmp_path / rig) for rig in ("one", "two")]

@@ -67,9 +67,7 @@ MUDC = list(WHEELSET.columns).index("muDC")
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("noise", [0.3, 1.0, 3.0])
-def test_noise_of_sensors_is_learnt(
-    fmu: FMU, kind: type[ExtendedKalmanFilter], noise: float
-) -> None:
+def test_noise_of_sensors_is_learnt(fmu, kind, noise):
     """After ten times the time for it, innovations are as large as the filter says."""
     found = estimate(fmu, kind, WHEELSET, *stop(fmu, np.full(5000, 0.30), noise))
     nis = np.asarray(found.nis)[4000:]
@@ -78,9 +76,7 @@ def test_noise_of_sensors_is_learnt(
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_friction_that_stays_is_known_the_better_the_longer(
-    fmu: FMU, kind: type[ExtendedKalmanFilter]
-) -> None:
+def test_a_friction_that_stays_is_known_the_better_the_longer(fmu, kind):
     held = replace(WHEELSET, learns=np.inf)
     samples = stop(fmu, np.full(6000, 0.30))
     learnt, assumed = (estimate(fmu, kind, one, *samples) for one in (WHEELSET, held))
@@ -90,9 +86,7 @@ def test_a_friction_that_stays_is_known_the_better_the_longer(
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_friction_that_moves_again_is_followed(
-    fmu: FMU, kind: type[ExtendedKalmanFilter]
-) -> None:
+def test_a_friction_that_moves_again_is_followed(fmu, kind):
     """Still for 15 s, then 0.1 in 5 s, as on a drying disc: the band opens, and holds it."""
     moving = np.concatenate([np.full(3000, 0.20), np.linspace(0.20, 0.30, 1000)])
     found = estimate(fmu, kind, WHEELSET, *stop(fmu, moving))
@@ -102,7 +96,7 @@ def test_a_friction_that_moves_again_is_followed(
 
 
 @pytest.mark.parametrize("kind", KINDS[:2])  # the window gives it less weight instead
-def test_a_single_wrong_sample_is_left_out(fmu: FMU, kind: type[ExtendedKalmanFilter]) -> None:
+def test_a_single_wrong_sample_is_left_out(fmu, kind):
     time, u, y = stop(fmu, np.full(3000, 0.30))
     spoilt = y.copy()
     spoilt[2000] *= 1.5
@@ -116,9 +110,7 @@ def test_a_single_wrong_sample_is_left_out(fmu: FMU, kind: type[ExtendedKalmanFi
     ("kind", "within", "limit"),
     [(KINDS[0], 0.3, 0.02), (KINDS[1], 0.3, 0.02), (KINDS[2], 0.7, 0.03)],
 )
-def test_a_jump_of_a_friction_is_followed_at_once(
-    fmu: FMU, kind: type[ExtendedKalmanFilter], within: float, limit: float
-) -> None:
+def test_a_jump_of_a_friction_is_followed_at_once(fmu, kind, within, limit):
     """Pads lose half their friction between two samples; held levels take a second to follow.
 
     The window first takes some of its samples for outliers, and is ready for more jumps after one.
@@ -130,7 +122,7 @@ def test_a_jump_of_a_friction_is_followed_at_once(
 
 
 @pytest.fixture(scope="module")
-def runs(fmu: FMU) -> dict[str, list[tuple[slice, Run]]]:
+def runs(fmu) -> dict[str, list[tuple[slice, Run]]]:
     made = {name: estimators_of(WHEELSET)[name] for name in FILTERS}
     ready = {
         name: kind(fmu, WHEELSET, kind.default_gains(fmu, WHEELSET)) for name, kind in made.items()
@@ -143,9 +135,7 @@ def runs(fmu: FMU) -> dict[str, list[tuple[slice, Run]]]:
 
 
 @pytest.mark.parametrize("name", FILTERS)
-def test_innovations_on_the_rig_are_as_large_as_filters_say(
-    runs: dict[str, list[tuple[slice, Run]]], name: str
-) -> None:
+def test_innovations_on_the_rig_are_as_large_as_filters_say(runs, name):
     """Chi-squared with two degrees of freedom: its mean, and its 95 % bound."""
     nis = np.concatenate([run.nis[window] for window, run in runs[name]])
     # Levels lag by two seconds behind speeds that fall, whose noise falls with them.
@@ -153,7 +143,7 @@ def test_innovations_on_the_rig_are_as_large_as_filters_say(
     assert np.mean(nis < chi2.ppf(0.95, 2)) == pytest.approx(0.95, abs=0.01)
 
 
-def test_one_sample_speaks_for_three_standard_deviations_at_most() -> None:
+def test_one_sample_speaks_for_three_standard_deviations_at_most():
     """Else a wrong sample that is still possible would widen all bands after it."""
     levels = kalman.levels(2, 1)
     kalman.reset(levels)

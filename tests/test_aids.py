@@ -68,12 +68,12 @@ TRAIN = load_system("train")
 
 
 @pytest.fixture(scope="module")
-def still(tmp_path_factory: pytest.TempPathFactory) -> System:
+def still(tmp_path_factory) -> System:
     return declare(tmp_path_factory.mktemp("still"), STILL, STILL_SYSTEM, Level="Still.Level")
 
 
 @pytest.fixture(scope="module")
-def level(still: System) -> Iterator[FMU]:
+def level(still) -> Iterator[FMU]:
     with open_model(still) as fmu:
         yield fmu
 
@@ -91,9 +91,7 @@ def samples(count: int) -> tuple[Vector, Matrix, Matrix]:
 
 
 @pytest.mark.parametrize("name", ["ekf", "arrow", "ukf", "mhe"])
-def test_a_constant_is_the_weighted_mean_of_what_was_measured(
-    name: str, still: System, level: FMU
-) -> None:
+def test_a_constant_is_the_weighted_mean_of_what_was_measured(name, still, level):
     """In closed form: of n readings of variance R and k of variance r, (n/R + k/r)^-1."""
     kind = estimators_of(still)[name]
     t, u, y = samples(40)
@@ -108,7 +106,7 @@ def test_a_constant_is_the_weighted_mean_of_what_was_measured(
     assert_allclose(found.sigma[:, 0], information**-0.5, rtol=1e-6)
 
 
-def test_innovations_are_those_of_what_was_measured(still: System, level: FMU) -> None:
+def test_innovations_are_those_of_what_was_measured(still, level):
     kind = ExtendedKalmanFilter
     t, u, y = samples(2000)
     nis = kind(level, still, kind.default_gains(level, still)).run(t, u, y).nis[1:]
@@ -120,9 +118,7 @@ def test_innovations_are_those_of_what_was_measured(still: System, level: FMU) -
 
 
 @pytest.mark.parametrize("name", ["ekf", "ukf", "mhe", "smoother", "imm"])
-def test_an_aid_that_is_never_there_changes_nothing(
-    name: str, stop: tuple[Case, SimulatedStop]
-) -> None:
+def test_an_aid_that_is_never_there_changes_nothing(name, stop):
     short = stop[0].part(slice(0, 120))
     runs = [
         observe(system, case, name)
@@ -138,7 +134,7 @@ def test_an_aid_that_is_never_there_changes_nothing(
         )
 
 
-def test_estimators_with_fixed_gains_do_without_aids(still: System, level: FMU) -> None:
+def test_estimators_with_fixed_gains_do_without_aids(still, level):
     t, u, y = samples(40)
     for name in ("open_loop", "parameter_estimator"):
         kind = estimators_of(still)[name]
@@ -158,9 +154,7 @@ def recorded(folder: Path, rows: str, header: str = "time [s],filling [m/s],coar
     return folder
 
 
-def test_an_empty_field_of_an_aid_is_a_sample_that_is_missing(
-    still: System, tmp_path: Path
-) -> None:
+def test_an_empty_field_of_an_aid_is_a_sample_that_is_missing(still, tmp_path):
     header = "time [s],filling [m/s],coarse [m],fine [cm]"
     fields = ["" if k % 3 else f"{150 + k}" for k in range(30)]
     rows = "\n".join(f"{k},0,1.{k:02d},{field}" for k, field in enumerate(fields))
@@ -171,7 +165,7 @@ def test_an_empty_field_of_an_aid_is_a_sample_that_is_missing(
     assert case.y.shape == (30, 2)
 
 
-def test_a_recording_may_have_no_aid_at_all(still: System, tmp_path: Path) -> None:
+def test_a_recording_may_have_no_aid_at_all(still, tmp_path):
     rows = "\n".join(f"{k},0,1.{k:02d}" for k in range(30))
     case = read_case(recorded(tmp_path, rows), still)
     assert "fine" not in case
@@ -179,9 +173,7 @@ def test_a_recording_may_have_no_aid_at_all(still: System, tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize(("row", "where"), [("7,0,,1.5", "coarse"), ("7,0,1.5,nan", "fine")])
-def test_other_fields_are_not_empty_and_gaps_are_no_words(
-    row: str, where: str, still: System, tmp_path: Path
-) -> None:
+def test_other_fields_are_not_empty_and_gaps_are_no_words(row, where, still, tmp_path):
     rows = [f"{k},0,1.{k:02d},1.5" for k in range(30)]
     rows[7] = row
     folder = recorded(tmp_path, "\n".join(rows), "time [s],filling [m/s],coarse [m],fine [m]")
@@ -189,9 +181,7 @@ def test_other_fields_are_not_empty_and_gaps_are_no_words(
         read_case(folder, still)
 
 
-def test_what_a_recorder_lacks_of_an_aid_holds_up_nothing_else(
-    still: System, tmp_path: Path
-) -> None:
+def test_what_a_recorder_lacks_of_an_aid_holds_up_nothing_else(still, tmp_path):
     """It has none at first, nor at last; and a fine sensor that is slower is in lines between."""
     fields = ["" if k < 5 or k > 90 or k % 2 else f"{1.5 + 0.01 * k:.3f}" for k in range(100)]
     rows = [f"{k};0.0;1.{k:02d};{field}" for k, field in enumerate(fields)]
@@ -208,9 +198,7 @@ def test_what_a_recorder_lacks_of_an_aid_holds_up_nothing_else(
 # --- conditions that estimators are told ---
 
 
-def test_what_the_crew_says_is_a_model_with_those_parameters(
-    stop: tuple[Case, SimulatedStop],
-) -> None:
+def test_what_the_crew_says_is_a_model_with_those_parameters(stop):
     case, _ = stop
     kind, part = ExtendedKalmanFilter, slice(0, 150)
     wet = {"muWR": 0.275, "polach.kA": 0.3, "polach.kS": 0.1, "polach.B": 0.2}
@@ -231,7 +219,7 @@ def test_what_the_crew_says_is_a_model_with_those_parameters(
     assert np.abs(values[1] - values[0]).max() > 0.01
 
 
-def test_who_finds_a_condition_is_not_told(stop: tuple[Case, SimulatedStop]) -> None:
+def test_who_finds_a_condition_is_not_told(stop):
     case, _ = stop
     kind, part = estimators_of(TRAIN)["imm"], slice(0, 20)
     with open_model(TRAIN) as model:
@@ -248,7 +236,7 @@ def test_who_finds_a_condition_is_not_told(stop: tuple[Case, SimulatedStop]) -> 
 
 
 @pytest.fixture(scope="module")
-def stop(tmp_path_factory: pytest.TempPathFactory) -> tuple[Case, SimulatedStop]:
+def stop(tmp_path_factory) -> tuple[Case, SimulatedStop]:
     (one,) = simulated("01_120_service_dry", 1, tmp_path_factory.mktemp("stop"))
     return one
 
@@ -261,7 +249,7 @@ def simulated(name: str, seed: int, folder: Path) -> list[tuple[Case, SimulatedS
     return [(case, made) for case in read_cases([folder], TRAIN)]
 
 
-def test_satellites_tell_the_speed_at_ten_hertz_but_not_in_tunnels(tmp_path: Path) -> None:
+def test_satellites_tell_the_speed_at_ten_hertz_but_not_in_tunnels(tmp_path):
     rig = virtual_rig(["02_160_service_dry"], None)
     errors, gaps = [], []
     for seed in range(24):
@@ -281,7 +269,7 @@ def test_satellites_tell_the_speed_at_ten_hertz_but_not_in_tunnels(tmp_path: Pat
     assert abs(together.mean()) < 4.0 * together.std() / np.sqrt(together.size)
 
 
-def test_satellites_tell_radii_that_axles_alone_do_not(tmp_path: Path) -> None:
+def test_satellites_tell_radii_that_axles_alone_do_not(tmp_path):
     """What all radii of a train have in common, no axle tells from the speed of the train."""
     common: dict[str, list[float]] = {"with": [], "without": []}
     apart: dict[str, list[Vector]] = {"with": [], "without": []}
@@ -303,7 +291,7 @@ def test_satellites_tell_radii_that_axles_alone_do_not(tmp_path: Path) -> None:
     assert np.sqrt(np.mean(np.square(common["without"]))) > 0.04
 
 
-def test_mass_and_gradient_are_estimated_within_their_bands(tmp_path: Path) -> None:
+def test_mass_and_gradient_are_estimated_within_their_bands(tmp_path):
     """Of sound trains they are hardly better known than before, and the bands say so."""
     within: dict[str, list[float]] = {"mass": [], "gradient": []}
     bands: dict[str, list[float]] = {"mass": [], "gradient": []}
@@ -345,13 +333,13 @@ def gradient_error(case: Case, made: SimulatedStop) -> Vector:
     return found
 
 
-def test_what_is_of_a_recording_is_not_watched_over_many() -> None:
+def test_what_is_of_a_recording_is_not_watched_over_many():
     names = {one.name for one in watched(TRAIN)}
     kinds = [f"{kind}[{i}]" for kind in ("muDC", "r") for i in range(1, 9)]
     assert names == {*kinds, "bias"}
 
 
-def test_a_constant_is_refused_by_who_could_not_find_it() -> None:
+def test_a_constant_is_refused_by_who_could_not_find_it():
     kind = estimators_of(TRAIN)["disturbance_observer"]
     with open_model(TRAIN) as model, pytest.raises(InputError, match="found 0: a constant"):
         kind.default_gains(model, TRAIN)

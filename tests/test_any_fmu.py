@@ -65,7 +65,7 @@ Build = Callable[..., Path]
 
 
 @pytest.fixture
-def build(tmp_path: Path) -> Build:
+def build(tmp_path) -> Build:
     """Builds the room in a folder with its system file; returns the FMU."""
 
     def make(
@@ -107,7 +107,7 @@ def exact(power: float, t: float, begin: float = 291.0) -> float:
     return float(end + (begin - end) * np.exp(-t * 50.0 / 1e5))
 
 
-def test_discrete_states_are_iterated_until_they_are_stable(build: Build) -> None:
+def test_discrete_states_are_iterated_until_they_are_stable(build):
     """One iteration would leave the heating off."""
     with FMU(build("RELAYS")) as fmu:
         fmu.start({})
@@ -142,7 +142,7 @@ def along(what: str, times: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("what", ["THERMOSTAT", "TIMETABLE"])
-def test_the_open_loop_goes_through_events(what: str, build: Build) -> None:
+def test_the_open_loop_goes_through_events(what, build):
     """The room is between 293 K and 295 K, or heated from 0 to 600 s, from 1200 s to 1800 s.
 
     Six events of a thermostat in an hour; the tolerance of the integration is 1e-8 of 300 K.
@@ -152,7 +152,7 @@ def test_the_open_loop_goes_through_events(what: str, build: Build) -> None:
     assert estimated == pytest.approx(along(what, 10.0 * np.arange(estimated.size)), abs=1e-4)
 
 
-def test_a_jump_of_an_input_is_an_event_where_it_happens(build: Build) -> None:
+def test_a_jump_of_an_input_is_an_event_where_it_happens(build):
     """Outside, it falls from 280 K to 270 K at 100 s: held inputs jump there, and not before."""
     with FMU(build("TIMETABLE")) as fmu:
         loop = estimator(fmu, "open_loop")
@@ -166,9 +166,7 @@ def test_a_jump_of_an_input_is_an_event_where_it_happens(build: Build) -> None:
     assert estimated[[10, 20]] == pytest.approx([at_jump, after], abs=1e-4)
 
 
-def test_the_open_loop_agrees_with_fmpy_through_events(
-    build: Build, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_open_loop_agrees_with_fmpy_through_events(build, capsys):
     """Of the timetable: FMPy ends a step before the thermostat compares T with 295 K."""
     path = build("TIMETABLE")
     assert main(["fmu", "compare", str(path), str(path.parent / "none.fmu")]) == 0
@@ -180,7 +178,7 @@ def test_the_open_loop_agrees_with_fmpy_through_events(
 
 @pytest.mark.parametrize("name", ["ekf", "ukf", "mhe"])
 @pytest.mark.parametrize("what", ["THERMOSTAT", "TIMETABLE", "FUSE"])
-def test_other_estimators_refuse_a_run_with_an_event(what: str, name: str, build: Build) -> None:
+def test_other_estimators_refuse_a_run_with_an_event(what, name, build):
     """They are fed 291 K: the thermostat of a filter does not switch, which it may not pretend."""
     with FMU(build(what)) as fmu:
         assert np.isfinite(run(fmu, name, 100.0)).all()
@@ -194,9 +192,7 @@ def test_other_estimators_refuse_a_run_with_an_event(what: str, name: str, build
             fmu.check_event()
 
 
-def test_the_open_loop_stops_where_a_model_asks_for_event_mode_that_has_no_indicators(
-    build: Build,
-) -> None:
+def test_the_open_loop_stops_where_a_model_asks_for_event_mode_that_has_no_indicators(build):
     """The fuse blows at 295 K, after 470 s, which only the end of a step tells."""
     with FMU(build("FUSE")) as fmu:
         assert run(fmu, "open_loop", 460.0)[-1] == pytest.approx(exact(1500.0, 460.0), abs=0.03)
@@ -204,7 +200,7 @@ def test_the_open_loop_stops_where_a_model_asks_for_event_mode_that_has_no_indic
             run(fmu, "open_loop", 600.0)
 
 
-def test_the_last_sample_may_not_be_beyond_an_event(build: Build) -> None:
+def test_the_last_sample_may_not_be_beyond_an_event(build):
     with FMU(build("THERMOSTAT")) as fmu:
         fmu.start({})
         fmu.set_states(np.array([296.0]))
@@ -212,7 +208,7 @@ def test_the_last_sample_may_not_be_beyond_an_event(build: Build) -> None:
             fmu.check_event()
 
 
-def test_time_begins_where_the_model_says_and_is_set_at_each_sample(build: Build) -> None:
+def test_time_begins_where_the_model_says_and_is_set_at_each_sample(build):
     with FMU(build("TIMETABLE", start=550.0)) as fmu:
         fmu.start({})
         assert fmu.next_event[0] == 600.0
@@ -222,7 +218,7 @@ def test_time_begins_where_the_model_says_and_is_set_at_each_sample(build: Build
             run(fmu, "ekf", 60.0)
 
 
-def test_parameters_are_set_by_their_type_where_references_repeat(build: Build) -> None:
+def test_parameters_are_set_by_their_type_where_references_repeat(build):
     with FMU(build("RELAYS"), parameters={"mode": 1.0, "flag": 1.0}) as fmu:
         fmu.start({})
         assert fmu.get_states()[0] == 291.0
@@ -243,7 +239,7 @@ SWITCHED = VARIABLES.replace(
 )
 
 
-def test_the_open_loop_sets_discrete_inputs_at_events_and_reads_whole_numbers(build: Build) -> None:
+def test_the_open_loop_sets_discrete_inputs_at_events_and_reads_whole_numbers(build):
     """A Boolean input that adds 1 K/s from 20 s to 40 s; an Integer output that says 10 or 11."""
     path = build("RELAYS", variables=SWITCHED)
     file = path.parent / "system.toml"
@@ -278,13 +274,13 @@ def test_the_open_loop_sets_discrete_inputs_at_events_and_reads_whole_numbers(bu
         ("T", "'T', which is a measured output"),
     ],
 )
-def test_a_correction_is_an_input_of_its_own(correction: str, found: str, build: Build) -> None:
+def test_a_correction_is_an_input_of_its_own(correction, found, build):
     path = build("RELAYS", correction=correction)
     with FMU(path) as fmu, pytest.raises(InputError, match=f"correction: found {found}"):
         estimator(fmu, "ekf")
 
 
-def test_compiled_code_gets_samples_of_the_size_that_it_needs(build: Build) -> None:
+def test_compiled_code_gets_samples_of_the_size_that_it_needs(build):
     with FMU(build("RELAYS")) as fmu:
         filter_ = estimator(fmu, "ekf")
         time, one, two = np.arange(5.0), np.zeros((5, 1)), np.zeros((5, 2))
@@ -316,7 +312,7 @@ def renamed_system(path: Path) -> Path:
     return file
 
 
-def test_a_system_file_gives_variables_names_of_its_own(build: Build) -> None:
+def test_a_system_file_gives_variables_names_of_its_own(build):
     path = build("RELAYS")
     time, u, y = np.arange(0.0, 605.0, 10.0), np.full((61, 1), 280.0), np.full((61, 1), 291.0)
     with FMU(path) as fmu:
@@ -336,18 +332,14 @@ def test_a_system_file_gives_variables_names_of_its_own(build: Build) -> None:
         ('variable = "Ta"', r"\[outputs.inside\] variable: found 'Ta' for 'inside', after"),
     ],
 )
-def test_a_name_that_the_fmu_has_not_or_that_is_taken_is_refused(
-    line: str, match: str, build: Build
-) -> None:
+def test_a_name_that_the_fmu_has_not_or_that_is_taken_is_refused(line, match, build):
     file = renamed_system(build("RELAYS"))
     file.write_text(file.read_text().replace("variable = 'T'", line))
     with pytest.raises(InputError, match=match):
         load_system(file)
 
 
-def test_names_of_a_system_file_may_come_from_the_command_line(
-    build: Build, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_names_of_a_system_file_may_come_from_the_command_line(build, capsys):
     """The file has none of the FMU's names: they are known before its variables are looked up."""
     file = renamed_system(build("RELAYS"))
     text = file.read_text().replace('variable = "Ta",', "").replace("variable = 'T',", "")
@@ -364,7 +356,7 @@ def test_names_of_a_system_file_may_come_from_the_command_line(
     capsys.readouterr()
 
 
-def test_a_recording_says_where_its_time_begins_for_the_model(build: Build) -> None:
+def test_a_recording_says_where_its_time_begins_for_the_model(build):
     """From 550 s of the timetable on, the heating goes off after 50 s, else after 600 s."""
     path = build("TIMETABLE")
     case = recorded(path.parent)
@@ -383,7 +375,7 @@ def test_a_recording_says_where_its_time_begins_for_the_model(build: Build) -> N
     assert values['model_time = "550 s"\n'] == pytest.approx([heated, off], abs=1e-4)
 
 
-def test_what_needs_modelica_asks_for_the_class(build: Build) -> None:
+def test_what_needs_modelica_asks_for_the_class(build):
     system = load_system(renamed_system(build("RELAYS")))
     with pytest.raises(InputError, match=r"found the FMU Room.fmu, and no 'class'"):
         system.models["observer"].name  # noqa: B018
@@ -397,7 +389,7 @@ COASTING = """
 
 
 @pytest.fixture
-def integrator(tmp_path: Path) -> Path:
+def integrator(tmp_path) -> Path:
     """A system on a Co-Simulation alone: der(x) = u from 1, each step exact."""
     source = Path(__file__).with_name("co_simulation.c")
     library = tmp_path / f"Alone{fmpy.sharedLibraryExtension}"
@@ -419,7 +411,7 @@ def integrator(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_the_open_loop_runs_on_co_simulation_alone(integrator: Path) -> None:
+def test_the_open_loop_runs_on_co_simulation_alone(integrator):
     """An input that is held: 3 s of 1 and 3 s of 0 make 3."""
     system = load_system(integrator)
     time, u = np.arange(7.0), np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0])[:, None]
@@ -432,8 +424,8 @@ def test_the_open_loop_runs_on_co_simulation_alone(integrator: Path) -> None:
 
 @pytest.mark.parametrize("name", ["ekf", "mhe", "smoother"])
 def test_what_co_simulation_alone_cannot_do_is_said_with_what_would_make_it_possible(
-    name: str, integrator: Path
-) -> None:
+    name, integrator
+):
     system = load_system(integrator)
     with open_model(system) as fmu:
         chosen = estimators_of(system)[name]
@@ -458,7 +450,7 @@ ARRAYS = """<?xml version="1.0" encoding="UTF-8"?>
 """  # noqa: E501
 
 
-def test_the_open_loop_reads_and_sets_elements_of_arrays(tmp_path: Path) -> None:
+def test_the_open_loop_reads_and_sets_elements_of_arrays(tmp_path):
     """der(x[i]) = -k[i] x[i]: the second element with k[2] = 3 instead of 2."""
     headers = Path(fmpy.__file__).parent / "c-code"
     source = Path(__file__).with_name("arrays.c").read_text()

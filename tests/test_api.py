@@ -34,23 +34,23 @@ except wb.InputError as error:
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("api")
     write_system(folder / "tank")
     return folder
 
 
 @pytest.fixture(scope="module")
-def system(folder: Path) -> wb.System:
+def system(folder) -> wb.System:
     return wb.load_system(folder / "tank")
 
 
 @pytest.fixture(scope="module")
-def case(folder: Path, system: wb.System) -> wb.Case:
+def case(folder, system) -> wb.Case:
     return wb.read_cases(folder / "tank" / "recordings" / "01_steps", system)[0]
 
 
-def test_a_script_needs_no_guard_from_file_to_diagnosis(root: Path, folder: Path) -> None:
+def test_a_script_needs_no_guard_from_file_to_diagnosis(root, folder):
     """Workers import neither the script nor start it again: it prints each line once."""
     script = folder / "script.py"
     script.write_text(SCRIPT)
@@ -69,7 +69,7 @@ def test_a_script_needs_no_guard_from_file_to_diagnosis(root: Path, folder: Path
     assert "no law: the diagnosis: found the verdict 'found'" in run.stdout
 
 
-def test_a_table_is_the_recording_that_a_file_holds(system: wb.System, case: wb.Case) -> None:
+def test_a_table_is_the_recording_that_a_file_holds(system, case):
     import pandas as pd
 
     frame = pd.read_csv(case.source)
@@ -81,7 +81,7 @@ def test_a_table_is_the_recording_that_a_file_holds(system: wb.System, case: wb.
     assert_allclose(runs[0], runs[1], rtol=1e-12)
 
 
-def test_a_table_without_a_signal_or_its_unit_is_refused(system: wb.System, case: wb.Case) -> None:
+def test_a_table_without_a_signal_or_its_unit_is_refused(system, case):
     import pandas as pd
 
     frame = pd.read_csv(case.source)
@@ -93,7 +93,7 @@ def test_a_table_without_a_signal_or_its_unit_is_refused(system: wb.System, case
         wb.case_from_frame(system, frame.rename(columns={"h [mm]": "h [bar]"}))
 
 
-def test_tuned_gains_are_what_an_estimator_then_runs_with(system: wb.System, case: wb.Case) -> None:
+def test_tuned_gains_are_what_an_estimator_then_runs_with(system, case):
     lines: list[str] = []
     tuned = wb.tune(
         *(system, "disturbance_observer", [case]),
@@ -109,6 +109,6 @@ def test_tuned_gains_are_what_an_estimator_then_runs_with(system: wb.System, cas
     assert not np.array_equal(usual.signal("c"), better.signal("c"))
 
 
-def test_an_estimator_that_there_is_none_of_is_refused(system: wb.System, case: wb.Case) -> None:
+def test_an_estimator_that_there_is_none_of_is_refused(system, case):
     with pytest.raises(wb.InputError, match=r"'ekff': .* \(closest: 'ekf'\)"):
         wb.observe(system, case, "ekff")

@@ -24,7 +24,7 @@ LIBRARY = "binaries/linux64/MinimalObserver.so"
 
 
 @pytest.fixture(autouse=True)
-def places(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def places(tmp_path, monkeypatch) -> Path:
     """A folder of temporary files of its own."""
     folder = tmp_path / "tmp"
     folder.mkdir()
@@ -58,7 +58,7 @@ def with_entry(path: Path, entry: zipfile.ZipInfo, content: bytes = b"x") -> Pat
         "resources/zero\0byte",
     ],
 )
-def test_a_name_that_leads_elsewhere_is_refused(name: str, tmp_path: Path) -> None:
+def test_a_name_that_leads_elsewhere_is_refused(name, tmp_path):
     path = with_entry(tmp_path / "evil.fmu", zipfile.ZipInfo("0" * len(name)))
     raw = path.read_bytes().replace(b"0" * len(name), name.encode())  # zipfile would mend it
     path.write_bytes(raw)
@@ -68,7 +68,7 @@ def test_a_name_that_leads_elsewhere_is_refused(name: str, tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize("kind", [stat.S_IFLNK, stat.S_IFIFO, stat.S_IFCHR])
-def test_a_link_or_device_is_refused(kind: int, tmp_path: Path) -> None:
+def test_a_link_or_device_is_refused(kind, tmp_path):
     entry = zipfile.ZipInfo("resources/link")
     entry.external_attr = (kind | 0o777) << 16
     with pytest.raises(InputError, match="'resources/link', which is a link or a device"):
@@ -77,13 +77,13 @@ def test_a_link_or_device_is_refused(kind: int, tmp_path: Path) -> None:
 
 @pytest.mark.filterwarnings("ignore:Duplicate name")
 @pytest.mark.parametrize("name", [LIBRARY, XML])
-def test_a_name_that_stands_twice_is_refused(name: str, tmp_path: Path) -> None:
+def test_a_name_that_stands_twice_is_refused(name, tmp_path):
     with pytest.raises(InputError, match=f"the name '{re.escape(name)}' twice"):
         FMU(with_entry(tmp_path / "evil.fmu", zipfile.ZipInfo(name)))
 
 
 @pytest.mark.filterwarnings("ignore:Duplicate name")
-def test_what_nothing_is_taken_from_may_stand_twice(tmp_path: Path) -> None:
+def test_what_nothing_is_taken_from_may_stand_twice(tmp_path):
     """Exporters write folders and documentation twice."""
     path = tmp_path / "twice.fmu"
     with_entry(path, zipfile.ZipInfo("extra/"))
@@ -95,14 +95,12 @@ def test_what_nothing_is_taken_from_may_stand_twice(tmp_path: Path) -> None:
         fmu.start({})
 
 
-def test_a_file_that_is_a_folder_too_is_refused(tmp_path: Path) -> None:
+def test_a_file_that_is_a_folder_too_is_refused(tmp_path):
     with pytest.raises(InputError, match="as a file and as a folder"):
         FMU(with_entry(tmp_path / "evil.fmu", zipfile.ZipInfo(f"{XML}/inside")))
 
 
-def test_an_archive_that_unpacks_to_much_more_is_refused_at_once(
-    tmp_path: Path, places: Path
-) -> None:
+def test_an_archive_that_unpacks_to_much_more_is_refused_at_once(tmp_path, places):
     path = tmp_path / "bomb.fmu"
     with_entry(path, zipfile.ZipInfo("resources/zeros"), bytes(64 << 20))
     assert path.stat().st_size < 1 << 20
@@ -111,7 +109,7 @@ def test_an_archive_that_unpacks_to_much_more_is_refused_at_once(
     assert list(places.iterdir()) == []
 
 
-def test_a_size_that_is_not_the_true_one_is_refused(tmp_path: Path, places: Path) -> None:
+def test_a_size_that_is_not_the_true_one_is_refused(tmp_path, places):
     """Where the list of contents says less than is there, no more is unpacked than it says."""
     path = with_entry(tmp_path / "liar.fmu", zipfile.ZipInfo("resources/zeros"), bytes(1 << 20))
     with zipfile.ZipFile(path) as archive:
@@ -127,7 +125,7 @@ def test_a_size_that_is_not_the_true_one_is_refused(tmp_path: Path, places: Path
     assert list(places.iterdir()) == []
 
 
-def test_a_list_of_contents_that_says_it_begins_later_is_refused(tmp_path: Path) -> None:
+def test_a_list_of_contents_that_says_it_begins_later_is_refused(tmp_path):
     """Of a file that lost bytes in the middle; all entries seem to begin as much earlier."""
     raw = bytearray(OWN.read_bytes())
     (begin,) = struct.unpack_from("<L", raw, len(raw) - 6)  # the last of it, but for no comment
@@ -138,7 +136,7 @@ def test_a_list_of_contents_that_says_it_begins_later_is_refused(tmp_path: Path)
         FMU(path)
 
 
-def test_many_files_are_refused(tmp_path: Path) -> None:
+def test_many_files_are_refused(tmp_path):
     path = tmp_path / "many.fmu"
     shutil.copy(OWN, path)
     with zipfile.ZipFile(path, "a") as archive:
@@ -149,7 +147,7 @@ def test_many_files_are_refused(tmp_path: Path) -> None:
         FMU(path)
 
 
-def test_only_what_runs_here_is_unpacked(tmp_path: Path) -> None:
+def test_only_what_runs_here_is_unpacked(tmp_path):
     path = with_entry(tmp_path / "own.fmu", zipfile.ZipInfo("resources/table.txt"))
     unpack(path, tmp_path / "in", "binaries/linux64")
     files = {p.relative_to(tmp_path / "in").as_posix() for p in (tmp_path / "in").rglob("*.*")}
@@ -232,7 +230,7 @@ DAMAGES: dict[str, tuple[Callable[[Path], None], str]] = {
 
 @pytest.mark.skipif(not Path("/lib").is_dir(), reason="damages binaries of Linux")
 @pytest.mark.parametrize("damage", DAMAGES)
-def test_a_damaged_fmu_is_refused_in_words(damage: str, tmp_path: Path, places: Path) -> None:
+def test_a_damaged_fmu_is_refused_in_words(damage, tmp_path, places):
     change, message = DAMAGES[damage]
     path = rewritten(OWN, tmp_path / "damaged.fmu", change)
     before = Path.cwd()
@@ -244,7 +242,7 @@ def test_a_damaged_fmu_is_refused_in_words(damage: str, tmp_path: Path, places: 
 
 
 @pytest.mark.parametrize("share", [0.1, 0.5, 0.9, 0.999])
-def test_a_truncated_file_is_refused(share: float, tmp_path: Path) -> None:
+def test_a_truncated_file_is_refused(share, tmp_path):
     whole = OWN.read_bytes()
     path = tmp_path / "half.fmu"
     path.write_bytes(whole[: int(share * len(whole))])
@@ -252,7 +250,7 @@ def test_a_truncated_file_is_refused(share: float, tmp_path: Path) -> None:
         FMU(path)
 
 
-def test_a_damaged_byte_is_refused(tmp_path: Path, places: Path) -> None:
+def test_a_damaged_byte_is_refused(tmp_path, places):
     with zipfile.ZipFile(OWN) as archive:
         begin = archive.getinfo(LIBRARY).header_offset
     whole = bytearray(OWN.read_bytes())
@@ -274,13 +272,7 @@ def test_a_damaged_byte_is_refused(tmp_path: Path, places: Path) -> None:
     ],
 )
 @pytest.mark.parametrize("damage", ["foreign binary", "text for a number"])
-def test_every_command_refuses_it_in_words(
-    damage: str,
-    command: list[str],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_every_command_refuses_it_in_words(damage, command, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     path = rewritten(OWN, tmp_path / "damaged.fmu", DAMAGES[damage][0])
     assert main([*command, str(path), "--quiet"]) == 2

@@ -105,7 +105,7 @@ def library() -> str:
 
 
 @pytest.fixture(scope="module")
-def vessels(tmp_path_factory: pytest.TempPathFactory) -> System:
+def vessels(tmp_path_factory) -> System:
     outputs = "\n".join(
         f'[outputs.reading{i}]\nunit = "V"\nnoise = "0.02 V"\nscale = "2 V"\n' for i in EVERY
     )
@@ -119,19 +119,19 @@ def vessels(tmp_path_factory: pytest.TempPathFactory) -> System:
 
 
 @pytest.fixture(scope="module")
-def filling(vessels: System) -> Iterator[FMU]:
+def filling(vessels) -> Iterator[FMU]:
     with open_model(vessels) as fmu:
         yield fmu
 
 
 @pytest.fixture(scope="module")
-def train(tmp_path_factory: pytest.TempPathFactory) -> System:
+def train(tmp_path_factory) -> System:
     """Two vehicles of four axles, whose wheel loads shift as bodies pitch."""
     return growth.build(2, tmp_path_factory.mktemp("train"))
 
 
 @pytest.fixture(scope="module")
-def rolling(train: System) -> Iterator[FMU]:
+def rolling(train) -> Iterator[FMU]:
     with open_model(train) as fmu:
         yield fmu
 
@@ -161,9 +161,7 @@ def assert_alike(found: Estimate, expected: Estimate, rtol: float) -> None:
 # --- blocks ---
 
 
-def test_unknowns_that_only_shared_ones_tie_are_blocks(
-    filling: FMU, vessels: System, rolling: FMU, train: System
-) -> None:
+def test_unknowns_that_only_shared_ones_tie_are_blocks(filling, vessels, rolling, train):
     """Level and leak of a vessel; four states, pads and radii of a bogie."""
     for fmu, system, size, count, shared in (
         (filling, vessels, 2, COUNT, {"header", "doffset"}),
@@ -177,7 +175,7 @@ def test_unknowns_that_only_shared_ones_tie_are_blocks(
         assert set(names[parts.order[parts.first[-2] :]]) == shared
 
 
-def test_unlike_parts_and_small_gains_are_one_block() -> None:
+def test_unlike_parts_and_small_gains_are_one_block():
     """A chain of three, of which blocks would save less than half; and parts of all sizes."""
     assert divide(3, 3, 0, [(0, 1), (1, 2)]) == ([[0, 1, 2]], [])
     star = [(0, k) for k in range(1, 9)]
@@ -186,13 +184,13 @@ def test_unlike_parts_and_small_gains_are_one_block() -> None:
     assert divide(11, 11, 0, unlike) == ([list(range(11))], [])
 
 
-def test_outputs_keep_together_what_they_depend_on() -> None:
+def test_outputs_keep_together_what_they_depend_on():
     star = [(0, k) for k in range(1, 9)]
     pairs = [(9 + k, 1 + 2 * k + side) for k in range(4) for side in range(2)]
     assert divide(9, 9, 4, star + pairs) == ([[1, 2], [3, 4], [5, 6], [7, 8]], [0])
 
 
-def test_a_model_without_blocks_has_the_extended_filter() -> None:
+def test_a_model_without_blocks_has_the_extended_filter():
     """Of this train loads shift by the pads of all axles at once: each depends on each other."""
     system = load_system("train")
     with open_model(system) as fmu:
@@ -204,7 +202,7 @@ def test_a_model_without_blocks_has_the_extended_filter() -> None:
     np.testing.assert_array_equal(found.sigma, expected.sigma)
 
 
-def test_a_model_whose_structure_is_not_said_is_one_block(filling: FMU, vessels: System) -> None:
+def test_a_model_whose_structure_is_not_said_is_one_block(filling, vessels):
     """As of exporters that leave it out, which FMI allows."""
     said = filling.description
     filling.description = replace(said, dependencies={})
@@ -213,7 +211,7 @@ def test_a_model_whose_structure_is_not_said_is_one_block(filling: FMU, vessels:
     assert estimator._blocks.first.tolist() == [0, 12, 12]
 
 
-def test_levels_are_not_learnt_of_blocks(filling: FMU, vessels: System) -> None:
+def test_levels_are_not_learnt_of_blocks(filling, vessels):
     with pytest.raises(InputError, match="noise levels that are to be learnt"):
         made(filling, replace(vessels, learns=2.0))
 
@@ -222,9 +220,7 @@ def test_levels_are_not_learnt_of_blocks(filling: FMU, vessels: System) -> None:
 
 
 @pytest.mark.parametrize("differences", [False, True])
-def test_like_parts_of_a_linear_machine_are_filtered_exactly(
-    filling: FMU, vessels: System, differences: bool
-) -> None:
+def test_like_parts_of_a_linear_machine_are_filtered_exactly(filling, vessels, differences):
     """400 samples; rounding adds up to 1e-9, differences of a linear model to 1e-6."""
     filling.has_directional_derivatives = not differences
     plain, estimator = made(filling, vessels)
@@ -280,9 +276,7 @@ def blind(estimator: BlockKalmanFilter, samples: Any, k: int) -> tuple[Vector, M
     return expected
 
 
-def test_a_step_keeps_what_is_known_of_a_block_and_the_shared_unknowns(
-    rolling: FMU, train: System
-) -> None:
+def test_a_step_keeps_what_is_known_of_a_block_and_the_shared_unknowns(rolling, train):
     """Amid a stop, against matrices of all unknowns, to rounding; pairs of blocks nearly."""
     _, estimator = made(rolling, train)
     z, P = blind(estimator, growth.stop(train), 60)
@@ -294,7 +288,7 @@ def test_a_step_keeps_what_is_known_of_a_block_and_the_shared_unknowns(
     assert 1e-6 < apart.max() < 0.01  # what a bogie in front has in common with one behind
 
 
-def test_a_sample_is_taken_as_by_matrices_of_all_unknowns(rolling: FMU, train: System) -> None:
+def test_a_sample_is_taken_as_by_matrices_of_all_unknowns(rolling, train):
     """After no time, within which nothing moves; y tells of all unknowns at once."""
     _, estimator = made(rolling, train)
     t, u, y = growth.stop(train)
@@ -362,7 +356,7 @@ def stops(
         yield (h * np.arange(samples), u, y), truth
 
 
-def test_estimates_of_a_train_are_those_of_the_extended_filter(rolling: FMU, train: System) -> None:
+def test_estimates_of_a_train_are_those_of_the_extended_filter(rolling, train):
     """Thirty stops. Differences of d standard deviations add d^2/2 to a root mean square error, and
     bands that are 3 % narrower hold 94.3 % in place of 95 %.
     """
@@ -390,9 +384,7 @@ def test_estimates_of_a_train_are_those_of_the_extended_filter(rolling: FMU, tra
     [({"mass": 1.2 * 48e3}, 0.15), ({"share": np.array([1.0, 0.0, 1.0, 1.0])}, 1.0)],
     ids=["laden", "released"],
 )
-def test_what_is_known_of_unlike_bogies_is_a_covariance(
-    rolling: FMU, train: System, unlike: dict[str, Any], within: float
-) -> None:
+def test_what_is_known_of_unlike_bogies_is_a_covariance(rolling, train, unlike, within):
     """Along a stop in which a vehicle has a fifth more mass, or a bogie does not brake at all.
 
     Of that the friction seems known better than it is; of the laden one nearly as well as it is.

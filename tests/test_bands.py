@@ -23,7 +23,7 @@ NAMES = ["open_loop", "ekf", "mhe"]
 
 
 @pytest.fixture(scope="module")
-def vessel(tmp_path_factory: pytest.TempPathFactory) -> System:
+def vessel(tmp_path_factory) -> System:
     folder = tmp_path_factory.mktemp("vessel")
     return declare(folder, VESSEL, SYSTEM)
 
@@ -41,9 +41,7 @@ def result_of(system: System, noise: float, seed: int, leak: float = 0.0) -> Cas
     return prepare(system, choose(system, NAMES)).run(case)
 
 
-def test_innovations_do_not_contradict_bands_of_a_model_and_noise_that_are_right(
-    vessel: System,
-) -> None:
+def test_innovations_do_not_contradict_bands_of_a_model_and_noise_that_are_right(vessel):
     results = [result_of(vessel, 1.0, seed) for seed in range(20)]
     assert all(not result.contradicted for result in results)
     # The test has something to go by, though the first sample has no innovation.
@@ -52,9 +50,7 @@ def test_innovations_do_not_contradict_bands_of_a_model_and_noise_that_are_right
     assert format_table(vessel, results[:1]).splitlines()[1].startswith("case")
 
 
-def test_bands_that_innovations_contradict_are_told_at_the_top_of_all_that_is_read(
-    vessel: System,
-) -> None:
+def test_bands_that_innovations_contradict_are_told_at_the_top_of_all_that_is_read(vessel):
     result = result_of(vessel, 3.0, 0)
     assert list(result.contradicted) == ["ekf", "mhe"]
     said = "Bands of ekf are too narrow in filled: innovations have "
@@ -67,7 +63,7 @@ def test_bands_that_innovations_contradict_are_told_at_the_top_of_all_that_is_re
     )
 
 
-def test_innovations_that_turn_say_that_walks_are_smaller_and_not_that_the_start_is_off() -> None:
+def test_innovations_that_turn_say_that_walks_are_smaller_and_not_that_the_start_is_off():
     turning = (-1.0) ** np.arange(400) + np.random.default_rng(2).standard_normal(400)
     (test,) = residual_tests({"V": turning}, {"V": np.ones(400)})
     assert not test.narrow
@@ -75,7 +71,7 @@ def test_innovations_that_turn_say_that_walks_are_smaller_and_not_that_the_start
     assert likely_reason(test, "", False, True) == "walks are smaller than the system file says"
 
 
-def test_bands_that_are_too_wide_are_told_as_well(vessel: System) -> None:
+def test_bands_that_are_too_wide_are_told_as_well(vessel):
     result = result_of(vessel, 0.2, 0)
     (test,) = [t for t in result.contradictions["ekf"] if t.test == "variance"]
     assert not test.narrow
@@ -83,7 +79,7 @@ def test_bands_that_are_too_wide_are_told_as_well(vessel: System) -> None:
     assert "Bands of ekf are too wide in filled: innovations have 0." in result.summary()
 
 
-def test_a_start_that_is_farther_off_than_it_is_said_to_be_is_named(vessel: System) -> None:
+def test_a_start_that_is_farther_off_than_it_is_said_to_be_is_named(vessel):
     """A leak of 20 standard deviations of what is known of it, to which the filter settles."""
     result = result_of(vessel, 1.0, 0, leak=2e-4)
     narrow = [test for test in result.contradictions["ekf"] if test.narrow]
@@ -107,7 +103,7 @@ def innovations(
     return {"y": np.array(values)[20:]}, {"y": np.array(deviations)[20:]}
 
 
-def test_residuals_of_a_right_filter_pass_both_tests() -> None:
+def test_residuals_of_a_right_filter_pass_both_tests():
     rng = np.random.default_rng(1)
     flagged = sum(bool(residual_tests(*innovations(rng, 0.3, 0.3))) for _ in range(1000))
     # Chance makes one in a thousand; seven or more of a Poisson number of one, one in 12 000.
@@ -115,15 +111,13 @@ def test_residuals_of_a_right_filter_pass_both_tests() -> None:
 
 
 @pytest.mark.parametrize(("walk", "narrow"), [(1.5, True), (0.05, False)])
-def test_a_walk_that_is_wrong_shows_in_what_follows_from_sample_to_sample(
-    walk: float, narrow: bool
-) -> None:
+def test_a_walk_that_is_wrong_shows_in_what_follows_from_sample_to_sample(walk, narrow):
     rng = np.random.default_rng(2)
     found = [residual_tests(*innovations(rng, walk, 0.3, count=4000)) for _ in range(20)]
     assert all(any(t.test == "whiteness" and t.narrow is narrow for t in tests) for tests in found)
 
 
-def test_a_mean_shows_though_it_is_far_below_the_noise() -> None:
+def test_a_mean_shows_though_it_is_far_below_the_noise():
     rng = np.random.default_rng(3)
     residuals, deviations = innovations(rng, 0.05, 0.05, count=4000)
     residuals["y"] += 0.2  # of the noise, whose estimate is sure to 0.22 of it
@@ -163,9 +157,7 @@ acts_on = "i"
 
 @pytest.mark.parametrize("step", [1e-4, 1e-3, 5e-3])
 @pytest.mark.parametrize("name", ["ekf", "ukf", "mhe"])
-def test_bands_hold_or_what_is_said_is_that_samples_are_too_far_apart(
-    tmp_path: Path, name: str, step: float
-) -> None:
+def test_bands_hold_or_what_is_said_is_that_samples_are_too_far_apart(tmp_path, name, step):
     """A sound coil, from a thirtieth to twice its time constant of 3 ms; nothing is lost in it."""
     system = declare(tmp_path / "coil", COIL, COIL_FILE.format(step=step))
     rng, count = np.random.default_rng(4), 2000
@@ -244,7 +236,7 @@ def swing(folder: Path, samples: int, mistuned: float = 1.0) -> CaseResult:
     return prepare(system, choose(system, ["open_loop"])).run(case)
 
 
-def test_an_error_that_steps_make_is_not_put_down_to_the_model(tmp_path: Path) -> None:
+def test_an_error_that_steps_make_is_not_put_down_to_the_model(tmp_path):
     result = swing(tmp_path / "coarse", samples=200)
     # Euler's implicit step of a swing: a period of n samples leaves exp(-2 pi^2 / n) of it.
     time = result.case.time
@@ -257,7 +249,7 @@ def test_an_error_that_steps_make_is_not_put_down_to_the_model(tmp_path: Path) -
     assert said in format_table(result.system, [result])
 
 
-def test_an_error_that_the_model_makes_is_not_put_down_to_steps(tmp_path: Path) -> None:
+def test_an_error_that_the_model_makes_is_not_put_down_to_steps(tmp_path):
     """A spring that is softer by a fifth: steps leave 0.91 of the swing, and its phase is lost."""
     result = swing(tmp_path / "fine", samples=2000, mistuned=0.9)
     assert result.step_share == 0.0

@@ -21,14 +21,12 @@ from workbench.cli.schemas import summaries
 from workbench.errors import InputError
 from workbench.models.compiler.benchmark import CallTimes, time_sources
 from workbench.models.description import read_description
-from workbench.models.fmu import FMU
-from workbench.system.system import System
 
 STEP = 0.005  # [s]
 
 
 @pytest.fixture
-def at(minimal: FMU, system: System) -> Matrix:
+def at(minimal, system) -> Matrix:
     return points(minimal, system, np.random.default_rng(1))
 
 
@@ -48,7 +46,7 @@ def change_source(fmu: Path, changed: Path, name: str, right: str, wrong: str) -
     return changed
 
 
-def test_calls_of_the_minimal_model_take_nanoseconds(minimal_path: Path, at: Matrix) -> None:
+def test_calls_of_the_minimal_model_take_nanoseconds(minimal_path, at):
     times = timed(minimal_path, at)
     assert (times.states, times.inputs) == (2, 6)
     # 50 operations and five elementary functions: no computer needs less than 5 ns or, through
@@ -62,7 +60,7 @@ def test_calls_of_the_minimal_model_take_nanoseconds(minimal_path: Path, at: Mat
     assert times.ratios()["jacobian"] < 2.0
 
 
-def test_the_schema_of_times_has_what_is_written_of_them() -> None:
+def test_the_schema_of_times_has_what_is_written_of_them():
     """A run of the command takes minutes; its file is made of these."""
     sections = summaries()["bench"]["properties"]
     observers, tuning = (sections[name]["properties"] for name in ("observers", "tuning"))
@@ -83,9 +81,7 @@ def test_the_schema_of_times_has_what_is_written_of_them() -> None:
         assert not schema["additionalProperties"]
 
 
-def test_a_delay_in_the_interface_shows_in_the_ratio(
-    minimal_path: Path, tmp_path: Path, at: Matrix
-) -> None:
+def test_a_delay_in_the_interface_shows_in_the_ratio(minimal_path, tmp_path, at):
     slow = change_source(
         minimal_path,
         tmp_path / "slow.fmu",
@@ -106,14 +102,14 @@ def test_a_delay_in_the_interface_shows_in_the_ratio(
     ],
 )
 def test_an_interface_that_gives_other_numbers_is_refused(
-    minimal_path: Path, tmp_path: Path, at: Matrix, right: str, wrong: str, found: str
-) -> None:
+    minimal_path, tmp_path, at, right, wrong, found
+):
     changed = change_source(minimal_path, tmp_path / "wrong.fmu", "instance.c", right, wrong)
     with pytest.raises(InputError, match=rf"wrong\.fmu: found {found}"):
         timed(changed, at)
 
 
-def test_sources_of_fmi_3_are_refused(root: Path, tmp_path: Path, at: Matrix) -> None:
+def test_sources_of_fmi_3_are_refused(root, tmp_path, at):
     path = tmp_path / "three.fmu"
     shutil.copyfile(root / "fmus" / "fmi3" / "MinimalObserver.fmu", path)
     with pytest.raises(InputError, match=r"C sources of FMI 2\.0 that compile"):

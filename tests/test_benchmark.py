@@ -7,19 +7,14 @@ from numpy.testing import assert_allclose, assert_array_equal
 from workbench.benchmark.observers import plain_filters, resample
 from workbench.benchmark.other_loops import open_loop
 from workbench.machines.wheelset.benchmark import LOOPS, by_fmpy
-from workbench.models.fmu import FMU
 from workbench.observers import choose
 from workbench.observers.estimators.disturbance import DisturbanceObserver
 from workbench.observers.estimators.open_loop import OpenLoop
-from workbench.recordings.case import Case
 from workbench.system.registry import open_model
-from workbench.system.system import System
 
 
 @pytest.mark.parametrize("name", LOOPS)
-def test_compiled_laws_agree_with_loops_written_in_numpy(
-    system: System, dry_case: Case, name: str
-) -> None:
+def test_compiled_laws_agree_with_loops_written_in_numpy(system, dry_case, name):
     """Coasting, braking and standstill. 1e-9 of a column's largest value: rounding, grown 1e4."""
     samples = (dry_case.time, dry_case.u, dry_case.y)
     system = plain_filters(system)
@@ -38,9 +33,7 @@ def test_compiled_laws_agree_with_loops_written_in_numpy(
         assert_allclose(ours.nis, theirs.nis, rtol=1e-6, atol=1e-8)
 
 
-def test_the_model_alone_goes_the_same_way_by_fmpy(
-    system: System, minimal: FMU, dry_case: Case
-) -> None:
+def test_the_model_alone_goes_the_same_way_by_fmpy(system, minimal, dry_case):
     """Coasting, braking and standstill, as above."""
     samples = (dry_case.time, dry_case.u, dry_case.y)
     ours = OpenLoop(minimal, system, OpenLoop.default_gains(minimal, system)).run(*samples).values
@@ -53,9 +46,7 @@ def test_the_model_alone_goes_the_same_way_by_fmpy(
     assert_allclose(ours / scale, theirs / scale, rtol=0, atol=1e-9)
 
 
-def test_plain_c_gives_the_same_bits_as_the_compiled_law(
-    system: System, minimal: FMU, dry_case: Case
-) -> None:
+def test_plain_c_gives_the_same_bits_as_the_compiled_law(system, minimal, dry_case):
     """Same arithmetic in the same order, and neither compiler may contract or reorder it."""
     pytest.importorskip("ziglang")
     from workbench.machines.wheelset.benchmark.c_loop import CLoop
@@ -67,7 +58,7 @@ def test_plain_c_gives_the_same_bits_as_the_compiled_law(
     assert_array_equal(ours.values, theirs)
 
 
-def test_resampling_keeps_the_recorded_samples(dry_case: Case) -> None:
+def test_resampling_keeps_the_recorded_samples(dry_case):
     """Of five samples at 1 kHz, the first is one recorded at 200 Hz, up to rounding of times."""
     _, u, y = resample(dry_case, 1000.0)
     assert_allclose(u[::5], dry_case.u[: len(u[::5])], rtol=1e-9, atol=1e-6)
@@ -75,8 +66,8 @@ def test_resampling_keeps_the_recorded_samples(dry_case: Case) -> None:
 
 
 def test_a_sample_of_the_moving_horizon_takes_a_twentieth_of_the_same_problem_in_ipopt(
-    system: System, dry_case: Case
-) -> None:
+    system, dry_case
+):
     """That both find the same cost is part of the measurement; it takes about a thousandth."""
     pytest.importorskip("casadi")
     pytest.importorskip("rumoca")

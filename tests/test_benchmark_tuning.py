@@ -5,7 +5,6 @@ import subprocess
 import sys
 from dataclasses import replace
 from importlib.util import find_spec
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -27,20 +26,17 @@ from workbench.machines.wheelset.benchmark import by_fmpy
 from workbench.observers.estimators.disturbance import DisturbanceObserver
 from workbench.recordings.case import Case
 from workbench.system.registry import open_model
-from workbench.system.system import System
 
 SAMPLES = slice(700, 1300)  # 3 s: first pressure and the beginning of the stop
 MB = 1e6
 
 
 @pytest.fixture(scope="module")
-def case(dry_case: Case) -> Case:
+def case(dry_case) -> Case:
     return dry_case.part(SAMPLES)
 
 
-def test_evaluations_by_the_tuning_and_by_fmpy_agree_and_are_timed(
-    system: System, case: Case
-) -> None:
+def test_evaluations_by_the_tuning_and_by_fmpy_agree_and_are_timed(system, case):
     rows = time_evaluations(case, system)
     assert [row.estimator for row in rows] == ["disturbance_observer", "parameter_estimator"]
     for row in rows:
@@ -51,7 +47,7 @@ def test_evaluations_by_the_tuning_and_by_fmpy_agree_and_are_timed(
         assert row.ratios() == {"fmpy": row.fmpy / row.ours}
 
 
-def test_times_of_evaluations_that_disagree_are_refused(system: System, case: Case) -> None:
+def test_times_of_evaluations_that_disagree_are_refused(system, case):
     """The other counts the force a millionth more."""
     job = tuning_job(DisturbanceObserver, system, [case])
     weights = {**system.objective.weights, "Fx": 1.000001e-3}
@@ -64,7 +60,7 @@ def test_times_of_evaluations_that_disagree_are_refused(system: System, case: Ca
         time_evaluation(job, functools.partial(evaluate_by_loop, loop, case, heavier))
 
 
-def test_rates_of_workers_are_measured(system: System, case: Case) -> None:
+def test_rates_of_workers_are_measured(system, case):
     rates = time_workers([case], system, candidates=4)
     assert (rates.cases, rates.candidates) == (1, 4)
     assert min(rates.one, rates.two) > 0.0
@@ -77,9 +73,7 @@ def test_rates_of_workers_are_measured(system: System, case: Case) -> None:
 
 
 @pytest.mark.long
-def test_memory_of_master_and_workers_is_measured(
-    root: Path, system: System, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_memory_of_master_and_workers_is_measured(root, system, monkeypatch):
     monkeypatch.chdir(root)
     memory = observe_memory([root / "cases" / "03_dry_120_3.6"], system)
     # numba and its compiler alone take 80 MB in each.
@@ -88,7 +82,7 @@ def test_memory_of_master_and_workers_is_measured(
     assert memory.total > memory.master + 1.8 * memory.worker
 
 
-def test_a_process_does_not_have_the_peak_of_the_one_that_started_it() -> None:
+def test_a_process_does_not_have_the_peak_of_the_one_that_started_it():
     """It does by `getrusage`."""
     ballast = np.ones(50_000_000)  # 400 MB
     program = "from workbench.benchmark.memory import peak_memory; print(peak_memory())"
@@ -97,7 +91,7 @@ def test_a_process_does_not_have_the_peak_of_the_one_that_started_it() -> None:
     assert int(run.stdout) < 100 * MB
 
 
-def test_a_watched_command_counts_with_what_it_starts() -> None:
+def test_a_watched_command_counts_with_what_it_starts():
     """100 MB in a process that lives for half a second, 25 looks, beside 200 MB in the first."""
     program = (
         "import subprocess, sys, time\n"
@@ -115,7 +109,7 @@ def test_a_watched_command_counts_with_what_it_starts() -> None:
         watch_command([sys.executable, "-c", "raise SystemExit(3)"])
 
 
-def test_the_table_has_the_ratios_and_says_what_was_not_measured() -> None:
+def test_the_table_has_the_ratios_and_says_what_was_not_measured():
     evaluations = [EvaluationTimes("disturbance_observer", 6233, 0.003, 0.45, 0.1)]
     memory = TuningMemory(master=290_000_000, worker=270_000_000, total=840_000_000)
     rates = WorkerRates(cases=14, candidates=60, one=15.0, two=28.5, dask=27.0)

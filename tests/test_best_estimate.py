@@ -1,6 +1,5 @@
 """The best estimate of a recording, with the nominal and with the extended model."""
 
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -16,7 +15,6 @@ from workbench.diagnosis.inference.best_estimate import bands, best_estimate
 from workbench.machines.wheelset.rig import Effects, select
 from workbench.observers.simulation import CaseResult
 from workbench.recordings.case import read_cases
-from workbench.system.system import System
 
 from .recordings import record
 
@@ -25,7 +23,7 @@ GAIN = 0.04  # of the measured torque, which is most of the balance that the for
 
 
 @pytest.fixture(scope="module")
-def outcome(system: System, tmp_path_factory: pytest.TempPathFactory) -> Outcome:
+def outcome(system, tmp_path_factory) -> Outcome:
     """Of two stops whose torque was measured too large."""
     folder = tmp_path_factory.mktemp("torque")
     for scenario in select(STOPS):
@@ -37,14 +35,12 @@ def outcome(system: System, tmp_path_factory: pytest.TempPathFactory) -> Outcome
 
 
 @pytest.fixture(scope="module")
-def estimates(outcome: Outcome) -> dict[str, CaseResult]:
+def estimates(outcome) -> dict[str, CaseResult]:
     found = {case.name: best_estimate(outcome, case.name) for case in outcome.cases}
     return {name: one for name, one in found.items() if one is not None}
 
 
-def test_the_band_holds_what_the_load_cells_say_once_the_model_is_extended(
-    outcome: Outcome, estimates: Mapping[str, CaseResult]
-) -> None:
+def test_the_band_holds_what_the_load_cells_say_once_the_model_is_extended(outcome, estimates):
     """The nominal model takes 4 % of torque for force, some forty standard deviations."""
     (cause,) = outcome.diagnosis.causes
     assert cause.effect.name == "DriveTorqueGain"
@@ -59,7 +55,7 @@ def test_the_band_holds_what_the_load_cells_say_once_the_model_is_extended(
     assert max(inside["nominal_model"]) < 0.1
 
 
-def test_load_cells_feed_no_estimate(outcome: Outcome, estimates: Mapping[str, CaseResult]) -> None:
+def test_load_cells_feed_no_estimate(outcome, estimates):
     """Without them the numbers are the same, but for the share of them that is inside."""
     case = outcome.cases[0]
     signals = {name: values for name, values in case.signals.items() if name != "Fx"}
@@ -72,7 +68,7 @@ def test_load_cells_feed_no_estimate(outcome: Outcome, estimates: Mapping[str, C
         assert bands(found)[model]["Fx"]["inside"] is None
 
 
-def test_where_errors_have_no_explanation_there_is_no_best_estimate(outcome: Outcome) -> None:
+def test_where_errors_have_no_explanation_there_is_no_best_estimate(outcome):
     unexplained = replace(outcome.diagnosis, verdict="unexplained")
     name = outcome.cases[0].name
     assert best_estimate(replace(outcome, diagnosis=unexplained), name) is None

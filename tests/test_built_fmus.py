@@ -14,7 +14,7 @@ from workbench.runtime.resources import fmus
 from workbench.system.installed import built_models
 
 
-def test_fmus_are_those_of_their_manifest_and_it_is_of_these_sources() -> None:
+def test_fmus_are_those_of_their_manifest_and_it_is_of_these_sources():
     """Libraries and the compiler, whose code is among the sources; nothing is built."""
     manifest = json.loads((fmus() / "manifest.json").read_text(encoding="utf-8"))
     assert manifest["source_sha256"] == source_hash(*built_models())
@@ -26,6 +26,6 @@ def test_fmus_are_those_of_their_manifest_and_it_is_of_these_sources() -> None:
 
 
 @pytest.mark.long
-def test_fmus_match_their_sources() -> None:
+def test_fmus_match_their_sources():
     """Builds all of them for all platforms, unless this machine has built these sources before."""
     assert main(["fmu", "build", "--all", "--check"]) == 0

@@ -53,21 +53,21 @@ def whole(negative: bool) -> Whole:
 
 
 @pytest.mark.parametrize("negative", [False, True])
-def test_a_law_reads_what_python_reads(negative: bool) -> None:
+def test_a_law_reads_what_python_reads(negative):
     """Arrays, numbers, truth values, tuples within tuples, and one of several by its number."""
     given = whole(negative)
     for k in range(3):
         assert everything(given, k) == everything.py_func(given, k)
 
 
-def test_what_a_law_writes_into_arrays_is_seen_by_itself_and_by_its_caller() -> None:
+def test_what_a_law_writes_into_arrays_is_seen_by_itself_and_by_its_caller():
     """Addresses are read once, what lies there each time."""
     part = Part(np.zeros(5), 0.25)
     assert fill(part, 8) == 2.0
     assert (part.values == 2.0).all()
 
 
-def test_arrays_of_one_call_are_not_those_of_the_next() -> None:
+def test_arrays_of_one_call_are_not_those_of_the_next():
     assert [weighted(Part(np.full(2, one), 1.0)) for one in (1.0, 2.0, 3.0)] == [2.0, 4.0, 6.0]
 
 
@@ -81,12 +81,12 @@ def difference(pair: Any) -> float:
     return pair.first - pair.second  # type: ignore[no-any-return]
 
 
-def test_classes_of_one_name_may_have_their_fields_in_another_order() -> None:
+def test_classes_of_one_name_may_have_their_fields_in_another_order():
     one, other = [("first", float), ("second", float)], [("second", float), ("first", float)]
     assert difference(_named(one)(5.0, 3.0)) == 2.0
     assert difference(_named(other)(5.0, 3.0)) == -2.0
 
 
-def test_a_field_that_there_is_not_is_named() -> None:
+def test_a_field_that_there_is_not_is_named():
     with pytest.raises(TypingError, match="first"):
         difference(Part(np.zeros(1), 1.0))

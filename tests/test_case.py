@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 from workbench.recordings.case import read_cases, sign
-from workbench.system.system import System
 
 from .case_folders import (
     LINES,
@@ -35,7 +34,7 @@ STANDARD = Path(__file__).parents[1] / "cases"
 # What is read
 
 
-def test_all_fourteen_standard_cases_are_read_in_order(system: System):
+def test_all_fourteen_standard_cases_are_read_in_order(system):
     cases = read_cases([STANDARD], system)
     assert [case.name[:2] for case in cases] == [f"{n:02d}" for n in range(1, 15)]
     for case in cases:
@@ -219,7 +218,7 @@ def test_a_field_is_read_as_the_number_it_shows_or_refused_at_its_line(
 # Folders
 
 
-def test_folders_of_cases_and_cases_are_read_together(tmp_path, system: System):
+def test_folders_of_cases_and_cases_are_read_together(tmp_path, system):
     for name in ("all/02_b", "all/01_a", "all/named", "00_c"):
         write(tmp_path / name)
     (tmp_path / "all" / "plots").mkdir()

@@ -102,7 +102,7 @@ SCALE, BEND, TEETH, NOISE = 2.1, 0.3, 3.0, 0.1
 
 
 @pytest.fixture(scope="module")
-def fits(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Fit]]:
+def fits(tmp_path_factory) -> Iterator[dict[str, Fit]]:
     """Two pulls of a gauge with each of the effects."""
     folder = tmp_path_factory.mktemp("gauge")
     system, rng = declare(folder, LIBRARY, SYSTEM), np.random.default_rng(1)
@@ -146,9 +146,7 @@ def least(fit: Fit, best: FittedModel, size: float) -> float:
     return float(minimize_scalar(deviance, bounds=(1.0, 3.0), options={"xatol": 1e-5}).fun)
 
 
-def test_at_the_ends_by_noise_alone_the_least_chi_squared_has_risen_by_3_84(
-    fits: dict[str, Fit],
-) -> None:
+def test_at_the_ends_by_noise_alone_the_least_chi_squared_has_risen_by_3_84(fits):
     fit = fits["Bend"]
     best = begun(fit, "Bend", BEND)
     found = assess(fit, best, lambda _: None)
@@ -163,9 +161,7 @@ def test_at_the_ends_by_noise_alone_the_least_chi_squared_has_risen_by_3_84(
     assert 1.02 < (best.point.sizes[key] - low) / (high - best.point.sizes[key]) < 2.0
 
 
-def test_errors_go_together_as_the_inverse_of_all_products_of_derivatives_says(
-    fits: dict[str, Fit],
-) -> None:
+def test_errors_go_together_as_the_inverse_of_all_products_of_derivatives_says(fits):
     """Closed form: the bend has the derivative u exp(b u), the scale u, in means of blocks."""
     fit = fits["Bend"]
     found = assess(fit, begun(fit, "Bend", BEND), lambda _: None)
@@ -177,16 +173,14 @@ def test_errors_go_together_as_the_inverse_of_all_products_of_derivatives_says(
     assert_allclose(found.correlations, [[1.0, expected], [expected, 1.0]], atol=2e-3)
 
 
-def test_a_law_with_one_minimum_is_found_from_everywhere(fits: dict[str, Fit]) -> None:
+def test_a_law_with_one_minimum_is_found_from_everywhere(fits):
     fit = fits["Bend"]
     found = assess(fit, begun(fit, "Bend", BEND), lambda _: None)
     assert found.same == len(found.behind) == 4
     assert found.lower == 0.0
 
 
-def test_of_a_law_with_many_minima_some_starts_end_elsewhere_and_none_lower(
-    fits: dict[str, Fit],
-) -> None:
+def test_of_a_law_with_many_minima_some_starts_end_elsewhere_and_none_lower(fits):
     fit = fits["Ripple"]
     found = assess(fit, begun(fit, "Ripple", TEETH), lambda _: None)
     assert 0 < found.same < 4
@@ -194,7 +188,7 @@ def test_of_a_law_with_many_minima_some_starts_end_elsewhere_and_none_lower(
     assert "none lower" in found.sentence
 
 
-def test_a_fit_that_sits_in_a_wrong_minimum_is_told(fits: dict[str, Fit]) -> None:
+def test_a_fit_that_sits_in_a_wrong_minimum_is_told(fits):
     fit = fits["Ripple"]
     wrong = begun(fit, "Ripple", 0.5 * TEETH)
     assert abs(wrong.point.sizes["Ripple", "k"] - TEETH) > 1.0

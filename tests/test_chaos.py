@@ -16,7 +16,7 @@ from tests.processes import comes_true
 
 
 @pytest.fixture(scope="module")
-def tune(tmp_path_factory: pytest.TempPathFactory) -> Undisturbed:
+def tune(tmp_path_factory) -> Undisturbed:
     folder = tmp_path_factory.mktemp("tune")
     command, *_ = commands(folder / "cases")
     return undisturbed(command, folder)
@@ -26,8 +26,8 @@ def tune(tmp_path_factory: pytest.TempPathFactory) -> Undisturbed:
 @pytest.mark.long
 @pytest.mark.parametrize("kind", ["interrupt", "full disk"])
 def test_a_tuning_that_is_ended_goes_on_to_the_same_gains_and_leaves_no_process(
-    kind: str, tune: Undisturbed, tmp_path: Path
-) -> None:
+    kind, tune, tmp_path
+):
     if kind == "full disk" and not can_starve():
         pytest.skip("this machine lets users mount no disk of their own")
     failures = disturb(tune, kind, Random(kind), tmp_path)
@@ -66,13 +66,8 @@ STAYS = "subprocess.Popen(['sh', '-c', 'trap : INT; sleep 5; sleep 5'])"
     ids=["nothing", "leaves a file", "leaves a process", "traceback", "other results"],
 )
 def test_what_an_ended_command_must_not_do_is_named(
-    begins: str,
-    wrote: str,
-    ends: str,
-    what: set[str],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    begins, wrote, ends, what, tmp_path, monkeypatch
+):
     monkeypatch.setattr(harness, "comes_true", lambda condition: condition())  # waits for none
     (tmp_path / "toy.py").write_text(TOY.format(begins=begins, wrote=wrote, ends=ends))
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))

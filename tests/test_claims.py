@@ -67,7 +67,7 @@ def simulate(package: Path, claim: str, scratch: Path) -> list[str]:
 
 
 @pytest.mark.parametrize("library", LIBRARIES, ids=lambda library: library.name)
-def test_every_claim_is_listed(library: Path) -> None:
+def test_every_claim_is_listed(library):
     listed = [claim for one, claim in CLAIMS if one == library]
     assert sorted(listed) == sorted(p.stem for p in (library / "Tests").glob("[A-Z]*.mo"))
 
@@ -77,12 +77,12 @@ def test_every_claim_is_listed(library: Path) -> None:
     [parameters(*claim) for claim in CLAIMS],
     ids=lambda value: getattr(value, "name", value),
 )
-def test_claim(library: Path, claim: str, tmp_path: Path) -> None:
+def test_claim(library, claim, tmp_path):
     assert simulate(library / "package.mo", claim, tmp_path) == []
 
 
 @pytest.mark.parametrize("library", LIBRARIES, ids=lambda library: library.name)
-def test_what_a_claim_allows_its_solver_is_what_it_asks_of_it(library: Path) -> None:
+def test_what_a_claim_allows_its_solver_is_what_it_asks_of_it(library):
     for claim in (library / "Tests").glob("[A-Z]*.mo"):
         text = claim.read_text()
         allowed = re.findall(r"constant Real tolerance\(.*?\) = (\S+)", text)
@@ -91,7 +91,7 @@ def test_what_a_claim_allows_its_solver_is_what_it_asks_of_it(library: Path) -> 
         assert allowed in ([], asked), claim.name
 
 
-def test_a_wrong_claim_fails_with_its_text(tmp_path: Path) -> None:
+def test_a_wrong_claim_fails_with_its_text(tmp_path):
     copy = tmp_path / "WheelsetRig"
     shutil.copytree(RIG, copy)
     claim = copy / "Tests" / "PolachSlopeIsKalkerStiffness.mo"

@@ -55,7 +55,7 @@ def run_fmpy(path: Path, interface: str) -> np.ndarray:
 
 
 @VERSIONS
-def test_model_exchange_under_fmpy_follows_a_ramp_whose_rows_stand_twice(fmi: int) -> None:
+def test_model_exchange_under_fmpy_follows_a_ramp_whose_rows_stand_twice(fmi):
     """FMPy sets inputs where its solver has returned, which may have stepped far past that.
 
     At a time that stands twice it starts anew. Against Co-Simulation with the same inputs, held
@@ -153,7 +153,7 @@ CLIENTS: dict[str, Callable[[Path], np.ndarray]] = {
 @MODELS
 @VERSIONS
 @pytest.mark.parametrize("client", CLIENTS)
-def test_every_client_computes_the_same_stop(model: str, fmi: int, client: str) -> None:
+def test_every_client_computes_the_same_stop(model, fmi, client):
     reference = run_fmpy(fmu_path(2, model), "ModelExchange")
     found = CLIENTS[client](fmu_path(fmi, model))
     # At the jump itself a client may show the force before or after it.
@@ -166,7 +166,7 @@ def test_every_client_computes_the_same_stop(model: str, fmi: int, client: str) 
 
 
 @MODELS
-def test_the_stop_brakes(model: str) -> None:
+def test_the_stop_brakes(model):
     """What the clients agree on is a stop: coasting, then the brake's deceleration."""
     omegaW, omegaR, Fx = run_fmpy(fmu_path(2, model), "ModelExchange").T
     # Three discs at 0.30*10.86 kN/bar*(2 - 0.25) bar and 0.300 m, less the share that slows the
@@ -205,7 +205,7 @@ def they_are_one_system(theirs: FMU, ours: FMU) -> None:
 
 @MODELS
 @pytest.mark.parametrize("interface", ["ModelExchange", "CoSimulation"])
-def test_openmodelica_builds_the_same_stop(model: str, interface: str, tmp_path: Path) -> None:
+def test_openmodelica_builds_the_same_stop(model, interface, tmp_path):
     """The second compiler, from the same sources; only where it is installed."""
     if shutil.which("omc") is None:
         pytest.skip("needs OpenModelica's omc")

@@ -70,7 +70,7 @@ def files(home: Path) -> list[Path]:
     return sorted(home.rglob("native.solve*.code"))
 
 
-def test_kept_code_is_used_and_damaged_code_is_made_again(home: Path) -> None:
+def test_kept_code_is_used_and_damaged_code_is_made_again(home):
     assert solved(home) == "0 kept"
     assert solved(home) == "1 kept"
     (file,) = files(home)
@@ -87,9 +87,7 @@ def test_kept_code_is_used_and_damaged_code_is_made_again(home: Path) -> None:
 @pytest.mark.parametrize(
     "name", ["observers/estimators/kalman.py", "models/native.py", "models/jit.py"]
 )
-def test_code_is_made_again_when_what_makes_it_changes(
-    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_code_is_made_again_when_what_makes_it_changes(name, tmp_path, monkeypatch):
     """A law, what all laws call, and what compiles them."""
     package = tmp_path / "workbench"
     shutil.copytree(ROOT / "workbench", package)
@@ -101,7 +99,7 @@ def test_code_is_made_again_when_what_makes_it_changes(
     assert jit._folder.__wrapped__() != before
 
 
-def test_what_two_processes_need_at_once_is_compiled_by_one(home: Path) -> None:
+def test_what_two_processes_need_at_once_is_compiled_by_one(home):
     both = [started(home) for _ in range(2)]
     told = []
     for process in both:
@@ -113,7 +111,7 @@ def test_what_two_processes_need_at_once_is_compiled_by_one(home: Path) -> None:
 
 
 @pytest.mark.skipif(os.name != "posix", reason="there each process compiles for itself")
-def test_who_dies_while_it_compiles_leaves_the_turn_to_the_next(home: Path) -> None:
+def test_who_dies_while_it_compiles_leaves_the_turn_to_the_next(home):
     with started(home, program=DYING) as first:
         assert first.stdout is not None
         assert first.stdout.readline() == "compiling\n"
@@ -125,14 +123,14 @@ def test_who_dies_while_it_compiles_leaves_the_turn_to_the_next(home: Path) -> N
 
 
 @pytest.mark.parametrize("home", ["/dev/null", "/proc", "", None])
-def test_without_a_place_to_keep_it_code_is_compiled_in_each_process(home: str | None) -> None:
+def test_without_a_place_to_keep_it_code_is_compiled_in_each_process(home):
     """A file, a folder that nothing can be made in, none at all."""
     cache = {"XDG_CACHE_HOME": "/dev/null/cache"} if not home else {}
     assert solved(home, **cache) == "0 kept"
 
 
 @pytest.mark.skipif(os.name != "posix" or os.geteuid() != 0, reason="takes another user's part")
-def test_a_user_without_a_home_keeps_nothing() -> None:
+def test_a_user_without_a_home_keeps_nothing():
     program = (
         "import os, platformdirs, workbench.models.fmu_cache\n"
         "os.setuid(54321)\n"  # of nobody
@@ -152,7 +150,7 @@ def test_a_user_without_a_home_keeps_nothing() -> None:
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="confines itself to reading by Landlock")
-def test_a_folder_that_can_only_be_read_is_used(home: Path) -> None:
+def test_a_folder_that_can_only_be_read_is_used(home):
     reading = f"from workbench.runtime.supervision import confine; confine([]); exec({PROGRAM!r})"
     assert solved(home, reading) == "0 kept"
     assert solved(home) == "0 kept"

@@ -6,7 +6,6 @@ import re
 import subprocess
 import sys
 import tomllib
-from pathlib import Path
 
 import pytest
 
@@ -19,7 +18,7 @@ PARSERS = [parser for parser in parsers(command_line("")) if " " in parser.prog]
 
 
 @pytest.fixture(autouse=True)
-def _from_the_checkout(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def _from_the_checkout(root, monkeypatch) -> None:
     monkeypatch.chdir(root)
 
 
@@ -35,9 +34,7 @@ def document(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> dict[s
 # --- one way to say what was found ---
 
 
-def test_json_is_all_that_standard_output_takes_and_what_the_file_says(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_json_is_all_that_standard_output_takes_and_what_the_file_says(tmp_path, capsys):
     case = "cases/01_dry_80_1.5"
     arguments = ["simulate", case, "--estimator", "ekf", "--workers", "1", "--out", str(tmp_path)]
     printed = document(arguments, capsys)
@@ -45,9 +42,7 @@ def test_json_is_all_that_standard_output_takes_and_what_the_file_says(
     assert printed["units"] == {"Fx_rms_N": "N", "seconds": "s"}
 
 
-def test_progress_goes_to_standard_error_unless_nobody_asks(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_progress_goes_to_standard_error_unless_nobody_asks(tmp_path, capsys):
     case = "cases/01_dry_80_1.5"
     arguments = ["simulate", case, "--estimator", "ekf", "--workers", "1", "--out", str(tmp_path)]
     assert main(arguments) == 0
@@ -59,7 +54,7 @@ def test_progress_goes_to_standard_error_unless_nobody_asks(
 
 
 @pytest.mark.parametrize("options", [[], ["--json"]])
-def test_a_reader_that_has_gone_costs_nothing_but_the_text(root: Path, options: list[str]) -> None:
+def test_a_reader_that_has_gone_costs_nothing_but_the_text(root, options):
     read, write = os.pipe()
     os.close(read)
     command = [sys.executable, "-m", "workbench", *options, "systems"]
@@ -70,7 +65,7 @@ def test_a_reader_that_has_gone_costs_nothing_but_the_text(root: Path, options: 
     assert (run.returncode, run.stderr) == (0, b"")
 
 
-def test_a_mistake_is_a_document_too(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_mistake_is_a_document_too(capsys):
     printed = document(["simulate", "cases/nowhere"], capsys)
     error = printed["error"]
     assert isinstance(error, dict)
@@ -91,9 +86,7 @@ def test_a_mistake_is_a_document_too(capsys: pytest.CaptureFixture[str]) -> None
     ],
     ids=" ".join,
 )
-def test_what_lists_or_describes_tells_programs_the_same(
-    arguments: list[str], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_lists_or_describes_tells_programs_the_same(arguments, capsys):
     if arguments[0] == "completion":
         pytest.importorskip("shtab")
     assert document(arguments, capsys)["result"]
@@ -104,7 +97,7 @@ def test_what_lists_or_describes_tells_programs_the_same(
 # --- the same option means the same everywhere ---
 
 
-def test_an_option_takes_the_same_everywhere() -> None:
+def test_an_option_takes_the_same_everywhere():
     """Kind of value and number of values by option; only files and folders differ by command."""
     meant: dict[str, set[tuple[object, ...]]] = {}
     for parser in PARSERS:
@@ -119,7 +112,7 @@ def test_an_option_takes_the_same_everywhere() -> None:
 
 
 @pytest.mark.parametrize("parser", PARSERS, ids=lambda one: one.prog)
-def test_every_command_knows_json_and_quiet(parser: object) -> None:
+def test_every_command_knows_json_and_quiet(parser):
     options = {option for action in parser._actions for option in action.option_strings}
     assert {"--json", "--quiet", "--help"} <= options
 
@@ -131,7 +124,7 @@ def test_every_command_knows_json_and_quiet(parser: object) -> None:
     "asked",
     [["--version"], ["--help"], *([*parser.prog.split()[1:], "--help"] for parser in PARSERS)],
 )
-def test_help_imports_nothing_that_takes_time(root: Path, asked: list[str]) -> None:
+def test_help_imports_nothing_that_takes_time(root, asked):
     """numba and what it needs take two seconds; half a second is what people wait for."""
     script = f"""
 import sys
@@ -155,9 +148,7 @@ except SystemExit as end:
 # --- completion ---
 
 
-def test_the_script_completes_commands_options_and_choices(
-    root: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_script_completes_commands_options_and_choices(root, tmp_path, capsys):
     """In bash itself: what it offers after each beginning of a line."""
     pytest.importorskip("shtab")
     assert main(["completion", "bash"]) == 0
@@ -183,12 +174,12 @@ def test_the_script_completes_commands_options_and_choices(
 # --- doctor ---
 
 
-def test_every_extra_has_a_purpose(root: Path) -> None:
+def test_every_extra_has_a_purpose(root):
     project = tomllib.loads((root / "pyproject.toml").read_text())["project"]
     assert set(project["optional-dependencies"]) == set(PURPOSES)
 
 
-def test_a_sound_installation_has_nothing_wrong(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_sound_installation_has_nothing_wrong(capsys):
     found = {
         finding["name"]: finding for finding in document(["doctor"], capsys)["result"]["findings"]
     }
@@ -199,11 +190,8 @@ def test_a_sound_installation_has_nothing_wrong(capsys: pytest.CaptureFixture[st
 
 
 def test_a_changed_fmu_and_a_cache_out_of_reach_are_told_with_what_to_do(
-    root: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+    root, tmp_path, monkeypatch, capsys
+):
     from workbench.cli import doctor
 
     kept = tmp_path / "fmus"

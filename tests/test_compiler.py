@@ -45,7 +45,7 @@ def evaluate(
     return np.array(f).ravel(), np.array(w).ravel()
 
 
-def test_expressions_mean_what_modelica_says(tmp_path: Path) -> None:
+def test_expressions_mean_what_modelica_says(tmp_path):
     """Reference: numpy, for arrays, matrices, functions with branches and loops, and builtins."""
     model = state_space(
         tmp_path,
@@ -123,7 +123,7 @@ CHAIN = """
   end M;"""
 
 
-def test_spring_dampers_between_connectors_become_an_explicit_ode(tmp_path: Path) -> None:
+def test_spring_dampers_between_connectors_become_an_explicit_ode(tmp_path):
     """Reference: equations of motion of two masses in a chain, written by hand."""
     model = state_space(tmp_path, CHAIN)
     assert [v.name for v in model.states] == ["m[1].s", "m[1].v", "m[2].s", "m[2].v"]
@@ -134,7 +134,7 @@ def test_spring_dampers_between_connectors_become_an_explicit_ode(tmp_path: Path
     assert_allclose(w, [first], rtol=1e-14)
 
 
-def test_linear_loops_are_solved(tmp_path: Path) -> None:
+def test_linear_loops_are_solved(tmp_path):
     model = state_space(
         tmp_path,
         "model M Real x(start=1.0, fixed=true); Real a; output Real b; equation "
@@ -167,16 +167,14 @@ def test_linear_loops_are_solved(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_what_cannot_be_compiled_is_refused_with_place_and_reason(
-    tmp_path: Path, text: str, match: str
-) -> None:
+def test_what_cannot_be_compiled_is_refused_with_place_and_reason(tmp_path, text, match):
     target = tmp_path / "out" / "M.fmu"
     with pytest.raises(InputError, match=match):
         compiler.build(library(tmp_path, text), "Lib.M", target, platforms=["linux-x86_64"])
     assert not target.parent.exists()
 
 
-def test_a_failed_build_leaves_the_old_fmu_alone(tmp_path: Path) -> None:
+def test_a_failed_build_leaves_the_old_fmu_alone(tmp_path):
     target = tmp_path / "M.fmu"
     target.write_text("old")
     package = library(tmp_path, "model M Real x; equation der(x) = y; end M;")
@@ -196,21 +194,17 @@ def test_a_failed_build_leaves_the_old_fmu_alone(tmp_path: Path) -> None:
         ("1", {}, 1.0),
     ],
 )
-def test_units_are_reduced_to_base_units(
-    unit: str, exponents: dict[str, int], factor: float
-) -> None:
+def test_units_are_reduced_to_base_units(unit, exponents, factor):
     assert base_units(unit) == (exponents, factor)
 
 
-def test_an_unknown_unit_is_refused() -> None:
+def test_an_unknown_unit_is_refused():
     with pytest.raises(InputError, match="unit 'wombats'"):
         base_units("wombats")
 
 
 @pytest.fixture(scope="module", params=[2, 3])
-def chain(
-    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
-) -> tuple[Path, int]:
+def chain(request, tmp_path_factory) -> tuple[Path, int]:
     folder = tmp_path_factory.mktemp("chain")
     path = folder / "M.fmu"
     package = library(folder, CHAIN)
@@ -218,13 +212,13 @@ def chain(
     return path, request.param
 
 
-def test_a_built_fmu_validates(chain: tuple[Path, int]) -> None:
+def test_a_built_fmu_validates(chain):
     path, fmi = chain
     assert validate_fmu(str(path)) == []
     assert fmpy.read_model_description(str(path)).fmiVersion == f"{fmi}.0"
 
 
-def test_a_built_fmu_computes_what_the_equations_say(chain: tuple[Path, int]) -> None:
+def test_a_built_fmu_computes_what_the_equations_say(chain):
     path, _ = chain
     with FMU(path) as fmu:
         fmu.start({"m[1].s": 0.3, "m[1].v": -1.0}, {"m[1].m": 4.0})
@@ -235,7 +229,7 @@ def test_a_built_fmu_computes_what_the_equations_say(chain: tuple[Path, int]) ->
         assert_allclose(A[1], [-(50 + 70) / 4, -6 / 4, 70 / 4, 3 / 4], rtol=1e-14)
 
 
-def test_dependencies_are_those_of_the_equations(chain: tuple[Path, int]) -> None:
+def test_dependencies_are_those_of_the_equations(chain):
     path, _ = chain
     description = fmpy.read_model_description(str(path))
     found = {
@@ -251,7 +245,7 @@ def test_dependencies_are_those_of_the_equations(chain: tuple[Path, int]) -> Non
     }
 
 
-def test_the_same_sources_give_the_same_bytes(tmp_path: Path) -> None:
+def test_the_same_sources_give_the_same_bytes(tmp_path):
     package = library(tmp_path, CHAIN)
     paths = [tmp_path / name / "M.fmu" for name in ("a", "b")]
     for path in paths:
@@ -259,16 +253,14 @@ def test_the_same_sources_give_the_same_bytes(tmp_path: Path) -> None:
     assert paths[0].read_bytes() == paths[1].read_bytes()
 
 
-def test_every_variable_of_the_minimal_observer_has_unit_and_description(
-    minimal_path: Path,
-) -> None:
+def test_every_variable_of_the_minimal_observer_has_unit_and_description(minimal_path):
     description = fmpy.read_model_description(str(minimal_path))
     assert validate_fmu(str(minimal_path)) == []
     bare = [v.name for v in description.modelVariables if not v.unit or not v.description]
     assert bare == ([] if description.fmiVersion == "2.0" else ["time"])
 
 
-def test_the_archive_holds_sources_and_no_paths_of_the_building_machine(minimal_path: Path) -> None:
+def test_the_archive_holds_sources_and_no_paths_of_the_building_machine(minimal_path):
     with zipfile.ZipFile(minimal_path) as archive:
         names = archive.namelist()
         assert "sources/model.c" in names
@@ -302,7 +294,7 @@ TWO_OF_ONE_NAME = """
 """
 
 
-def test_a_model_has_its_own_experiment_not_that_of_a_namesake(tmp_path: Path) -> None:
+def test_a_model_has_its_own_experiment_not_that_of_a_namesake(tmp_path):
     package = library(tmp_path, TWO_OF_ONE_NAME)
     new, old, plain = (
         flatten(package, f"Lib.{name}") for name in ("New.Pump", "Old.Pump", "New.Plain")
@@ -314,9 +306,7 @@ def test_a_model_has_its_own_experiment_not_that_of_a_namesake(tmp_path: Path) -
     assert plain.experiment == {}
 
 
-def test_a_panic_of_the_front_end_is_an_error_with_file_and_line(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_a_panic_of_the_front_end_is_an_error_with_file_and_line(tmp_path, capfd):
     """The front end panics where the derivative of an input is asked for."""
     package = library(
         tmp_path,

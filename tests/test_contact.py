@@ -28,7 +28,7 @@ def creep_force(fmu: FMU, contact: dict[str, float], v: float, slip: np.ndarray)
 
 
 @pytest.mark.parametrize("v", [10.0, 44.4])
-def test_slope_at_zero_slip_is_kalkers_for_unreduced_stiffness(minimal: FMU, v: float) -> None:
+def test_slope_at_zero_slip_is_kalkers_for_unreduced_stiffness(minimal, v):
     """Reference: F -> K*s (Kalker) for kA = kS = 1; Polach (2000)."""
     w = 1e-6
     (force,) = creep_force(minimal, DRY_40 | {"polach.kS": 1.0}, v, np.array([w]))
@@ -37,7 +37,7 @@ def test_slope_at_zero_slip_is_kalkers_for_unreduced_stiffness(minimal: FMU, v: 
     assert_allclose(force, 2 * K * w / v, rtol=1e-4)
 
 
-def test_stiffness_grows_with_load_to_the_power_two_thirds(minimal: FMU) -> None:
+def test_stiffness_grows_with_load_to_the_power_two_thirds(minimal):
     """Reference: Kalker stiffness 9.02 and 10.32 MN at 72 and 88 kN, from Hertz and Table E.3."""
     for load, stiffness in ((72e3, 9.02e6), (88e3, 10.32e6)):
         contact = DRY_40 | {"polach.kS": 1.0, "Fz": load}
@@ -52,9 +52,7 @@ def test_stiffness_grows_with_load_to_the_power_two_thirds(minimal: FMU) -> None
     v=st.floats(-45.0, 45.0),
     mu0=st.floats(0.05, 0.55),
 )
-def test_force_is_odd_in_slip_and_bounded_by_friction(
-    minimal_path: object, w: float, v: float, mu0: float
-) -> None:
+def test_force_is_odd_in_slip_and_bounded_by_friction(minimal_path, w, v, mu0):
     contact = DRY_55 | {"muWR": mu0}
     with FMU(minimal_path) as fmu:  # type: ignore[arg-type]
         plus, minus = creep_force(fmu, contact, v, np.array([w, -w]))
@@ -80,8 +78,8 @@ def test_force_is_odd_in_slip_and_bounded_by_friction(
     ],
 )
 def test_falling_branch_starts_where_published_parameters_put_it(
-    minimal: FMU, contact: dict[str, float], v: float, peak: float, at: float, sliding: float
-) -> None:
+    minimal, contact, v, peak, at, sliding
+):
     """Reference: peak of F/Q, its slip velocity and F/Q at full sliding, computed independently."""
     slip = np.arange(0.005, v, 0.005)
     adhesion = creep_force(minimal, contact, v, np.append(slip, v)) / (2 * LOAD)

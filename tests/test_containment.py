@@ -25,7 +25,7 @@ pytestmark = needs_compiler
 
 
 @pytest.fixture(autouse=True)
-def places(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def places(tmp_path, monkeypatch) -> Path:
     """A memory, a cache, a folder of temporary files of its own; returns the last."""
     monkeypatch.setattr(
         fmu_cache.platformdirs, "user_cache_dir", lambda name: str(tmp_path / "cache")
@@ -40,7 +40,7 @@ def places(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.fixture
-def plan(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], None]:
+def plan(monkeypatch) -> Callable[[str], None]:
     """Sets what the FMU does."""
     return lambda what: monkeypatch.setenv("HOSTILE", what)
 
@@ -69,9 +69,7 @@ ATTACKS = {
 
 
 @pytest.mark.parametrize("attack", ATTACKS)
-def test_what_an_fmu_did_is_named_and_leaves_nothing(
-    attack: str, hostile_path: Path, places: Path, plan: Callable[[str], None]
-) -> None:
+def test_what_an_fmu_did_is_named_and_leaves_nothing(attack, hostile_path, places, plan):
     plan(f"{attack} {CALL} 2")
     with pytest.raises(ContainedError, match=f"^evil.fmu: {ATTACKS[attack]}"):
         FMU(hostile_path)
@@ -79,30 +77,21 @@ def test_what_an_fmu_did_is_named_and_leaves_nothing(
 
 
 @pytest.mark.parametrize("call", CALLS)
-def test_every_call_of_an_observer_is_tried(
-    call: str, hostile_path: Path, plan: Callable[[str], None]
-) -> None:
+def test_every_call_of_an_observer_is_tried(call, hostile_path, plan):
     plan(f"exit {call} 1")
     named = "loading of its library" if call == "load" else call
     with pytest.raises(ContainedError, match=f"exit status 0 in {named} "):
         FMU(hostile_path)
 
 
-def test_a_solver_of_its_own_is_tried_where_it_is_used(
-    hostile_path: Path, plan: Callable[[str], None]
-) -> None:
+def test_a_solver_of_its_own_is_tried_where_it_is_used(hostile_path, plan):
     plan("crash fmi2DoStep 1")
     FMU(hostile_path).close()
     with pytest.raises(ContainedError, match="SIGSEGV in fmi2DoStep"):
         CoSimulation(hostile_path)
 
 
-def test_one_that_waits_is_not_measured_rather_than_unfit(
-    hostile_path: Path,
-    places: Path,
-    plan: Callable[[str], None],
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_one_that_waits_is_not_measured_rather_than_unfit(hostile_path, places, plan, monkeypatch):
     plan(f"wait {CALL} 1")
     monkeypatch.setenv("WORKBENCH_TRIAL", "answer=1")
     with pytest.raises(NoAnswerError, match=r"did not answer from .* within 1 s, .* for 0\.\d s"):
@@ -110,9 +99,7 @@ def test_one_that_waits_is_not_measured_rather_than_unfit(
     assert list(places.iterdir()) == []
 
 
-def test_limits_that_cannot_be_read_are_refused(
-    hostile_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_limits_that_cannot_be_read_are_refused(hostile_path, monkeypatch):
     for text in ("processor=fast", "time=3", "memory=-1", "answer=nan"):
         monkeypatch.setenv("WORKBENCH_TRIAL", text)
         with pytest.raises(InputError, match=f"found '{text}'"):
@@ -123,7 +110,7 @@ def test_limits_that_cannot_be_read_are_refused(
 
 
 @pytest.fixture
-def tried(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+def tried(monkeypatch) -> list[str]:
     """Names of the FMUs that were tried."""
     names: list[str] = []
     original = trial.run_trial
@@ -136,9 +123,7 @@ def tried(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     return names
 
 
-def test_a_sound_fmu_is_tried_once_and_remembered_by_its_hash(
-    hostile_path: Path, tmp_path: Path, tried: list[str]
-) -> None:
+def test_a_sound_fmu_is_tried_once_and_remembered_by_its_hash(hostile_path, tmp_path, tried):
     copy = tmp_path / "copy.fmu"
     shutil.copy(hostile_path, copy)
     other = rewritten(copy, tmp_path / "other.fmu", lambda folder: (folder / "new").touch())
@@ -148,9 +133,7 @@ def test_a_sound_fmu_is_tried_once_and_remembered_by_its_hash(
     assert tried == ["copy.fmu", "other.fmu"]
 
 
-def test_an_unsound_fmu_is_tried_again(
-    hostile_path: Path, tried: list[str], plan: Callable[[str], None]
-) -> None:
+def test_an_unsound_fmu_is_tried_again(hostile_path, tried, plan):
     plan("exit load 1")
     for _ in range(2):
         with pytest.raises(ContainedError):
@@ -158,32 +141,28 @@ def test_an_unsound_fmu_is_tried_again(
     assert tried == ["evil.fmu"] * 2
 
 
-def test_the_process_remembers_where_nothing_can_be_kept(
-    hostile_path: Path, tmp_path: Path, tried: list[str]
-) -> None:
+def test_the_process_remembers_where_nothing_can_be_kept(hostile_path, tmp_path, tried):
     (tmp_path / "cache").write_text("a file where the folder should be")
     for _ in range(2):
         FMU(hostile_path).close()
     assert tried == ["evil.fmu"]
 
 
-def test_the_projects_own_fmus_are_not_tried(minimal_path: Path, tried: list[str]) -> None:
+def test_the_projects_own_fmus_are_not_tried(minimal_path, tried):
     FMU(minimal_path).close()
     assert tried == []
 
 
 @pytest.mark.parametrize("version", ["fmi2", "fmi3"])
 @pytest.mark.parametrize("interface", ["Model Exchange", "Co-Simulation"])
-def test_the_trial_makes_no_call_that_a_sound_fmu_refuses(
-    root: Path, version: str, interface: str
-) -> None:
+def test_the_trial_makes_no_call_that_a_sound_fmu_refuses(root, version, interface):
     """A refusal ends the trial, so that it must be none of the trial's own making."""
     description = read_description(root / "fmus" / version / "Reference.fmu")
     with trial.unpacked(description, interface) as folder:
         assert trial.run_trial(description, interface, folder, trial.Limits()) == ""
 
 
-def test_a_trial_takes_no_longer_than_0_3_s(minimal_path: Path) -> None:
+def test_a_trial_takes_no_longer_than_0_3_s(minimal_path):
     """The least of several, because other work on the machine only adds."""
     description = read_description(minimal_path)
     times = []
@@ -200,9 +179,7 @@ def test_a_trial_takes_no_longer_than_0_3_s(minimal_path: Path) -> None:
 QUICK = Limits(processor=1.0, answer=60.0)
 
 
-def test_a_call_that_returns_at_first_and_then_not_is_named_by_its_check(
-    hostile_path: Path, plan: Callable[[str], None]
-) -> None:
+def test_a_call_that_returns_at_first_and_then_not_is_named_by_its_check(hostile_path, plan):
     plan("spin fmi2Instantiate 30")
     findings = {finding.name: finding for finding in check(hostile_path, 60, QUICK)}
     found = findings["instantiations"]
@@ -214,9 +191,7 @@ def test_a_call_that_returns_at_first_and_then_not_is_named_by_its_check(
     assert findings["rollback"].passed
 
 
-def test_a_process_that_ends_well_before_its_time_is_a_failure(
-    hostile_path: Path, plan: Callable[[str], None]
-) -> None:
+def test_a_process_that_ends_well_before_its_time_is_a_failure(hostile_path, plan):
     plan("exit fmi2Instantiate 30")
     findings = {finding.name: finding for finding in check(hostile_path, 60, QUICK)}
     reason = "the FMU ended the process with exit status 0 after"
@@ -225,8 +200,8 @@ def test_a_process_that_ends_well_before_its_time_is_a_failure(
 
 
 def test_the_check_shows_what_it_finds_as_it_goes_and_what_an_unfit_fmu_would_do_for(
-    hostile_path: Path, plan: Callable[[str], None], capsys: pytest.CaptureFixture[str]
-) -> None:
+    hostile_path, plan, capsys
+):
     plan("exit fmi2SerializedFMUstateSize 1")
     assert main(["fmu", "check", str(hostile_path), "--instantiations", "5"]) == 1
     printed = capsys.readouterr().out
@@ -236,12 +211,8 @@ def test_the_check_shows_what_it_finds_as_it_goes_and_what_an_unfit_fmu_would_do
 
 
 def test_an_fmu_that_does_not_answer_is_neither_fit_nor_unfit(
-    hostile_path: Path,
-    tmp_path: Path,
-    plan: Callable[[str], None],
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+    hostile_path, tmp_path, plan, monkeypatch, capsys
+):
     plan(f"wait {CALL} 1")
     monkeypatch.setenv("WORKBENCH_TRIAL", "answer=1")
     assert main(["fmu", "check", str(hostile_path)]) == 3

@@ -43,7 +43,7 @@ def rolling(system: System, time: np.ndarray, speed: np.ndarray) -> dict[str, np
 # --- common times ---
 
 
-def test_a_straight_line_is_met_exactly_between_samples(system: System) -> None:
+def test_a_straight_line_is_met_exactly_between_samples(system):
     fast, slow = np.arange(0.0, 5.0, 0.01), np.arange(0.0, 5.0, 0.05)
     signals = rolling(system, fast, np.full(fast.size, 20.0))
     held = file(group("fast", fast, **signals), group("slow", slow, pB=1e5 * slow))
@@ -53,7 +53,7 @@ def test_a_straight_line_is_met_exactly_between_samples(system: System) -> None:
     assert any("pB: interpolated from samples every 0.05 s" in note for note in measured.notes)
 
 
-def test_the_slowest_output_sets_the_times(system: System) -> None:
+def test_the_slowest_output_sets_the_times(system):
     fast, slow = np.arange(0.0, 5.0, 0.01), np.arange(0.002, 5.0, 0.02)
     signals = rolling(system, fast, 20.0 + fast)
     radius = system.values["rR"]
@@ -69,7 +69,7 @@ def test_the_slowest_output_sets_the_times(system: System) -> None:
     assert_allclose(measured.signals["omegaW"], expected, rtol=1e-12)
 
 
-def test_no_sample_is_invented_in_a_gap(system: System) -> None:
+def test_no_sample_is_invented_in_a_gap(system):
     """Pressure is missing from 2 to 2.05 s, where it may be, and from 3 to 4 s, where not."""
     time = np.arange(0.0, 6.0, 0.01)
     pressure = 1e4 * time
@@ -83,7 +83,7 @@ def test_no_sample_is_invented_in_a_gap(system: System) -> None:
     assert any("samples in gaps of more than 0.1 s were left out" in n for n in measured.notes)
 
 
-def test_an_input_that_is_held_stays_until_its_next_sample(system: System) -> None:
+def test_an_input_that_is_held_stays_until_its_next_sample(system):
     inputs = tuple(replace(one, held=one.name == "pB") for one in system.inputs)
     changed = replace(system, inputs=inputs)
     fast, slow = np.arange(0.0, 5.0, 0.01), np.arange(0.0, 5.0, 0.05)
@@ -96,7 +96,7 @@ def test_an_input_that_is_held_stays_until_its_next_sample(system: System) -> No
     assert_array_equal(measured.signals["pB"], 1e5 * before)
 
 
-def test_loggers_are_brought_together_by_their_time_stamps(system: System) -> None:
+def test_loggers_are_brought_together_by_their_time_stamps(system):
     time = np.arange(0.0, 5.0, 0.01)
     one = group("", time, 1000.0, **rolling(system, time, 20.0 + time))
     other = group("", time, 998.5, pB=1e4 * time)  # began 1.5 s before
@@ -109,7 +109,7 @@ def test_loggers_are_brought_together_by_their_time_stamps(system: System) -> No
     assert_allclose(measured.signals["omegaW"], expected, rtol=1e-12)
 
 
-def test_clocks_that_cannot_be_compared_are_refused(system: System) -> None:
+def test_clocks_that_cannot_be_compared_are_refused(system):
     time = np.arange(0.0, 5.0, 0.01)
     one = group("", time, 1000.0, **rolling(system, time, 20.0 + time))
     files = [file(one), file(group("", time, pB=1e4 * time))]
@@ -117,7 +117,7 @@ def test_clocks_that_cannot_be_compared_are_refused(system: System) -> None:
         merge(files, propose(files, system, {}), system)
 
 
-def test_recordings_of_different_times_are_refused(system: System) -> None:
+def test_recordings_of_different_times_are_refused(system):
     time = np.arange(0.0, 5.0, 0.01)
     one = group("", time, 1000.0, **rolling(system, time, 20.0 + time))
     files = [file(one), file(group("", time, 2000.0, pB=1e4 * time))]
@@ -133,9 +133,7 @@ def test_recordings_of_different_times_are_refused(system: System) -> None:
         (np.full(500, np.nan), None, "no times"),
     ],
 )
-def test_times_that_do_not_go_on_are_refused(
-    system: System, times: np.ndarray, rate: float | None, match: str
-) -> None:
+def test_times_that_do_not_go_on_are_refused(system, times, rate, match):
     time = np.arange(0.0, 5.0, 0.01)
     signals = rolling(system, time, np.full(time.size, 20.0))
     held = file(group("", times, pB=1e5 * time, **signals))
@@ -145,9 +143,7 @@ def test_times_that_do_not_go_on_are_refused(
 
 
 @pytest.mark.parametrize(("unit", "factor"), [("ns", 1e9), ("us", 1e6), ("ms", 1e3), ("s", 1.0)])
-def test_a_time_without_a_unit_is_read_as_recordings_are_usually_sampled(
-    system: System, unit: str, factor: float
-) -> None:
+def test_a_time_without_a_unit_is_read_as_recordings_are_usually_sampled(system, unit, factor):
     time = np.arange(0.0, 5.0, 0.01)
     plain = group("", time, pB=time, **rolling(system, time, np.full(time.size, 20.0)))
     channels = (FileChannel("Zeit", "", time * factor), *plain.channels)
@@ -159,7 +155,7 @@ def test_a_time_without_a_unit_is_read_as_recordings_are_usually_sampled(
     assert_allclose(next(iter(named.clocks.values())).times, time * factor)
 
 
-def test_a_counted_time_goes_before_stamps_that_are_coarser(system: System) -> None:
+def test_a_counted_time_goes_before_stamps_that_are_coarser(system):
     time = np.arange(0.0, 5.0, 0.01)
     plain = group("", time, pB=time, **rolling(system, time, np.full(time.size, 20.0)))
     stamps = FileChannel("Datum", "s", np.ceil(100 * time) / 100 + 1e-3 * time, stamp=True)
@@ -168,7 +164,7 @@ def test_a_counted_time_goes_before_stamps_that_are_coarser(system: System) -> N
     assert clock.channel == "Zeit"
 
 
-def test_one_channel_of_two_groups_is_not_taken_for_the_other(system: System) -> None:
+def test_one_channel_of_two_groups_is_not_taken_for_the_other(system):
     time = np.arange(0.0, 5.0, 0.01)
     one = group("run 1", time, pB=time, **rolling(system, time, 20.0 + time))
     held = file(one, group("run 2", time, pB=2 * time))
@@ -200,7 +196,7 @@ def drive(stops: list[tuple[float, float]], system: System) -> tuple[np.ndarray,
     return time, {"pB": np.array(pressure), **rolling(system, time, np.array(speed))}
 
 
-def test_each_stop_of_a_day_is_a_recording(system: System) -> None:
+def test_each_stop_of_a_day_is_a_recording(system):
     time, signals = drive([(25.0, 1.0), (15.0, 2.0), (5.0, 1.0), (25.0, 1.0)], system)
     parts = cut(time, signals, system)
     kept = [(time[part.first], time[part.end - 1]) for part in parts if not part.reason]
@@ -218,14 +214,14 @@ def test_each_stop_of_a_day_is_a_recording(system: System) -> None:
     assert (parts[0].first, parts[-1].end) == (0, time.size)
 
 
-def test_a_recording_of_one_stop_is_left_whole(system: System) -> None:
+def test_a_recording_of_one_stop_is_left_whole(system):
     time, signals = drive([(25.0, 1.0)], system)
     assert [(one.first, one.end, one.reason) for one in cut(time, signals, system)] == [
         (0, time.size, "")
     ]
 
 
-def test_a_part_without_its_beginning_or_its_end_is_left_out(system: System) -> None:
+def test_a_part_without_its_beginning_or_its_end_is_left_out(system):
     time, signals = drive([(25.0, 1.0)] * 4, system)
     piece = slice(round(15 * RATE), round(162 * RATE))  # within the first, within the last
     cuts = cut(time[piece], {name: v[piece] for name, v in signals.items()}, system)
@@ -238,14 +234,14 @@ def test_a_part_without_its_beginning_or_its_end_is_left_out(system: System) -> 
     ]
 
 
-def test_a_gap_parts_recordings_without_any_rule(system: System) -> None:
+def test_a_gap_parts_recordings_without_any_rule(system):
     time = np.concatenate([np.arange(0.0, 5.0, 0.01), 100.0 + np.arange(0.0, 5.0, 0.01)])
     signals = {"pB": np.zeros(time.size), **rolling(system, time, np.full(time.size, 20.0))}
     parts = cut(time, signals, replace(system, cutting=None))
     assert [(part.first, part.end) for part in parts] == [(0, 500), (500, 1000)]
 
 
-def test_a_long_file_becomes_cases_and_a_figure(tmp_path: Path, system: System, root: Path) -> None:
+def test_a_long_file_becomes_cases_and_a_figure(tmp_path, system, root):
     (stop,) = wb.read_cases(root / "cases" / "01_dry_80_1.5", system)
     twice = [stop.part(slice(None, None, 4))] * 2
     write(tmp_path / "day.csv", twice)

@@ -51,7 +51,7 @@ def pump(content: dict[str, Any]) -> Pump:
     return read(Pump, Table(content, "pump.toml"), Scope(Path("pump.toml"), None))
 
 
-def test_fields_are_read_in_their_units_by_all_their_names() -> None:
+def test_fields_are_read_in_their_units_by_all_their_names():
     read = pump(GOOD)
     assert (read.speed, read.torque, read.lag, read.open) == (30.0, None, 0.02, False)
     assert read.valves == (Valve("inlet", "m", (1e-3, 2e-3), "left"),)
@@ -79,14 +79,14 @@ OF_VALUES = {  # which no schema says
 
 
 @pytest.mark.parametrize("message", [*MISTAKES, *OF_VALUES])
-def test_what_is_not_as_declared_is_refused_where_it_stands(message: str) -> None:
+def test_what_is_not_as_declared_is_refused_where_it_stands(message):
     wrong = GOOD | {**MISTAKES, **OF_VALUES}[message]
     with pytest.raises(InputError, match=message):
         pump(wrong)
     assert validator(schema(Pump)).is_valid(wrong) == (message in OF_VALUES)
 
 
-def test_schema_and_reference_have_every_key() -> None:
+def test_schema_and_reference_have_every_key():
     validator(schema(Pump)).validate(GOOD)
     assert tables(Pump) == {"Pump": Pump, "Valve": Valve}
     page = reference(Pump)

@@ -3,8 +3,7 @@
 import json
 import shutil
 import tomllib
-from collections.abc import Callable, Iterator
-from pathlib import Path
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -17,26 +16,23 @@ from workbench.observers.estimators.disturbance import DisturbanceObserver
 from workbench.observers.estimators.parameter import ParameterEstimator
 from workbench.observers.gains_file import read_gains, usual_gains
 from workbench.recordings.case import read_cases
-from workbench.runtime.pool import Pool
 from workbench.system.registry import open_model
 from workbench.system.system import System
-from workbench.tuning import Evaluator, Job, evaluate_gains, pose
+from workbench.tuning import evaluate_gains, pose
 from workbench.tuning.settling import Settling
 
 NAMES = ("disturbance_observer", "parameter_estimator")
 
 
 @pytest.fixture(scope="module")
-def models(system: System) -> Iterator[dict[str, FMU]]:
+def models(system) -> Iterator[dict[str, FMU]]:
     """The models of both estimators, by the estimators' names."""
     with open_model(system) as minimal, open_model(system, "full") as full:
         yield dict(zip(NAMES, (minimal, full), strict=True))
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_default_gains_reach_the_z_they_claim_and_beat_reasoned_ones(
-    root: Path, system: System, inline: Callable[[Job], Pool[Evaluator]], name: str
-) -> None:
+def test_default_gains_reach_the_z_they_claim_and_beat_reasoned_ones(root, system, inline, name):
     path = root / "workbench" / "machines" / "wheelset" / "gains" / f"{name}.toml"
     claimed = tomllib.loads(path.read_text())["provenance"]
     cases = read_cases([root / "cases"], system)
@@ -52,9 +48,7 @@ def test_default_gains_reach_the_z_they_claim_and_beat_reasoned_ones(
     assert after.max() < before.max()
 
 
-def test_models_that_gains_were_not_tuned_on_get_reasoned_ones(
-    system: System, models: dict[str, FMU]
-) -> None:
+def test_models_that_gains_were_not_tuned_on_get_reasoned_ones(system, models):
     known = estimators_of(system)
     minimal, full = models.values()
     gains = {
@@ -71,8 +65,8 @@ def test_models_that_gains_were_not_tuned_on_get_reasoned_ones(
 
 
 def test_gains_act_on_the_states_they_were_tuned_for_in_whatever_order_a_compiler_has_them(
-    root: Path, system: System, tmp_path: Path
-) -> None:
+    root, system, tmp_path
+):
     """OpenModelica sorts states by name; here the order is that of the declarations."""
     pytest.importorskip("casadi")
     pytest.importorskip("rumoca")
@@ -104,7 +98,7 @@ def test_gains_act_on_the_states_they_were_tuned_for_in_whatever_order_a_compile
     assert_allclose(forces[1], forces[0], rtol=1e-6, atol=1e-6)
 
 
-def test_simulate_says_whose_gains_it_used(root: Path, tmp_path: Path) -> None:
+def test_simulate_says_whose_gains_it_used(root, tmp_path):
     case = str(root / "cases" / "03_dry_120_3.6")
     told = {}
     for extra in ([], ["--untuned"]):
@@ -138,12 +132,7 @@ def slow_parameter_estimator(fmu: FMU, system: System) -> tuple[Estimator, Gains
         (slow_parameter_estimator, "parameter_estimator"),
     ],
 )
-def test_settling_predicts_how_much_of_a_friction_step_is_left(
-    system: System,
-    models: dict[str, FMU],
-    make: Callable[[FMU, System], tuple[Estimator, Gains]],
-    name: str,
-) -> None:
+def test_settling_predicts_how_much_of_a_friction_step_is_left(system, models, make, name):
     """Reference: the observer itself along a model whose friction steps at the operating point."""
     fmu, asked = models[name], system.following
     assert asked is not None
@@ -168,7 +157,7 @@ def test_settling_predicts_how_much_of_a_friction_step_is_left(
     assert left == pytest.approx(settling.left(gains), rel=0.1)
 
 
-def test_methods_of_an_estimator_under_their_former_names_are_taken() -> None:
+def test_methods_of_an_estimator_under_their_former_names_are_taken():
     former = {"name": "former", "reasoned": classmethod(lambda cls, fmu, system: "its own")}
     with pytest.warns(DeprecationWarning, match="reasoned is now called default_gains"):
         kind = type("Former", (DisturbanceObserver,), former)

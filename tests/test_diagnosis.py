@@ -84,7 +84,7 @@ def mostly_long(names: Iterable[str], short: Collection[str]) -> list[Any]:
 
 
 @pytest.fixture(scope="session")
-def everything(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def everything(tmp_path_factory) -> Path:
     """The observer model with every effect at zero."""
     path = tmp_path_factory.mktemp("library") / "AllEffects.fmu"
     text = ExtendedModel(
@@ -95,7 +95,7 @@ def everything(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def diagnosed(everything: Path) -> Callable[[Sequence[Case]], Diagnosis]:
+def diagnosed(everything) -> Callable[[Sequence[Case]], Diagnosis]:
     def run(cases: Sequence[Case], system: System = SYSTEM) -> Diagnosis:
         effects = catalogue(system, LIBRARY)
         # Alone: the tests themselves run side by side.
@@ -113,19 +113,17 @@ def recorded(folder: Path, effects: Effects, seed: int, names: Sequence[str] = S
 
 
 @pytest.fixture(scope="session")
-def clean(tmp_path_factory: pytest.TempPathFactory) -> list[Case]:
+def clean(tmp_path_factory) -> list[Case]:
     return recorded(tmp_path_factory.mktemp("clean"), Effects(), 31)
 
 
-def test_every_effect_of_the_catalogue_is_planted_or_known_to_be_hidden() -> None:
+def test_every_effect_of_the_catalogue_is_planted_or_known_to_be_hidden():
     named = {name for name, _, _ in PLANTED.values()}
     hidden = {"CaliperHysteresis", "AdhesionRecovery", "FallingFriction", "WheelInertia"}
     assert named | hidden == {effect.name for effect in EFFECTS}
 
 
-def test_a_wheel_load_that_is_said_is_no_finding_and_one_that_is_not_said_is(
-    tmp_path: Path, diagnosed: Callable[[Sequence[Case]], Diagnosis]
-) -> None:
+def test_a_wheel_load_that_is_said_is_no_finding_and_one_that_is_not_said_is(tmp_path, diagnosed):
     for scenario in select(STOPS):
         light = replace(scenario, conditions=replace(scenario.conditions, wheel_load=60e3))
         record(light, 38, CONSTANT_PADS, tmp_path / scenario.name)
@@ -139,9 +137,7 @@ def test_a_wheel_load_that_is_said_is_no_finding_and_one_that_is_not_said_is(
     assert {cause.effect.name, *cause.confusable_with} == {"WheelLoad", "CreepStiffness"}
 
 
-def test_a_force_that_one_recording_has_not_tells_in_the_others(
-    tmp_path: Path, diagnosed: Callable[[Sequence[Case]], Diagnosis]
-) -> None:
+def test_a_force_that_one_recording_has_not_tells_in_the_others(tmp_path, diagnosed):
     cases = recorded(tmp_path, plant(CONSTANT_PADS, ["fx_gain=0.02"]), 39)
     some = [cases[0].without(["Fx"]), *cases[1:]]
     widths = []
@@ -156,9 +152,7 @@ def test_a_force_that_one_recording_has_not_tells_in_the_others(
 
 
 @pytest.mark.parametrize("planted", mostly_long(PLANTED, SHORT))
-def test_a_planted_effect_is_named_with_its_size(
-    planted: str, tmp_path: Path, diagnosed: Callable[[Sequence[Case]], Diagnosis]
-) -> None:
+def test_a_planted_effect_is_named_with_its_size(planted, tmp_path, diagnosed):
     name, parameter, small = PLANTED[planted]
     seed = 500 + list(PLANTED).index(planted)
     size = small * np.random.default_rng(seed).uniform(1.0, 2.0)
@@ -176,7 +170,7 @@ def test_a_planted_effect_is_named_with_its_size(
 
 
 @pytest.mark.long
-def test_nothing_is_missing_in_the_model_that_a_diagnosis_extended(tmp_path: Path) -> None:
+def test_nothing_is_missing_in_the_model_that_a_diagnosis_extended(tmp_path):
     """As by `--model Extended.fmu`: what was found of the pads acts in every simulation."""
     cases = recorded(tmp_path / "stops", Effects(cylinder_lag=0.06), 511)
 
@@ -192,9 +186,7 @@ def test_nothing_is_missing_in_the_model_that_a_diagnosis_extended(tmp_path: Pat
 
 @pytest.mark.long
 @pytest.mark.parametrize("planted", sorted(HIDDEN))
-def test_an_effect_that_the_stops_do_not_show_is_not_invented(
-    planted: str, tmp_path: Path, diagnosed: Callable[[Sequence[Case]], Diagnosis]
-) -> None:
+def test_an_effect_that_the_stops_do_not_show_is_not_invented(planted, tmp_path, diagnosed):
     sizes = {"caliper_hysteresis": 0.03, "adhesion_recovery": 0.3, "wheel_inertia": 0.2}
     found = diagnosed(recorded(tmp_path, Effects(**{planted: sizes[planted]}), 77))
     assert found.verdict == "nothing"
@@ -203,9 +195,7 @@ def test_an_effect_that_the_stops_do_not_show_is_not_invented(
 
 
 @pytest.mark.long
-def test_hysteresis_of_the_calipers_shows_where_pressure_falls(
-    tmp_path: Path, diagnosed: Callable[[Sequence[Case]], Diagnosis]
-) -> None:
+def test_hysteresis_of_the_calipers_shows_where_pressure_falls(tmp_path, diagnosed):
     stairs = ("staircase_160", "staircase_120_rev", "dry_120_3.6")
     found = diagnosed(recorded(tmp_path, Effects(caliper_hysteresis=0.05), 78, stairs))
     assert [cause.effect.name for cause in found.causes] == ["CaliperHysteresis"]
@@ -214,23 +204,17 @@ def test_hysteresis_of_the_calipers_shows_where_pressure_falls(
     assert set(found.not_visible) == {"FallingFriction", "WheelInertia"}
 
 
-def test_nothing_is_found_where_nothing_is_missing(
-    clean: list[Case], diagnosed: Callable[[Sequence[Case]], Diagnosis]
-) -> None:
+def test_nothing_is_found_where_nothing_is_missing(clean, diagnosed):
     found = diagnosed(clean)
     assert (found.verdict, found.causes, found.gain) == ("nothing", (), None)
 
 
-def test_nothing_is_found_without_a_measured_force(
-    clean: list[Case], diagnosed: Callable[[Sequence[Case]], Diagnosis]
-) -> None:
+def test_nothing_is_found_without_a_measured_force(clean, diagnosed):
     assert diagnosed([case.without(["Fx"]) for case in clean]).verdict == "nothing"
 
 
 @pytest.mark.long
-def test_stops_by_one_clock_show_none_that_is_late(
-    clean: list[Case], everything: Path, tmp_path: Path
-) -> None:
+def test_stops_by_one_clock_show_none_that_is_late(clean, everything, tmp_path):
     """Three sets: chance has no side, and a bias that one set hides shows in their mean."""
     clock = next(one for one in catalogue(SYSTEM, LIBRARY) if "omegaW" in one.late)
     ratios = []
@@ -246,9 +230,7 @@ def test_stops_by_one_clock_show_none_that_is_late(
 
 
 @pytest.mark.long
-def test_fade_is_found_without_a_measured_force(
-    tmp_path: Path, diagnosed: Callable[[Sequence[Case]], Diagnosis]
-) -> None:
+def test_fade_is_found_without_a_measured_force(tmp_path, diagnosed):
     cases = recorded(tmp_path, Effects(fade=5e-4), 12)
     found = diagnosed([case.without(["Fx"]) for case in cases])
     assert [cause.effect.name for cause in found.causes] == ["BrakeFade"]
@@ -260,9 +242,7 @@ LATE = {"pB": "late_pB", "tauR": "late_tauR", "omegaR": "late_omegaR", "Fx": "la
 
 @pytest.mark.long
 @pytest.mark.parametrize("signals", [("pB", "Fx"), ("pB",)], ids="-".join)
-def test_a_late_logger_is_named_whatever_it_records(
-    signals: tuple[str, ...], tmp_path: Path, diagnosed: Callable[..., Diagnosis]
-) -> None:
+def test_a_late_logger_is_named_whatever_it_records(signals, tmp_path, diagnosed):
     cases = recorded(tmp_path, Effects(**{LATE[name]: 0.025 for name in signals}), 700)
     found = diagnosed(cases, replace(SYSTEM, loggers={"second": signals}))
     assert [cause.effect.name for cause in found.causes] == ["LoggerTimeSkew[second]"]
@@ -272,9 +252,7 @@ def test_a_late_logger_is_named_whatever_it_records(
 
 @pytest.mark.long
 @pytest.mark.parametrize("signals", [("pB", "Fx"), *((name,) for name in LATE)], ids="-".join)
-def test_a_late_logger_that_nobody_declared_is_no_other_cause(
-    signals: tuple[str, ...], tmp_path: Path, diagnosed: Callable[..., Diagnosis]
-) -> None:
+def test_a_late_logger_that_nobody_declared_is_no_other_cause(signals, tmp_path, diagnosed):
     """The clock of the speeds that the system file has would be 49 ms early, and explains less."""
     cases = recorded(tmp_path, Effects(**{LATE[name]: 0.012 for name in signals}), 700)
     found = diagnosed(cases)
@@ -286,9 +264,7 @@ def test_a_late_logger_that_nobody_declared_is_no_other_cause(
 
 
 @pytest.mark.parametrize("outside", mostly_long(OUTSIDE, {"drive_beat"}))
-def test_a_cause_outside_the_catalogue_is_not_given_a_name(
-    outside: str, tmp_path: Path, diagnosed: Callable[[Sequence[Case]], Diagnosis]
-) -> None:
+def test_a_cause_outside_the_catalogue_is_not_given_a_name(outside, tmp_path, diagnosed):
     found = diagnosed(recorded(tmp_path, Effects(**{outside: OUTSIDE[outside]}), 55))
     assert (found.verdict, found.causes, found.gain) == ("unexplained", (), None)
 
@@ -303,9 +279,7 @@ def test_a_cause_outside_the_catalogue_is_not_given_a_name(
         ("pressure_offset", "cylinder_lag"),
     ],
 )
-def test_two_effects_are_found_one_after_the_other(
-    one: str, other: str, tmp_path: Path, diagnosed: Callable[[Sequence[Case]], Diagnosis]
-) -> None:
+def test_two_effects_are_found_one_after_the_other(one, other, tmp_path, diagnosed):
     effects = Effects(**{name: 1.5 * PLANTED[name][2] for name in (one, other)})
     found = diagnosed(recorded(tmp_path, effects, 91))
     groups = [{cause.effect.name, *cause.confusable_with} for cause in found.causes]
@@ -315,9 +289,7 @@ def test_two_effects_are_found_one_after_the_other(
 
 
 @pytest.mark.long
-def test_two_effects_that_hide_each_other_are_found_in_six_stops(
-    tmp_path: Path, diagnosed: Callable[[Sequence[Case]], Diagnosis]
-) -> None:
+def test_two_effects_that_hide_each_other_are_found_in_six_stops(tmp_path, diagnosed):
     """Either alone leaves some channel worse than without it; three stops say "unexplained"."""
     six = ("01_", "02_", "03_", "04_", "05_", "06_")
     names = [name for name in SCENARIOS if name.startswith(six)]
@@ -329,9 +301,7 @@ def test_two_effects_that_hide_each_other_are_found_in_six_stops(
         assert any(planted in group for group in groups)
 
 
-def test_wrong_samples_are_set_aside_and_never_fitted(
-    tmp_path: Path, diagnosed: Callable[[Sequence[Case]], Diagnosis]
-) -> None:
+def test_wrong_samples_are_set_aside_and_never_fitted(tmp_path, diagnosed):
     cases = recorded(tmp_path, Effects(spikes=0.2, dropouts=0.2), 64)
     found = diagnosed(cases)
     assert found.verdict == "nothing"
@@ -349,9 +319,7 @@ SEEN = {
 
 @pytest.mark.skipif(not LABELLED.exists(), reason="no recordings of the independent simulator")
 @pytest.mark.parametrize("folder", mostly_long(SEEN, {"speed_friction"}))
-def test_an_independent_simulator_is_seen_through(
-    folder: str, diagnosed: Callable[[Sequence[Case]], Diagnosis]
-) -> None:
+def test_an_independent_simulator_is_seen_through(folder, diagnosed):
     name, parameter, size = SEEN[folder]
     found = diagnosed(read_cases([LABELLED / folder], SYSTEM))
     assert [cause.effect.name for cause in found.causes] == [name]
@@ -389,17 +357,13 @@ def uneven(case: Case) -> Case:
         uneven,
     ],
 )
-def test_clean_recordings_of_an_independent_simulator_stay_clean(
-    sampled: Callable[[Case], Case], diagnosed: Callable[[Sequence[Case]], Diagnosis]
-) -> None:
+def test_clean_recordings_of_an_independent_simulator_stay_clean(sampled, diagnosed):
     cases = [sampled(case) for case in read_cases([LABELLED / "clean"], SYSTEM)]
     assert diagnosed(cases).verdict == "nothing"
 
 
 @pytest.mark.skipif(not LABELLED.exists(), reason="no recordings of the independent simulator")
-def test_a_pole_ring_is_named_from_uneven_samples(
-    diagnosed: Callable[[Sequence[Case]], Diagnosis],
-) -> None:
+def test_a_pole_ring_is_named_from_uneven_samples(diagnosed):
     (cause,) = diagnosed([uneven(case) for case in two_stops("pole_ring")]).causes
     assert cause.effect.name == "PoleRingEccentricity"
     assert cause.parameters["amplitude"].low <= 2e-3 <= cause.parameters["amplitude"].high
@@ -407,9 +371,7 @@ def test_a_pole_ring_is_named_from_uneven_samples(
 
 @pytest.mark.skipif(not LABELLED.exists(), reason="no recordings of the independent simulator")
 @pytest.mark.parametrize("folder", mostly_long(SEEN, {"radius"}))
-def test_two_stops_of_an_independent_simulator_are_enough(
-    folder: str, diagnosed: Callable[[Sequence[Case]], Diagnosis]
-) -> None:
+def test_two_stops_of_an_independent_simulator_are_enough(folder, diagnosed):
     name, parameter, size = SEEN[folder]
     (cause,) = diagnosed(two_stops(folder)).causes
     assert cause.effect.name == name
@@ -446,9 +408,7 @@ WRONG_SENSORS: dict[str, tuple[Callable[[Case], Case], str, str, float]] = {
 
 @pytest.mark.skipif(not LABELLED.exists(), reason="no recordings of the independent simulator")
 @pytest.mark.parametrize("sensor", mostly_long(WRONG_SENSORS, {"late wheel speed"}))
-def test_a_wrong_sensor_on_an_independent_simulator_is_named(
-    sensor: str, diagnosed: Callable[[Sequence[Case]], Diagnosis]
-) -> None:
+def test_a_wrong_sensor_on_an_independent_simulator_is_named(sensor, diagnosed):
     wrong, name, parameter, size = WRONG_SENSORS[sensor]
     found = diagnosed([wrong(case) for case in read_cases([LABELLED / "clean"], SYSTEM)])
     assert found.verdict == "found"
@@ -460,9 +420,7 @@ def test_a_wrong_sensor_on_an_independent_simulator_is_named(
 
 @pytest.mark.long
 @pytest.mark.skipif(not LABELLED.exists(), reason="no recordings of the independent simulator")
-def test_load_cells_that_drift_on_an_independent_simulator_are_unexplained(
-    diagnosed: Callable[[Sequence[Case]], Diagnosis],
-) -> None:
+def test_load_cells_that_drift_on_an_independent_simulator_are_unexplained(diagnosed):
     """300 N over a stop, a hundredth of the force, which no effect of the catalogue does."""
     cases = read_cases([LABELLED / "clean"], SYSTEM)
     drifting = [
@@ -473,9 +431,7 @@ def test_load_cells_that_drift_on_an_independent_simulator_are_unexplained(
 
 @pytest.mark.long
 @pytest.mark.skipif(not LABELLED.exists(), reason="no recordings of the independent simulator")
-def test_a_wrong_sensor_beside_wrong_physics_is_found_too(
-    diagnosed: Callable[[Sequence[Case]], Diagnosis],
-) -> None:
+def test_a_wrong_sensor_beside_wrong_physics_is_found_too(diagnosed):
     wrong, _, _, _ = WRONG_SENSORS["wheel radius"]
     found = diagnosed([wrong(case) for case in read_cases([LABELLED / "fade"], SYSTEM)])
     assert {cause.effect.name for cause in found.causes} == {"BrakeFade", "WheelRadius"}
@@ -483,9 +439,7 @@ def test_a_wrong_sensor_beside_wrong_physics_is_found_too(
 
 @pytest.mark.long
 @pytest.mark.skipif(not LABELLED.exists(), reason="no recordings of the independent simulator")
-def test_two_wrong_sensors_are_found_though_either_hides_the_other(
-    diagnosed: Callable[[Sequence[Case]], Diagnosis],
-) -> None:
+def test_two_wrong_sensors_are_found_though_either_hides_the_other(diagnosed):
     cases = read_cases([LABELLED / "clean"], SYSTEM)
     found = diagnosed(
         [c.with_signals({"tauR": 1.015 * c["tauR"], "Fx": c["Fx"] - 100.0}) for c in cases]
@@ -498,9 +452,7 @@ def test_two_wrong_sensors_are_found_though_either_hides_the_other(
 
 @pytest.mark.long
 @pytest.mark.skipif(not LABELLED.exists(), reason="no recordings of the independent simulator")
-def test_an_effect_that_turns_is_found_beside_one_that_dwarfs_it(
-    diagnosed: Callable[[Sequence[Case]], Diagnosis],
-) -> None:
+def test_an_effect_that_turns_is_found_beside_one_that_dwarfs_it(diagnosed):
     """The law of the pads leaves 350 times the noise, the pole ring 2 times."""
 
     def eccentric(case: Case) -> Case:

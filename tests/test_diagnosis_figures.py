@@ -6,19 +6,17 @@ import numpy as np
 from numpy.testing import assert_allclose
 
 from workbench.diagnosis.outcome import FAST, lasting, lasting_blocks, recording_figure
-from workbench.recordings.case import Case
-from workbench.system.system import System
 
 from .diagnosis_pages import residuals
 
 LASTING = 10  # blocks of 50 ms
 
 
-def test_half_a_lasting_time_is_ten_blocks(system: System) -> None:
+def test_half_a_lasting_time_is_ten_blocks(system):
     assert lasting_blocks(system) == LASTING
 
 
-def test_noise_alone_leaves_one_and_a_lasting_error_stands_out() -> None:
+def test_noise_alone_leaves_one_and_a_lasting_error_stands_out():
     before, after = lasting(residuals(gap=False), LASTING).noises()
     # 80 independent means: one standard deviation of their rms is 8 %.
     assert_allclose(after, 1.0, atol=0.3)
@@ -26,9 +24,7 @@ def test_noise_alone_leaves_one_and_a_lasting_error_stands_out() -> None:
     assert_allclose(before, 10.0 * np.sqrt(10.0 * 0.7), rtol=0.05)
 
 
-def test_an_error_that_turns_with_the_wheel_is_shown_where_means_would_hide_it(
-    dry_case: Case, system: System
-) -> None:
+def test_an_error_that_turns_with_the_wheel_is_shown_where_means_would_hide_it(dry_case, system):
     one = residuals(gap=False)
     turning = one.after + 5.0 * (-1.0) ** np.arange(len(one.after))[:, None]
     one = dataclasses.replace(one, before=turning)
@@ -38,7 +34,7 @@ def test_an_error_that_turns_with_the_wheel_is_shown_where_means_would_hide_it(
     assert "means over 50 ms" in figure.finding
 
 
-def test_no_mean_and_no_line_bridges_what_was_set_aside(dry_case: Case, system: System) -> None:
+def test_no_mean_and_no_line_bridges_what_was_set_aside(dry_case, system):
     one = residuals(gap=True)
     quiet, loud = one.block_time < 10.0, one.block_time > 15.0
     assert abs(lasting(one, LASTING).before[quiet]).max() < 3.0

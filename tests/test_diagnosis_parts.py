@@ -70,7 +70,7 @@ INPUTS, OUTPUTS = ("pB", "tauR"), ("omegaW", "omegaR")
 
 
 @pytest.fixture(scope="module")
-def everything(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def everything(tmp_path_factory) -> Path:
     path = tmp_path_factory.mktemp("library") / "AllEffects.fmu"
     text = ExtendedModel(
         LIBRARY, "MinimalObserver", "AllEffects", EFFECTS, "Every effect at zero"
@@ -117,9 +117,7 @@ def prepare(case: Case, fmu: FMU) -> Samples:
     return prepare_samples(case, SYSTEM, signals, OpenModel(fmu, motion(fmu, SYSTEM)))
 
 
-def test_a_signal_that_a_recording_has_not_says_nothing_and_leaves_the_others(
-    everything: Path,
-) -> None:
+def test_a_signal_that_a_recording_has_not_says_nothing_and_leaves_the_others(everything):
     """Beside one that has it."""
     case = simulated(everything, {})
     rng = np.random.default_rng(5)
@@ -153,9 +151,7 @@ def errors_of(case: Case, fmu: FMU, values: dict[str, float]) -> tuple[Samples, 
     "effects",
     [{}, {"padFriction.brakeFade.fade": 5e-4}, {"wheelRadius.outOfRoundWheel.cosine": 2e-4}],
 )
-def test_prediction_agrees_with_an_error_controlled_integrator(
-    effects: dict[str, float], everything: Path
-) -> None:
+def test_prediction_agrees_with_an_error_controlled_integrator(effects, everything):
     case = simulated(everything, effects)
     with FMU(everything) as fmu:
         ready, errors = errors_of(case, fmu, {"muWR": 0.4, **effects})
@@ -169,7 +165,7 @@ def test_prediction_agrees_with_an_error_controlled_integrator(
     assert np.abs(0.46 * errors[moving, 0]).max() < 0.015
 
 
-def test_an_effect_of_size_zero_predicts_what_the_observer_model_does(everything: Path) -> None:
+def test_an_effect_of_size_zero_predicts_what_the_observer_model_does(everything):
     case = simulated(MINIMAL, {})
     both = []
     for path in (MINIMAL, everything):
@@ -203,7 +199,7 @@ def ready(case: Case) -> Samples:
 
 
 @pytest.mark.parametrize("share", [0.5, -0.5, 2.3])
-def test_a_clock_that_is_set_right_leaves_readings_the_noise_they_have(share: float) -> None:
+def test_a_clock_that_is_set_right_leaves_readings_the_noise_they_have(share):
     """A line between two samples would have half of its variance, and half a sample be favoured.
 
     Of 6000 samples the standard deviation is known to 1 %; the mean of ten that moves adds 0.5 %.
@@ -219,7 +215,7 @@ def test_a_clock_that_is_set_right_leaves_readings_the_noise_they_have(share: fl
     assert abs(np.mean(found[inside])) < 5e-3
 
 
-def test_spikes_are_set_aside_with_their_blocks() -> None:
+def test_spikes_are_set_aside_with_their_blocks():
     spikes = (1503, 2407, 3801)
     samples = ready(noisy(1, spikes))
     assert samples.set_aside["spike, dropout or saturation"] == len(spikes)
@@ -228,7 +224,7 @@ def test_spikes_are_set_aside_with_their_blocks() -> None:
         assert samples.gain[k] == 0.0
 
 
-def test_blocks_span_equal_times_where_steps_do_not(tmp_path: Path) -> None:
+def test_blocks_span_equal_times_where_steps_do_not(tmp_path):
     """A cycler: 0.5 s while it pulses, one sample in 60 s while it rests; nearly all counts."""
     write_system(tmp_path / "tank")
     tank = load_system(tmp_path / "tank")
@@ -255,12 +251,12 @@ def test_blocks_span_equal_times_where_steps_do_not(tmp_path: Path) -> None:
     assert (held[resting] == signals["inflow"][resting]).all()
 
 
-def test_samples_that_are_lost_at_random_are_no_other_rate() -> None:
+def test_samples_that_are_lost_at_random_are_no_other_rate():
     kept = np.random.default_rng(1).random(20_000) > 0.3
     assert not uneven_steps(np.flatnonzero(kept) * 0.01, 0.01).any()
 
 
-def test_a_gap_is_in_no_block_and_leaves_others_as_they_are(tmp_path: Path) -> None:
+def test_a_gap_is_in_no_block_and_leaves_others_as_they_are(tmp_path):
     write_system(tmp_path / "tank")
     tank = load_system(tmp_path / "tank")
     time = np.delete(np.arange(0.0, 600.0, 0.5), slice(400, 440))
@@ -277,7 +273,7 @@ def test_a_gap_is_in_no_block_and_leaves_others_as_they_are(tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize("name", ["pB", "tauR", "omegaW", "omegaR", "Fx"])
-def test_single_wrong_samples_are_found_wherever_they_strike(name: str) -> None:
+def test_single_wrong_samples_are_found_wherever_they_strike(name):
     """From a tenth of the range on, in stops with ramps and steps; nothing else is added."""
     rng, struck, missed, more = np.random.default_rng(3), 20, 0, 0
     for case in read_cases([ROOT / "cases"], SYSTEM):
@@ -294,7 +290,7 @@ def test_single_wrong_samples_are_found_wherever_they_strike(name: str) -> None:
     assert more == 0
 
 
-def test_pressure_loses_its_noise_but_no_time() -> None:
+def test_pressure_loses_its_noise_but_no_time():
     time = 0.005 * np.arange(4000)
     # Up within half a second, held, down: as a valve with its lags does.
     true = 2.7e5 * (1.0 - np.exp(-np.clip(time - 4.0, 0.0, None) / 0.5))
@@ -312,7 +308,7 @@ def test_pressure_loses_its_noise_but_no_time() -> None:
     assert abs(late) < 0.001
 
 
-def test_noise_is_whitened_to_variance_one() -> None:
+def test_noise_is_whitened_to_variance_one():
     case = noisy(2)
     samples = ready(case)
     smooth = np.column_stack(
@@ -331,7 +327,7 @@ def test_noise_is_whitened_to_variance_one() -> None:
     assert 0.3 < white[:, 1].var() < 1.2
 
 
-def test_errors_that_last_are_noise_though_samples_are_missing() -> None:
+def test_errors_that_last_are_noise_though_samples_are_missing():
     """The right gain leaves innovations white: a mean over a second has the variance of a mean."""
     rng, draws = np.random.default_rng(6), 40
     kept = rng.random(6000) > 0.3
@@ -357,7 +353,7 @@ def test_errors_that_last_are_noise_though_samples_are_missing() -> None:
     assert 20.0 * np.square(lasting).mean() == pytest.approx(1.0, abs=0.15)
 
 
-def test_load_cells_behind_the_mode_follow_its_transfer_function() -> None:
+def test_load_cells_behind_the_mode_follow_its_transfer_function():
     samples = ready(noisy(3))
     for frequency in (2.0, 8.0, 15.0):
         wave = np.sin(2.0 * np.pi * frequency * samples.time)
@@ -368,7 +364,7 @@ def test_load_cells_behind_the_mode_follow_its_transfer_function() -> None:
         assert np.abs(read).max() == pytest.approx(gain, rel=0.02)
 
 
-def test_a_step_that_is_held_at_its_bound_lets_the_others_do_their_best() -> None:
+def test_a_step_that_is_held_at_its_bound_lets_the_others_do_their_best():
     rng = np.random.default_rng(5)
     J, r = rng.normal(size=(40, 3)), rng.normal(size=40)
     J[:, 1] += 2.0 * J[:, 0]  # what one of them does the other may do too
@@ -384,7 +380,7 @@ def test_a_step_that_is_held_at_its_bound_lets_the_others_do_their_best() -> Non
     np.testing.assert_allclose(minimum_within(total, np.full(3, -9.0), np.full(3, 9.0)), free)
 
 
-def test_eliminating_local_unknowns_is_least_squares_over_all() -> None:
+def test_eliminating_local_unknowns_is_least_squares_over_all():
     rng = np.random.default_rng(4)
     systems = [
         RecordingSystem(
@@ -420,7 +416,7 @@ def test_eliminating_local_unknowns_is_least_squares_over_all() -> None:
     np.testing.assert_allclose(local, brute[13:18], rtol=1e-6)
 
 
-def test_a_tolerance_at_its_bound_stays_there_while_the_rest_does_its_best() -> None:
+def test_a_tolerance_at_its_bound_stays_there_while_the_rest_does_its_best():
     rng = np.random.default_rng(4)
     begun = rng.uniform(-1.0, 1.0, size=(4, 3))
     far = 0.9 * np.abs(begun).max()  # some are beyond it as begun
@@ -459,13 +455,13 @@ def linearised(errors: Matrix) -> LinearizedPoint:
     return LinearizedPoint(Point({}, {}, np.zeros((1, 5)), {}), (), residuals, 20, np.ones(3), 0.0)
 
 
-def test_deviance_is_chi_squared_where_errors_are_noise() -> None:
+def test_deviance_is_chi_squared_where_errors_are_noise():
     lin = linearised(np.random.default_rng(4).standard_normal((400, 3)))
     assert lin.deviance == pytest.approx(lin.misfit, rel=1e-12)
     assert lin.spread.tolist() == [1.0, 1.0, 1.0]
 
 
-def test_chi_squared_over_spread_is_the_slope_of_the_deviance() -> None:
+def test_chi_squared_over_spread_is_the_slope_of_the_deviance():
     errors = np.random.default_rng(4).standard_normal((400, 3)) * [1.0, 3.0, 200.0]
     lin, step = linearised(errors), 1e-6
     for j, spread in enumerate(lin.spread):
@@ -476,14 +472,14 @@ def test_chi_squared_over_spread_is_the_slope_of_the_deviance() -> None:
         assert slope == pytest.approx(2.0 * np.square(errors[:, j]).sum() / spread, rel=1e-5)
 
 
-def test_to_spoil_a_clean_channel_for_a_wrong_one_is_no_gain() -> None:
+def test_to_spoil_a_clean_channel_for_a_wrong_one_is_no_gain():
     errors = np.random.default_rng(4).standard_normal((400, 3)) * [1.0, 1.0, 40.0]
     traded = linearised(errors * [1.0, 10.0, 0.5])
     assert traded.misfit < linearised(errors).misfit
     assert traded.deviance > linearised(errors).deviance
 
 
-def test_covariance_is_the_same_in_any_unit() -> None:
+def test_covariance_is_the_same_in_any_unit():
     rng = np.random.default_rng(5)
     matrix = rng.normal(size=(30, 4))
     units: Vector = np.array([1.0, 1e5, 1e-6, 30.0])
@@ -492,7 +488,7 @@ def test_covariance_is_the_same_in_any_unit() -> None:
     np.testing.assert_allclose(other, plain * np.outer(units, units), rtol=1e-8)
 
 
-def test_sizes_have_bounds_units_and_a_zero_default(everything: Path) -> None:
+def test_sizes_have_bounds_units_and_a_zero_default(everything):
     with FMU(everything) as fmu:
         described = {variable.name: variable for variable in fmu.description.variables}
         for effect in EFFECTS:
@@ -511,7 +507,7 @@ def test_sizes_have_bounds_units_and_a_zero_default(everything: Path) -> None:
                 assert one.minimum <= min(values) <= max(values) <= one.maximum
 
 
-def test_water_is_where_the_conditions_say_if_those_of_any_stop_do(everything: Path) -> None:
+def test_water_is_where_the_conditions_say_if_those_of_any_stop_do(everything):
     effects = {effect.name: effect for effect in EFFECTS}
     film, single, lag = (effects[n] for n in ("WaterFilm", "SingleDiscWaterFilm", "CylinderLag"))
     named = ("03_dry_120_3.6", "13_onedisc_100_2.7", "11_brakewet_120_2.7_rev")
@@ -535,7 +531,7 @@ def test_water_is_where_the_conditions_say_if_those_of_any_stop_do(everything: P
     assert asked([cases[0]] * 2) == ([True, True], [True, True], [None, None], "")
 
 
-def test_what_shows_only_where_an_input_falls_is_not_looked_for_elsewhere() -> None:
+def test_what_shows_only_where_an_input_falls_is_not_looked_for_elsewhere():
     rising = ready(noisy(1))
     assert not rising.falls("pB")
     falling = replace(rising, u=rising.u[::-1])
@@ -544,12 +540,12 @@ def test_what_shows_only_where_an_input_falls_is_not_looked_for_elsewhere() -> N
         rising.falls("pC")
 
 
-def test_an_unknown_effect_is_refused_with_the_closest_name() -> None:
+def test_an_unknown_effect_is_refused_with_the_closest_name():
     with pytest.raises(InputError, match="closest: 'BrakeFade'"):
         choose(["brakefade"], EFFECTS)
 
 
-def test_source_with_an_error_says_where(tmp_path: Path) -> None:
+def test_source_with_an_error_says_where(tmp_path):
     wrong = {EFFECTS[0].name: {"slop": 0.1}}
     text = ExtendedModel(
         LIBRARY, "MinimalObserver", "Extended", EFFECTS[:1], "a typo", wrong
@@ -559,7 +555,7 @@ def test_source_with_an_error_says_where(tmp_path: Path) -> None:
     assert not (tmp_path / "Extended.fmu").exists()
 
 
-def test_derivatives_of_the_errors_are_those_of_central_differences() -> None:
+def test_derivatives_of_the_errors_are_those_of_central_differences():
     samples, point = ready(noisy(6)), {delay("Fx"): 0.002, "muWR": 0.4}
     steps = {"muDC": 0.003, "Fz": 120.0, "JW": 0.5}
     with simulating(SimulatorSetup(MINIMAL, SYSTEM, (samples,))) as simulator:
@@ -579,7 +575,7 @@ def test_derivatives_of_the_errors_are_those_of_central_differences() -> None:
             np.testing.assert_allclose(found[:, j], central, atol=share * np.abs(central).max())
 
 
-def test_derivatives_that_grow_beyond_all_bounds_are_refused_in_words() -> None:
+def test_derivatives_that_grow_beyond_all_bounds_are_refused_in_words():
     samples, point = ready(noisy(6)), {delay("Fx"): 0.002, "muWR": 0.4}
     with simulating(SimulatorSetup(MINIMAL, SYSTEM, (samples,))) as simulator:
         # An inertia less than none: the wheel runs away from what presses it on, yet stays a
@@ -590,7 +586,7 @@ def test_derivatives_that_grow_beyond_all_bounds_are_refused_in_words() -> None:
             simulator.derivatives(0, runaway, [Variation(("JW",))])
 
 
-def test_recordings_that_share_an_open_model_say_what_they_say_alone(everything: Path) -> None:
+def test_recordings_that_share_an_open_model_say_what_they_say_alone(everything):
     """One set after the other, whatever the one before left in the model, which stays open."""
     inertia = next(effect for effect in EFFECTS if effect.name == "WheelInertia")
     values = given_values(everything, SYSTEM)
@@ -610,7 +606,7 @@ def test_recordings_that_share_an_open_model_say_what_they_say_alone(everything:
             np.testing.assert_array_equal(shared.jacobian, alone.jacobian)
 
 
-def test_a_fit_that_leads_to_no_derivative_is_no_rival(everything: Path) -> None:
+def test_a_fit_that_leads_to_no_derivative_is_no_rival(everything):
     """An effect is given up, and not the diagnosis, where a step leads beyond what a model can."""
     inertia = next(effect for effect in EFFECTS if effect.name == "WheelInertia")
     with ResidualModel(
@@ -628,7 +624,7 @@ def test_a_fit_that_leads_to_no_derivative_is_no_rival(everything: Path) -> None
         assert extended(fit, nominal, none, rounds=1) is None
 
 
-def test_states_of_effects_that_are_absent_change_no_derivative(everything: Path) -> None:
+def test_states_of_effects_that_are_absent_change_no_derivative(everything):
     """Derivatives with all states, and with those alone that anything depends on."""
     fade = next(effect for effect in EFFECTS if effect.name == "BrakeFade")
     present = {variables(fade, "fade")[0]: 4e-4, "muWR": 0.4}
@@ -657,7 +653,7 @@ RISING = """
   model Observer"""
 
 
-def test_what_a_varied_effect_adds_up_counts_though_its_size_is_zero(tmp_path: Path) -> None:
+def test_what_a_varied_effect_adds_up_counts_though_its_size_is_zero(tmp_path):
     """Reference: central differences, of an effect that acts by its own state alone."""
     write_system(tmp_path)
     modelica = tmp_path / "package.mo"

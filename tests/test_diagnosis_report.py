@@ -3,7 +3,6 @@
 import dataclasses
 import json
 import re
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
@@ -18,7 +17,6 @@ from workbench.diagnosis.inference.residuals import Balance
 from workbench.diagnosis.outcome import lasting_blocks, recording_figure
 from workbench.diagnosis.report import write_diagnosis_page
 from workbench.pages.figures import CaseFigure
-from workbench.recordings.case import Case
 from workbench.system.system import System
 
 from .diagnosis_pages import STOPS, TWINS, diagnose, residuals, section, text
@@ -27,23 +25,23 @@ from .schemas import check
 
 
 @pytest.fixture(scope="session")
-def results(root: Path, stops: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def results(root, stops, tmp_path_factory) -> Path:
     pytest.importorskip("rumoca", reason="no Modelica compiler")
     return diagnose(root, stops, tmp_path_factory.mktemp("diagnosis"))
 
 
 @pytest.fixture(scope="session")
-def summary(results: Path) -> dict[str, Any]:
+def summary(results) -> dict[str, Any]:
     return json.loads((results / "summary.json").read_text())
 
 
-def test_summary_and_page_are_as_all_are(results: Path, summary: dict[str, Any]) -> None:
+def test_summary_and_page_are_as_all_are(results, summary):
     check("diagnose", summary)
     check_page(results / "index.html", summary)
 
 
 @pytest.fixture(scope="session")
-def page(results: Path) -> Any:
+def page(results) -> Any:
     return lxml.html.fromstring((results / "index.html").read_bytes())
 
 
@@ -65,8 +63,8 @@ def steps(path: str) -> np.ndarray:
 
 
 def test_verdict_comes_first_in_one_sentence_and_names_the_planted_effect_and_its_twin(
-    page: Any, summary: dict[str, Any]
-) -> None:
+    page, summary
+):
     headline = page.find_class("headline")[0]
     assert summary["sentence"] in text(headline)
     assert all(twin in text(headline) for twin in TWINS)
@@ -74,7 +72,7 @@ def test_verdict_comes_first_in_one_sentence_and_names_the_planted_effect_and_it
     assert headline.getparent().tag == "header"
 
 
-def test_page_links_to_all_files_beside_it_and_its_drawings_tell_numbers(page: Any) -> None:
+def test_page_links_to_all_files_beside_it_and_its_drawings_tell_numbers(page):
     links = {Path(unquote(address)).name for address in page.xpath("//a/@href")}
     figures = {*STOPS, "dependences", "confusability", "gain"}
     for suffix in (".csv", ".png", ".svg"):
@@ -86,7 +84,7 @@ def test_page_links_to_all_files_beside_it_and_its_drawings_tell_numbers(page: A
 # --- the figure that convinces ---
 
 
-def test_every_stop_has_a_figure_and_the_clearest_comes_first(page: Any, results: Path) -> None:
+def test_every_stop_has_a_figure_and_the_clearest_comes_first(page, results):
     names = [text(heading) for heading in page.xpath("//article[figure]/h3")]
     assert sorted(names) == sorted(STOPS)
     clearness = []
@@ -105,7 +103,7 @@ def test_every_stop_has_a_figure_and_the_clearest_comes_first(page: Any, results
     ]
 
 
-def test_curves_of_the_page_are_those_of_the_data(page: Any, results: Path) -> None:
+def test_curves_of_the_page_are_those_of_the_data(page, results):
     name = text(page.xpath("//article[figure]/h3")[0])
     table = pd.read_csv(results / f"{name}.csv")
     axes = page.xpath("//article[figure][1]//g[starts-with(text, 'Creep force')]")[0]
@@ -121,9 +119,7 @@ def test_curves_of_the_page_are_those_of_the_data(page: Any, results: Path) -> N
         )
 
 
-def test_the_noise_band_holds_what_the_extended_model_leaves_and_not_the_effect(
-    results: Path,
-) -> None:
+def test_the_noise_band_holds_what_the_extended_model_leaves_and_not_the_effect(results):
     for name in STOPS:
         table = pd.read_csv(results / f"{name}.csv")
         band = 2.0 * table["lasting_sigma.Fx [N]"]
@@ -135,9 +131,7 @@ def test_the_noise_band_holds_what_the_extended_model_leaves_and_not_the_effect(
 # --- evidence in tables ---
 
 
-def test_dependences_are_those_of_the_summary_before_and_after(
-    page: Any, summary: dict[str, Any]
-) -> None:
+def test_dependences_are_those_of_the_summary_before_and_after(page, summary):
     table = data(page.get_element_by_id("dependence-table"))
     for dependence in summary["dependences"]:
         assert (
@@ -151,9 +145,7 @@ def test_dependences_are_those_of_the_summary_before_and_after(
     assert table.size == 2 * len(summary["dependences"])
 
 
-def test_cause_is_told_with_interval_unit_twin_and_the_experiment(
-    page: Any, summary: dict[str, Any]
-) -> None:
+def test_cause_is_told_with_interval_unit_twin_and_the_experiment(page, summary):
     (cause,) = summary["causes"]
     article = section(page, "causes").xpath(".//article")[0]
     assert cause["effect"] in text(article.find("h3"))
@@ -168,9 +160,7 @@ def test_cause_is_told_with_interval_unit_twin_and_the_experiment(
     assert f"{100 * cause['explained']:.1f} %" in text(article)
 
 
-def test_a_size_is_told_with_what_noise_alone_allows_and_what_its_error_goes_with(
-    page: Any, summary: dict[str, Any]
-) -> None:
+def test_a_size_is_told_with_what_noise_alone_allows_and_what_its_error_goes_with(page, summary):
     (cause,), certainty = summary["causes"], summary["certainty"]
     ((name, one),) = cause["parameters"].items()
     size = f"{cause['effect']} {name}"
@@ -192,7 +182,7 @@ def test_a_size_is_told_with_what_noise_alone_allows_and_what_its_error_goes_wit
     assert certainty["starts"]["same"] == 4
 
 
-def test_each_candidate_has_one_row_the_best_first(page: Any, summary: dict[str, Any]) -> None:
+def test_each_candidate_has_one_row_the_best_first(page, summary):
     table = data(page.get_element_by_id("candidate-table"))
     falls = table["fall, cross-validated"].astype(float)
     assert sorted(table.index) == sorted(
@@ -213,9 +203,7 @@ def test_each_candidate_has_one_row_the_best_first(page: Any, summary: dict[str,
         assert f"{effect}, {reason}" in text(section(page, "causes"))
 
 
-def test_matrix_frames_what_was_found_and_reads_out_its_twin(
-    page: Any, summary: dict[str, Any]
-) -> None:
+def test_matrix_frames_what_was_found_and_reads_out_its_twin(page, summary):
     (matrix,) = page.find_class("matrix")
     names = summary["confusability"]["effects"]
     assert len(matrix.xpath("./rect")) == len(names) ** 2
@@ -227,7 +215,7 @@ def test_matrix_frames_what_was_found_and_reads_out_its_twin(
         assert re.search(r"ApexOffset and FxOffset|FxOffset and ApexOffset", told)
 
 
-def test_gain_is_drawn_for_every_stop_and_for_all(page: Any, summary: dict[str, Any]) -> None:
+def test_gain_is_drawn_for_every_stop_and_for_all(page, summary):
     (dots,) = page.find_class("dots")
     gain = summary["gain"]
     names = [text(label) for label in dots.xpath("./text[@text-anchor='end']")]
@@ -248,9 +236,7 @@ def test_gain_is_drawn_for_every_stop_and_for_all(page: Any, summary: dict[str, 
         assert f"{number:.2f}" in shown
 
 
-def test_extended_model_is_shown_as_written_with_the_next_command(
-    page: Any, summary: dict[str, Any]
-) -> None:
+def test_extended_model_is_shown_as_written_with_the_next_command(page, summary):
     shown = section(page, "model").xpath(".//pre/code")
     assert shown[0].text_content().strip() == Path(summary["model"]["modelica"]).read_text().strip()
     assert "redeclare" in shown[0].text_content()
@@ -258,7 +244,7 @@ def test_extended_model_is_shown_as_written_with_the_next_command(
     assert "simulate" not in shown[1].text_content()
 
 
-def test_levels_and_samples_set_aside_are_reported(page: Any, summary: dict[str, Any]) -> None:
+def test_levels_and_samples_set_aside_are_reported(page, summary):
     entries = section(page, "baseline").xpath(".//dt")
     shown = {text(entry): text(entry.getnext()).split()[0] for entry in entries}
     assert shown == {name: f"{level['value']:.4g}" for name, level in summary["levels"].items()}
@@ -270,9 +256,7 @@ def test_levels_and_samples_set_aside_are_reported(page: Any, summary: dict[str,
 # --- the best estimate ---
 
 
-def test_best_estimates_of_the_recording_shown_are_those_of_the_data(
-    page: Any, results: Path, summary: dict[str, Any]
-) -> None:
+def test_best_estimates_of_the_recording_shown_are_those_of_the_data(page, results, summary):
     smoothed = summary["smoothed"]
     assert smoothed["recording"] == text(page.xpath("//article[figure]/h3")[0])
     table = pd.read_csv(results / "smoothed.csv")
@@ -302,7 +286,7 @@ def test_best_estimates_of_the_recording_shown_are_those_of_the_data(
 
 
 @pytest.fixture
-def figure(dry_case: Case, system: System) -> CaseFigure:
+def figure(dry_case, system) -> CaseFigure:
     span = lasting_blocks(system)
     return recording_figure(residuals(gap=False), dry_case, system, "with FxOffset", span)
 
@@ -316,9 +300,7 @@ def written(
     return lxml.html.fromstring(path.read_bytes())
 
 
-def test_the_unexplained_is_no_cause(
-    system: System, summary: dict[str, Any], figure: CaseFigure, tmp_path: Path
-) -> None:
+def test_the_unexplained_is_no_cause(system, summary, figure, tmp_path):
     unexplained = {
         **summary,
         "verdict": "unexplained",
@@ -336,9 +318,7 @@ def test_the_unexplained_is_no_cause(
     assert "is not explained" in text(section(page, "shown"))
 
 
-def test_a_fit_from_elsewhere_that_ended_lower_is_a_warning(
-    system: System, summary: dict[str, Any], figure: CaseFigure, tmp_path: Path
-) -> None:
+def test_a_fit_from_elsewhere_that_ended_lower_is_a_warning(system, summary, figure, tmp_path):
     starts = {
         "behind": [0.0, -40.0, None],
         "same": 1,
@@ -352,16 +332,14 @@ def test_a_fit_from_elsewhere_that_ended_lower_is_a_warning(
 
 
 def test_a_diagnosis_that_was_not_asked_says_nothing_of_how_sure_sizes_are(
-    system: System, summary: dict[str, Any], figure: CaseFigure, tmp_path: Path
-) -> None:
+    system, summary, figure, tmp_path
+):
     page = written(system, {**summary, "certainty": None}, [figure], tmp_path)
     assert "noise alone" not in text(section(page, "causes"))
     assert "Begun elsewhere" not in text(section(page, "causes"))
 
 
-def test_a_deviation_beyond_its_tolerance_is_flagged(
-    system: System, summary: dict[str, Any], figure: CaseFigure, tmp_path: Path
-) -> None:
+def test_a_deviation_beyond_its_tolerance_is_flagged(system, summary, figure, tmp_path):
     deviations = {"a": {"muDC": 2.6, "JR": -2.4}, "b": {"muDC": -2.6, "JR": 0.0}}
     page = written(system, {**summary, "deviations": deviations}, [figure], tmp_path)
     table = page.get_element_by_id("deviation-table")
@@ -369,8 +347,8 @@ def test_a_deviation_beyond_its_tolerance_is_flagged(
 
 
 def test_observers_are_compared_at_every_stop_that_could_be_judged(
-    system: System, summary: dict[str, Any], figure: CaseFigure, tmp_path: Path
-) -> None:
+    system, summary, figure, tmp_path
+):
     errors = {name: {"before": 0.021, "after": 0.004} for name in STOPS}
     errors["03_dry_120_3.6"] = {"before": 0.03, "after": None}
     page = written(system, {**summary, "observers": {"ekf": errors}}, [figure], tmp_path)
@@ -384,9 +362,7 @@ def test_observers_are_compared_at_every_stop_that_could_be_judged(
     assert not without.xpath("//*[@id='observer-table']")
 
 
-def test_pages_of_six_and_fourteen_long_stops_stay_small(
-    system: System, summary: dict[str, Any], dry_case: Case, tmp_path: Path
-) -> None:
+def test_pages_of_six_and_fourteen_long_stops_stay_small(system, summary, dry_case, tmp_path):
     """Residuals of noise, of every kind, are the longest that curves can be."""
     one = residuals(gap=True)
     rng = np.random.default_rng(2)
@@ -437,12 +413,12 @@ told.overflow = document.documentElement.scrollWidth - document.documentElement.
 
 
 @pytest.fixture(scope="session")
-def browser(results: Path, probe: Callable[[Path, str], dict[str, Any]]) -> dict[str, Any]:
+def browser(results, probe) -> dict[str, Any]:
     """What a script that uses the page finds."""
     return probe(results / "index.html", PROBE)
 
 
-def test_page_opens_without_errors_and_draws_every_figure(browser: dict[str, Any]) -> None:
+def test_page_opens_without_errors_and_draws_every_figure(browser):
     assert browser["errors"] == []
     assert [len(heights) for heights in browser["panels"]] == [8, 8, 8, 8]
     assert min(min(heights) for heights in browser["panels"]) > 35  # [px] that can be read
@@ -451,13 +427,11 @@ def test_page_opens_without_errors_and_draws_every_figure(browser: dict[str, Any
     assert browser["overflow"] <= 0
 
 
-def test_the_matrix_and_all_else_fit_a_narrow_screen(
-    results: Path, narrow: Callable[[Path], None]
-) -> None:
+def test_the_matrix_and_all_else_fit_a_narrow_screen(results, narrow):
     narrow(results / "index.html")
 
 
-def test_candidates_sort_on_click(browser: dict[str, Any], summary: dict[str, Any]) -> None:
+def test_candidates_sort_on_click(browser, summary):
     best: dict[str, float] = {}
     for candidate in summary["candidates"]:
         best.setdefault(candidate["effect"], candidate["gain"])
@@ -470,12 +444,12 @@ def test_candidates_sort_on_click(browser: dict[str, Any], summary: dict[str, An
     assert sorted(up) == sorted(best)
 
 
-def test_only_stops_and_the_best_estimate_of_one_zoom(browser: dict[str, Any]) -> None:
+def test_only_stops_and_the_best_estimate_of_one_zoom(browser):
     assert browser["tools"] == len(STOPS) + 1
     assert browser["zoomed"][2] == 0.5 * browser["whole"][2]
 
 
-def test_heat_follows_the_share(browser: dict[str, Any]) -> None:
+def test_heat_follows_the_share(browser):
     """Cells of equal share have one colour, others another."""
     alpha = [
         float(re.search(r"([\d.]+)\)$", colour)[1]) if colour.endswith(")") else 0.0

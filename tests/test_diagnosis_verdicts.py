@@ -16,7 +16,7 @@ from .processes import ending
 
 
 @pytest.fixture(scope="session")
-def forceless(root: Path, stops: Path, tmp_path_factory: pytest.TempPathFactory) -> Any:
+def forceless(root, stops, tmp_path_factory) -> Any:
     """The page of the same stops without Fx, in which nothing is wrong then."""
     pytest.importorskip("rumoca", reason="no Modelica compiler")
     folder = tmp_path_factory.mktemp("forceless")
@@ -32,7 +32,7 @@ def forceless(root: Path, stops: Path, tmp_path_factory: pytest.TempPathFactory)
 
 @pytest.mark.usefixtures("ctrl_c")
 @pytest.mark.long
-def test_an_interrupted_search_keeps_what_it_found(root: Path, stops: Path, tmp_path: Path) -> None:
+def test_an_interrupted_search_keeps_what_it_found(root, stops, tmp_path):
     """Ctrl-C while a second cause is sought."""
     pytest.importorskip("rumoca", reason="no Modelica compiler")
     arguments = ["diagnose", str(stops), "--effects", *EFFECTS, "--out", str(tmp_path)]
@@ -56,7 +56,7 @@ def test_an_interrupted_search_keeps_what_it_found(root: Path, stops: Path, tmp_
     assert "more may be missing" in text(page.get_element_by_id("answer"))
 
 
-def test_without_force_the_verdict_says_what_that_costs(forceless: Any) -> None:
+def test_without_force_the_verdict_says_what_that_costs(forceless):
     headline = text(forceless.find_class("headline")[0])
     assert headline.startswith("Nothing.")
     assert "Without a measured creep force, fewer effects" in headline
@@ -70,7 +70,7 @@ def test_without_force_the_verdict_says_what_that_costs(forceless: Any) -> None:
     assert any(text(title).startswith("Creep force") for title in estimated)
 
 
-def test_where_nothing_is_missing_nothing_is_claimed(forceless: Any) -> None:
+def test_where_nothing_is_missing_nothing_is_claimed(forceless):
     assert not forceless.find_class("dots")
     assert not forceless.xpath("//section[@aria-labelledby='model']")
     assert not forceless.xpath("//a[@href='#model']")

@@ -1,7 +1,6 @@
 """The physical trend of disc-pad friction: null, closed forms, and what it is good for."""
 
 from collections.abc import Iterator
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -21,13 +20,13 @@ RR, RB, NOMINAL = 0.70, 0.30, 0.30
 
 
 @pytest.fixture(scope="module")
-def fmu(minimal_path: Path) -> Iterator[FMU]:
+def fmu(minimal_path) -> Iterator[FMU]:
     with FMU(minimal_path) as opened:
         yield opened
 
 
 @pytest.fixture(scope="module")
-def gains(fmu: FMU, system: System) -> Gains:
+def gains(fmu, system) -> Gains:
     return DisturbanceObserver.default_gains(fmu, system)
 
 
@@ -48,9 +47,7 @@ def column(system: System, name: str) -> int:
     return list(system.columns).index(name)
 
 
-def test_a_trend_of_zero_size_is_the_constant_bit_for_bit(
-    fmu: FMU, system: System, gains: Gains, dry_case: Case
-) -> None:
+def test_a_trend_of_zero_size_is_the_constant_bit_for_bit(fmu, system, gains, dry_case):
     """The disc warms, but neither speed nor temperature matters to friction."""
     zero = DiscModel(slope=0.0, fade=0.0)
     observers: list[Estimator] = [
@@ -62,17 +59,13 @@ def test_a_trend_of_zero_size_is_the_constant_bit_for_bit(
     assert_array_equal(runs[0].estimate, runs[1].estimate)
 
 
-def test_the_two_observers_can_be_told_apart_by_name(
-    fmu: FMU, system: System, gains: Gains
-) -> None:
+def test_the_two_observers_can_be_told_apart_by_name(fmu, system, gains):
     names = [kind(fmu, system, gains).name for kind in (DisturbanceObserver, DiscObserver)]
     assert names == ["disturbance_observer", "disturbance_observer_disc"]
 
 
 @pytest.mark.parametrize("name", ["03_dry_120_3.6", "05_dry_120_2.7_rev"])
-def test_without_feedback_friction_follows_the_law_of_speed(
-    root: Path, fmu: FMU, system: System, gains: Gains, name: str
-) -> None:
+def test_without_feedback_friction_follows_the_law_of_speed(root, fmu, system, gains, name):
     """Reference: muDC = 0.30 (1 + slope (1 - v/speed)), in both directions."""
     case = read_case(root / "cases" / name, system)
     run = without_feedback(fmu, system, gains, case, DiscModel(slope=0.2, fade=0.0, speed=22.0))
@@ -82,9 +75,7 @@ def test_without_feedback_friction_follows_the_law_of_speed(
     assert np.ptp(law) > 0.05
 
 
-def test_without_feedback_friction_fades_with_the_energy_of_the_brake(
-    fmu: FMU, system: System, gains: Gains, dry_case: Case
-) -> None:
+def test_without_feedback_friction_fades_with_the_energy_of_the_brake(fmu, system, gains, dry_case):
     """Reference: warming is share * energy / capacity without cooling; brake as in the nominal
     plant, three discs, 10.86 kN/bar above 0.25 bar."""
     fade, capacity, share = 1e-3, 1.2e5, 0.9
@@ -108,9 +99,7 @@ def test_without_feedback_friction_fades_with_the_energy_of_the_brake(
     assert NOMINAL - law.min() > 0.01
 
 
-def test_a_disc_cools_to_the_air_with_its_time_constant(
-    fmu: FMU, system: System, gains: Gains, dry_case: Case
-) -> None:
+def test_a_disc_cools_to_the_air_with_its_time_constant(fmu, system, gains, dry_case):
     """Reference: T - ambient falls by exp(-cooling t/capacity) at rest without pressure."""
     disc = DiscModel(slope=0.0, fade=1e-3, temperature=20.0, capacity=2e5, cooling=1e4)
     observer = DiscObserver(fmu, system, slowed(gains, 0.0), disc)
@@ -129,8 +118,8 @@ def test_a_disc_cools_to_the_air_with_its_time_constant(
 
 
 def test_what_was_learned_decays_towards_the_law_not_towards_the_constant(
-    fmu: FMU, system: System, gains: Gains, dry_case: Case
-) -> None:
+    fmu, system, gains, dry_case
+):
     """At rest the law of speed says 0.30 (1 + slope); a decay of 2/s forgets all else in 10 s."""
     values = gains.values.copy()
     values[gains.names.index("T_muDC")] = -2.0
@@ -146,9 +135,7 @@ def test_what_was_learned_decays_towards_the_law_not_towards_the_constant(
 
 
 @pytest.mark.parametrize("name", ["03_dry_120_3.6", "05_dry_120_2.7_rev"])
-def test_slow_feedback_errs_half_as_much_with_the_trend(
-    root: Path, fmu: FMU, system: System, gains: Gains, name: str
-) -> None:
+def test_slow_feedback_errs_half_as_much_with_the_trend(root, fmu, system, gains, name):
     """A thirtieth of the gain on muDC cannot follow the rise of friction; the textbook trend can.
 
     Measured: 0.60 to 0.23 % in case 03, 0.59 to 0.28 % in case 05; half is asked.

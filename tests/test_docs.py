@@ -25,7 +25,7 @@ RUN = [
 
 
 @pytest.mark.parametrize("page", RUN, ids=lambda page: page.name)
-def test_the_examples_of_a_page_run_and_print_what_it_says(page: Path, tmp_path: Path) -> None:
+def test_the_examples_of_a_page_run_and_print_what_it_says(page, tmp_path):
     run_page(page, tmp_path, ROOT, long=False)
 
 
@@ -35,12 +35,12 @@ def test_the_examples_of_a_page_run_and_print_what_it_says(page: Path, tmp_path:
     [page for page in RUN if any(block.mark == "long" for block in blocks(page))],
     ids=lambda page: page.name,
 )
-def test_the_long_examples_of_a_page_run(page: Path, tmp_path: Path) -> None:
+def test_the_long_examples_of_a_page_run(page, tmp_path):
     run_page(page, tmp_path, ROOT, long=True)
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
-def test_every_example_is_in_a_block_that_says_what_it_is(page: Path) -> None:
+def test_every_example_is_in_a_block_that_says_what_it_is(page):
     text = page.read_text()
     assert not re.findall(r"^    (?:python -m workbench|workbench|make|pip) .*", text, re.MULTILINE)
     assert {block.kind for block in blocks(page)} <= {
@@ -55,7 +55,7 @@ def test_every_example_is_in_a_block_that_says_what_it_is(page: Path) -> None:
         check_calls(block.code, page.name, ROOT)
 
 
-def test_a_wrong_example_is_found(tmp_path: Path) -> None:
+def test_a_wrong_example_is_found(tmp_path):
     for name, block, match in (
         ("status", "```sh\nworkbench simulate nowhere\n```", "status 2"),
         ("print", "```sh\necho one\n```\n\n```text\ntwo\n```", "'two' is not in"),
@@ -77,7 +77,7 @@ def test_a_wrong_example_is_found(tmp_path: Path) -> None:
 
 
 @pytest.fixture(scope="module")
-def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def site(tmp_path_factory) -> Path:
     """Built as `make docs` does, where no network can be reached."""
     pytest.importorskip("material", reason="needs the extra [docs]")
     out = tmp_path_factory.mktemp("site")
@@ -96,7 +96,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
-def test_the_site_is_built_strictly_and_needs_no_network(site: Path) -> None:
+def test_the_site_is_built_strictly_and_needs_no_network(site):
     for page in site.rglob("*.html"):
         loaded = re.findall(
             r'<(?:script|link|img)[^>]+(?:src|href)="(https?://[^"]+)', page.read_text()
@@ -104,12 +104,12 @@ def test_the_site_is_built_strictly_and_needs_no_network(site: Path) -> None:
         assert not loaded, page
 
 
-def test_the_picture_of_the_readme_is_in_the_site(site: Path) -> None:
+def test_the_picture_of_the_readme_is_in_the_site(site):
     (source,) = re.findall(r'src="([^"]+\.svg)"', (site / "index.html").read_text())
     assert (site / source).is_file()
 
 
-def test_the_reference_has_every_command_name_effect_and_threshold(site: Path) -> None:
+def test_the_reference_has_every_command_name_effect_and_threshold(site):
     import workbench as wb
     from workbench.cli.parser import command_line, parsers
     from workbench.diagnosis.inference.thresholds import Thresholds
@@ -130,7 +130,7 @@ def test_the_reference_has_every_command_name_effect_and_threshold(site: Path) -
     assert Thresholds.__dataclass_fields__["form"].default == 40.0
 
 
-def test_the_page_of_the_system_file_has_every_key_that_is_read(site: Path) -> None:
+def test_the_page_of_the_system_file_has_every_key_that_is_read(site):
     from workbench.system.declaration import key_names
     from workbench.system.reference import tables
     from workbench.system.system import System
@@ -142,7 +142,7 @@ def test_the_page_of_the_system_file_has_every_key_that_is_read(site: Path) -> N
             assert re.search(rf"<code>([a-zA-Z_]+\.)*{name}</code>", page), (table, name)
 
 
-def test_the_schema_of_case_files_takes_those_that_are_there_and_no_others(site: Path) -> None:
+def test_the_schema_of_case_files_takes_those_that_are_there_and_no_others(site):
     jsonschema = pytest.importorskip("jsonschema")
     schema = json.loads((site / "schemas" / "wheelset.case.json").read_text())
     jsonschema.Draft202012Validator.check_schema(schema)
@@ -156,7 +156,7 @@ def test_the_schema_of_case_files_takes_those_that_are_there_and_no_others(site:
     assert not validator.is_valid({key: value for key, value in good.items() if key != "title"})
 
 
-def test_the_citation_names_this_version() -> None:
+def test_the_citation_names_this_version():
     version = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
     citation = (ROOT / "CITATION.cff").read_text()
     assert f"version: {version}\n" in citation
@@ -168,7 +168,7 @@ def test_the_citation_names_this_version() -> None:
     )
 
 
-def test_the_readme_says_what_the_table_says() -> None:
+def test_the_readme_says_what_the_table_says():
     """The worst of each column, in the digits that the README has."""
     rows = re.findall(
         r"^\| \d\d_\S+ \| (.*) \|$", (ROOT / "docs" / "accuracy.md").read_text(), re.M
@@ -185,7 +185,7 @@ def test_the_readme_says_what_the_table_says() -> None:
     assert f"the Kalman filters up to {max(observers[2:]):.2f} %" in text
 
 
-def test_the_readme_says_of_machines_what_the_page_says() -> None:
+def test_the_readme_says_of_machines_what_the_page_says():
     page, readme = (
         re.findall(r"^\| (.*) \|$", (ROOT / name).read_text(), re.M)
         for name in ("docs/accuracy.md", "README.md")
@@ -200,12 +200,12 @@ def test_the_readme_says_of_machines_what_the_page_says() -> None:
         assert set(numbers) <= set(known)
 
 
-def test_the_picture_of_the_readme_is_small_and_drawn_by_the_diagnosis() -> None:
+def test_the_picture_of_the_readme_is_small_and_drawn_by_the_diagnosis():
     picture = ROOT / "docs" / "pictures" / "diagnosis.svg"
     assert picture.stat().st_size < 200_000
     assert "matplotlib" in picture.read_text()
 
 
-def test_calls_are_read_as_a_shell_does() -> None:
+def test_calls_are_read_as_a_shell_does():
     code = "workbench tune ekf \\\n  --budget 2  # quick\nworkbench doctor --json > doctor.json\n"
     assert list(calls(code)) == [["tune", "ekf", "--budget", "2"], ["doctor", "--json"]]

@@ -9,7 +9,7 @@ pytest.importorskip("casadi")
 pytest.importorskip("rumoca")
 
 from workbench.__main__ import main
-from workbench.diagnosis import Effect, read_effects
+from workbench.diagnosis import read_effects
 from workbench.diagnosis.effects.extension import ExtendedModel, build, variables
 from workbench.diagnosis.effects.slots import read_slots
 from workbench.errors import InputError
@@ -115,7 +115,7 @@ def tank(folder: Path, *changes: tuple[str, str]) -> Library:
 
 
 @pytest.mark.parametrize("effect", EFFECTS, ids=lambda effect: effect.name)
-def test_every_effect_has_a_claim_that_gives_it_a_size(effect: Effect) -> None:
+def test_every_effect_has_a_claim_that_gives_it_a_size(effect):
     """A class with an annotation is an effect, and is found here without being listed."""
     claims = [
         one.name
@@ -130,7 +130,7 @@ def test_every_effect_has_a_claim_that_gives_it_a_size(effect: Effect) -> None:
     assert claims
 
 
-def test_slots_follow_from_the_class_that_an_effect_extends() -> None:
+def test_slots_follow_from_the_class_that_an_effect_extends():
     slots = {effect.name: effect.slots for effect in EFFECTS}
     assert slots["BrakeFade"] == ("padFriction",)
     assert slots["SingleDiscWaterFilm"] == ("padFriction",)  # which extends WaterFilm
@@ -139,13 +139,13 @@ def test_slots_follow_from_the_class_that_an_effect_extends() -> None:
     assert slots["ApexOffset"] == ("forceSensor",)
 
 
-def test_of_several_slots_of_one_class_an_effect_names_its_own() -> None:
+def test_of_several_slots_of_one_class_an_effect_names_its_own():
     slots = {effect.name: effect.slots for effect in EFFECTS}
     assert slots["SpeedSignalDelay"] == ("speedSensorW",)
     assert (slots["WheelsetLosses"], slots["RollerLosses"]) == (("wheelsetLoss",), ("rollerLoss",))
 
 
-def test_outputs_continue_inputs_where_they_are_of_the_same_kind() -> None:
+def test_outputs_continue_inputs_where_they_are_of_the_same_kind():
     slots = {slot.name: slot for slot in read_slots(WHEELSET, "MinimalObserver")}
     cylinder, loss = slots["cylinder"], slots["wheelsetLoss"]
     assert (cylinder.inputs, cylinder.outputs) == (("pB", "restBefore"), ("p", "rest"))
@@ -159,9 +159,7 @@ def test_outputs_continue_inputs_where_they_are_of_the_same_kind() -> None:
     }
 
 
-def test_an_output_that_is_an_input_is_handed_on_by_effects_that_say_nothing_of_it(
-    tmp_path: Path,
-) -> None:
+def test_an_output_that_is_an_input_is_handed_on_by_effects_that_say_nothing_of_it(tmp_path):
     """Water on one of three discs, before and behind laws that hold for all of them."""
     slots = {slot.name: slot for slot in read_slots(WHEELSET, "MinimalObserver")}
     assert slots["padFriction"].outputs == ("mu",)
@@ -185,7 +183,7 @@ def test_an_output_that_is_an_input_is_handed_on_by_effects_that_say_nothing_of_
         assert force(size, 0.5) == pytest.approx(dry * 0.21 / 0.30, rel=1e-12)
 
 
-def test_of_effects_that_look_the_same_the_usual_one_stands_first() -> None:
+def test_of_effects_that_look_the_same_the_usual_one_stands_first():
     names = [effect.name for effect in EFFECTS]
     for usual, rare in (
         ("WaterFilm", "SingleDiscWaterFilm"),
@@ -195,9 +193,7 @@ def test_of_effects_that_look_the_same_the_usual_one_stands_first() -> None:
         assert names.index(usual) < names.index(rare), (usual, rare)
 
 
-def test_the_command_lists_the_effects_of_a_library(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_command_lists_the_effects_of_a_library(tmp_path, capsys):
     package = ROOT / "modelica" / "WheelsetRig" / "package.mo"
     assert main(["diagnose", "--list", "--library", str(package)]) == 0
     lines = capsys.readouterr().out.splitlines()
@@ -209,7 +205,7 @@ def test_the_command_lists_the_effects_of_a_library(
 # --- another field ---
 
 
-def test_effects_of_a_library_of_one_file_are_read_in_its_order(tmp_path: Path) -> None:
+def test_effects_of_a_library_of_one_file_are_read_in_its_order(tmp_path):
     effects = read_effects(tank(tmp_path), "Base")
     assert [(effect.name, effect.slots) for effect in effects] == [
         ("Clogging", ("orifice",)),
@@ -220,13 +216,13 @@ def test_effects_of_a_library_of_one_file_are_read_in_its_order(tmp_path: Path) 
     assert effects[0].text == "an orifice that is narrower than drawn"
 
 
-def test_after_puts_an_effect_behind_a_more_usual_one(tmp_path: Path) -> None:
+def test_after_puts_an_effect_behind_a_more_usual_one(tmp_path):
     library = tank(tmp_path, ('separation="a dry floor"', 'separation="", after="GaugeOffset"'))
     names = [effect.name for effect in read_effects(library, "Base")]
     assert names.index("Leak") > names.index("GaugeOffset")
 
 
-def test_a_foreign_library_is_extended_and_flattened(tmp_path: Path) -> None:
+def test_a_foreign_library_is_extended_and_flattened(tmp_path):
     library = tank(tmp_path)
     effects = read_effects(library, "Base")
     text = ExtendedModel(
@@ -240,7 +236,7 @@ def test_a_foreign_library_is_extended_and_flattened(tmp_path: Path) -> None:
     assert [state.name for state in flat.differentiated] == ["h"]
 
 
-def test_effects_in_a_chain_follow_one_another_and_others_add_up(tmp_path: Path) -> None:
+def test_effects_in_a_chain_follow_one_another_and_others_add_up(tmp_path):
     """Closed forms: a level of 1 m, Torricelli's law."""
     library = tank(tmp_path)
     effects = read_effects(library, "Base")
@@ -264,7 +260,7 @@ def test_effects_in_a_chain_follow_one_another_and_others_add_up(tmp_path: Path)
         np.testing.assert_allclose(reading, [1.5 * 1.2], rtol=1e-12)
 
 
-def test_what_is_handed_on_is_so_where_changes_add_up(tmp_path: Path) -> None:
+def test_what_is_handed_on_is_so_where_changes_add_up(tmp_path):
     library = tank(
         tmp_path,
         (
@@ -295,7 +291,7 @@ def test_what_is_handed_on_is_so_where_changes_add_up(tmp_path: Path) -> None:
         assert rate == pytest.approx(-(0.7e-3 + 2e-4) * np.sqrt(2.0 * 9.81) / 2.0, rel=1e-12)
 
 
-def test_effects_beside_a_class_with_values_of_the_base_model_are_refused(tmp_path: Path) -> None:
+def test_effects_beside_a_class_with_values_of_the_base_model_are_refused(tmp_path):
     library = tank(tmp_path, ("Orifice orifice(h=h)", "Orifice orifice(h=h, a=A/1e3)"))
     effects = read_effects(library, "Base")
     with pytest.raises(InputError, match=r"Clogging and Leak beside a Tank\.Orifice"):
@@ -339,15 +335,13 @@ def test_effects_beside_a_class_with_values_of_the_base_model_are_refused(tmp_pa
         ('size="share",', 'size="share", falling(signal="inflow"),', "found no 'because'"),
     ],
 )
-def test_an_effect_that_says_something_wrong_is_refused_with_its_line(
-    old: str, new: str, message: str, tmp_path: Path
-) -> None:
+def test_an_effect_that_says_something_wrong_is_refused_with_its_line(old, new, message, tmp_path):
     library = tank(tmp_path, (old, new))
     with pytest.raises(InputError, match=message) as refused:
         read_effects(library, "Base")
     assert str(tmp_path / "Tank.mo") in refused.value.where
 
 
-def test_a_base_model_that_is_not_there_is_refused(tmp_path: Path) -> None:
+def test_a_base_model_that_is_not_there_is_refused(tmp_path):
     with pytest.raises(InputError, match=r"no class 'Bas' \(closest: 'Tank\.Base'\)"):
         read_effects(tank(tmp_path), "Bas")

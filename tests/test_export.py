@@ -81,9 +81,7 @@ def with_all_gains(gains: Gains) -> Gains:
 
 
 @pytest.fixture(scope="module", params=NAMES)
-def exported(
-    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
-) -> Iterator[Exported]:
+def exported(request, tmp_path_factory) -> Iterator[Exported]:
     kind = KINDS[request.param]
     with open_model(SYSTEM, kind.role) as fmu:
         gains = with_all_gains(kind.default_gains(fmu, SYSTEM))
@@ -92,7 +90,7 @@ def exported(
 
 
 @pytest.fixture(scope="module")
-def cases(root: Path) -> list[Case]:
+def cases(root) -> list[Case]:
     return read_cases([root / "cases"], SYSTEM)
 
 
@@ -143,23 +141,21 @@ def disagreement(found: np.ndarray, expected: np.ndarray) -> float:
     return float((abs(found - expected).max(axis=0) / abs(expected).max(axis=0)).max())
 
 
-def test_fmu_reproduces_python_on_all_recorded_stops(exported: Exported, cases: list[Case]) -> None:
+def test_fmu_reproduces_python_on_all_recorded_stops(exported, cases):
     for case in cases:
         recording = case.time, case.u, case.y
         found = run_fmu(exported.path, *recording)
         assert disagreement(found, run_python(exported.python, *recording)) < AGREEMENT, case.name
 
 
-def test_fmu_reproduces_python_on_samples_that_are_not_even(
-    exported: Exported, dry_case: Case
-) -> None:
+def test_fmu_reproduces_python_on_samples_that_are_not_even(exported, dry_case):
     keep = np.flatnonzero(np.random.default_rng(1).random(dry_case.time.size) < 0.7)
     recording = dry_case.time[keep], dry_case.u[keep], dry_case.y[keep]
     found = run_fmu(exported.path, *recording)
     assert disagreement(found, run_python(exported.python, *recording)) < AGREEMENT
 
 
-def test_limits_of_friction_are_kept_and_reached(exported: Exported, dry_case: Case) -> None:
+def test_limits_of_friction_are_kept_and_reached(exported, dry_case):
     """A pressure sensor that reads 0.4 of the pressure wants more friction than pads have."""
     recording = dry_case.time, dry_case.u * [0.4, 1.0], dry_case.y
     found = run_fmu(exported.path, *recording)
@@ -169,9 +165,7 @@ def test_limits_of_friction_are_kept_and_reached(exported: Exported, dry_case: C
 
 @pytest.mark.parametrize("fmi", [2, 3])
 @pytest.mark.parametrize("name", NAMES)
-def test_a_tool_without_python_of_ours_gets_the_same(
-    tmp_path: Path, dry_case: Case, name: str, fmi: int
-) -> None:
+def test_a_tool_without_python_of_ours_gets_the_same(tmp_path, dry_case, name, fmi):
     """FMPy's own simulation, which sees the estimate at the end of a step, one sample later."""
     with open_model(SYSTEM, KINDS[name].role) as fmu:
         gains = KINDS[name].default_gains(fmu, SYSTEM)
@@ -194,7 +188,7 @@ def test_a_tool_without_python_of_ours_gets_the_same(
     assert disagreement(found[1:], expected[:-1]) < AGREEMENT
 
 
-def test_a_restored_state_repeats_the_steps(exported: Exported, dry_case: Case) -> None:
+def test_a_restored_state_repeats_the_steps(exported, dry_case):
     samples = np.hstack([dry_case.u, dry_case.y])
     with instance(exported.path) as (fmu, references):
         inputs, outputs = references(INPUTS), references(tuple(OUTPUTS))
@@ -215,7 +209,7 @@ def test_a_restored_state_repeats_the_steps(exported: Exported, dry_case: Case) 
         fmu.freeFMUState(state)
 
 
-def test_default_gains_of_the_modelica_classes_are_the_reasoned_ones() -> None:
+def test_default_gains_of_the_modelica_classes_are_the_reasoned_ones():
     for name in NAMES:
         gains = default_gains(name)
         flat = observer.flatten(SYSTEM.library, ObserverModel(SYSTEM, KINDS[name], gains, "").model)
@@ -226,7 +220,7 @@ def test_default_gains_of_the_modelica_classes_are_the_reasoned_ones() -> None:
 
 
 @pytest.fixture(scope="module")
-def package(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def package(root, tmp_path_factory) -> Path:
     """The folder that the command writes, with gains from a file."""
     folder = tmp_path_factory.mktemp("export")
     gains = default_gains("disturbance_observer")
@@ -244,7 +238,7 @@ def exporting(gains: Path, out: Path) -> list[str]:
     return ["export", "--gains", str(gains), "--platforms", "native", "--out", str(out)]
 
 
-def test_the_command_writes_the_gains_of_the_file(package: Path) -> None:
+def test_the_command_writes_the_gains_of_the_file(package):
     out = package / "out"
     names = ["DisturbanceObserver.fmu", "DisturbanceObserver.ssp", "summary.json"]
     assert sorted(file.name for file in out.iterdir()) == names
@@ -263,7 +257,7 @@ def test_the_command_writes_the_gains_of_the_file(package: Path) -> None:
 
 
 @pytest.mark.long
-def test_an_observer_is_for_all_platforms_unless_others_are_asked_for(tmp_path: Path) -> None:
+def test_an_observer_is_for_all_platforms_unless_others_are_asked_for(tmp_path):
     gains = default_gains("disturbance_observer")
     model = ObserverModel(SYSTEM, KINDS[gains.estimator], gains, "")
     build_observer(model, tmp_path / "observer.fmu", 2, lambda _: None)
@@ -272,11 +266,11 @@ def test_an_observer_is_for_all_platforms_unless_others_are_asked_for(tmp_path: 
     assert folders == {fmi2_name for fmi2_name, *_ in PLATFORMS.values()}
 
 
-def test_the_command_asks_for_all_platforms_unless_told_otherwise() -> None:
+def test_the_command_asks_for_all_platforms_unless_told_otherwise():
     assert command_line("0", "export").parse_args(["export"]).platforms == "all"
 
 
-def test_the_same_gains_give_the_same_bytes(root: Path, package: Path, tmp_path: Path) -> None:
+def test_the_same_gains_give_the_same_bytes(root, package, tmp_path):
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(root)
         assert main(exporting(package / "gains.toml", tmp_path)) == 0
@@ -284,9 +278,7 @@ def test_the_same_gains_give_the_same_bytes(root: Path, package: Path, tmp_path:
         assert file.read_bytes() == (package / "out" / file.name).read_bytes(), file.name
 
 
-def test_the_package_follows_the_schemas_and_names_what_its_fmus_have(
-    package: Path, tmp_path: Path
-) -> None:
+def test_the_package_follows_the_schemas_and_names_what_its_fmus_have(package, tmp_path):
     ssp = package / "out" / "DisturbanceObserver.ssp"
     system = read_ssd(str(ssp), validate=True).system
     start = read_ssv(str(ssp), resource="resources/start.ssv", validate=True)
@@ -305,7 +297,7 @@ def test_the_package_follows_the_schemas_and_names_what_its_fmus_have(
         assert variables[component][name].unit == parameter.unit
 
 
-def test_in_an_ssp_tool_the_estimate_follows_the_reference(package: Path) -> None:
+def test_in_an_ssp_tool_the_estimate_follows_the_reference(package):
     """A stop at 2.7 bar; the pads of the rig have 0.33, of the observer's model nominally 0.30."""
     ssp = str(package / "out" / "DisturbanceObserver.ssp")
     result = simulate_ssp(
@@ -329,9 +321,7 @@ def test_in_an_ssp_tool_the_estimate_follows_the_reference(package: Path) -> Non
 @pytest.mark.parametrize("parameters", [True, False], ids=["start.ssv", "from rest"])
 @pytest.mark.parametrize("pressure", [0.5e5, 2e5, 4.2e5])
 @pytest.mark.parametrize("step", [0.001, 0.005, 0.02])
-def test_in_an_ssp_tool_frictions_are_right_at_any_step(
-    package: Path, step: float, pressure: float, parameters: bool
-) -> None:
+def test_in_an_ssp_tool_frictions_are_right_at_any_step(package, step, pressure, parameters):
     """FMPy steps both FMUs once before it connects them: the observer's first inputs are zero.
 
     It takes the start values from its caller and not from the package; without them the machine is
@@ -364,9 +354,7 @@ def test_in_an_ssp_tool_frictions_are_right_at_any_step(
     assert result["muDCEstimate"][late] == pytest.approx(0.33 if parameters else 0.30, abs=within)
 
 
-def test_steps_before_the_inputs_are_connected_do_not_start_the_observer(
-    exported: Exported, dry_case: Case
-) -> None:
+def test_steps_before_the_inputs_are_connected_do_not_start_the_observer(exported, dry_case):
     count = 2000
     time, u, y = dry_case.time[:count], dry_case.u[:count], dry_case.y[:count]
     earlier = np.append(time[0] - 0.005 * np.arange(3, 0, -1), time)
@@ -375,7 +363,7 @@ def test_steps_before_the_inputs_are_connected_do_not_start_the_observer(
     assert disagreement(found, run_python(exported.python, time, u, y)) < AGREEMENT
 
 
-def test_start_values_of_the_package_cover_the_observer(package: Path) -> None:
+def test_start_values_of_the_package_cover_the_observer(package):
     ssp = str(package / "out" / "DisturbanceObserver.ssp")
     values = {
         parameter.name: float(parameter.value)
@@ -385,9 +373,7 @@ def test_start_values_of_the_package_cover_the_observer(package: Path) -> None:
         assert values[f"observer.{name}"] == values[f"machine.{name}"] > 0.0
 
 
-def test_gains_of_an_estimator_that_is_none_are_refused(
-    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_gains_of_an_estimator_that_is_none_are_refused(root, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(root)
     (tmp_path / "gains.toml").write_text('estimator = "oracle"\n')
     command = ["export", "--gains", str(tmp_path / "gains.toml"), "--out", str(tmp_path / "out")]
@@ -397,9 +383,7 @@ def test_gains_of_an_estimator_that_is_none_are_refused(
 
 
 @pytest.mark.parametrize("name", ["nothing.toml", "cases"])
-def test_a_file_of_gains_that_cannot_be_read_is_refused(
-    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
-) -> None:
+def test_a_file_of_gains_that_cannot_be_read_is_refused(root, tmp_path, monkeypatch, name):
     monkeypatch.chdir(root)
     assert main(["export", "--gains", name, "--out", str(tmp_path / "out")]) == 2
     assert not (tmp_path / "out").exists()
@@ -413,8 +397,8 @@ def test_a_file_of_gains_that_cannot_be_read_is_refused(
     ],
 )
 def test_only_a_reference_with_the_connectors_goes_into_a_package(
-    root: Path, package: Path, tmp_path: Path, fmu: str, match: str
-) -> None:
+    root, package, tmp_path, fmu, match
+):
     ssp = tmp_path / "out.ssp"
     observer_fmu = package / "out" / "DisturbanceObserver.fmu"
     with pytest.raises(InputError, match=match):
@@ -422,7 +406,7 @@ def test_only_a_reference_with_the_connectors_goes_into_a_package(
     assert not ssp.exists()
 
 
-def test_a_model_without_the_readings_is_refused(package: Path, tmp_path: Path) -> None:
+def test_a_model_without_the_readings_is_refused(package, tmp_path):
     fmu = package / "out" / "DisturbanceObserver.fmu"
     with pytest.raises(InputError, match="no output 'omegaWReading'"):
         write_package(SYSTEM, fmu, fmu, tmp_path / "out.ssp")

@@ -80,16 +80,14 @@ def opened(system: System, name: str) -> Iterator[Estimator]:
 
 
 @pytest.fixture(scope="module", params=NAMES)
-def exported(
-    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
-) -> Iterator[Exported]:
+def exported(request, tmp_path_factory) -> Iterator[Exported]:
     with opened(SYSTEM, request.param) as estimator:
         path = tmp_path_factory.mktemp(request.param) / "estimator.fmu"
         yield Exported(write_fmu(path, estimator), estimator)
 
 
 @pytest.fixture(scope="module")
-def horizon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Exported]:
+def horizon(tmp_path_factory) -> Iterator[Exported]:
     """The moving horizon estimator in FMI 3.0."""
     with opened(SYSTEM, "mhe") as estimator:
         path = tmp_path_factory.mktemp("horizon") / "estimator.fmu"
@@ -97,7 +95,7 @@ def horizon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Exported]:
 
 
 @pytest.fixture(scope="module")
-def slide(root: Path) -> Case:
+def slide(root) -> Case:
     """A wet stop in which the wheel slides."""
     return read_case(root / "cases" / "09_wet_160_4.2_wsp", SYSTEM)
 
@@ -177,28 +175,24 @@ def assert_same(found: np.ndarray, expected: np.ndarray) -> None:
     assert (np.nan_to_num(abs(found - expected)) <= AGREEMENT * largest).all()
 
 
-def test_fmu_reproduces_python_over_first_contact_and_slide(
-    exported: Exported, dry_case: Case, slide: Case
-) -> None:
+def test_fmu_reproduces_python_over_first_contact_and_slide(exported, dry_case, slide):
     for case in (dry_case, slide):
         recording = case.time, case.u, case.y
         assert_same(run_fmu(exported.path, *recording), run_python(exported.python, *recording))
 
 
-def test_fmu_reproduces_python_on_samples_that_are_not_even(
-    exported: Exported, slide: Case
-) -> None:
+def test_fmu_reproduces_python_on_samples_that_are_not_even(exported, slide):
     keep = np.flatnonzero(np.random.default_rng(1).random(3000) < 0.7)
     recording = slide.time[keep], slide.u[keep], slide.y[keep]
     assert_same(run_fmu(exported.path, *recording), run_python(exported.python, *recording))
 
 
-def test_fmi_3_gives_the_same(horizon: Exported, slide: Case) -> None:
+def test_fmi_3_gives_the_same(horizon, slide):
     recording = slide.time[:2500], slide.u[:2500], slide.y[:2500]
     assert_same(run_fmu(horizon.path, *recording), run_python(horizon.python, *recording))
 
 
-def test_samples_that_are_missing_are_left_out(horizon: Exported, slide: Case) -> None:
+def test_samples_that_are_missing_are_left_out(horizon, slide):
     """One speed is sampled at a quarter of the rate, the other fails for a second of the slide."""
     y = slide.y[:3000].copy()
     y[np.arange(3000) % 4 != 0, 0] = np.nan
@@ -209,7 +203,7 @@ def test_samples_that_are_missing_are_left_out(horizon: Exported, slide: Case) -
     assert_same(run_fmu(horizon.path, *recording), expected)
 
 
-def test_only_measured_outputs_may_be_missing(horizon: Exported, slide: Case) -> None:
+def test_only_measured_outputs_may_be_missing(horizon, slide):
     sample = np.append(slide.u[0], slide.y[0])
     sample[0] = np.nan
     with (
@@ -220,9 +214,7 @@ def test_only_measured_outputs_may_be_missing(horizon: Exported, slide: Case) ->
 
 
 @pytest.mark.parametrize("gap", [0.0, np.nan])
-def test_the_first_whole_sample_that_is_connected_starts_it(
-    exported: Exported, dry_case: Case, gap: float
-) -> None:
+def test_the_first_whole_sample_that_is_connected_starts_it(exported, dry_case, gap):
     time, u, y = dry_case.time[:500], dry_case.u[:500], dry_case.y[:500]
     before = y[:3].copy()
     before[:, 1 if np.isnan(gap) else slice(None)] = gap
@@ -233,7 +225,7 @@ def test_the_first_whole_sample_that_is_connected_starts_it(
     assert (found[:3] == found[0]).all()
 
 
-def test_a_restored_state_repeats_the_steps(exported: Exported, slide: Case) -> None:
+def test_a_restored_state_repeats_the_steps(exported, slide):
     samples = np.hstack([slide.u, slide.y])
     with instance(exported.path) as fmu:
 
@@ -250,7 +242,7 @@ def test_a_restored_state_repeats_the_steps(exported: Exported, slide: Case) -> 
         assert steps(range(900, 1000)) == first
 
 
-def test_a_sample_that_fails_is_as_if_it_had_not_been(horizon: Exported, slide: Case) -> None:
+def test_a_sample_that_fails_is_as_if_it_had_not_been(horizon, slide):
     samples = np.hstack([slide.u, slide.y])[:60]
     wrong = samples[40].copy()
     wrong[:2] = 1e308  # where the model has no finite derivative
@@ -265,11 +257,11 @@ def test_a_sample_that_fails_is_as_if_it_had_not_been(horizon: Exported, slide: 
         assert [fmu.step(samples[k], 0.005 * k, 0.005) for k in range(40, 60)] == expected
 
 
-def test_description_is_valid_and_has_units_and_columns(exported: Exported) -> None:
+def test_description_is_valid_and_has_units_and_columns(exported):
     assert_described(exported)
 
 
-def test_description_of_fmi_3_is_so_too(horizon: Exported) -> None:
+def test_description_of_fmi_3_is_so_too(horizon):
     assert_described(horizon)
 
 
@@ -292,7 +284,7 @@ def assert_described(own: Exported) -> None:
     assert variables == expected | {"nis": ("output", "1")}
 
 
-def test_a_tool_without_python_of_ours_gets_the_same(exported: Exported, dry_case: Case) -> None:
+def test_a_tool_without_python_of_ours_gets_the_same(exported, dry_case):
     """FMPy's own simulation, which sees the estimate at the end of a step, one sample later."""
     time = np.arange(1500) * 0.005
     names = ("time", *(signal.name for signal in (*SYSTEM.inputs, *SYSTEM.outputs)))
@@ -309,16 +301,14 @@ def test_a_tool_without_python_of_ours_gets_the_same(exported: Exported, dry_cas
 # --- fixed memory ---
 
 
-def test_sources_of_the_law_ask_for_no_memory(exported: Exported) -> None:
+def test_sources_of_the_law_ask_for_no_memory(exported):
     own = ("integrator.c", "memory.h", "law_code.h", "law_data.h", "plant.h", "plant_code.h")
     with zipfile.ZipFile(exported.path) as archive:
         text = "\n".join(archive.read(f"sources/{name}").decode() for name in own)
     assert not re.search(r"\b(malloc|calloc|realloc|alloca|free)\b", text)
 
 
-def test_under_the_sanitizers_samples_are_clean_and_nothing_is_allocated(
-    tmp_path: Path, slide: Case
-) -> None:
+def test_under_the_sanitizers_samples_are_clean_and_nothing_is_allocated(tmp_path, slide):
     """Over the slide; what is printed are the same numbers, and those of restored steps again."""
     if COMPILER is None:
         pytest.skip("needs a C compiler")
@@ -365,7 +355,7 @@ def test_under_the_sanitizers_samples_are_clean_and_nothing_is_allocated(
 # --- other machines ---
 
 
-def test_a_machine_with_a_state_that_is_not_measured_exports(tmp_path: Path) -> None:
+def test_a_machine_with_a_state_that_is_not_measured_exports(tmp_path):
     system = heater.system(tmp_path / "heater")
     time = np.arange(200.0)
     power = np.where(time % 60.0 < 30.0, 40.0, 5.0)
@@ -377,7 +367,7 @@ def test_a_machine_with_a_state_that_is_not_measured_exports(tmp_path: Path) -> 
         assert_same(run_fmu(path, *recording), run_python(estimator, *recording))
 
 
-def test_a_machine_whose_output_is_no_state_exports(tmp_path: Path) -> None:
+def test_a_machine_whose_output_is_no_state_exports(tmp_path):
     """Friction of a seal, a model without states at all."""
     system = load_system("seal_friction")
     rng = np.random.default_rng(5)
@@ -439,9 +429,7 @@ class Shared(ExtendedKalmanFilter):
         ("Shared", "estimator shared: found an array that stands in two places of its memory"),
     ],
 )
-def test_what_does_not_become_c_is_refused_in_words(
-    tmp_path: Path, minimal: FMU, name: str, match: str
-) -> None:
+def test_what_does_not_become_c_is_refused_in_words(tmp_path, minimal, name, match):
     (tmp_path / "own.py").write_text(OWN)
     found = importlib.util.spec_from_file_location("own", tmp_path / "own.py")
     assert found is not None
@@ -455,9 +443,7 @@ def test_what_does_not_become_c_is_refused_in_words(
     assert not (tmp_path / "own.fmu").exists()
 
 
-def test_a_model_that_is_not_of_the_library_is_refused(
-    tmp_path: Path, reference_path: Path
-) -> None:
+def test_a_model_that_is_not_of_the_library_is_refused(tmp_path, reference_path):
     with FMU(reference_path) as fmu:
         gains = ExtendedKalmanFilter.default_gains(fmu, SYSTEM)
         law = EstimatorLaw(ExtendedKalmanFilter(fmu, SYSTEM, gains), "")
@@ -469,15 +455,13 @@ def test_a_model_that_is_not_of_the_library_is_refused(
 
 
 @pytest.fixture
-def command(root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., int]:
+def command(root, tmp_path, monkeypatch) -> Callable[..., int]:
     """Runs `export` into tmp_path / "out"."""
     monkeypatch.chdir(root)
     return lambda *options: main(["export", *options, "--out", str(tmp_path / "out")])
 
 
-def test_the_command_writes_a_bank_with_gains_of_its_filters(
-    command: Callable[..., int], tmp_path: Path
-) -> None:
+def test_the_command_writes_a_bank_with_gains_of_its_filters(command, tmp_path):
     with opened(SYSTEM, "ekf") as estimator:
         gains = estimator.gains.with_values(0.5 * estimator.gains.values)
     (tmp_path / "gains.toml").write_text(format_gains(gains, "", {"z": 0.3}))
@@ -497,9 +481,7 @@ def test_the_command_writes_a_bank_with_gains_of_its_filters(
     assert [element.source for element in elements][1] == f"resources/{model}.fmu"
 
 
-def test_gains_of_another_estimator_are_refused(
-    command: Callable[..., int], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_gains_of_another_estimator_are_refused(command, tmp_path, capsys):
     with opened(SYSTEM, "ekf") as estimator:
         (tmp_path / "gains.toml").write_text(format_gains(estimator.gains, "", {}))
     assert command("--estimator", "mhe", "--gains", str(tmp_path / "gains.toml")) == 2

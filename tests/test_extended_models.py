@@ -38,7 +38,7 @@ FADING_STATES = ("omegaW", "omegaR", "padFriction.rise")
 
 
 @pytest.fixture(scope="module")
-def extended(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, FMU]]:
+def extended(root, tmp_path_factory) -> Iterator[dict[str, FMU]]:
     """The minimal model with one effect each."""
     folder = tmp_path_factory.mktemp("extended")
     library = read_library(root / "modelica" / "WheelsetRig" / "package.mo")
@@ -58,7 +58,7 @@ def extended(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[d
 
 
 @pytest.fixture(scope="module")
-def fading_stop(extended: dict[str, FMU]) -> tuple[Case, float]:
+def fading_stop(extended) -> tuple[Case, float]:
     """A stop from 120 km/h whose pads fade, without noise, and what discs are warmer then [K]."""
     fmu = extended["Fading"]
     assert fmu.states == FADING_STATES
@@ -108,17 +108,15 @@ def force_error(case: Case, estimator: Estimator) -> float:
 
 
 def test_a_model_that_knows_the_fade_of_its_pads_lowers_the_error_of_the_force(
-    minimal: FMU, extended: dict[str, FMU], fading_stop: tuple[Case, float]
-) -> None:
+    minimal, extended, fading_stop
+):
     case, _ = fading_stop
     without, knowing = (force_error(case, observer(fmu)) for fmu in (minimal, extended["Fading"]))
     # Measured: 0.05 % and 0.007 %; what is left is of the step.
     assert knowing < 0.5 * without
 
 
-def test_a_state_without_effect_changes_no_estimate(
-    minimal: FMU, extended: dict[str, FMU], dry_case: Case
-) -> None:
+def test_a_state_without_effect_changes_no_estimate(minimal, extended, dry_case):
     gains = gains_of(minimal)
     recording = dry_case.time, dry_case.u, dry_case.y
     expected, found = (
@@ -129,9 +127,7 @@ def test_a_state_without_effect_changes_no_estimate(
     assert_allclose(found, expected, rtol=1e-6, atol=1e-6)
 
 
-def test_the_disturbance_observer_follows_a_disc_that_it_does_not_measure(
-    extended: dict[str, FMU], fading_stop: tuple[Case, float]
-) -> None:
+def test_the_disturbance_observer_follows_a_disc_that_it_does_not_measure(extended, fading_stop):
     case, rise = fading_stop
     fmu = extended["Fading"]
     observer(fmu).run(case.time, case.u, case.y)
@@ -140,9 +136,7 @@ def test_the_disturbance_observer_follows_a_disc_that_it_does_not_measure(
     assert fmu.get_states()[2] == pytest.approx(rise, rel=1e-3)
 
 
-def test_the_effect_costs_nothing_on_a_recorded_stop(
-    minimal: FMU, extended: dict[str, FMU], root: Path
-) -> None:
+def test_the_effect_costs_nothing_on_a_recorded_stop(minimal, extended, root):
     """The recorded pads fade by 7e-4 /K instead of 1e-3."""
     folder = root.parent / "shared" / "recordings" / "labelled" / "fade" / "04_dry_160_4.2"
     if not folder.is_dir():
@@ -153,7 +147,7 @@ def test_the_effect_costs_nothing_on_a_recorded_stop(
     assert knowing < 1.1 * without
 
 
-def test_the_operating_point_is_an_equilibrium_of_every_model(extended: dict[str, FMU]) -> None:
+def test_the_operating_point_is_an_equilibrium_of_every_model(extended):
     for fmu in extended.values():
         gains = gains_of(fmu)
         # Of some 100 rad/s2 that pads and creep force have; the search ends at 1e-9 m/s of slip.
@@ -163,24 +157,20 @@ def test_the_operating_point_is_an_equilibrium_of_every_model(extended: dict[str
         assert np.abs(gains.design["effect"]).min() > 10.0
 
 
-def test_a_cylinder_that_lags_is_full_at_the_operating_point(
-    minimal: FMU, extended: dict[str, FMU]
-) -> None:
+def test_a_cylinder_that_lags_is_full_at_the_operating_point(minimal, extended):
     expected, found = (gains_of(fmu) for fmu in (minimal, extended["Lagging"]))
     assert_allclose(found.values, expected.values, rtol=1e-9)
     assert_allclose(found.design["effect"], expected.design["effect"], rtol=1e-9)
 
 
-def test_discs_are_at_their_start_at_the_operating_point(extended: dict[str, FMU]) -> None:
+def test_discs_are_at_their_start_at_the_operating_point(extended):
     fmu = extended["Fading"]
     gains_of(fmu)
     assert fmu.get_states()[2] == fmu.defaults["padFriction.rise"]
 
 
 @pytest.mark.parametrize("method", [ExtendedKalmanFilter, UnscentedKalmanFilter])
-def test_a_worn_wheel_at_standstill_has_no_creep_force(
-    extended: dict[str, FMU], dry_case: Case, method: type[ExtendedKalmanFilter]
-) -> None:
+def test_a_worn_wheel_at_standstill_has_no_creep_force(extended, dry_case, method):
     """The radius of rolling is the model's, not the parameter rW: that would leave 7 kN."""
     fmu = extended["Worn"]
     case = dry_case.with_signals({"omegaW": dry_case["omegaW"] * fmu.defaults["rW"] / WORN})

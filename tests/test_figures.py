@@ -37,18 +37,18 @@ def page(name: str) -> Path:
 
 
 @pytest.mark.parametrize("name", figures.FIGURES)
-def test_each_table_has_one_place_on_the_page(name: str) -> None:
+def test_each_table_has_one_place_on_the_page(name):
     assert len(figures.block(name).findall(page(name).read_text())) == 1
 
 
 @pytest.mark.parametrize("name", figures.FIGURES)
-def test_what_is_said_to_be_written_is_of_its_command(name: str) -> None:
+def test_what_is_said_to_be_written_is_of_its_command(name):
     (text,) = figures.block(name).findall(page(name).read_text())
     if "Written by" in text:
         assert text.endswith(f"\n\n{figures.origin(figures.FIGURES[name].commands)}")
 
 
-def test_tables_say_what_was_found() -> None:
+def test_tables_say_what_was_found():
     header, force, *_ = table = tables.worst(WORST)
     assert (header[1], force[:3]) == ("goal", ["force, dry discs", "2 %", "0.18 %"])
     assert {row[0]: row[2] for row in table}["delay at 90 % of the force"] == "never"
@@ -65,7 +65,7 @@ def test_tables_say_what_was_found() -> None:
     ]
 
 
-def test_sets_that_are_labelled_have_a_row_each() -> None:
+def test_sets_that_are_labelled_have_a_row_each():
     cause = {"effect": "BrakeFade", "confusable_with": ["WaterFilm"], "parameters": FADE}
     named = {"verdict": "found", "causes": [cause], "gain": {"before": 55.2, "after": 1.12}}
     nothing = {"verdict": "nothing", "causes": [], "gain": None}
@@ -77,7 +77,7 @@ def test_sets_that_are_labelled_have_a_row_each() -> None:
     assert fade == ["`fade`", "BrakeFade or WaterFilm", planted, estimate, "55.2 → 1.1"]
 
 
-def test_folds_stand_beside_each_other_by_the_stops_that_were_left_out() -> None:
+def test_folds_stand_beside_each_other_by_the_stops_that_were_left_out():
     fold = {"cases": ["04_dry_160_4.2", "09_wet"], "reasoned": 0.158, "tuned": None}
     fold |= {"error_reasoned": 0.0046, "error": 0.0172}
     first = {"estimator": "disturbance_observer", "judged": "Fx", "folds": [fold]}
@@ -87,7 +87,7 @@ def test_folds_stand_beside_each_other_by_the_stops_that_were_left_out() -> None
     assert row == ["04, 09", *2 * ["0.158 → n/a", "0.46 % → 1.72 %"]]
 
 
-def test_the_next_stop_stands_beside_what_was_said_before_it_and_after() -> None:
+def test_the_next_stop_stands_beside_what_was_said_before_it_and_after():
     made = {"experiment": "a step", "foreseen": True, "parts": True, "named": ["FxGain"]}
     made |= {"separations": []}
     other = made | {"foreseen": False, "parts": False, "named": ["FxGain", "DriveTorqueGain"]}
@@ -114,7 +114,7 @@ def test_the_next_stop_stands_beside_what_was_said_before_it_and_after() -> None
     assert last[3:] == [f"{ends}; together 2 of 4", "1 of 6"]
 
 
-def test_a_tuning_stands_beside_the_runs_before_and_after_it() -> None:
+def test_a_tuning_stands_beside_the_runs_before_and_after_it():
     def runs(**errors: float) -> dict[str, object]:
         names = {name: {"Fx_nrmse": error, "z": 10 * error} for name, error in errors.items()}
         return {"cases": {"01_dry_80": {"estimators": names}, "07_wet_80": {"estimators": names}}}
@@ -134,7 +134,7 @@ def test_a_tuning_stands_beside_the_runs_before_and_after_it() -> None:
     ]
 
 
-def test_a_machine_is_told_by_what_was_held_out_in_the_unit_of_who_published_it() -> None:
+def test_a_machine_is_told_by_what_was_held_out_in_the_unit_of_who_published_it():
     def error(unit: str, channel: str = "", **more: object) -> dict[str, object]:
         sizes = {"rms": [0.3, 0.04], "mean_absolute": [0.2, 0.02]}
         return {"unit": unit, "samples": 100, "held_out": True, "channel": channel, **sizes, **more}
@@ -164,9 +164,7 @@ def test_a_machine_is_told_by_what_was_held_out_in_the_unit_of_who_published_it(
     assert machine.errors({"errors": [error("N"), longer]})[0] == pytest.approx(0.458, abs=5e-4)
 
 
-def test_without_their_recordings_tables_stay(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_without_their_recordings_tables_stay(monkeypatch, capsys):
     before = page("singles").read_text()
     monkeypatch.setattr("sys.argv", ["figures.py", "singles"])
     figures.main()
@@ -174,9 +172,7 @@ def test_without_their_recordings_tables_stay(
     assert page("singles").read_text() == before
 
 
-def test_a_command_that_fails_costs_its_own_table(
-    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_a_command_that_fails_costs_its_own_table(monkeypatch, capfd, tmp_path):
     before = page("machines").read_text()
     command = ["figures.py", "machines", "--recordings", str(tmp_path / "none")]
     monkeypatch.setattr("sys.argv", command)
@@ -191,7 +187,7 @@ def test_a_command_that_fails_costs_its_own_table(
     assert page("machines").read_text() == before
 
 
-def test_a_table_is_written_in_its_place_and_nothing_else_is_touched() -> None:
+def test_a_table_is_written_in_its_place_and_nothing_else_is_touched():
     text = "before\n\n<!-- figures: accuracy -->\n\nold\n\n<!-- figures end -->\n\nafter\n"
     found = figures.placed(text, "accuracy", WORST)
     assert found == text.replace("old", figures.written("accuracy", WORST))
@@ -200,7 +196,7 @@ def test_a_table_is_written_in_its_place_and_nothing_else_is_touched() -> None:
         figures.placed(text, "coverage", COVERED)
 
 
-def test_a_safety_level_stands_beside_plain_stops_as_far_as_these_reach() -> None:
+def test_a_safety_level_stands_beside_plain_stops_as_far_as_these_reach():
     level = {"decade": 1, "ratio": 0.97051, "low": 0.9672, "high": 0.9743}
     rare = {**level, "decade": 7, "variation": 0.0232, "plain_stops": 1.96e10}
     first = {**level, "variation": 0.1284, "plain_stops": 1.1e4}
@@ -214,7 +210,7 @@ def test_a_safety_level_stands_beside_plain_stops_as_far_as_these_reach() -> Non
     assert unseen[2] == "too few"
 
 
-def test_stops_beyond_the_claim_count_apart_with_their_reasons() -> None:
+def test_stops_beyond_the_claim_count_apart_with_their_reasons():
     widths = [{"width": width, "outside": ""} for width in (1.0, 1.1, 1.5)]
     slide = {"width": 9.0, "outside": "an axle slides"}
     one = {"held": {"of": 3, "stops": 2}, "stops": [*widths, slide, slide]}
@@ -222,7 +218,7 @@ def test_stops_beyond_the_claim_count_apart_with_their_reasons() -> None:
     assert row[1:] == ["2 of 3", "1.10 (1.00 to 1.50)", "2: an axle slides"]
 
 
-def test_what_monitoring_tells_stands_beside_what_was_planted() -> None:
+def test_what_monitoring_tells_stands_beside_what_was_planted():
     told = {"recordings": 40, "refused": {}, "sentences": ["axle 7: -12 %"]}
     sound = {"recordings": 6, "refused": {"07": "", "08": ""}, "sentences": []}
     cause = {"effect": "BrakeFade", "confusable_with": [], "parameters": FADE}
@@ -232,7 +228,7 @@ def test_what_monitoring_tells_stands_beside_what_was_planted() -> None:
     assert third[1:] == ["nothing", "6 of 8", "no alarms"]
 
 
-def test_faults_of_all_places_count_together() -> None:
+def test_faults_of_all_places_count_together():
     right, missed = {"4": {"hits": 1, "of": 1}}, {"4": {"hits": 0, "of": 1}}
     share = {"hits": 1, "of": 2, "low": 0.0126, "high": 0.987}
     summary = {
@@ -249,7 +245,7 @@ def test_faults_of_all_places_count_together() -> None:
     assert whole == ["all faults", "1 of 2 (1 to 99 %)", "0 a wrong name"]
 
 
-def test_a_law_is_right_where_the_cause_acts() -> None:
+def test_a_law_is_right_where_the_cause_acts():
     none = {"left_out": ["A"], "verdict": "unexplained", "named": [], "laws": [], "asked": True}
     none |= {"rig": "--seed 7 --effect a=0.1", "slot_right": False, "before": None, "after": None}
     none |= {"after_with_it": None, "function_error": None}
@@ -267,7 +263,7 @@ def test_a_law_is_right_where_the_cause_acts() -> None:
     assert last[3:] == ["2 of 3", "1 of 1 gain 80 %", "", "1 of 1 within 15 %"]
 
 
-def test_a_size_in_bars_stays_in_its_cell() -> None:
+def test_a_size_in_bars_stays_in_its_cell():
     row = {"planted": "A", "multiple": 8.0, "group": ["A", "B"], "drawn": [], "sensed": None}
     made = {"experiment": "|v| rises", "foreseen": True, "parts": True, "named": ["A"]}
     rows = [row | {"proposed": made | {"separations": []}}]

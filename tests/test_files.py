@@ -2,7 +2,6 @@
 
 import json
 import os
-from pathlib import Path
 
 import pytest
 
@@ -10,7 +9,7 @@ from workbench.errors import InputError
 from workbench.runtime.files import replacing, write_json, write_whole
 
 
-def test_text_bytes_and_json_are_written_in_folders_made_as_needed(tmp_path: Path) -> None:
+def test_text_bytes_and_json_are_written_in_folders_made_as_needed(tmp_path):
     folder = tmp_path / "a" / "b"
     write_whole(folder / "text", "µ\n")
     write_whole(folder / "bytes", b"\x00\n")
@@ -21,7 +20,7 @@ def test_text_bytes_and_json_are_written_in_folders_made_as_needed(tmp_path: Pat
     assert sorted(file.name for file in folder.iterdir()) == ["bytes", "json", "text"]
 
 
-def test_what_fails_half_way_leaves_the_file_as_it_was(tmp_path: Path) -> None:
+def test_what_fails_half_way_leaves_the_file_as_it_was(tmp_path):
     path = tmp_path / "result"
     write_whole(path, "before")
 
@@ -36,9 +35,7 @@ def test_what_fails_half_way_leaves_the_file_as_it_was(tmp_path: Path) -> None:
     assert [file.name for file in tmp_path.iterdir()] == ["result"]
 
 
-def test_a_full_disk_is_told_and_keeps_the_file_before(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_full_disk_is_told_and_keeps_the_file_before(tmp_path, monkeypatch):
     path = tmp_path / "result"
     write_whole(path, "before")
 
@@ -52,7 +49,7 @@ def test_a_full_disk_is_told_and_keeps_the_file_before(
     assert [file.name for file in tmp_path.iterdir()] == ["result"]
 
 
-def test_a_place_that_is_no_folder_is_refused(tmp_path: Path) -> None:
+def test_a_place_that_is_no_folder_is_refused(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match="cannot be written"):
         write_whole(tmp_path / "file" / "result", "content")

@@ -140,7 +140,7 @@ def by_name(findings: Iterable[CheckResult], name: str) -> CheckResult:
 
 
 @pytest.mark.parametrize("version", ["fmi2", "fmi3"])
-def test_own_fmu_is_fit_in_every_respect(root: Path, version: str) -> None:
+def test_own_fmu_is_fit_in_every_respect(root, version):
     path = root / "fmus" / version / f"{NAME}.fmu"
     if not path.exists():
         pytest.skip(f"no {path.name} of {version}")
@@ -153,7 +153,7 @@ def test_own_fmu_is_fit_in_every_respect(root: Path, version: str) -> None:
 
 @needs_compiler
 @pytest.mark.parametrize("fault", FAULTS)
-def test_fault_is_named_by_its_own_finding(fault: str, minimal_path: Path, tmp_path: Path) -> None:
+def test_fault_is_named_by_its_own_finding(fault, minimal_path, tmp_path):
     name, old, new = FAULTS[fault]
     findings = check(faulty(minimal_path, tmp_path / "faulty.fmu", old, new), FEW)
     assert failed(findings) == [name]
@@ -163,8 +163,8 @@ def test_fault_is_named_by_its_own_finding(fault: str, minimal_path: Path, tmp_p
 
 @needs_compiler
 def test_crash_is_named_by_its_signal_and_the_instances_before_and_leaves_no_files(
-    minimal_path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    minimal_path, tmp_path, monkeypatch
+):
     _, old, new = FAULTS["40th instance crashes"]
     path = faulty(minimal_path, tmp_path / "faulty.fmu", old, new)
     scratch = tmp_path / "scratch"
@@ -180,7 +180,7 @@ def test_crash_is_named_by_its_signal_and_the_instances_before_and_leaves_no_fil
 
 
 @needs_compiler
-def test_wrong_derivative_is_named_with_both_values(minimal_path: Path, tmp_path: Path) -> None:
+def test_wrong_derivative_is_named_with_both_values(minimal_path, tmp_path):
     name, old, new = FAULTS["directional derivative has the wrong sign"]
     reason = by_name(check(faulty(minimal_path, tmp_path / "faulty.fmu", old, new), 1), name).reason
     found = re.search(r"is (\S+) by the FMU, (\S+) by differences", reason)
@@ -190,7 +190,7 @@ def test_wrong_derivative_is_named_with_both_values(minimal_path: Path, tmp_path
 
 
 @needs_compiler
-def test_leak_is_named_by_memory_growth(minimal_path: Path, tmp_path: Path) -> None:
+def test_leak_is_named_by_memory_growth(minimal_path, tmp_path):
     findings = check(faulty(minimal_path, tmp_path / "faulty.fmu", *LEAKS), 500)
     assert failed(findings) == ["memory growth"]
     # 20 kB each: 20 MB in 1000, and whole pages.
@@ -198,7 +198,7 @@ def test_leak_is_named_by_memory_growth(minimal_path: Path, tmp_path: Path) -> N
 
 
 @needs_compiler
-def test_call_that_hangs_is_stopped(minimal_path: Path, tmp_path: Path) -> None:
+def test_call_that_hangs_is_stopped(minimal_path, tmp_path):
     path = faulty(minimal_path, tmp_path / "faulty.fmu", *HANGS)
     findings = check(path, FEW, Limits(processor=1.0, answer=60.0))
     assert failed(findings) == ["start"]
@@ -207,7 +207,7 @@ def test_call_that_hangs_is_stopped(minimal_path: Path, tmp_path: Path) -> None:
     assert by_name(findings, "rollback").reason == "not tried: needs 'start'"
 
 
-def test_what_an_fmu_does_not_offer_is_not_applicable(minimal_path: Path, tmp_path: Path) -> None:
+def test_what_an_fmu_does_not_offer_is_not_applicable(minimal_path, tmp_path):
     def restrict(folder: Path) -> None:
         file = folder / "modelDescription.xml"
         text = re.sub(r"<CoSimulation.*</CoSimulation>", "", file.read_text(), flags=re.DOTALL)
@@ -230,7 +230,7 @@ def test_what_an_fmu_does_not_offer_is_not_applicable(minimal_path: Path, tmp_pa
 
 
 @pytest.fixture
-def co_simulation_only(minimal_path: Path, tmp_path: Path) -> Path:
+def co_simulation_only(minimal_path, tmp_path) -> Path:
     def restrict(folder: Path) -> None:
         file = folder / "modelDescription.xml"
         text = file.read_text()
@@ -239,14 +239,12 @@ def co_simulation_only(minimal_path: Path, tmp_path: Path) -> Path:
     return variant(minimal_path, tmp_path / "slave.fmu", restrict)
 
 
-def test_fmu_without_model_exchange_is_refused(co_simulation_only: Path) -> None:
+def test_fmu_without_model_exchange_is_refused(co_simulation_only):
     with pytest.raises(InputError, match=r"Co-Simulation only; expected Model Exchange"):
         check(co_simulation_only)
 
 
-def test_command_describes_an_fmu_without_model_exchange(
-    co_simulation_only: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_command_describes_an_fmu_without_model_exchange(co_simulation_only, capsys):
     assert main(["fmu", "info", str(co_simulation_only)]) == 0
     printed = capsys.readouterr().out
     assert "Co-Simulation: saves state" in printed
@@ -254,9 +252,7 @@ def test_command_describes_an_fmu_without_model_exchange(
     assert re.search(r"^pB +input +0\.0 +Pa +Brake cylinder pressure$", printed, re.MULTILINE)
 
 
-def test_command_tells_programs_what_it_describes(
-    minimal_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_command_tells_programs_what_it_describes(minimal_path, capsys):
     assert main(["fmu", "info", str(minimal_path), "--json"]) == 0
     written = json.loads(capsys.readouterr().out)["result"]
     with FMU(minimal_path) as fmu:
@@ -265,9 +261,7 @@ def test_command_tells_programs_what_it_describes(
         assert {v["name"]: v["unit"] for v in written["variables"]} == fmu.units
 
 
-def test_command_tells_findings_and_ends_with_0_for_a_fit_fmu(
-    minimal_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_command_tells_findings_and_ends_with_0_for_a_fit_fmu(minimal_path, capsys):
     arguments = ["fmu", "check", str(minimal_path), "--instantiations", "5"]
     assert main([*arguments, "--json"]) == 0
     written = json.loads(capsys.readouterr().out)["result"]
@@ -279,9 +273,7 @@ def test_command_tells_findings_and_ends_with_0_for_a_fit_fmu(
 
 
 @needs_compiler
-def test_command_gives_the_reason_and_ends_with_1_for_an_unfit_fmu(
-    minimal_path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_command_gives_the_reason_and_ends_with_1_for_an_unfit_fmu(minimal_path, tmp_path, capsys):
     _, old, new = FAULTS["set states are ignored"]
     path = faulty(minimal_path, tmp_path / "faulty.fmu", old, new)
     assert main(["fmu", "check", str(path), "--instantiations", "5"]) == 1
@@ -290,15 +282,13 @@ def test_command_gives_the_reason_and_ends_with_1_for_an_unfit_fmu(
     assert "not fit" in printed
 
 
-def test_command_ends_with_2_for_a_wrong_file(
-    co_simulation_only: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_command_ends_with_2_for_a_wrong_file(co_simulation_only, capsys):
     assert main(["fmu", "check", str(co_simulation_only)]) == 2
     assert main(["fmu", "check", __file__]) == 2
     assert "no FMU" in capsys.readouterr().err
 
 
-def test_co_simulation_rolls_back_to_identical_bits(minimal_path: Path) -> None:
+def test_co_simulation_rolls_back_to_identical_bits(minimal_path):
     with CoSimulation(minimal_path) as simulation:
         inputs = simulation.variables(["pB", "tauR"])
         simulation.start({"omegaW": 60.0, "omegaR": 39.5})
@@ -314,7 +304,7 @@ def test_co_simulation_rolls_back_to_identical_bits(minimal_path: Path) -> None:
     assert first[0][0] > first[-1][0] + 1.0  # it brakes
 
 
-def test_state_serialised_by_one_instance_continues_in_another(minimal_path: Path) -> None:
+def test_state_serialised_by_one_instance_continues_in_another(minimal_path):
     with FMU(minimal_path) as one, FMU(minimal_path) as other:
         one.start({"omegaW": 60.0, "omegaR": 39.5})
         one.set(one.variables(["pB"]), np.array([3.6e5]))
@@ -330,7 +320,7 @@ def test_state_serialised_by_one_instance_continues_in_another(minimal_path: Pat
 
 
 @pytest.mark.parametrize("reload", [False, True])
-def test_renewed_instance_starts_as_the_first_did(minimal: FMU, reload: bool) -> None:
+def test_renewed_instance_starts_as_the_first_did(minimal, reload):
     minimal.start({"omegaW": 60.0, "omegaR": 39.5})
     first = minimal.step(0.01)
     minimal.renew(reload=reload)

@@ -17,7 +17,7 @@ from .train_stops import write_stop
 
 
 @pytest.fixture(scope="module")
-def fleet(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def fleet(tmp_path_factory) -> Path:
     """Two machines of two stops, and one whose recordings are none."""
     folder = tmp_path_factory.mktemp("fleet")
     for machine, pads in (("one", {}), ("two", {3: 0.27})):
@@ -36,7 +36,7 @@ def watched(where: str, out: Path, *more: str) -> dict[str, dict[str, object]]:
 
 
 @pytest.fixture(scope="module")
-def local(fleet: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def local(fleet, tmp_path_factory) -> Path:
     out = tmp_path_factory.mktemp("local")
     watched(str(fleet), out, "--workers", "1")
     return out
@@ -46,7 +46,7 @@ def estimates(out: Path) -> pd.DataFrame:
     return pd.read_csv(out / "estimates.csv")
 
 
-def test_each_machine_is_watched_as_it_is_alone(fleet: Path, local: Path, tmp_path: Path) -> None:
+def test_each_machine_is_watched_as_it_is_alone(fleet, local, tmp_path):
     told = pd.read_csv(local / "fleet.csv").set_index("machine")
     assert list(told["recordings"]) == [0, 2, 2]
     assert "no recording that can be used" in told.loc["broken", "refusal"]
@@ -55,9 +55,7 @@ def test_each_machine_is_watched_as_it_is_alone(fleet: Path, local: Path, tmp_pa
     assert (local / "two" / "estimates.csv").read_text() == frame
 
 
-def test_a_fleet_goes_on_from_its_states_and_reads_urls(
-    fleet: Path, local: Path, tmp_path: Path
-) -> None:
+def test_a_fleet_goes_on_from_its_states_and_reads_urls(fleet, local, tmp_path):
     pytest.importorskip("fsspec")
     out, where = tmp_path / "out", tmp_path / "fleet"
     shutil.copytree(local, out)
@@ -74,7 +72,7 @@ def test_a_fleet_goes_on_from_its_states_and_reads_urls(
     assert (out / "one" / STATE).stat().st_size > 500
 
 
-def test_a_cluster_finds_the_same(fleet: Path, local: Path, tmp_path: Path) -> None:
+def test_a_cluster_finds_the_same(fleet, local, tmp_path):
     distributed = pytest.importorskip("distributed")
     # In processes of their own: within this one, after hundreds of tests, a task may never end.
     options = {"n_workers": 1, "threads_per_worker": 1, "dashboard_address": ":0"}
@@ -93,9 +91,7 @@ def test_a_cluster_finds_the_same(fleet: Path, local: Path, tmp_path: Path) -> N
         (".", ["--cluster", "tcp://127.0.0.1:1"], "add --fleet"),
     ],
 )
-def test_what_makes_no_sense_is_refused(
-    where: str, more: list[str], found: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_makes_no_sense_is_refused(where, more, found, tmp_path, capsys):
     words = ["monitor", where, "--system", "train", "--out", str(tmp_path / "out"), *more]
     assert main(words) == 2
     assert found in capsys.readouterr().err

@@ -41,7 +41,7 @@ class Spring(Fmi2Slave):
 
 @pytest.mark.skipif(not ELSEWHERE, reason="WORKBENCH_FMUS names no folder of FMUs")
 @pytest.mark.parametrize("path", ELSEWHERE, ids=lambda path: path.name)
-def test_an_fmu_from_elsewhere_is_right_or_refused_in_words(path: Path) -> None:
+def test_an_fmu_from_elsewhere_is_right_or_refused_in_words(path):
     comparison = compare_with_fmpy(path)
     assert comparison.verdict in (RIGHT, REFUSED, NO_REFERENCE), comparison
     if comparison.verdict == RIGHT:
@@ -55,7 +55,7 @@ def test_an_fmu_from_elsewhere_is_right_or_refused_in_words(path: Path) -> None:
         )
 
 
-def test_co_simulation_in_python_runs_as_in_fmpy(tmp_path: Path) -> None:
+def test_co_simulation_in_python_runs_as_in_fmpy(tmp_path):
     pytest.importorskip("pythonfmu", reason="builds the FMU")
     (tmp_path / "spring.py").write_text(SLAVE)
     build = ["-m", "pythonfmu", "build", "-f", "spring.py", "-d", "."]

@@ -62,9 +62,7 @@ points = st.tuples(
 
 @settings(max_examples=100, deadline=None)
 @given(points)
-def test_derivatives_equal_an_independent_evaluation(
-    minimal_path: Path, point: tuple[tuple[float, ...], tuple[float, ...]]
-) -> None:
+def test_derivatives_equal_an_independent_evaluation(minimal_path, point):
     x, u = map(np.array, point)
     with FMU(minimal_path) as fmu:
         fmu.start({})
@@ -79,7 +77,7 @@ def test_derivatives_equal_an_independent_evaluation(
 
 
 @pytest.mark.parametrize("omegaR", [1.0, 20.0, 63.0, -40.0])
-def test_jacobians_equal_differences(minimal: FMU, omegaR: float) -> None:
+def test_jacobians_equal_differences(minimal, omegaR):
     minimal.start({})
     inputs, outputs = (
         minimal.variables(INPUTS),
@@ -100,7 +98,7 @@ def test_jacobians_equal_differences(minimal: FMU, omegaR: float) -> None:
     assert np.abs(exact.A).max() > 1.0
 
 
-def test_save_run_restore_run_gives_identical_bits(minimal: FMU) -> None:
+def test_save_run_restore_run_gives_identical_bits(minimal):
     minimal.start({"omegaW": 60.0, "omegaR": 39.5})
     minimal.set(minimal.variables(["pB", "tauR"]), np.array([3.6e5, 4e3]))
     for _ in range(10):
@@ -114,7 +112,7 @@ def test_save_run_restore_run_gives_identical_bits(minimal: FMU) -> None:
     assert not np.array_equal(first[0], first[-1])
 
 
-def test_restart_repeats_bit_for_bit(minimal: FMU) -> None:
+def test_restart_repeats_bit_for_bit(minimal):
     runs = []
     for _ in range(2):
         minimal.start({"omegaW": 60.0, "omegaR": 39.5})
@@ -129,7 +127,7 @@ def brake_input(t: np.ndarray | float) -> np.ndarray | float:
 
 
 @pytest.fixture(scope="module")
-def held_pressure_stop(minimal_path: Path) -> tuple[np.ndarray, np.ndarray]:
+def held_pressure_stop(minimal_path) -> tuple[np.ndarray, np.ndarray]:
     """Reference trajectory: Radau at 1e-10 on the FMU's derivatives, inputs held per 10 ms."""
     times = np.arange(0.0, 4.0, 0.01)
     states = [np.array([80.0, 80.0 * 0.46 / 0.70])]
@@ -150,9 +148,7 @@ def held_pressure_stop(minimal_path: Path) -> tuple[np.ndarray, np.ndarray]:
     return times, np.array(states)
 
 
-def test_co_simulation_equals_model_exchange(
-    minimal_path: Path, held_pressure_stop: tuple[np.ndarray, np.ndarray]
-) -> None:
+def test_co_simulation_equals_model_exchange(minimal_path, held_pressure_stop):
     times, states = held_pressure_stop
     signal = np.array(
         [(t, p) for t, p in zip(times, brake_input(times), strict=True)],
@@ -176,7 +172,7 @@ def test_co_simulation_equals_model_exchange(
 
 
 @pytest.mark.parametrize("version", ["fmi2", "fmi3"])
-def test_compiled_loops_step_as_the_fmu_itself_does(root: Path, version: str) -> None:
+def test_compiled_loops_step_as_the_fmu_itself_does(root, version):
     path, read_ = root / "fmus" / version / "MinimalObserver.fmu", ["omegaW", "omegaR", "Fx"]
     with CoSimulation(path) as called, CoSimulation(path) as compiled:
         inputs, outputs = called.variables(["pB", "tauR"]), called.variables(read_)
@@ -198,9 +194,7 @@ def test_compiled_loops_step_as_the_fmu_itself_does(root: Path, version: str) ->
             raise_on_failure(set_inputs(running, 0, 2), compiled)
 
 
-def test_implicit_step_converges_with_order_one(
-    minimal_path: Path, held_pressure_stop: tuple[np.ndarray, np.ndarray]
-) -> None:
+def test_implicit_step_converges_with_order_one(minimal_path, held_pressure_stop):
     """Halving the step of linearly implicit Euler halves the error (Hairer and Wanner 1996)."""
     times, states = held_pressure_stop
     errors = []
@@ -220,12 +214,12 @@ def test_implicit_step_converges_with_order_one(
     assert errors[0] < 0.01
 
 
-def test_missing_variable_is_named(minimal: FMU) -> None:
+def test_missing_variable_is_named(minimal):
     with pytest.raises(InputError, match=r"no variable 'omegaX'.*omegaW, omegaR"):
         minimal.variables(["omegaX"])
 
 
-def test_nan_is_refused_with_a_reason_and_nothing_changes(minimal: FMU) -> None:
+def test_nan_is_refused_with_a_reason_and_nothing_changes(minimal):
     minimal.start({"omegaW": 60.0, "omegaR": 39.5})
     inputs = minimal.variables(["pB", "tauR"])
     before = minimal.derivatives()
@@ -234,7 +228,7 @@ def test_nan_is_refused_with_a_reason_and_nothing_changes(minimal: FMU) -> None:
     assert_array_equal(minimal.derivatives(), before)
 
 
-def test_a_file_that_is_no_fmu_is_refused(tmp_path: Path) -> None:
+def test_a_file_that_is_no_fmu_is_refused(tmp_path):
     wrong = tmp_path / "wrong.fmu"
     wrong.write_text("no archive")
     with pytest.raises(InputError, match="no FMU"):
@@ -244,8 +238,8 @@ def test_a_file_that_is_no_fmu_is_refused(tmp_path: Path) -> None:
 
 
 def test_a_refusal_names_the_model_of_an_fmu_that_is_kept_not_its_file(
-    minimal_path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    minimal_path, tmp_path, monkeypatch
+):
     kept = Path(shutil.copy(minimal_path, tmp_path / "0123.fmu"))
     with FMU(kept) as fmu, pytest.raises(InputError, match=re.escape(str(kept))):
         fmu.variables(["nothing"])

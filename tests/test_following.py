@@ -1,7 +1,6 @@
 """Proposals that are followed: what the rig then makes parts what stops before left together."""
 
 import json
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -25,7 +24,7 @@ def made(parts: bool, foreseen: bool, predicted: float, shown: float | None) -> 
     }
 
 
-def test_what_was_followed_is_counted() -> None:
+def test_what_was_followed_is_counted():
     row = {"planted": "A", "multiple": 8.0, "verdict": "found", "group": ["A", "B"], "error": ""}
     row |= {"sensed": None}
     fitted = {"sensor": "the load", **made(True, True, 9.0, 9.0)}
@@ -49,23 +48,21 @@ def test_what_was_followed_is_counted() -> None:
     assert f"2 of 4 {SHARES['proposed']} (7% to 93%)" in told
 
 
-def test_a_rival_that_is_nearer_than_the_true_cause_is_predicted_as_such() -> None:
+def test_a_rival_that_is_nearer_than_the_true_cause_is_predicted_as_such():
     row = {"planted": "A", "multiple": 8.0, "verdict": "found", "group": ["A", "B"], "sensed": None}
     rows = [row | {"proposed": made(False, False, -9.0, shown), "drawn": []} for shown in (-9.5, 9)]
     found = summarise_following(rows)["separations"]
     assert (found["hits"], found["of"]) == (1, 2)
 
 
-def test_a_rig_that_makes_no_experiments_is_refused(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_rig_that_makes_no_experiments_is_refused(tmp_path, capsys):
     pytest.importorskip("rumoca", reason="no Modelica compiler")
     assert main(["power", "--follow", "--system", "train", "--out", str(tmp_path)]) == 2
     assert "one with the method 'following'" in capsys.readouterr().err
 
 
 @pytest.mark.long
-def test_torque_and_force_part_where_the_drive_imitates_nothing(tmp_path: Path) -> None:
+def test_torque_and_force_part_where_the_drive_imitates_nothing(tmp_path):
     """With an inertia imitated, both are collinear in any stop, whatever the pressure."""
     pytest.importorskip("rumoca", reason="no Modelica compiler")
     options = ["--follow", "--effects", "FxGain", "--sizes", "8", "--repeats", "1"]
@@ -94,9 +91,7 @@ def test_torque_and_force_part_where_the_drive_imitates_nothing(tmp_path: Path) 
         ("CreepStiffness", "WheelLoad", "wheel load, at the vertical cylinders", ""),
     ],
 )
-def test_a_twin_is_parted_by_what_is_proposed_for_it(
-    planted: str, twin: str, sensor: str, answer: str, tmp_path: Path
-) -> None:
+def test_a_twin_is_parted_by_what_is_proposed_for_it(planted, twin, sensor, answer, tmp_path):
     pytest.importorskip("rumoca", reason="no Modelica compiler")
     options = ["--follow", "--effects", planted, "--sizes", "8", "--repeats", "1"]
     alike = ["--case", "24_alike_80_2.7", "--case", "25_alike_80_2.7"]

@@ -121,7 +121,7 @@ def simulated(seed: int) -> pd.DataFrame:
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(tmp_path_factory) -> Path:
     """All that a user writes: library, system file and recordings; and the compiled model."""
     folder = tmp_path_factory.mktemp("tanks")
     for seed, name in enumerate(("01_first", "02_second")):
@@ -132,18 +132,18 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def tanks(folder: Path) -> System:
+def tanks(folder) -> System:
     return declare(folder, LIBRARY, SYSTEM, Tanks="Water.Tanks")
 
 
 @pytest.fixture(scope="module")
-def fmu(tanks: System) -> Iterator[FMU]:
+def fmu(tanks) -> Iterator[FMU]:
     with open_model(tanks) as opened:
         yield opened
 
 
 @pytest.fixture(scope="module")
-def case(folder: Path, tanks: System) -> Case:
+def case(folder, tanks) -> Case:
     return read_case(folder / "cases" / "01_first", tanks)
 
 
@@ -153,20 +153,18 @@ def made(fmu: FMU, tanks: System, name: str) -> Estimator:
 
 
 @pytest.fixture(scope="module")
-def runs(fmu: FMU, tanks: System, case: Case) -> dict[str, Run]:
+def runs(fmu, tanks, case) -> dict[str, Run]:
     return {name: replay(case, made(fmu, tanks, name)) for name in estimators_of(tanks)}
 
 
-def test_a_system_has_the_estimators_of_all_systems_and_no_others(tanks: System) -> None:
+def test_a_system_has_the_estimators_of_all_systems_and_no_others(tanks):
     assert list(estimators_of(tanks)) == ["open_loop", *ESTIMATORS]
     with pytest.raises(InputError, match="direct_inversion"):
         choose(tanks, ["direct_inversion"])
 
 
 @pytest.mark.parametrize("name", ESTIMATORS)
-def test_a_leak_that_opens_is_found_from_the_voltage_of_a_level_sensor(
-    case: Case, tanks: System, runs: dict[str, Run], name: str
-) -> None:
+def test_a_leak_that_opens_is_found_from_the_voltage_of_a_level_sensor(case, tanks, runs, name):
     run = runs[name]
     assert run.ending is Ending.OK
     settled = case.time >= SETTLED
@@ -181,18 +179,14 @@ def test_a_leak_that_opens_is_found_from_the_voltage_of_a_level_sensor(
 
 
 @pytest.mark.parametrize("name", ESTIMATORS)
-def test_every_observer_is_nearer_to_what_judges_than_the_model_alone(
-    case: Case, tanks: System, runs: dict[str, Run], name: str
-) -> None:
+def test_every_observer_is_nearer_to_what_judges_than_the_model_alone(case, tanks, runs, name):
     alone, own = (score(case, runs[one], tanks) for one in ("open_loop", name))
     assert alone.nrmse is not None
     assert own.nrmse is not None
     assert own.nrmse < 0.5 * alone.nrmse
 
 
-def test_the_open_loop_model_goes_where_its_own_equations_lead(
-    case: Case, runs: dict[str, Run]
-) -> None:
+def test_the_open_loop_model_goes_where_its_own_equations_lead(case, runs):
     """Reference: the exact solution of the linear model with the nominal leak."""
     A = np.array([[-PIPE, PIPE], [PIPE, -PIPE - DRAIN]]) / AREA
     levels = [np.array([1.0, 0.8])]
@@ -207,9 +201,7 @@ def test_the_open_loop_model_goes_where_its_own_equations_lead(
 
 
 @pytest.mark.parametrize("name", ["ekf", "ukf", "mhe"])
-def test_filters_are_the_kalman_filter_where_the_model_is_linear(
-    fmu: FMU, tanks: System, case: Case, runs: dict[str, Run], name: str
-) -> None:
+def test_filters_are_the_kalman_filter_where_the_model_is_linear(fmu, tanks, case, runs, name):
     """Reference: textbook equations in matrices, with the same implicit step."""
     gains = estimators_of(tanks)[name].default_gains(fmu, tanks)
     walk = np.array([1e-5, 1e-5, gains["leak"]])
@@ -239,9 +231,7 @@ def test_filters_are_the_kalman_filter_where_the_model_is_linear(
 
 
 @pytest.mark.parametrize("name", ["disturbance_observer", "parameter_estimator", "ekf"])
-def test_tuning_improves_z_and_its_page_speaks_of_the_system(
-    folder: Path, tmp_path: Path, name: str
-) -> None:
+def test_tuning_improves_z_and_its_page_speaks_of_the_system(folder, tmp_path, name):
     chosen = ["--system", str(folder), "--cases", str(folder / "cases"), "--out", str(tmp_path)]
     search = ["--budget", "3", "--population", "3", "--workers", "1", "--folds", "2"]
     assert main(["tune", name, *chosen, *search]) == 0

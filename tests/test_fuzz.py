@@ -1,9 +1,8 @@
 """What users give is read or refused in words, however damaged; `make fuzz` reads many more."""
 
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -41,15 +40,13 @@ COUNTS = {
 
 
 @pytest.fixture(scope="module")
-def known(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Target]]:
+def known(tmp_path_factory) -> Iterator[dict[str, Target]]:
     with one_process():
         yield {target.name: target for target in targets(tmp_path_factory.mktemp("originals"))}
 
 
 @pytest.mark.parametrize(("name", "count"), COUNTS.items())
-def test_damaged_files_are_read_or_refused_in_words(
-    name: str, count: int, known: dict[str, Target]
-) -> None:
+def test_damaged_files_are_read_or_refused_in_words(name, count, known):
     report = fuzz(known[name], seed=1, numbers=range(count))
     assert [str(failure) for failure in report.failures] == []
     counts = report.outcomes[name]
@@ -58,17 +55,17 @@ def test_damaged_files_are_read_or_refused_in_words(
     assert min(counts["accepted"], counts["refused"]) > count // 50
 
 
-def test_every_kind_of_file_is_among_them(known: dict[str, Target]) -> None:
+def test_every_kind_of_file_is_among_them(known):
     assert COUNTS.keys() == known.keys()
 
 
-def test_originals_are_accepted(known: dict[str, Target], tmp_path: Path) -> None:
+def test_originals_are_accepted(known, tmp_path):
     for target in known.values():
         write(target.original, tmp_path / target.name)
         assert target.impossible(target.read(tmp_path / target.name)) == ""
 
 
-def test_the_same_seed_makes_the_same_mutants(known: dict[str, Target]) -> None:
+def test_the_same_seed_makes_the_same_mutants(known):
     for target in known.values():
         made = [
             target.change(target.original, generator(target.name, seed, 7)) for seed in (1, 1, 2)
@@ -110,13 +107,7 @@ def leaves(_: Path) -> None:
         (lambda _: "NaN", "impossible", "NaN"),
     ],
 )
-def test_what_a_reader_must_not_do_is_named(
-    read: Callable[[Path], Any],
-    outcome: str,
-    said: str,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_what_a_reader_must_not_do_is_named(read, outcome, said, tmp_path, monkeypatch):
     monkeypatch.setattr(harness, "LONGEST", 0.2)
     target = Target("toy", {"a": b"1"}, read, lambda value: value or "")
     report = fuzz(target, seed=3, numbers=range(5, 7), keep=tmp_path)
@@ -129,7 +120,7 @@ def test_what_a_reader_must_not_do_is_named(
         assert (folder / "a").exists()
 
 
-def test_what_is_written_outside_is_seen(tmp_path: Path) -> None:
+def test_what_is_written_outside_is_seen(tmp_path):
     def changes(_: Path) -> None:
         (tmp_path / "made").mkdir()
         (tmp_path / "made" / "file").write_text("x")

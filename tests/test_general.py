@@ -7,7 +7,7 @@ import pytest
 
 from workbench.diagnosis import read_effects
 from workbench.models.modelica import read_library
-from workbench.system.system import OBSERVER, System
+from workbench.system.system import OBSERVER
 
 ROOT = Path(__file__).parent.parent
 KINDS = (".py", ".html", ".js", ".css", ".c", ".h")
@@ -17,7 +17,7 @@ ALLOWED = {"direction", "speed"}  # words of every field
 
 
 @pytest.fixture(scope="module")
-def names(system: System) -> set[str]:
+def names(system) -> set[str]:
     """Names that the system file and the library of the wheelset give to things."""
     library = read_library(system.library)
     effects = read_effects(library, system.models[OBSERVER].name)
@@ -47,7 +47,7 @@ def sources() -> list[Path]:
 
 
 @pytest.mark.parametrize("source", sources(), ids=lambda p: str(p.relative_to(ROOT / "workbench")))
-def test_no_source_names_what_one_machine_has(source: Path, names: set[str]) -> None:
+def test_no_source_names_what_one_machine_has(source, names):
     words = re.compile(rf"\b({'|'.join(map(re.escape, names))}|{PROSE})\b")
     lines = enumerate(source.read_text().splitlines(), 1)
     assert [(number, line.strip()) for number, line in lines if words.search(line)] == []

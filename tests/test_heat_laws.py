@@ -1,7 +1,5 @@
 """Laws of heat that is kept, or lost again: they are offered, and their classes hold that heat."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -24,20 +22,19 @@ from workbench.diagnosis.laws.writing import extended_library
 from workbench.diagnosis.simulation.residual_model import ResidualModel
 from workbench.models.fmu import FMU
 from workbench.models.modelica import Library, read_library
-from workbench.recordings.case import Case
-from workbench.system.system import OBSERVER, System
+from workbench.system.system import OBSERVER
 
 LONGEST = 40.0  # [s]
 
 
 @pytest.fixture(scope="module")
-def library(system: System) -> Library:
+def library(system) -> Library:
     assert system.library is not None
     return read_library(system.library)
 
 
 @pytest.fixture(scope="module")
-def pads(library: Library, system: System) -> Place:
+def pads(library, system) -> Place:
     """Where the pads' friction coefficient acts."""
     base = system.models[OBSERVER].name
     every = places(library, base, read_slots(library, base))
@@ -63,7 +60,7 @@ def of_heat(pads: Place) -> dict[float, ClosedForm]:
     return found
 
 
-def test_friction_may_depend_on_the_heat_it_makes_kept_or_lost(pads: Place) -> None:
+def test_friction_may_depend_on_the_heat_it_makes_kept_or_lost(pads):
     """All of its power: force, speed and the coefficient itself."""
     found = of_heat(pads)
     # From heat that a stop keeps to heat of which most is gone at its end.
@@ -75,8 +72,8 @@ def test_friction_may_depend_on_the_heat_it_makes_kept_or_lost(pads: Place) -> N
 
 @pytest.mark.parametrize("span", [0.0, LONGEST])
 def test_the_class_of_a_law_holds_the_heat_that_was_looked_at(
-    span: float, library: Library, pads: Place, system: System, dry_case: Case, tmp_path: Path
-) -> None:
+    span, library, pads, system, dry_case, tmp_path
+):
     """What the model integrates, beside the integral over samples of what was watched."""
     base = system.models[OBSERVER].name
     law = of_heat(pads)[span]

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -82,19 +81,19 @@ ESTIMATORS = [
 
 
 @pytest.fixture(scope="module")
-def vessel(tmp_path_factory: pytest.TempPathFactory) -> System:
+def vessel(tmp_path_factory) -> System:
     folder = tmp_path_factory.mktemp("vessel")
     return declare(folder, VESSEL, SYSTEM)
 
 
 @pytest.fixture(scope="module")
-def fmu(vessel: System) -> Iterator[FMU]:
+def fmu(vessel) -> Iterator[FMU]:
     with open_model(vessel) as model:
         yield model
 
 
 @pytest.fixture(scope="module")
-def filled(vessel: System) -> Case:
+def filled(vessel) -> Case:
     """A litre in a second for ten seconds, switched at samples: ten litres, without any noise."""
     time = np.arange(31.0)
     flow = np.where(time < 10.0, 1e-3, 0.0)
@@ -105,8 +104,8 @@ def filled(vessel: System) -> Case:
 
 @pytest.mark.parametrize("name", ESTIMATORS)
 def test_a_switched_pump_is_integrated_exactly_and_nothing_is_made_of_the_switch(
-    vessel: System, fmu: FMU, filled: Case, name: str
-) -> None:
+    vessel, fmu, filled, name
+):
     kind = estimators_of(vessel)[name]
     run = replay(filled, kind(fmu, vessel, kind.default_gains(fmu, vessel)))
     assert_allclose(run.signal("V"), filled["V"], rtol=0.0, atol=1e-12)
@@ -115,9 +114,7 @@ def test_a_switched_pump_is_integrated_exactly_and_nothing_is_made_of_the_switch
     assert_allclose(run.signal("through"), filled["through"], rtol=0.0, atol=1e-12)
 
 
-def test_a_modelica_class_of_an_observer_is_not_exported_with_it(
-    vessel: System, fmu: FMU, tmp_path: Path
-) -> None:
+def test_a_modelica_class_of_an_observer_is_not_exported_with_it(vessel, fmu, tmp_path):
     kind = estimators_of(vessel)["disturbance_observer"]
     listed = replace(vessel, export=replace(vessel.export, classes={kind.name: "Observer"}))
     model = ObserverModel(listed, kind, kind.default_gains(fmu, vessel), "")

@@ -122,9 +122,7 @@ def refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
 @pytest.mark.parametrize(
     ("file", "kind"), [("measured.csv", k) for k in CSV] + [("case.toml", k) for k in TOMLS]
 )
-def test_a_case_that_no_person_wrote_is_refused(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], file: str, kind: str
-) -> None:
+def test_a_case_that_no_person_wrote_is_refused(tmp_path, capsys, file, kind):
     case = write(tmp_path / "a")
     spoil, match = (CSV if file == "measured.csv" else TOMLS)[kind]
     spoil(case / file)
@@ -154,9 +152,7 @@ SYSTEM = "modelica/WheelsetRig/system.toml"
     ],
     ids=["design", "hexadecimal", "digits", "nan", "brackets", "sum", "constant", "zero"],
 )
-def test_a_system_that_no_person_wrote_is_refused(
-    root: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], old: str, new: str, match: str
-) -> None:
+def test_a_system_that_no_person_wrote_is_refused(root, tmp_path, capsys, old, new, match):
     library = tmp_path / "modelica" / "WheelsetRig"
     library.mkdir(parents=True)
     (tmp_path / "fmus").symlink_to(root / "fmus")
@@ -179,9 +175,7 @@ def test_a_system_that_no_person_wrote_is_refused(
         f"[gains]\nL11 = 1{'0' * 400}",
     ],
 )
-def test_gains_that_no_person_wrote_are_refused(
-    root: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], line: str
-) -> None:
+def test_gains_that_no_person_wrote_are_refused(root, tmp_path, capsys, line):
     tuned = (root / "workbench/machines/wheelset/gains/disturbance_observer.toml").read_text()
     key = line.split(" = ")[0].split("\n")[-1]
     start = tuned.index("[gains]")
@@ -203,18 +197,14 @@ def test_gains_that_no_person_wrote_are_refused(
     assert "gains.toml" in refused(["simulate", case, "--gains", str(path), *out], capsys)
 
 
-def test_a_path_that_cannot_be_read_is_refused(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_path_that_cannot_be_read_is_refused(tmp_path, capsys):
     long = str(tmp_path / ("x" * 5000))
     assert "x (50" not in refused(["simulate", long], capsys)
     assert "no such file" in refused(["simulate", "--system", long], capsys)
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="a folder of somebody else is made by root")
-def test_a_folder_without_permission_is_refused(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_folder_without_permission_is_refused(tmp_path, capsys):
     case = write(tmp_path / "a")
     case.chmod(0)
     os.seteuid(65534)  # nobody

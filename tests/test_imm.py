@@ -72,7 +72,7 @@ RATES, STEP, NOISE, WALK = (0.02, 0.05), 1.0, 0.2, np.array([0.01, 0.002])
 
 
 @pytest.fixture(scope="module")
-def vessel(tmp_path_factory: pytest.TempPathFactory) -> System:
+def vessel(tmp_path_factory) -> System:
     pytest.importorskip("casadi")
     pytest.importorskip("rumoca")
     folder = tmp_path_factory.mktemp("vessel")
@@ -91,13 +91,13 @@ def vessel(tmp_path_factory: pytest.TempPathFactory) -> System:
 
 
 @pytest.fixture(scope="module")
-def fmu(vessel: System) -> Iterator[FMU]:
+def fmu(vessel) -> Iterator[FMU]:
     with open_model(vessel) as opened:
         yield opened
 
 
 @pytest.fixture(scope="module")
-def case(vessel: System) -> Case:
+def case(vessel) -> Case:
     return read_case(vessel.source.parent / "cases" / "01_cover_lost", vessel)
 
 
@@ -142,9 +142,7 @@ def textbook(case: Case, transition: np.ndarray) -> tuple[np.ndarray, ...]:
 
 
 @pytest.mark.parametrize("lasts", [20.0, 100.0, np.inf])
-def test_it_is_the_textbook_where_the_model_is_linear(
-    fmu: FMU, vessel: System, case: Case, lasts: float
-) -> None:
+def test_it_is_the_textbook_where_the_model_is_linear(fmu, vessel, case, lasts):
     """Without changes the mixture is exact: two filters side by side, weighed by Bayes' rule."""
     case = case.part(slice(0, 140))  # in which no probability vanishes in double precision
     run = replay(case, bank(fmu, vessel, lasts))
@@ -159,14 +157,14 @@ def test_it_is_the_textbook_where_the_model_is_linear(
     assert_allclose(run.probability["cover_off"], weight[:, 1], rtol=1e-7, atol=1e-12)
 
 
-def test_a_cover_that_is_lost_under_way_is_noticed(fmu: FMU, vessel: System, case: Case) -> None:
+def test_a_cover_that_is_lost_under_way_is_noticed(fmu, vessel, case):
     run = replay(case, bank(fmu, vessel, 100.0))
     off = run.probability["cover_off"]
     assert off[140:150].max() < 0.05
     assert np.median(off[-100:]) > 0.95
 
 
-def test_rates_of_change_leave_one_choice_for_each_other(vessel: System) -> None:
+def test_rates_of_change_leave_one_choice_for_each_other(vessel):
     assert_allclose(changes(vessel), [[-0.01, 0.01], [0.01, -0.01]])
     (cover,) = vessel.conditions
     second = replace(cover, name="lid", lasts=50.0)
@@ -177,7 +175,7 @@ def test_rates_of_change_leave_one_choice_for_each_other(vessel: System) -> None
     assert_allclose(both.sum(axis=1), 0.0, atol=1e-15)
 
 
-def test_a_time_that_is_none_is_refused(vessel: System, tmp_path: Path) -> None:
+def test_a_time_that_is_none_is_refused(vessel, tmp_path):
     shutil.copy(vessel.source.parent / "Vessel.fmu", tmp_path)
     (tmp_path / "system.toml").write_text(SYSTEM.replace('"100 s"', '"0 s"'))
     with pytest.raises(InputError, match=r"lasts.*a time above 0"):
@@ -197,7 +195,7 @@ def rails() -> dict[str, Run]:
         return {one.name: replay(one, own) for one in found}
 
 
-def test_with_one_hypothesis_it_is_the_extended_filter() -> None:
+def test_with_one_hypothesis_it_is_the_extended_filter():
     conditions = tuple(replace(condition, parameters={}) for condition in WHEELSET.conditions)
     plain = replace(WHEELSET, conditions=conditions, bands={})
     case = read_case(ROOT / "cases" / "09_wet_160_4.2_wsp", plain)
@@ -210,7 +208,7 @@ def test_with_one_hypothesis_it_is_the_extended_filter() -> None:
     assert_allclose(one.nis, alone.nis, rtol=1e-12, atol=0)
 
 
-def test_the_condition_of_the_rail_is_found_within_a_second(rails: dict[str, Run]) -> None:
+def test_the_condition_of_the_rail_is_found_within_a_second(rails):
     """Where the wheel rolls: sliding, the laws of wet and dry rails are alike."""
     for case in read_cases([ROOT / "cases"], WHEELSET):
         right = rails[case.name].probability[f"wheel_rail_{case.conditions['wheel_rail']}"]

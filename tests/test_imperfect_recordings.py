@@ -4,8 +4,6 @@ A heated block whose casing takes some of the heat; the casing's temperature is 
 recordings are exact solutions of the linear equations, not of the compiled model.
 """
 
-from pathlib import Path
-
 import fmpy
 import lxml.html
 import numpy as np
@@ -52,13 +50,11 @@ def simulated(seed: int, loss: float, casing: float) -> pd.DataFrame:
 
 
 @pytest.fixture(scope="module")
-def heater(tmp_path_factory: pytest.TempPathFactory) -> System:
+def heater(tmp_path_factory) -> System:
     return system(tmp_path_factory.mktemp("systems") / "heater")
 
 
-def test_parts_of_a_single_recording_are_held_out_and_its_cause_named(
-    heater: System, tmp_path: Path
-) -> None:
+def test_parts_of_a_single_recording_are_held_out_and_its_cause_named(heater, tmp_path):
     outcome = diagnosed(heater, cases(heater, [simulated(1, LOSS, 12.0)]), tmp_path)
     (cause,) = outcome.diagnosis.causes
     assert cause.effect.name == "Draught"
@@ -73,12 +69,12 @@ def test_parts_of_a_single_recording_are_held_out_and_its_cause_named(
     assert gain.low < 1.0 < gain.high
 
 
-def test_a_single_recording_without_a_cause_lacks_nothing(heater: System, tmp_path: Path) -> None:
+def test_a_single_recording_without_a_cause_lacks_nothing(heater, tmp_path):
     outcome = diagnosed(heater, cases(heater, [simulated(2, 0.0, -8.0)]), tmp_path)
     assert outcome.diagnosis.verdict == "nothing"
 
 
-def test_a_single_recording_is_refused_where_recordings_differ(tmp_path: Path) -> None:
+def test_a_single_recording_is_refused_where_recordings_differ(tmp_path):
     differing = system(tmp_path / "heaters", "[diagnosis.tolerances]\nGc = 0.05")
     recordings = cases(differing, [simulated(k, LOSS, 0.0) for k in range(4)])
     with pytest.raises(InputError, match=r"two or more to fit, because what .*tolerances.*Gc"):
@@ -87,15 +83,13 @@ def test_a_single_recording_is_refused_where_recordings_differ(tmp_path: Path) -
         diagnosed(differing, recordings[:1], tmp_path, recordings[1:])
 
 
-def test_a_single_recording_too_short_for_two_parts_is_refused(tmp_path: Path) -> None:
+def test_a_single_recording_too_short_for_two_parts_is_refused(tmp_path):
     brief = system(tmp_path / "brief", '[diagnosis]\nlasting = "60 s"\nleast = "90 s"')
     with pytest.raises(InputError, match=r"one recording, 110 s that count.*120 s or more"):
         diagnosed(brief, cases(brief, [simulated(1, LOSS, 0.0)[:110]]), tmp_path)
 
 
-def test_a_state_that_nobody_measured_starts_where_the_recording_says(
-    heater: System, tmp_path: Path
-) -> None:
+def test_a_state_that_nobody_measured_starts_where_the_recording_says(heater, tmp_path):
     starts = [15.0, -10.0, 4.0]
     recordings = cases(heater, [simulated(k, 0.0, at) for k, at in enumerate(starts)])
     outcome = diagnosed(heater, recordings, tmp_path)
@@ -105,7 +99,7 @@ def test_a_state_that_nobody_measured_starts_where_the_recording_says(
     assert found == pytest.approx(starts, abs=0.5)
 
 
-def test_errors_are_told_on_recordings_that_were_held_out(heater: System, tmp_path: Path) -> None:
+def test_errors_are_told_on_recordings_that_were_held_out(heater, tmp_path):
     recordings = cases(heater, [simulated(k, LOSS, 3.0 * k) for k in range(4)])
     outcome = diagnosed(heater, recordings[:2], tmp_path, recordings[2:])
     assert [error.recording for error in outcome.errors if error.held_out] == ["02", "03"]
@@ -124,9 +118,7 @@ def test_errors_are_told_on_recordings_that_were_held_out(heater: System, tmp_pa
     assert outcome.sentence.count("held-out") == 1
 
 
-def test_another_tool_starts_the_extended_model_as_a_recording_does(
-    heater: System, tmp_path: Path
-) -> None:
+def test_another_tool_starts_the_extended_model_as_a_recording_does(heater, tmp_path):
     recordings = cases(heater, [simulated(k, LOSS, 10.0 * k) for k in range(3)])
     outcome = diagnosed(heater, recordings[:2], tmp_path, recordings[2:])
     assert outcome.extension is not None
@@ -153,7 +145,7 @@ def in_steps(values: NDArray[np.float64], step: float) -> NDArray[np.float64]:
     return step * np.round(values / step)
 
 
-def test_coarse_steps_of_a_reading_are_no_cause(tmp_path: Path) -> None:
+def test_coarse_steps_of_a_reading_are_no_cause(tmp_path):
     step = 2.0
     coarse = system(tmp_path / "coarse", f'resolution = "{step} K"')
     frames = [simulated(k, 0.0, 0.0) for k in range(3)]
@@ -165,7 +157,7 @@ def test_coarse_steps_of_a_reading_are_no_cause(tmp_path: Path) -> None:
     assert all(sum(counts.values()) == 0 for counts in outcome.set_aside.values())
 
 
-def test_samples_at_the_limit_of_a_sensor_do_not_count(tmp_path: Path) -> None:
+def test_samples_at_the_limit_of_a_sensor_do_not_count(tmp_path):
     limit = 40.0
     cut_off = system(tmp_path / "cut_off", f'saturates = ["-50 K", "{limit} K"]')
     frames = [simulated(k, LOSS, 0.0) for k in range(3)]
@@ -188,16 +180,12 @@ def test_samples_at_the_limit_of_a_sensor_do_not_count(tmp_path: Path) -> None:
         ('resolution = "1 bar"', "cannot be converted|bar"),
     ],
 )
-def test_mistakes_in_what_a_sensor_reads_are_refused(
-    sensor: str, match: str, tmp_path: Path
-) -> None:
+def test_mistakes_in_what_a_sensor_reads_are_refused(sensor, match, tmp_path):
     with pytest.raises(InputError, match=match):
         system(tmp_path / "wrong", sensor)
 
 
-def test_page_tells_errors_of_fitted_and_of_held_out_recordings(
-    heater: System, tmp_path: Path
-) -> None:
+def test_page_tells_errors_of_fitted_and_of_held_out_recordings(heater, tmp_path):
     recordings = cases(heater, [simulated(k, LOSS, 0.0) for k in range(3)])
     outcome = diagnosed(heater, recordings[:2], tmp_path, recordings[2:])
     provenance = {"run": run_of("diagnose", outcome.system, {})}
@@ -212,7 +200,7 @@ def test_page_tells_errors_of_fitted_and_of_held_out_recordings(
     assert shown == pytest.approx(table[names].iloc[2].to_list(), rel=1e-4)
 
 
-def test_errors_of_a_sensor_at_its_limit_are_those_beyond_it(tmp_path: Path) -> None:
+def test_errors_of_a_sensor_at_its_limit_are_those_beyond_it(tmp_path):
     limit = 40.0
     cut_off = system(tmp_path / "cut_off", f'saturates = ["-50 K", "{limit} K"]')
     frames = [simulated(k, 0.0, 0.0) for k in range(3)]
@@ -228,7 +216,7 @@ def test_errors_of_a_sensor_at_its_limit_are_those_beyond_it(tmp_path: Path) -> 
         assert error.rms[0] == pytest.approx(NOISE * np.sqrt(below), rel=0.1)
 
 
-def test_a_fast_rise_between_slow_falls_is_no_spike(heater: System) -> None:
+def test_a_fast_rise_between_slow_falls_is_no_spike(heater):
     sensor = heater.signals["T"]
     rng = np.random.default_rng(3)
     # Ten samples up and two hundred down, as a compressor fills a reservoir that leaks.

@@ -27,14 +27,14 @@ UNITS = {"pB": 1e5, "tauR": 1e3, "omegaW": 1 / 3.6 / 0.4, "omegaR": 1 / 3.6 / 0.
 
 
 @pytest.fixture(scope="module")
-def stop(root: Path, system: System) -> Case:
+def stop(root, system) -> Case:
     """A stop, every fourth sample of it."""
     (case,) = wb.read_cases(root / "cases" / "01_dry_80_1.5", system)
     return case.part(slice(None, None, 4))
 
 
 @pytest.fixture(autouse=True)
-def nobody_answers(monkeypatch: pytest.MonkeyPatch) -> None:
+def nobody_answers(monkeypatch) -> None:
     monkeypatch.setattr(builtins, "input", lambda: pytest.fail("a question"))
 
 
@@ -52,9 +52,7 @@ def imported(out: Path, name: str, system: System) -> Case:
 
 
 @pytest.mark.parametrize("name", FORMATS)
-def test_a_file_is_imported_without_a_wrong_number(
-    tmp_path: Path, stop: Case, system: System, name: str
-) -> None:
+def test_a_file_is_imported_without_a_wrong_number(tmp_path, stop, system, name):
     path = tmp_path / name
     FORMATS[name](path, recorded(stop, system))
     before = path.read_bytes()
@@ -68,9 +66,7 @@ def test_a_file_is_imported_without_a_wrong_number(
     assert path.read_bytes() == before
 
 
-def test_what_was_done_to_a_file_is_written_down(
-    tmp_path: Path, stop: Case, system: System
-) -> None:
+def test_what_was_done_to_a_file_is_written_down(tmp_path, stop, system):
     csv_of_a_german_rig(tmp_path / "a.csv", recorded(stop, system))
     main(["import", str(tmp_path / "a.csv"), "--out", str(tmp_path / "out"), "--yes"])
     (one,) = json.loads((tmp_path / "out" / "import.json").read_text())["imports"]
@@ -89,9 +85,7 @@ def test_what_was_done_to_a_file_is_written_down(
     assert conditions["wheel_rail"] == {"value": "unknown", "from": "unknown"}
 
 
-def test_a_file_that_ends_the_process_of_its_library_is_refused(
-    tmp_path: Path, stop: Case, system: System
-) -> None:
+def test_a_file_that_ends_the_process_of_its_library_is_refused(tmp_path, stop, system):
     """Its channels lie far beyond what it holds, where asammdf's compiled code looks for them."""
     path = tmp_path / "stop.mf4"
     mdf_4(path, recorded(stop, system))
@@ -105,9 +99,7 @@ def test_a_file_that_ends_the_process_of_its_library_is_refused(
         read_recorded_file(path)
 
 
-def test_the_end_that_a_tdms_file_lacks_is_told(
-    tmp_path: Path, stop: Case, system: System, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_end_that_a_tdms_file_lacks_is_told(tmp_path, stop, system, capsys):
     path = tmp_path / "stop.tdms"
     FORMATS["labview.tdms"](path, recorded(stop, system))
     command = ["import", str(path), "--out", str(tmp_path / "cases"), "--yes"]
@@ -125,7 +117,7 @@ def test_the_end_that_a_tdms_file_lacks_is_told(
         wb.read_cases(path, system, conditions={"wheel_rail": "dry", "discs": ["dry"] * 3})
 
 
-def test_what_a_library_warns_of_is_noted(tmp_path: Path, stop: Case, system: System) -> None:
+def test_what_a_library_warns_of_is_noted(tmp_path, stop, system):
     """A variable that a MAT file holds twice: scipy says so by a warning, which nobody saw."""
     path = tmp_path / "stop.mat"
     FORMATS["structures.mat"](path, recorded(stop, system))
@@ -135,9 +127,7 @@ def test_what_a_library_warns_of_is_noted(tmp_path: Path, stop: Case, system: Sy
 
 
 @pytest.mark.parametrize("package", ["openpyxl", "pyarrow", "h5py", "asammdf", "nptdms"])
-def test_a_missing_reader_names_the_extra(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, package: str
-) -> None:
+def test_a_missing_reader_names_the_extra(tmp_path, monkeypatch, package):
     begins = {
         "openpyxl": b"PK\x03\x04",
         "pyarrow": b"PAR1",
@@ -169,9 +159,7 @@ def test_a_missing_reader_names_the_extra(
         (b"t;p;v\n0;1.234;5\n1;1.234;5\n2;1.234;6\n", "'1.234', which can be read with"),
     ],
 )
-def test_what_is_no_recording_is_refused_in_words(
-    tmp_path: Path, content: bytes, match: str
-) -> None:
+def test_what_is_no_recording_is_refused_in_words(tmp_path, content, match):
     (tmp_path / "a").write_bytes(content)
     with pytest.raises(InputError, match=match):
         read_recorded_file(tmp_path / "a")
@@ -180,9 +168,7 @@ def test_what_is_no_recording_is_refused_in_words(
 # --- the same reader elsewhere ---
 
 
-def test_a_case_folder_may_hold_the_recorders_file(
-    tmp_path: Path, stop: Case, system: System
-) -> None:
+def test_a_case_folder_may_hold_the_recorders_file(tmp_path, stop, system):
     columns = recorded(stop, system)
     unit, force = columns["Längskraft"]
     mdf_4(tmp_path / "stop.mf4", {**columns, "Längskraft": (unit, -force)})
@@ -209,9 +195,7 @@ Fx = { channel = "Längskraft", reversed = true }
     assert_allclose(case["Fx"], stop["Fx"], rtol=1e-12, atol=1e-9)
 
 
-def test_a_bare_file_is_a_case_with_its_conditions_as_options(
-    tmp_path: Path, stop: Case, system: System
-) -> None:
+def test_a_bare_file_is_a_case_with_its_conditions_as_options(tmp_path, stop, system):
     lines = ["time [s],pB [bar],tauR [kN.m],omegaW [rad/s],omegaR [1/min]"]
     values = stop.time, stop["pB"] / 1e5, stop["tauR"] / 1e3, stop["omegaW"]
     columns = (*values, stop["omegaR"] * 30 / np.pi)
@@ -227,9 +211,7 @@ def test_a_bare_file_is_a_case_with_its_conditions_as_options(
         wb.read_cases(tmp_path / "stop.csv", system)
 
 
-def test_nothing_is_claimed_of_a_condition_that_nobody_knows(
-    root: Path, tmp_path: Path, system: System
-) -> None:
+def test_nothing_is_claimed_of_a_condition_that_nobody_knows(root, tmp_path, system):
     """A slide shows the friction of the rail, if the law of the contact is known."""
     source = root / "cases" / "09_wet_160_4.2_wsp"
     text = (source / "case.toml").read_text()
@@ -247,7 +229,7 @@ def test_nothing_is_claimed_of_a_condition_that_nobody_knows(
     assert not runs["unknown"].claimed[rail].any()
 
 
-def test_the_sign_of_the_signals_must_be_known(tmp_path: Path, root: Path, system: System) -> None:
+def test_the_sign_of_the_signals_must_be_known(tmp_path, root, system):
     source = root / "cases" / "01_dry_80_1.5"
     text = (source / "case.toml").read_text()
     (tmp_path / "case.toml").write_text(text.replace("direction = 1", 'direction = "unknown"'))
@@ -256,17 +238,13 @@ def test_the_sign_of_the_signals_must_be_known(tmp_path: Path, root: Path, syste
         wb.read_cases(tmp_path, system)
 
 
-def test_names_that_nobody_confirmed_are_not_taken_in_silence(
-    tmp_path: Path, stop: Case, system: System
-) -> None:
+def test_names_that_nobody_confirmed_are_not_taken_in_silence(tmp_path, stop, system):
     csv_of_a_german_rig(tmp_path / "a.csv", recorded(stop, system))
     with pytest.raises(InputError, match=r"nobody confirmed: perhaps pB = Bremsdruck \[bar\]"):
         wb.read_cases(tmp_path / "a.csv", system)
 
 
-def test_channels_confirmed_for_a_folder_hold_for_its_files(
-    tmp_path: Path, stop: Case, system: System
-) -> None:
+def test_channels_confirmed_for_a_folder_hold_for_its_files(tmp_path, stop, system):
     out = tmp_path / "out"
     for name in ("a.csv", "b.csv"):
         csv_of_a_german_rig(tmp_path / name, recorded(stop, system))
@@ -280,7 +258,7 @@ def test_channels_confirmed_for_a_folder_hold_for_its_files(
 
 
 @pytest.fixture(scope="module")
-def train_stop(tmp_path_factory: pytest.TempPathFactory) -> Case:
+def train_stop(tmp_path_factory) -> Case:
     """A stop of a train on the level, without faults."""
     folder = tmp_path_factory.mktemp("train") / "01_stop"
     write_stop(folder, 1, {})
@@ -301,8 +279,8 @@ ENGLISH = ("BCP {} [bar]", "vehicle mass {} [t]", "slope {} [1]", "axle speed {}
     ids=["German", "English"],
 )
 def test_channels_of_a_train_are_known_by_the_names_of_a_laboratory(
-    tmp_path: Path, train_stop: Case, names: tuple[str, ...], curve: str, acceleration: str
-) -> None:
+    tmp_path, train_stop, names, curve, acceleration
+):
     factors = 1e-5, 1e-3, 1.0, 3.6 * 0.46
     kinds = zip(("pB", "mass", "slope", "omega"), names, factors, strict=True)
     columns = {"Zeit [s]": train_stop.time}
@@ -323,7 +301,7 @@ def test_channels_of_a_train_are_known_by_the_names_of_a_laboratory(
         assert_allclose(case[name], values, rtol=1e-12, atol=1e-12)
 
 
-def test_speeds_of_all_axles_in_another_unit_contradict_the_acceleration(train_stop: Case) -> None:
+def test_speeds_of_all_axles_in_another_unit_contradict_the_acceleration(train_stop):
     """In km/h declared as rad/s they agree with each other."""
     train = load_system("train")
     wrong = {f"omega{i}": 3.6 * 0.46 * train_stop[f"omega{i}"] for i in range(1, 9)}
@@ -341,7 +319,7 @@ def test_speeds_of_all_axles_in_another_unit_contradict_the_acceleration(train_s
 
 
 @pytest.fixture
-def table(tmp_path: Path, stop: Case, system: System) -> Callable[..., Path]:
+def table(tmp_path, stop, system) -> Callable[..., Path]:
     """Writes a CSV of a stop with other headers, by the usual name of a column."""
 
     def write(name: str = "a.csv", **headers: str) -> Path:
@@ -355,9 +333,7 @@ def table(tmp_path: Path, stop: Case, system: System) -> Callable[..., Path]:
     return write
 
 
-def test_an_answer_confirms_and_corrects_at_once(
-    table: Callable[..., Path], tmp_path: Path, system: System, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_answer_confirms_and_corrects_at_once(table, tmp_path, system, monkeypatch):
     questions = []
 
     def answer() -> str:
@@ -395,13 +371,7 @@ def test_an_answer_confirms_and_corrects_at_once(
         ({"Zeit": "Zeit"}, "time: no unit in the file, --column 'time=Zeit [s]' confirms"),
     ],
 )
-def test_what_is_not_certain_is_not_taken_by_yes(
-    table: Callable[..., Path],
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    headers: dict[str, str],
-    match: str,
-) -> None:
+def test_what_is_not_certain_is_not_taken_by_yes(table, tmp_path, capsys, headers, match):
     path = table(**headers)
     assert main(["import", str(path), "--out", str(tmp_path / "out"), "--yes"]) == 2
     error = capsys.readouterr().err
@@ -409,9 +379,7 @@ def test_what_is_not_certain_is_not_taken_by_yes(
     assert not list((tmp_path / "out").glob("*/case.toml"))
 
 
-def test_one_channel_is_not_taken_for_two_signals(
-    table: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_one_channel_is_not_taken_for_two_signals(table, tmp_path, capsys):
     command = ["import", str(table()), "--out", str(tmp_path / "out"), "--yes"]
     assert main([*command, "--column", "omegaW=v_Rolle", "--column", "omegaR=V_ROLLE"]) == 2
     error = capsys.readouterr().err
@@ -420,12 +388,8 @@ def test_one_channel_is_not_taken_for_two_signals(
 
 
 def test_a_unit_that_alone_is_plausible_is_asked_about_and_said(
-    table: Callable[..., Path],
-    tmp_path: Path,
-    stop: Case,
-    system: System,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    table, tmp_path, stop, system, monkeypatch
+):
     monkeypatch.setattr(builtins, "input", lambda: "")
     path = table(Bremsdruck="Bremsdruck")
     assert main(["import", str(path), "--out", str(tmp_path / "out")]) == 0
@@ -435,9 +399,7 @@ def test_a_unit_that_alone_is_plausible_is_asked_about_and_said(
     assert_allclose(imported(tmp_path / "out", "a", system)["pB"], stop["pB"], atol=rounding("pB"))
 
 
-def test_a_unit_that_a_further_file_states_is_not_overruled(
-    table: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_unit_that_a_further_file_states_is_not_overruled(table, tmp_path, capsys):
     """The first file has no unit, and bar is confirmed; the second says kPa and is asked about."""
     out = str(tmp_path / "out")
     first = ["import", str(table(Bremsdruck="Bremsdruck")), "--out", out, "--yes"]
@@ -447,9 +409,7 @@ def test_a_unit_that_a_further_file_states_is_not_overruled(
     assert "Bremsdruck [kPa]" in capsys.readouterr().out
 
 
-def test_of_several_files_one_that_is_refused_leaves_the_others(
-    table: Callable[..., Path], tmp_path: Path, system: System
-) -> None:
+def test_of_several_files_one_that_is_refused_leaves_the_others(table, tmp_path, system):
     bad = table("bad.csv", Zeit="Messwert")
     good = table("good.csv")
     command = ["import", str(bad), str(good), "--out", str(tmp_path / "out"), "--yes"]
@@ -457,9 +417,7 @@ def test_of_several_files_one_that_is_refused_leaves_the_others(
     assert [read_case.name for read_case in wb.read_cases(tmp_path / "out", system)] == ["good"]
 
 
-def test_a_folder_with_other_files_is_left_as_it_is(
-    table: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_folder_with_other_files_is_left_as_it_is(table, tmp_path, capsys):
     path = table()
     assert main(["import", str(path), "--out", str(tmp_path), "--yes"]) == 2
     assert "a folder with other files" in capsys.readouterr().err

@@ -30,7 +30,7 @@ QUARTER = 900.0  # s, between samples
 
 
 @pytest.fixture(scope="module")
-def tank(tmp_path_factory: pytest.TempPathFactory) -> System:
+def tank(tmp_path_factory) -> System:
     """A tank with an inflow and a level, sampled each quarter of an hour."""
     folder = tmp_path_factory.mktemp("systems") / "tank"
     write_system(folder)
@@ -80,30 +80,26 @@ SYDNEY = ZoneInfo("Australia/Sydney")
         (datetime(2024, 3, 28, tzinfo=BERLIN), "%Y-%m-%d %H:%M", 7200.0),
     ],
 )
-def test_local_times_go_on_through_changes_of_the_clock(
-    tmp_path: Path, tank: System, begin: datetime, form: str, step: float
-) -> None:
+def test_local_times_go_on_through_changes_of_the_clock(tmp_path, tank, begin, form, step):
     path = table(tmp_path / "a.csv", local(begin, 160, form, step))
     assert_allclose(clock(path, tank).times, step * np.arange(160))
 
 
-def test_a_mended_clock_is_told(tmp_path: Path, tank: System) -> None:
+def test_a_mended_clock_is_told(tmp_path, tank):
     begin = datetime(2024, 10, 26, tzinfo=BERLIN)
     recorded = read_recorded_file(table(tmp_path / "a.csv", local(begin, 160, "%Y-%m-%d %H:%M")))
     (doubt,) = merge([recorded], propose([recorded], tank, {}), tank).doubts
     assert "the hour after 2024-10-27 02:45:00 comes twice" in doubt
 
 
-def test_an_hour_without_samples_on_another_day_stays_a_gap(tmp_path: Path, tank: System) -> None:
+def test_an_hour_without_samples_on_another_day_stays_a_gap(tmp_path, tank):
     stamps = local(datetime(2024, 6, 1, tzinfo=UTC), 60, "%Y-%m-%d %H:%M")
     del stamps[30:34]
     times = clock(table(tmp_path / "a.csv", stamps), tank).times
     assert times[30] - times[29] == 5 * QUARTER
 
 
-def test_a_zone_that_is_said_tells_the_hours_of_a_changing_clock(
-    tmp_path: Path, tank: System
-) -> None:
+def test_a_zone_that_is_said_tells_the_hours_of_a_changing_clock(tmp_path, tank):
     begin = datetime(2024, 10, 26, 22, tzinfo=BERLIN)
     path = table(tmp_path / "a.csv", local(begin, 100, "%d.%m.%Y %H:%M"))
     found = clock(path, tank, "Time [DMY Europe/Berlin]")
@@ -143,9 +139,7 @@ def test_a_zone_that_is_said_tells_the_hours_of_a_changing_clock(
         ("DT#%Y-%m-%d-%H:%M:%S", "2024-03-01"),
     ],
 )
-def test_dates_of_any_order_are_read_as_times_go_on(
-    tmp_path: Path, tank: System, form: str, start: str
-) -> None:
+def test_dates_of_any_order_are_read_as_times_go_on(tmp_path, tank, form, start):
     path = table(tmp_path / "a.csv", local(datetime(2024, 3, 1, tzinfo=UTC), 300, form))
     found = clock(path, tank)
     assert_allclose(found.times, QUARTER * np.arange(300))
@@ -162,9 +156,7 @@ def test_dates_of_any_order_are_read_as_times_go_on(
         ("Time;Date", "%H:%M;%d/%m/%y"),
     ],
 )
-def test_dates_and_times_stand_in_columns_of_their_own(
-    tmp_path: Path, tank: System, names: str, form: str
-) -> None:
+def test_dates_and_times_stand_in_columns_of_their_own(tmp_path, tank, names, form):
     stamps = local(datetime(2024, 3, 1, tzinfo=UTC), 300, form)
     found = clock(table(tmp_path / "a.csv", stamps, names), tank)
     assert_allclose(found.times, QUARTER * np.arange(300))
@@ -174,14 +166,12 @@ def test_dates_and_times_stand_in_columns_of_their_own(
 @pytest.mark.parametrize(
     "form", ["{d} days {h:02d}:{m:02d}:00", "{d}.{h:02d}:{m:02d}:00", "P{d}DT{h}H{m}M"]
 )
-def test_durations_of_days_go_on(tmp_path: Path, tank: System, form: str) -> None:
+def test_durations_of_days_go_on(tmp_path, tank, form):
     stamps = [form.format(d=k // 96, h=k // 4 % 24, m=15 * (k % 4)) for k in range(300)]
     assert_allclose(clock(table(tmp_path / "a.csv", stamps), tank).times, QUARTER * np.arange(300))
 
 
-def test_two_figures_are_minutes_and_seconds_if_that_is_nearer_to_usual_steps(
-    tmp_path: Path,
-) -> None:
+def test_two_figures_are_minutes_and_seconds_if_that_is_nearer_to_usual_steps(tmp_path):
     """5 s apart as minutes and seconds, 300 s as hours and minutes; asked, and kept."""
     write_system(tmp_path / "tank")
     tank = load_system(tmp_path / "tank")  # a sample each 0.5 s
@@ -195,7 +185,7 @@ def test_two_figures_are_minutes_and_seconds_if_that_is_nearer_to_usual_steps(
     assert (said.certain, said.stated) == (True, "min:s")
 
 
-def test_hours_to_12_go_on_from_12_to_1(tmp_path: Path, tank: System) -> None:
+def test_hours_to_12_go_on_from_12_to_1(tmp_path, tank):
     """As times of day they are told; beside dates half days are not known, and asked for."""
     begin = datetime(2024, 3, 5, tzinfo=UTC)
     path = table(tmp_path / "a.csv", local(begin, 200, "%I:%M:%S"))
@@ -207,7 +197,7 @@ def test_hours_to_12_go_on_from_12_to_1(tmp_path: Path, tank: System) -> None:
         clock(dated, tank)
 
 
-def test_an_hour_that_may_be_missing_is_told(tmp_path: Path, tank: System) -> None:
+def test_an_hour_that_may_be_missing_is_told(tmp_path, tank):
     """Without a date, and where samples are not even."""
     begin = datetime(2024, 3, 30, tzinfo=BERLIN)
     (word,) = clock(table(tmp_path / "a.csv", local(begin, 160, "%H:%M:%S")), tank).corrections
@@ -219,7 +209,7 @@ def test_an_hour_that_may_be_missing_is_told(tmp_path: Path, tank: System) -> No
     assert "an hour may be missing after 2024-03-31 01:" in word
 
 
-def test_a_zone_of_the_header_is_that_of_its_times(tmp_path: Path, tank: System) -> None:
+def test_a_zone_of_the_header_is_that_of_its_times(tmp_path, tank):
     begin = datetime(2024, 10, 26, 22, tzinfo=BERLIN)
     stamps = local(begin, 100, "%d.%m.%Y %H:%M")
     found = clock(table(tmp_path / "a.csv", stamps, "Time [Europe/Berlin]"), tank)
@@ -227,7 +217,7 @@ def test_a_zone_of_the_header_is_that_of_its_times(tmp_path: Path, tank: System)
     assert iso(found.start) == "2024-10-26T20:00:00.000000"
 
 
-def test_days_that_follow_are_not_those_of_several_years(tmp_path: Path, tank: System) -> None:
+def test_days_that_follow_are_not_those_of_several_years(tmp_path, tank):
     """Eight hours a day: no order is even."""
     stamps = local(datetime(2024, 3, 1, tzinfo=UTC), 300, "%y/%m/%d %H:%M")
     worked = [stamp for stamp in stamps if "08:00" <= stamp[-5:] < "16:00"]
@@ -235,7 +225,7 @@ def test_days_that_follow_are_not_those_of_several_years(tmp_path: Path, tank: S
     assert times[-1] < 4 * 86400.0
 
 
-def test_dates_that_go_on_in_two_ways_are_asked_for(tmp_path: Path, tank: System) -> None:
+def test_dates_that_go_on_in_two_ways_are_asked_for(tmp_path, tank):
     """Twelve firsts of a month, or twelve days in January."""
     path = table(tmp_path / "a.csv", [f"{k:02d}/01/2024" for k in range(1, 13)])
     with pytest.raises(InputError, match=r"in two ways, .*DMY.*MDY.*--column 'time=Time \[YMD\]'"):
@@ -245,15 +235,13 @@ def test_dates_that_go_on_in_two_ways_are_asked_for(tmp_path: Path, tank: System
     assert said.stated == "DMY"
 
 
-def test_how_dates_are_written_is_kept_for_further_files(tmp_path: Path, tank: System) -> None:
+def test_how_dates_are_written_is_kept_for_further_files(tmp_path, tank):
     path = table(tmp_path / "a.csv", [f"{k:02d}/01/2024" for k in range(1, 13)])
     proposal = propose([read_recorded_file(path)], tank, {"time": NamedChannel("Time", "MDY")})
     assert proposal.named["time"] == NamedChannel("Time", "MDY")
 
 
-def test_a_format_that_is_said_reads_what_is_no_date_elsewhere(
-    tmp_path: Path, tank: System
-) -> None:
+def test_a_format_that_is_said_reads_what_is_no_date_elsewhere(tmp_path, tank):
     stamps = local(datetime(2024, 3, 1, tzinfo=UTC), 100, "day %j of %Y, %Hh%M")
     path = table(tmp_path / "a.csv", stamps)
     with pytest.raises(InputError, match=r"texts such as 'day 061 of 2024, 00h00'.*say how they"):
@@ -296,9 +284,7 @@ def test_a_format_that_is_said_reads_what_is_no_date_elsewhere(
         ("Time", local(datetime(2024, 3, 1, tzinfo=UTC), 300, "%Y%m%d%H%M"), "2024-03-01"),
     ],
 )
-def test_counts_are_seconds_from_their_first(
-    tmp_path: Path, tank: System, name: str, values: list[str], start: str
-) -> None:
+def test_counts_are_seconds_from_their_first(tmp_path, tank, name, values, start):
     found = clock(table(tmp_path / "a.csv", values, name), tank)
     assert_allclose(found.times - found.times[0], QUARTER * np.arange(300), atol=1e-3)
     assert found.certain
@@ -306,9 +292,7 @@ def test_counts_are_seconds_from_their_first(
     assert bool(start) == bool(iso(found.start))
 
 
-def test_clocks_that_contradict_each_other_are_refused_with_both(
-    tmp_path: Path, tank: System
-) -> None:
+def test_clocks_that_contradict_each_other_are_refused_with_both(tmp_path, tank):
     stamps = local(datetime(2024, 3, 1, tzinfo=UTC), 60, "%Y-%m-%d %H:%M")
     rows = [f"{stamp};{900000 * k};1.{k % 7};2{k % 9}" for k, stamp in enumerate(stamps)]
     path = tmp_path / "a.csv"
@@ -320,9 +304,7 @@ def test_clocks_that_contradict_each_other_are_refused_with_both(
 
 
 @pytest.mark.parametrize(("rate", "refused"), [("1.111111 Hz", True), ("10 Hz", False)])
-def test_a_stated_rate_that_times_contradict_is_told(
-    tmp_path: Path, tank: System, rate: str, refused: bool
-) -> None:
+def test_a_stated_rate_that_times_contradict_is_told(tmp_path, tank, rate, refused):
     """Times in ms that count as s are refused; a recorder may scan more often than it writes."""
     path = table(tmp_path / "a.csv", [str(900 * k) for k in range(60)], "Time [s]")
     path.write_text(f"Sample rate: {rate}\n" + path.read_text())
@@ -339,7 +321,7 @@ def test_a_stated_rate_that_times_contradict_is_told(
         )
 
 
-def test_stamps_coarser_than_samples_tell_the_rate(tmp_path: Path, tank: System) -> None:
+def test_stamps_coarser_than_samples_tell_the_rate(tmp_path, tank):
     path = table(tmp_path / "a.csv", local(datetime(2024, 3, 5, tzinfo=UTC), 300, "%H:%M", 10.0))
     with pytest.raises(InputError, match=r"coarser than samples.*--sample-rate '0.1017 Hz'"):
         clock(path, tank)
@@ -370,16 +352,14 @@ def test_stamps_coarser_than_samples_tell_the_rate(tmp_path: Path, tank: System)
         ("Calibrated: 05.03.2024 10:00:00", "t [s]", [str(900 * k) for k in range(60)], ""),
     ],
 )
-def test_a_preamble_tells_the_date_of_a_recording(
-    tmp_path: Path, tank: System, head: str, name: str, stamps: list[str], date: str
-) -> None:
+def test_a_preamble_tells_the_date_of_a_recording(tmp_path, tank, head, name, stamps, date):
     path = table(tmp_path / "a.csv", stamps, name)
     path.write_text(f"{head}\n\n" + path.read_text())
     recorded = read_recorded_file(path)
     assert merge([recorded], propose([recorded], tank, {}), tank).date(0)[:19] == date
 
 
-def test_parts_of_a_second_beside_a_date_are_of_its_time(tmp_path: Path, tank: System) -> None:
+def test_parts_of_a_second_beside_a_date_are_of_its_time(tmp_path, tank):
     """Every 2.5 s: in whole seconds, steps were 2 s and 3 s."""
     moments = [datetime(2024, 3, 1) + timedelta(seconds=2.5 * k) for k in range(60)]
     rows = [
@@ -391,7 +371,7 @@ def test_parts_of_a_second_beside_a_date_are_of_its_time(tmp_path: Path, tank: S
     assert_allclose(clock(path, tank).times, 2.5 * np.arange(60), atol=1e-9)
 
 
-def test_nothing_goes_across_a_censored_sample(tmp_path: Path, tank: System) -> None:
+def test_nothing_goes_across_a_censored_sample(tmp_path, tank):
     """Neither the inflow before it, which is held, nor a line between its neighbours."""
     path = table(tmp_path / "a.csv", [str(900 * k) for k in range(60)], "time [s]")
     path.write_text(path.read_text().replace("\n27000;1.2;", "\n27000;<0.01;"))
@@ -409,9 +389,7 @@ def test_nothing_goes_across_a_censored_sample(tmp_path: Path, tank: System) -> 
         ("%H:%M", ""),
     ],
 )
-def test_a_recording_has_the_date_of_its_first_sample(
-    tmp_path: Path, tank: System, form: str, date: str
-) -> None:
+def test_a_recording_has_the_date_of_its_first_sample(tmp_path, tank, form, date):
     path = table(tmp_path / "a.csv", local(datetime(2024, 6, 1, tzinfo=BERLIN), 60, form))
     recorded = read_recorded_file(path)
     proposal = propose([recorded], tank, {})

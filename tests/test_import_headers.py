@@ -184,9 +184,7 @@ TOA5 = ['"TOA5","Station","CR6","1234","CR6.Std.09","CPU:prog.CR6","5678","Fast"
         ),
     ],
 )
-def test_names_and_units_stand_in_rows_of_their_own(
-    tmp_path: Path, head: list[str], row: str, expected: list[tuple[str, str]]
-) -> None:
+def test_names_and_units_stand_in_rows_of_their_own(tmp_path, head, row, expected):
     path = table(tmp_path / "a.csv", [*head, *(row.format(k) for k in range(60))])
     assert channels(path) == expected
 
@@ -199,7 +197,7 @@ def test_names_and_units_stand_in_rows_of_their_own(
         ["", "Statistics", "Min;4.0;850", "60;258;54000"],
     ],
 )
-def test_statistics_below_samples_are_left_out_and_told(tmp_path: Path, below: list[str]) -> None:
+def test_statistics_below_samples_are_left_out_and_told(tmp_path, below):
     rows = [f"{k};4.{k % 9};95{k % 7}.1" for k in range(60)]
     path = table(tmp_path / "a.csv", ["time [s];inflow [l/s];h [mm]", *rows, *below])
     recorded = read_recorded_file(path)
@@ -208,14 +206,14 @@ def test_statistics_below_samples_are_left_out_and_told(tmp_path: Path, below: l
     assert "lines that are no samples were left out, the first in line" in recorded.notes[-1]
 
 
-def test_statistics_above_samples_are_no_samples(tmp_path: Path) -> None:
+def test_statistics_above_samples_are_no_samples(tmp_path):
     head = ["Statistics", "Min;0;4.0;850", "Max;60;4.6;951", "Mean;30;4.3;901", ""]
     rows = [f"{k};{0.5 * k};4.{k % 9};95{k % 7}.1" for k in range(60)]
     path = table(tmp_path / "a.csv", [*head, "Nr;Time [s];inflow [l/s];h [mm]", *rows])
     assert channels(path)[1:] == [("Time", "s"), ("inflow", "l/s"), ("h", "mm")]
 
 
-def test_columns_of_fixed_places_may_be_empty(tmp_path: Path) -> None:
+def test_columns_of_fixed_places_may_be_empty(tmp_path):
     """An event, once in three lines, between two signals."""
     rows = [f"{k:8.1f} {7.5 if k % 3 == 0 else '':>8} {4.0:8.2f} {900 + k:8.3f}" for k in range(60)]
     head = ["    Time    event   inflow        h", "       s       mm      l/s       mm"]
@@ -227,7 +225,7 @@ def test_columns_of_fixed_places_may_be_empty(tmp_path: Path) -> None:
     assert np.isnan(group.channels[1].values).sum() == 40
 
 
-def test_channels_may_be_rows(tmp_path: Path) -> None:
+def test_channels_may_be_rows(tmp_path):
     signals = {"time [s]": range(60), "inflow [l/s]": range(60, 120), "h [mm]": range(900, 960)}
     lines = [";".join([name, *map(str, values)]) for name, values in signals.items()]
     assert channels(table(tmp_path / "a.csv", lines)) == [
@@ -237,7 +235,7 @@ def test_channels_may_be_rows(tmp_path: Path) -> None:
     ]
 
 
-def test_a_row_for_each_value_is_read_by_tags(tmp_path: Path) -> None:
+def test_a_row_for_each_value_is_read_by_tags(tmp_path):
     """As historians of plants export; each tag keeps its own times."""
     rows = [f"h;2024-03-05 10:00:{k:02d};95{k % 7}.5;mm" for k in range(60)]
     rows[1::2] = [row.replace("h;", "inflow;").replace(";mm", ";l/s") for row in rows[1::2]]
@@ -257,9 +255,7 @@ def test_a_row_for_each_value_is_read_by_tags(tmp_path: Path) -> None:
         (b"", "an archive"),
     ],
 )
-def test_a_format_that_nobody_reads_is_called_by_its_name(
-    tmp_path: Path, content: bytes, words: str
-) -> None:
+def test_a_format_that_nobody_reads_is_called_by_its_name(tmp_path, content, words):
     path = tmp_path / "a.dat"
     path.write_bytes(content)
     if words == "an archive":
@@ -269,7 +265,7 @@ def test_a_format_that_nobody_reads_is_called_by_its_name(
         read_recorded_file(path)
 
 
-def test_texts_of_parquet_are_dates_times_and_numbers(tmp_path: Path) -> None:
+def test_texts_of_parquet_are_dates_times_and_numbers(tmp_path):
     moments = [datetime.datetime(2024, 3, 5, 10) + datetime.timedelta(seconds=k) for k in range(60)]
     content = {
         "date": [moment.date() for moment in moments],
@@ -284,13 +280,13 @@ def test_texts_of_parquet_are_dates_times_and_numbers(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-16-be", "utf-32", "latin-1"])
-def test_encodings_are_found(tmp_path: Path, encoding: str) -> None:
+def test_encodings_are_found(tmp_path, encoding):
     text = "\n".join(["time [s];T [°C]", *(f"{k};2{k % 7}.5" for k in range(60))])
     (tmp_path / "a.csv").write_bytes(text.encode(encoding) + b"\0" * 512)
     assert channels(tmp_path / "a.csv") == [("time", "s"), ("T", "degC")]
 
 
-def test_merged_cells_of_a_workbook_name_all_columns_below(tmp_path: Path) -> None:
+def test_merged_cells_of_a_workbook_name_all_columns_below(tmp_path):
     book = openpyxl.Workbook()
     sheet = book.active
     sheet.append(["Zeit", "Zulauf", None, "Pegel", None])
@@ -305,7 +301,7 @@ def test_merged_cells_of_a_workbook_name_all_columns_below(tmp_path: Path) -> No
     assert names == ["Zeit", "Zulauf roh", "Zulauf gefiltert", "Pegel roh", "Pegel gefiltert"]
 
 
-def test_a_number_in_brackets_is_that_of_a_channel() -> None:
+def test_a_number_in_brackets_is_that_of_a_channel():
     assert named("log(1)") == ("log(1)", "")
     assert named("log(1)[s]") == ("log(1)", "s")
     assert named("slip [1]") == ("slip", "1")
@@ -317,25 +313,25 @@ def test_a_number_in_brackets_is_that_of_a_channel() -> None:
 @pytest.mark.parametrize(
     "cell", ["OL", "-OL", "----", "#N/A", "#VALUE!", "Over", "****", " ", "nan"]
 )
-def test_an_overload_is_no_number(cell: str) -> None:
+def test_an_overload_is_no_number(cell):
     assert is_missing(cell)
 
 
-def test_a_sign_may_stand_apart_from_its_number(tmp_path: Path) -> None:
+def test_a_sign_may_stand_apart_from_its_number(tmp_path):
     path = table(tmp_path / "a.csv", ["time [s];h [mm]", *(f"{k};- {k}.5" for k in range(60))])
     (group,) = read_recorded_file(path).groups
     assert_allclose(group.channels[1].values, -(np.arange(60.0) + 0.5))
 
 
 @pytest.mark.parametrize("form", ["{0}.5D+01", '="{0}5"', "'{0}5", "{0}5 mm", "{0}5mm"])
-def test_numbers_are_read_as_people_and_programs_write_them(tmp_path: Path, form: str) -> None:
+def test_numbers_are_read_as_people_and_programs_write_them(tmp_path, form):
     rows = [f"{k};{form.format(k)}" for k in range(10, 70)]
     (group,) = read_recorded_file(table(tmp_path / "a.csv", ["time [s];h [mm]", *rows])).groups
     assert_allclose(group.channels[1].values, 10.0 * np.arange(10, 70) + 5.0)
     assert group.channels[1].unit == "mm"
 
 
-def test_on_and_off_are_1_and_0_of_what_has_no_unit(tmp_path: Path) -> None:
+def test_on_and_off_are_1_and_0_of_what_has_no_unit(tmp_path):
     rows = [f"{k};{'ON' if k % 20 < 5 else 'OFF'};{k}.5" for k in range(60)]
     (group,) = read_recorded_file(
         table(tmp_path / "a.csv", ["time [s];valve;h [mm]", *rows])
@@ -347,7 +343,7 @@ def test_on_and_off_are_1_and_0_of_what_has_no_unit(tmp_path: Path) -> None:
     assert [channel.name for channel in other.channels] == ["time", "h"]
 
 
-def test_a_censored_cell_is_no_sample_and_is_told(tmp_path: Path) -> None:
+def test_a_censored_cell_is_no_sample_and_is_told(tmp_path):
     rows = [f"{k};{'<0.01' if k == 30 else f'{k}.5'}" for k in range(60)]
     recorded = read_recorded_file(table(tmp_path / "a.csv", ["time [s];h [mm]", *rows]))
     assert recorded.groups[0].channels[1].censored == (30,)

@@ -23,7 +23,7 @@ from workbench.system.template import write_system
 
 
 @pytest.fixture(scope="module")
-def tank(tmp_path_factory: pytest.TempPathFactory) -> System:
+def tank(tmp_path_factory) -> System:
     """A tank with an inflow and a level, sampled each 0.5 s."""
     folder = tmp_path_factory.mktemp("systems") / "tank"
     write_system(folder)
@@ -48,15 +48,13 @@ def table(path: Path, lines: list[str]) -> Path:
     ],
     ids=["R without a name of rows", "the same by way of a spreadsheet", "commas", "units"],
 )
-def test_a_header_that_is_narrower_than_its_samples_is_refused(
-    tmp_path: Path, header: str, row: str, match: str
-) -> None:
+def test_a_header_that_is_narrower_than_its_samples_is_refused(tmp_path, header, row, match):
     path = table(tmp_path / "a.csv", [header, *(row.format(i) for i in range(1, 60))])
     with pytest.raises(InputError, match=rf"above line \d: found {match}.*name every column"):
         read_recorded_file(path)
 
 
-def test_columns_beyond_the_header_may_be_empty(tmp_path: Path) -> None:
+def test_columns_beyond_the_header_may_be_empty(tmp_path):
     rows = [f"{i};{i}.5;;" for i in range(60)]
     (group,) = read_recorded_file(table(tmp_path / "a.csv", ["time [s];h [mm]", *rows])).groups
     assert [channel.name for channel in group.channels] == ["time", "h"]
@@ -74,13 +72,13 @@ def clock(path: Path, system: System, **columns: NamedChannel) -> Clock:
 MINUTE = np.arange(0.0, 60.0, 0.5)  # s
 
 
-def test_times_beside_data_are_in_the_unit_that_stands_there(tmp_path: Path, tank: System) -> None:
+def test_times_beside_data_are_in_the_unit_that_stands_there(tmp_path, tank):
     said = {"unit": "mm", "data": MINUTE, "time": 1e3 * MINUTE, "time_unit": "ms"}
     savemat(tmp_path / "a.mat", {"h": said})
     assert_allclose(clock(tmp_path / "a.mat", tank).times, MINUTE, rtol=1e-12)
 
 
-def test_times_beside_data_that_state_no_unit_are_asked_about(tmp_path: Path, tank: System) -> None:
+def test_times_beside_data_that_state_no_unit_are_asked_about(tmp_path, tank):
     savemat(tmp_path / "a.mat", {"h": {"unit": "mm", "data": MINUTE, "time": 1e3 * MINUTE}})
     found = clock(tmp_path / "a.mat", tank)
     assert (found.unit, found.certain) == ("ms", False)
@@ -89,9 +87,7 @@ def test_times_beside_data_that_state_no_unit_are_asked_about(tmp_path: Path, ta
 
 
 @pytest.mark.parametrize(("unit", "step"), [("ms", 500.0), ("s", 0.5), ("", 0.5)])
-def test_steps_of_a_waveform_are_in_its_own_unit(
-    tmp_path: Path, tank: System, unit: str, step: float
-) -> None:
+def test_steps_of_a_waveform_are_in_its_own_unit(tmp_path, tank, unit, step):
     stated = {"unit_string": "mm", "wf_increment": step, "wf_start_offset": 2 * step}
     with TdmsWriter(tmp_path / "a.tdms") as file:
         written = ChannelObject("G", "h", MINUTE, {**stated, "wf_xunit_string": unit})
@@ -99,7 +95,7 @@ def test_steps_of_a_waveform_are_in_its_own_unit(
     assert_allclose(clock(tmp_path / "a.tdms", tank).times, 1.0 + MINUTE, rtol=1e-12)
 
 
-def test_a_waveform_over_no_time_has_no_times(tmp_path: Path, tank: System) -> None:
+def test_a_waveform_over_no_time_has_no_times(tmp_path, tank):
     stated = {"unit_string": "mm", "wf_increment": 0.5, "wf_xunit_string": "Hz"}
     with TdmsWriter(tmp_path / "a.tdms") as file:
         file.write_segment([ChannelObject("G", "h", MINUTE, stated)])
@@ -107,9 +103,7 @@ def test_a_waveform_over_no_time_has_no_times(tmp_path: Path, tank: System) -> N
         clock(tmp_path / "a.tdms", tank)
 
 
-def test_durations_of_a_workbook_count_in_no_unit_of_their_column(
-    tmp_path: Path, tank: System
-) -> None:
+def test_durations_of_a_workbook_count_in_no_unit_of_their_column(tmp_path, tank):
     book = openpyxl.Workbook()
     book.active.append(["Zeit [min]", "h [mm]"])
     for t in MINUTE:
@@ -128,9 +122,7 @@ def test_durations_of_a_workbook_count_in_no_unit_of_their_column(
         (["Sampling interval: 500 ms", "Messrate: 2 Hz"], 2.0),
     ],
 )
-def test_a_rate_of_something_else_is_none_of_the_samples(
-    tmp_path: Path, tank: System, head: list[str], rate: float
-) -> None:
+def test_a_rate_of_something_else_is_none_of_the_samples(tmp_path, tank, head, rate):
     path = table(tmp_path / "a.csv", [*head, "Nr;h [mm]", *(f"{i};{i}" for i in range(60))])
     assert_allclose(clock(path, tank).times, np.arange(60) / rate)
 
@@ -146,9 +138,7 @@ def test_a_rate_of_something_else_is_none_of_the_samples(
         (["Abtastrate: 2 Hz", "Messrate: 5 Hz"], "'Abtastrate: 2 Hz' and 'Messrate: 5 Hz'"),
     ],
 )
-def test_a_rate_in_doubt_is_refused_until_it_is_said(
-    tmp_path: Path, tank: System, head: list[str], match: str
-) -> None:
+def test_a_rate_in_doubt_is_refused_until_it_is_said(tmp_path, tank, head, match):
     path = table(tmp_path / "a.csv", [*head, "Nr;h [mm]", *(f"{i};{i}" for i in range(60))])
     with pytest.raises(InputError, match=f"{match}.*--sample-rate '200 Hz'"):
         clock(path, tank)
@@ -157,9 +147,7 @@ def test_a_rate_in_doubt_is_refused_until_it_is_said(
 
 
 @pytest.mark.parametrize("said", [None, 0.5])
-def test_one_rate_is_not_that_of_vectors_of_two_lengths(
-    tmp_path: Path, tank: System, said: float | None
-) -> None:
+def test_one_rate_is_not_that_of_vectors_of_two_lengths(tmp_path, tank, said):
     savemat(tmp_path / "a.mat", {"fs": 2.0, "h_mm": MINUTE, "inflow": MINUTE[::4], "gains": [1, 2]})
     columns = {"inflow": NamedChannel("inflow", "l/s")}
     with pytest.raises(InputError, match="one rate for channels of 30 and 120 samples"):
@@ -167,9 +155,7 @@ def test_one_rate_is_not_that_of_vectors_of_two_lengths(
     assert_allclose(clock(tmp_path / "a.mat", tank).times, MINUTE)
 
 
-def test_a_rate_that_is_stated_goes_before_a_unit_that_is_concluded(
-    tmp_path: Path, tank: System
-) -> None:
+def test_a_rate_that_is_stated_goes_before_a_unit_that_is_concluded(tmp_path, tank):
     """In ms the count would be sampled as is usual."""
     rows = [f"{500 * i};{i}" for i in range(60)]
     path = table(tmp_path / "a.csv", ["Abtastrate: 2 Hz", "Zeit;h [mm]", *rows])
@@ -177,9 +163,7 @@ def test_a_rate_that_is_stated_goes_before_a_unit_that_is_concluded(
 
 
 @pytest.mark.parametrize("named", [{}, {"time": NamedChannel("Zeit")}], ids=["found", "named"])
-def test_times_that_may_be_seconds_or_minutes_are_asked_for(
-    tmp_path: Path, tank: System, named: dict[str, NamedChannel]
-) -> None:
+def test_times_that_may_be_seconds_or_minutes_are_asked_for(tmp_path, tank, named):
     rows = [f"{i * 2 / 60:.6f};{i}" for i in range(60)]
     path = table(tmp_path / "a.csv", ["Zeit;h [mm]", *rows])
     with pytest.raises(InputError, match=r"without a unit.*--column 'time=\w+ \[UNIT\]'"):
@@ -191,7 +175,7 @@ def test_times_that_may_be_seconds_or_minutes_are_asked_for(
 @pytest.mark.parametrize(
     "day", ["01-Mar-2024", "1 March 2024", "01-MAR-2024", "1. März 2024", "01.03.2024"]
 )
-def test_months_may_be_written_by_their_names(tmp_path: Path, tank: System, day: str) -> None:
+def test_months_may_be_written_by_their_names(tmp_path, tank, day):
     """The first as MATLAB writes it."""
     rows = [f"{day} 08:15:{t:06.3f};{t}" for t in MINUTE]
     found = clock(table(tmp_path / "a.csv", ["Time;h [mm]", *rows]), tank)
@@ -200,7 +184,7 @@ def test_months_may_be_written_by_their_names(tmp_path: Path, tank: System, day:
 
 
 @pytest.mark.parametrize("day", ["01-Mon-2024", "31-Feb-2024", "Mar-2024", "01-Mar-24 x"])
-def test_what_is_no_day_of_a_month_is_no_time(tmp_path: Path, tank: System, day: str) -> None:
+def test_what_is_no_day_of_a_month_is_no_time(tmp_path, tank, day):
     rows = [f"{day} 08:15:{t:06.3f};{t};{t}" for t in MINUTE]
     with pytest.raises(InputError, match="found no time"):
         clock(table(tmp_path / "a.csv", ["Time;h [mm];v", *rows]), tank)
@@ -210,9 +194,7 @@ def test_what_is_no_day_of_a_month_is_no_time(tmp_path: Path, tank: System, day:
 
 
 @pytest.mark.parametrize("said", [{}, {"inflow": NamedChannel("inflow")}], ids=["found", "named"])
-def test_a_unit_that_nobody_says_is_to_be_confirmed(
-    tmp_path: Path, tank: System, said: dict[str, NamedChannel]
-) -> None:
+def test_a_unit_that_nobody_says_is_to_be_confirmed(tmp_path, tank, said):
     path = table(tmp_path / "a.csv", ["t [s];inflow;h [m]", *(f"{i};5;1" for i in range(60))])
     proposal = propose([read_recorded_file(path)], tank, said)
     assert not proposal.certain
@@ -229,16 +211,14 @@ def test_a_unit_that_nobody_says_is_to_be_confirmed(
         *("h_Anforderung", "h_sp", "h_req", "h dmd", "level_setpoint", "levelDemand"),
     ],
 )
-def test_a_value_that_is_asked_for_is_no_measurement(
-    tmp_path: Path, tank: System, name: str
-) -> None:
+def test_a_value_that_is_asked_for_is_no_measurement(tmp_path, tank, name):
     rows = [f"{i};1.5;{i}" for i in range(60)]
     path = table(tmp_path / "a.csv", [f"t [s];inflow [l/s];{name} [mm]", *rows])
     assert set(propose([read_recorded_file(path)], tank, {}).assigned) == {"inflow"}
 
 
 @pytest.mark.parametrize("name", ["Rollenmessung h", "Radsatz-Rolle h", "h console"])
-def test_letters_of_other_words_ask_for_nothing(tmp_path: Path, tank: System, name: str) -> None:
+def test_letters_of_other_words_ask_for_nothing(tmp_path, tank, name):
     rows = [f"{i};1.5;{i}" for i in range(60)]
     path = table(tmp_path / "a.csv", [f"t [s];inflow [l/s];{name} [mm]", *rows])
     assert set(propose([read_recorded_file(path)], tank, {}).assigned) == {"inflow", "h"}
@@ -247,9 +227,7 @@ def test_letters_of_other_words_ask_for_nothing(tmp_path: Path, tank: System, na
 ROWS = [f"{i};5;{i}" for i in range(60)]
 
 
-def test_in_place_of_a_unit_that_is_not_known_none_is_proposed(
-    tmp_path: Path, tank: System
-) -> None:
+def test_in_place_of_a_unit_that_is_not_known_none_is_proposed(tmp_path, tank):
     path = table(tmp_path / "a.csv", ["t [s];inflow [l/s];h [Zoll]", *ROWS])
     (problem,) = propose([read_recorded_file(path)], tank, {}).problems
     assert problem == "h: 'h' is in [Zoll], a unit that is not known"
@@ -258,9 +236,7 @@ def test_in_place_of_a_unit_that_is_not_known_none_is_proposed(
         propose([read_recorded_file(path)], tank, {"h": NamedChannel("h")})
 
 
-def test_a_unit_that_contradicts_the_one_in_the_file_is_told(
-    tmp_path: Path, tank: System, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_unit_that_contradicts_the_one_in_the_file_is_told(tmp_path, tank, capsys):
     path = table(tmp_path / "a.csv", ["t [ms];inflow [l/s];h [Zoll]", *ROWS])
     command = [
         "import",
@@ -279,9 +255,7 @@ def test_a_unit_that_contradicts_the_one_in_the_file_is_told(
     ]
 
 
-def test_a_channel_that_judges_is_named_and_not_dropped_in_silence(
-    tmp_path: Path, system: System
-) -> None:
+def test_a_channel_that_judges_is_named_and_not_dropped_in_silence(tmp_path, system):
     """A recording may be without the creep force, but its channel is seen."""
     names = "t [s];Bremsdruck [bar];Antriebsmoment [kNm];v_Rad [m/s];v_Rolle [m/s]"
     rows = [f"{0.01 * i:.2f};1.5;1.5;20.5;20.5;1.5" for i in range(60)]
@@ -318,16 +292,14 @@ def test_a_channel_that_judges_is_named_and_not_dropped_in_silence(
         ("ft-lbf", "N.m", 1.3558179483314004),
     ],
 )
-def test_units_of_workshops_are_known(unit: str, si: str, factor: float) -> None:
+def test_units_of_workshops_are_known(unit, si, factor):
     found = conversion(spelled(f"[{unit}]"), si)
     assert found is not None
     assert found.factor == pytest.approx(factor, rel=1e-15)
     assert found.zero == 0.0
 
 
-def test_a_torque_without_a_unit_may_be_in_that_of_another_country(
-    tmp_path: Path, system: System
-) -> None:
+def test_a_torque_without_a_unit_may_be_in_that_of_another_country(tmp_path, system):
     names = "t [s],BCP [psi],Torque,Wheel speed [mph],Roller speed [mph]"
     rows = [f"{0.01 * i:.2f},20.5,3000.5,45.5,45.5" for i in range(60)]
     (problem,) = propose(
@@ -336,9 +308,7 @@ def test_a_torque_without_a_unit_may_be_in_that_of_another_country(
     assert problem == "tauR: 'Torque' has no unit and is plausible as N.m or lbf.ft"
 
 
-def test_channels_that_are_left_out_have_the_names_by_which_they_are_taken(
-    tmp_path: Path, tank: System
-) -> None:
+def test_channels_that_are_left_out_have_the_names_by_which_they_are_taken(tmp_path, tank):
     """Two recordings on two sheets: one of them is named."""
     book = openpyxl.Workbook()
     for sheet in (book.active, book.create_sheet("two")):

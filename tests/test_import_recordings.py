@@ -19,7 +19,6 @@ from workbench.errors import InputError
 from workbench.recordings.case import Case
 from workbench.recordings.channels import RecordingOptions, propose_recordings
 from workbench.recordings.formats import read_recorded_file
-from workbench.system.system import System
 
 from .files_of_stops import FORMATS, Stops, add_sheet, workbook, workbook_of_stamps
 from .recorder_files import BEGAN, Columns, recorded
@@ -29,7 +28,7 @@ SIGNALS = "pB", "tauR", "omegaW", "omegaR", "Fx"
 
 
 @pytest.fixture(scope="module")
-def cases(root: Path, system: System) -> list[Case]:
+def cases(root, system) -> list[Case]:
     """Two stops, every fourth sample of them."""
     names = "01_dry_80_1.5", "02_dry_100_2.7"
     read = wb.read_cases([root / "cases" / name for name in names], system)
@@ -37,17 +36,17 @@ def cases(root: Path, system: System) -> list[Case]:
 
 
 @pytest.fixture(scope="module")
-def stops(cases: list[Case], system: System) -> dict[str, Columns]:
+def stops(cases, system) -> dict[str, Columns]:
     return {name: recorded(case, system) for name, case in zip(NAMES, cases, strict=True)}
 
 
 @pytest.fixture(autouse=True)
-def nobody_answers(monkeypatch: pytest.MonkeyPatch) -> None:
+def nobody_answers(monkeypatch) -> None:
     monkeypatch.setattr(builtins, "input", lambda: pytest.fail("a question"))
 
 
 @pytest.fixture
-def take(tmp_path: Path) -> Callable[..., int]:
+def take(tmp_path) -> Callable[..., int]:
     """Imports a file of the folder into `out`."""
     return lambda name, *said: main(
         ["import", str(tmp_path / name), "--out", str(tmp_path / "out"), "--yes", *said]
@@ -69,13 +68,8 @@ def record(folder: Path) -> list[dict]:
 
 @pytest.mark.parametrize("name", FORMATS)
 def test_each_recording_of_a_file_is_a_case_without_a_wrong_number(
-    tmp_path: Path,
-    take: Callable[..., int],
-    cases: list[Case],
-    stops: Stops,
-    system: System,
-    name: str,
-) -> None:
+    tmp_path, take, cases, stops, system, name
+):
     write, called = FORMATS[name]
     write(tmp_path / name, stops)
     assert take(name) == 0
@@ -92,13 +86,8 @@ def test_each_recording_of_a_file_is_a_case_without_a_wrong_number(
 
 
 def test_one_question_asks_for_all_recordings_and_what_it_says_is_kept(
-    tmp_path: Path,
-    cases: list[Case],
-    stops: Stops,
-    system: System,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+    tmp_path, cases, stops, system, monkeypatch, capsys
+):
     questions = []
 
     def answer() -> str:
@@ -124,9 +113,7 @@ def test_one_question_asks_for_all_recordings_and_what_it_says_is_kept(
 
 
 @pytest.mark.filterwarnings("ignore:.*a sample every 0.04 s")
-def test_sheets_may_differ_in_order_rate_and_stated_units(
-    tmp_path: Path, take: Callable[..., int], cases: list[Case], stops: Stops, system: System
-) -> None:
+def test_sheets_may_differ_in_order_rate_and_stated_units(tmp_path, take, cases, stops, system):
     other = {name: (unit, v[::2]) for name, (unit, v) in reversed(stops["Stop 2"].items())}
     _, pressure = other["Bremsdruck"]
     other["Bremsdruck"] = "kPa", 100.0 * pressure
@@ -139,8 +126,8 @@ def test_sheets_may_differ_in_order_rate_and_stated_units(
 
 
 def test_a_unit_that_one_sheet_alone_states_is_not_taken_for_the_others(
-    tmp_path: Path, take: Callable[..., int], stops: Stops, capsys: pytest.CaptureFixture[str]
-) -> None:
+    tmp_path, take, stops, capsys
+):
     third = {name: (unit, 0.9 * values) for name, (unit, values) in stops["Stop 1"].items()}
     third["Bremsdruck"] = "", 0.9 * stops["Stop 1"]["Bremsdruck"][1]
     workbook(tmp_path / "a.xlsx", {**stops, "third": third})
@@ -151,8 +138,8 @@ def test_a_unit_that_one_sheet_alone_states_is_not_taken_for_the_others(
 
 
 def test_a_sheet_that_lacks_a_channel_is_refused_and_leaves_the_others(
-    tmp_path: Path, take: Callable[..., int], stops: Stops, capsys: pytest.CaptureFixture[str]
-) -> None:
+    tmp_path, take, stops, capsys
+):
     third = {name: one for name, one in stops["Stop 1"].items() if name != "Bremsdruck"}
     workbook(tmp_path / "a.xlsx", {**stops, "third": third})
     assert take("a.xlsx") == 2
@@ -161,9 +148,7 @@ def test_a_sheet_that_lacks_a_channel_is_refused_and_leaves_the_others(
         assert any("'third' is no such recording: pB" in note for note in one["files"][0]["notes"])
 
 
-def test_what_else_a_workbook_holds_is_written_down(
-    tmp_path: Path, take: Callable[..., int], stops: Stops, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_else_a_workbook_holds_is_written_down(tmp_path, take, stops, capsys):
     """A sheet of notes, an empty one, a hidden one, a climate record and a sheet of a diagram."""
     book = openpyxl.Workbook()
     book.active.append(["Prüfer", "Müller"])
@@ -184,9 +169,7 @@ def test_what_else_a_workbook_holds_is_written_down(
     assert [one["recording"] for one in record(tmp_path)] == list(NAMES)
 
 
-def test_names_of_sheets_become_names_that_differ(
-    tmp_path: Path, take: Callable[..., int], stops: Stops, system: System, cases: list[Case]
-) -> None:
+def test_names_of_sheets_become_names_that_differ(tmp_path, take, stops, system, cases):
     """Two that differ in signs alone, which no file system takes."""
     FORMATS["labview.tdms"][0](
         tmp_path / "a.tdms", dict(zip(("80 km/h wet", "80 km:h wet"), stops.values(), strict=True))
@@ -263,12 +246,8 @@ def extract(path: Path, stops: Stops) -> None:
 
 @pytest.mark.parametrize("write", [at_once, clocks_of_day, running_clock, filtered, extract])
 def test_what_may_be_one_recording_by_two_recorders_is_not_taken_for_two(
-    tmp_path: Path,
-    take: Callable[..., int],
-    stops: Stops,
-    capsys: pytest.CaptureFixture[str],
-    write: Callable[[Path, Stops], None],
-) -> None:
+    tmp_path, take, stops, capsys, write
+):
     write(tmp_path / "a.xlsx", stops)
     assert take("a.xlsx") == 2
     error = capsys.readouterr().err
@@ -278,9 +257,7 @@ def test_what_may_be_one_recording_by_two_recorders_is_not_taken_for_two(
     assert len(list((tmp_path / "out").glob("*/case.toml"))) == 2
 
 
-def test_channels_of_one_sheet_may_be_named(
-    tmp_path: Path, take: Callable[..., int], stops: Stops, system: System, cases: list[Case]
-) -> None:
+def test_channels_of_one_sheet_may_be_named(tmp_path, take, stops, system, cases):
     at_once(tmp_path / "a.xlsx", stops)
     channels = {"pB": "Bremsdruck", "tauR": "Antriebsmoment", "omegaW": "v_Rad", "Fx": "Längskraft"}
     channels["omegaR"] = "v_Rolle"
@@ -292,9 +269,7 @@ def test_channels_of_one_sheet_may_be_named(
     assert_same(got, cases[1])
 
 
-def test_signals_of_two_sheets_that_may_be_two_recordings_are_told(
-    tmp_path: Path, take: Callable[..., int], stops: Stops, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_signals_of_two_sheets_that_may_be_two_recordings_are_told(tmp_path, take, stops, capsys):
     """What the second lacks is in the first alone, and would be taken from it in silence."""
     second = {name: one for name, one in stops["Stop 2"].items() if name != "v_Rad"}
     workbook(tmp_path / "a.xlsx", {"Stop 1": stops["Stop 1"], "Stop 2": second})
@@ -306,8 +281,8 @@ def test_signals_of_two_sheets_that_may_be_two_recordings_are_told(
 
 
 def test_a_unit_named_for_all_sheets_is_not_taken_for_one_that_states_another(
-    tmp_path: Path, take: Callable[..., int], stops: Stops, capsys: pytest.CaptureFixture[str]
-) -> None:
+    tmp_path, take, stops, capsys
+):
     third = {name: (unit, 0.9 * values) for name, (unit, values) in stops["Stop 1"].items()}
     _, pressure = third["Bremsdruck"]
     silent = {
@@ -323,17 +298,13 @@ def test_a_unit_named_for_all_sheets_is_not_taken_for_one_that_states_another(
     assert [one["recording"] for one in record(tmp_path)] == list(NAMES)
 
 
-def test_files_together_are_one_recording_whatever_their_sheets(
-    tmp_path: Path, take: Callable[..., int], stops: Stops, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_files_together_are_one_recording_whatever_their_sheets(tmp_path, take, stops, capsys):
     workbook(tmp_path / "a.xlsx", stops)
     assert take("a.xlsx", "--together") == 2
     assert "it may be 'Stop 1/Bremsdruck' or 'Stop 2/Bremsdruck'" in capsys.readouterr().err
 
 
-def test_a_file_of_several_recordings_is_no_case_by_itself(
-    tmp_path: Path, stops: Stops, system: System
-) -> None:
+def test_a_file_of_several_recordings_is_no_case_by_itself(tmp_path, stops, system):
     workbook(tmp_path / "a.xlsx", stops)
     with pytest.raises(InputError, match=r"2 recordings, 'Stop 1', 'Stop 2'.*a case of each"):
         wb.read_cases(tmp_path / "a.xlsx", system)
@@ -343,8 +314,8 @@ def test_a_file_of_several_recordings_is_no_case_by_itself(
 
 
 def test_channels_of_two_loggers_on_two_sheets_are_one_recording(
-    tmp_path: Path, take: Callable[..., int], stops: Stops, system: System, cases: list[Case]
-) -> None:
+    tmp_path, take, stops, system, cases
+):
     columns = stops["Stop 1"]
     pressure = {name: columns[name] for name in ("Zeit", "Bremsdruck", "Temperatur")}
     others = {
@@ -358,9 +329,7 @@ def test_channels_of_two_loggers_on_two_sheets_are_one_recording(
     assert not one.get("recording")
 
 
-def test_a_sheet_whose_names_are_less_alike_is_left_out(
-    tmp_path: Path, take: Callable[..., int], stops: Stops, system: System, cases: list[Case]
-) -> None:
+def test_a_sheet_whose_names_are_less_alike_is_left_out(tmp_path, take, stops, system, cases):
     other = {f"{name} gefiltert": column for name, column in stops["Stop 2"].items()}
     workbook(tmp_path / "a.xlsx", {"raw": stops["Stop 1"], "filtered": other})
     assert take("a.xlsx") == 0
@@ -369,9 +338,7 @@ def test_a_sheet_whose_names_are_less_alike_is_left_out(
     assert "Bremsdruck gefiltert [bar]" in record(tmp_path)[0]["dropped"]
 
 
-def test_vectors_without_a_time_of_their_own_are_no_recordings(
-    tmp_path: Path, stops: Stops, system: System
-) -> None:
+def test_vectors_without_a_time_of_their_own_are_no_recordings(tmp_path, stops, system):
     """TDMS without waveforms."""
     with TdmsWriter(tmp_path / "a.tdms") as file:
         for title, columns in stops.items():

@@ -50,9 +50,7 @@ def group(path: Path, content: Mapping[str, Any], form: Literal["4", "5"] = "5")
     ],
     ids=["t, u, y", "u, y, Ts", "MAT 4", "Simulink", "without names", "without time"],
 )
-def test_all_signals_of_a_structure_are_channels(
-    tmp_path: Path, content: Mapping[str, Any], names: list[str], form: Literal["4", "5"]
-) -> None:
+def test_all_signals_of_a_structure_are_channels(tmp_path, content, names, form):
     found = group(tmp_path / "a.mat", content, form)
     assert [channel.name for channel in found.channels] == names
     u, y = found.channels[-2:]
@@ -82,9 +80,7 @@ def array(*entries: Mapping[str, Any]) -> np.ndarray:
         | struct(InputUnit="l/s", OutputUnit="mm", Ts=0.5),
     ],
 )
-def test_data_of_system_identification_has_its_names_units_and_steps(
-    tmp_path: Path, content: Mapping[str, Any]
-) -> None:
+def test_data_of_system_identification_has_its_names_units_and_steps(tmp_path, content):
     found = group(tmp_path / "a.mat", {"data": content})
     assert [(c.name, c.unit) for c in found.channels] == [("inflow", "l/s"), ("h", "mm")]
     assert found.step == 0.5
@@ -114,9 +110,7 @@ def test_data_of_system_identification_has_its_names_units_and_steps(
     ],
     ids=["Dataset", "array of signals", "time series", "values, times and units"],
 )
-def test_signals_with_times_of_their_own_have_their_names(
-    tmp_path: Path, logged: Mapping[str, Any] | np.ndarray
-) -> None:
+def test_signals_with_times_of_their_own_have_their_names(tmp_path, logged):
     savemat(tmp_path / "a.mat", {"logsout": logged})
     groups = read_recorded_file(tmp_path / "a.mat").groups
     found = {c.name: c for held in groups for c in held.channels}
@@ -125,7 +119,7 @@ def test_signals_with_times_of_their_own_have_their_names(
     assert_allclose(found["h"].values, LEVEL)
 
 
-def test_signals_over_common_times_are_those_of_a_test_stand(tmp_path: Path) -> None:
+def test_signals_over_common_times_are_those_of_a_test_stand(tmp_path):
     signals = array(
         struct(Name="inflow", Data=FLOW, Unit="l/s"), struct(Name="h", Data=LEVEL, Unit="mm")
     )
@@ -135,25 +129,25 @@ def test_signals_over_common_times_are_those_of_a_test_stand(tmp_path: Path) -> 
     ]
 
 
-def test_a_table_of_inputs_beside_an_output_is_not_lost(tmp_path: Path) -> None:
+def test_a_table_of_inputs_beside_an_output_is_not_lost(tmp_path):
     inputs = np.column_stack([FLOW, 2.0 * FLOW])
     found = group(tmp_path / "a.mat", {"z": {"u": inputs, "y": column(LEVEL), "Ts": 0.5}})
     assert [channel.name for channel in found.channels] == ["u(1)", "u(2)", "y"]
 
 
-def test_times_may_be_texts(tmp_path: Path) -> None:
+def test_times_may_be_texts(tmp_path):
     stamps = np.array([f"2024-03-05 10:00:{t:06.3f}" for t in TIME], dtype=object)
     found = group(tmp_path / "a.mat", {"t": stamps, "h": column(LEVEL)})
     assert_allclose(found.channels[0].values, TIME)
 
 
-def test_arrays_of_another_length_than_times_say_so(tmp_path: Path) -> None:
+def test_arrays_of_another_length_than_times_say_so(tmp_path):
     savemat(tmp_path / "a.mat", {"t": TIME[:-1], "u": FLOW, "y": LEVEL})
     doubts = [held.step_doubt for held in read_recorded_file(tmp_path / "a.mat").groups]
     assert "no times for 120 samples of u, y: 't' has 119" in doubts
 
 
-def test_hdf5_is_read_with_what_its_attributes_say(tmp_path: Path) -> None:
+def test_hdf5_is_read_with_what_its_attributes_say(tmp_path):
     """A table with names, rows of a compound, a rate, times since a date; no object of MATLAB."""
     with h5py.File(tmp_path / "a.h5", "w") as file:
         table = file.create_group("a").create_dataset("data", data=np.column_stack([FLOW, LEVEL]))
@@ -185,7 +179,7 @@ def texts(rows: list[str], *, turned: bool) -> np.ndarray:
 
 
 @pytest.mark.parametrize("turned", [True, False], ids=["binTrans", "binNormal"])
-def test_results_of_modelica_tools_are_recordings(tmp_path: Path, *, turned: bool) -> None:
+def test_results_of_modelica_tools_are_recordings(tmp_path, *, turned):
     """Of two samples at an event the later one is kept; a parameter is no channel."""
     times = np.array([0.0, 1.0, 2.0, 2.0, 3.0])
     data = np.array([times, 10.0 * times, [0.0, 0.0, 0.0, 1.0, 1.0]])

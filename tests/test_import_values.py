@@ -20,7 +20,7 @@ LEVEL = 900.0 + 50.0 * np.sin(0.1 * TIME)  # mm
 
 
 @pytest.fixture(scope="module")
-def tank(tmp_path_factory: pytest.TempPathFactory) -> System:
+def tank(tmp_path_factory) -> System:
     """A tank with an inflow and a level of about 1 m, sampled each 0.5 s."""
     folder = tmp_path_factory.mktemp("systems") / "tank"
     write_system(folder)
@@ -53,7 +53,7 @@ def proposed(path: Path, system: System, *columns: str) -> ProposedMapping:
 
 
 @pytest.mark.parametrize("marker", [-9999.0, -7999.0, 9.9e37, 32767.0, 3276.7])
-def test_a_marker_of_a_recorder_is_no_sample(tmp_path: Path, tank: System, marker: float) -> None:
+def test_a_marker_of_a_recorder_is_no_sample(tmp_path, tank, marker):
     levels = np.where(np.arange(200) % 50 == 20, marker, LEVEL)
     path = write(tmp_path / "a.csv", levels)
     proposal = proposed(path, tank)
@@ -63,9 +63,7 @@ def test_a_marker_of_a_recorder_is_no_sample(tmp_path: Path, tank: System, marke
     assert measured.signals["h"].max() < 1.0
 
 
-def test_a_value_that_may_be_a_marker_is_asked_about_and_declared(
-    tmp_path: Path, tank: System
-) -> None:
+def test_a_value_that_may_be_a_marker_is_asked_about_and_declared(tmp_path, tank):
     path = write(tmp_path / "a.csv", np.where(np.arange(200) % 80 == 20, 12345.0, LEVEL))
     (doubt,) = proposed(path, tank).doubts
     assert "'h' is 12345 in 3 samples, far outside" in doubt
@@ -81,9 +79,7 @@ def test_a_value_that_may_be_a_marker_is_asked_about_and_declared(
 
 
 @pytest.mark.parametrize("value", [0.0, -1.0, -99.99, 888888.0, 9999.999])
-def test_samples_that_go_out_and_back_at_once_are_asked_about(
-    tmp_path: Path, tank: System, value: float
-) -> None:
+def test_samples_that_go_out_and_back_at_once_are_asked_about(tmp_path, tank, value):
     """As no tank moves; the proposal leaves them out, be they possible or not."""
     path = write(tmp_path / "a.csv", np.where(np.arange(200) % 60 == 20, value, LEVEL))
     proposal = proposed(path, tank)
@@ -93,7 +89,7 @@ def test_samples_that_go_out_and_back_at_once_are_asked_about(
     assert np.isnan(proposal.assigned["h"].values).sum() == 3
 
 
-def test_two_markers_beside_each_other_are_no_samples(tmp_path: Path, tank: System) -> None:
+def test_two_markers_beside_each_other_are_no_samples(tmp_path, tank):
     counts = np.arange(200) % 50
     path = write(
         tmp_path / "a.csv", np.where(counts == 3, -9999.0, np.where(counts == 30, -7999.0, LEVEL))
@@ -101,33 +97,33 @@ def test_two_markers_beside_each_other_are_no_samples(tmp_path: Path, tank: Syst
     assert set(proposed(path, tank).assigned["h"].missing) == {-9999.0, -7999.0}
 
 
-def test_a_level_that_rests_at_zero_is_one(tmp_path: Path, tank: System) -> None:
+def test_a_level_that_rests_at_zero_is_one(tmp_path, tank):
     path = write(tmp_path / "a.csv", np.where(np.arange(200) < 4, 0.0, LEVEL))
     assert proposed(path, tank).assigned["h"].missing == ()
 
 
-def test_a_signal_that_holds_texts_says_which(tmp_path: Path, tank: System) -> None:
+def test_a_signal_that_holds_texts_says_which(tmp_path, tank):
     path = write(tmp_path / "a.csv", LEVEL)
     path.write_text(path.read_text().replace("\n", " high\n").replace("h [mm] high", "h [mm]"))
     (problem,) = proposed(path, tank).problems
     assert "'h' holds texts such as '900.000 high', no numbers" in problem
 
 
-def test_two_columns_of_one_name_can_be_told(tmp_path: Path, tank: System) -> None:
+def test_two_columns_of_one_name_can_be_told(tmp_path, tank):
     path = write(tmp_path / "a.csv", LEVEL, extra=";h [mm]", more=";7.1")
     (problem,) = proposed(path, tank).problems
     assert "it may be 'h#1' or 'h#2'" in problem
     assert_allclose(proposed(path, tank, "h=h#1").assigned["h"].values, 1e-3 * LEVEL, atol=1e-6)
 
 
-def test_steps_between_a_few_values_are_samples() -> None:
+def test_steps_between_a_few_values_are_samples():
     valve = np.where(np.arange(200) % 20 == 0, 9999.0, 0.0)
     noisy = 0.5 + 0.3 * np.sin(np.arange(200.0))
     assert markers(valve) == ({}, {})
     assert markers(noisy) == ({}, {})
 
 
-def test_a_marker_in_a_recording_of_the_workbench_is_refused(tmp_path: Path, tank: System) -> None:
+def test_a_marker_in_a_recording_of_the_workbench_is_refused(tmp_path, tank):
     (tmp_path / "case.toml").write_text('title = "a"\n[measurement]\nfile = "measured.csv"\n')
     levels = np.where(np.arange(200) == 20, -9999.0, LEVEL)
     path = write(tmp_path / "measured.csv", levels)
@@ -136,7 +132,7 @@ def test_a_marker_in_a_recording_of_the_workbench_is_refused(tmp_path: Path, tan
         wb.read_cases(tmp_path, tank)
 
 
-def test_a_unit_that_is_wrong_by_a_thousand_is_asked_about(tmp_path: Path, tank: System) -> None:
+def test_a_unit_that_is_wrong_by_a_thousand_is_asked_about(tmp_path, tank):
     path = write(tmp_path / "a.csv", LEVEL, "um")
     (doubt,) = proposed(path, tank).doubts
     assert "its largest value, 0.00095 m, is 0.00095 times the typical 1 m" in doubt
@@ -147,7 +143,7 @@ def test_a_unit_that_is_wrong_by_a_thousand_is_asked_about(tmp_path: Path, tank:
     assert "a thousandth of it would be usual" in problem
 
 
-def test_a_thousandth_in_the_own_unit_is_asked_about(tmp_path: Path, tank: System) -> None:
+def test_a_thousandth_in_the_own_unit_is_asked_about(tmp_path, tank):
     """An inflow in m3/s that is declared in l/s: it moves by less than its noise."""
     path = write(tmp_path / "a.csv", LEVEL)
     lines = path.read_text().split("\n")
@@ -171,9 +167,7 @@ def test_a_thousandth_in_the_own_unit_is_asked_about(tmp_path: Path, tank: Syste
         ("300 K", "water", 293.0, "degC", r"as if it were in [K]"),
     ],
 )
-def test_a_temperature_has_the_zero_of_its_signal(
-    tmp_path: Path, scale: str, label: str, values: float, unit: str, first: float | str
-) -> None:
+def test_a_temperature_has_the_zero_of_its_signal(tmp_path, scale, label, values, unit, first):
     system = system_with_temperature(tmp_path / "system", scale, label)
     path = write(tmp_path / "a.csv", LEVEL, extra=f";T [{unit}]", more=f";{values}")
     proposal = proposed(path, system)
@@ -184,7 +178,7 @@ def test_a_temperature_has_the_zero_of_its_signal(
         assert_allclose(proposal.assigned["T"].values[0], first)
 
 
-def test_milliseconds_declared_as_seconds_are_refused(tmp_path: Path, tank: System) -> None:
+def test_milliseconds_declared_as_seconds_are_refused(tmp_path, tank):
     (tmp_path / "case.toml").write_text('title = "a"\n[measurement]\nfile = "measured.csv"\n')
     rows = [
         f"{1000 * t},{4 + k % 7 / 10},{h:.3f}"

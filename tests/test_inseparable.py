@@ -81,7 +81,7 @@ def ran(folder: Path, *estimated: str, power: float = 1.6e5) -> CaseResult:
     return prepare(system, choose(system, ["ekf"])).run(case)
 
 
-def test_a_mass_and_an_efficiency_that_act_as_their_quotient_are_guesses(tmp_path: Path) -> None:
+def test_a_mass_and_an_efficiency_that_act_as_their_quotient_are_guesses(tmp_path):
     result = ran(tmp_path / "pair", "m", "e")
     assert list(result.inseparable) == [("m", "e")]
     assert result.inseparable["m", "e"] > 0.999
@@ -92,14 +92,14 @@ def test_a_mass_and_an_efficiency_that_act_as_their_quotient_are_guesses(tmp_pat
     assert result.to_dict()["doubts"][-1].startswith(said)
 
 
-def test_a_mass_and_a_resistance_are_told_apart_as_the_power_changes(tmp_path: Path) -> None:
+def test_a_mass_and_a_resistance_are_told_apart_as_the_power_changes(tmp_path):
     result = ran(tmp_path / "apart", "m", "A")
     assert not result.inseparable
     assert "m" not in result.runs["ekf"].claimed
 
 
 @pytest.mark.filterwarnings("ignore:.*found values up to 1 W")  # as it is meant here
-def test_a_quantity_that_nothing_moves_is_a_guess_by_itself(tmp_path: Path) -> None:
+def test_a_quantity_that_nothing_moves_is_a_guess_by_itself(tmp_path):
     """While a tram rolls with next to no power, the efficiency acts on nothing."""
     result = ran(tmp_path / "rolls", "e", power=1.0)
     assert result.untold == ("e",)
@@ -107,9 +107,7 @@ def test_a_quantity_that_nothing_moves_is_a_guess_by_itself(tmp_path: Path) -> N
     assert "e is not shown by this recording" in result.summary()
 
 
-def test_observability_names_what_cannot_be_told_apart(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_observability_names_what_cannot_be_told_apart(tmp_path, capsys):
     """The disturbance observer, which it follows elsewhere, has no gain for such a pair."""
     ran(tmp_path / "pair", "m", "e")
     options = ["--system", str(tmp_path / "pair"), "--out", str(tmp_path / "out"), "--workers", "1"]
@@ -121,9 +119,7 @@ def test_observability_names_what_cannot_be_told_apart(
     assert said in (tmp_path / "out" / "index.html").read_text()
 
 
-def test_estimates_that_no_recording_tells_end_with_a_status(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_estimates_that_no_recording_tells_end_with_a_status(tmp_path, capsys):
     ran(tmp_path / "pair", "m", "e")
     options = ["--system", str(tmp_path / "pair"), "--out", str(tmp_path / "out"), "--workers", "1"]
     command = ["simulate", str(tmp_path / "pair" / "run.csv"), *options]
@@ -174,9 +170,7 @@ acts_on = "v"
 
 
 @pytest.mark.parametrize("step", [0.1, 1.0, 10.0])
-def test_states_that_no_quantity_moves_are_observable_where_outputs_show_them(
-    tmp_path: Path, step: float
-) -> None:
+def test_states_that_no_quantity_moves_are_observable_where_outputs_show_them(tmp_path, step):
     point = 'points.design.inputs = { I = "2 A" }\n'
     system = declare(tmp_path / "cell", CELL, CELL_FILE.format(step=step, point=point))
     with open_model(system) as fmu:

@@ -73,7 +73,7 @@ def said(skews: Mapping[str, float], monkeypatch: pytest.MonkeyPatch) -> LateSig
     return by_themselves(fit, nominal, nominal, clean=False)  # type: ignore[arg-type]
 
 
-def test_one_late_signal_is_named_with_its_time(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_one_late_signal_is_named_with_its_time(monkeypatch):
     """Six microseconds are a hundredth of a sample, however sure they are."""
     found = said({"u": -6e-6, "w": 8e-3}, monkeypatch)
     assert found is not None
@@ -81,22 +81,20 @@ def test_one_late_signal_is_named_with_its_time(monkeypatch: pytest.MonkeyPatch)
     assert found.skew == pytest.approx(8e-3)
 
 
-def test_what_all_others_are_early_against_is_late(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_all_others_are_early_against_is_late(monkeypatch):
     found = said({"u": -8e-3, "w": -8e-3}, monkeypatch)
     assert found is not None
     assert (found.signals, found.skew) == (("i",), pytest.approx(8e-3))
 
 
-def test_signals_that_are_late_by_different_times_are_listed(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_signals_that_are_late_by_different_times_are_listed(monkeypatch):
     found = said({"u": 3e-3, "v": -2e-3, "w": 8e-3, "x": 5e-3}, monkeypatch)
     assert found is not None
     assert found.skews == {"u": 3e-3, "v": -2e-3, "w": 8e-3, "x": 5e-3}
     assert found.signals == ("u", "v", "w", "x")
 
 
-def test_clocks_that_are_right_are_no_cause(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_clocks_that_are_right_are_no_cause(monkeypatch):
     assert said({"u": -6e-6, "w": 9e-5}, monkeypatch) is None
 
 
@@ -232,9 +230,7 @@ def late_by() -> Iterator[Any]:
 
 
 @pytest.mark.parametrize(("signal", "ms"), [*late_by()])
-def test_one_late_signal_is_named_and_its_advice_leads_to_the_cause(
-    signal: str, ms: int, tmp_path: Path
-) -> None:
+def test_one_late_signal_is_named_and_its_advice_leads_to_the_cause(signal, ms, tmp_path):
     """By a fraction of the motor's time constant, 5 ms, and by three of them.
 
     Without a logger its clock or, of the speed, its delay is named; with one the clock is a cause.
@@ -254,6 +250,6 @@ def test_one_late_signal_is_named_and_its_advice_leads_to_the_cause(
     assert skew.low <= 1e-3 * ms <= skew.high
 
 
-def test_signals_in_time_are_not_late(tmp_path: Path) -> None:
+def test_signals_in_time_are_not_late(tmp_path):
     outcome = diagnosis({}, tmp_path, '[loggers]\nown = ["w"]\n')
     assert (outcome.diagnosis.verdict, outcome.diagnosis.late) == ("nothing", None)

@@ -69,23 +69,23 @@ def found(frames: Sequence[pd.DataFrame], folder: Path) -> list[str]:
     ]
 
 
-def test_what_no_block_of_its_kind_has_is_a_cause(tmp_path: Path) -> None:
+def test_what_no_block_of_its_kind_has_is_a_cause(tmp_path):
     """Of 3.5 deviations, where 3.3 are asked for. Held-out recordings say nothing of it."""
     frames = [recorded(G + 3.5 * SPREAD, seed) for seed in range(3)]
     assert found(frames, tmp_path) == ["Draught"]
 
 
-def test_what_one_block_in_twenty_has_is_none(tmp_path: Path) -> None:
+def test_what_one_block_in_twenty_has_is_none(tmp_path):
     assert found([recorded(G + 2.0 * SPREAD, seed) for seed in range(3)], tmp_path) == []
 
 
-def test_what_a_single_recording_tells_is_none(tmp_path: Path) -> None:
+def test_what_a_single_recording_tells_is_none(tmp_path):
     """The others are of a block that is hardly heated."""
     frames = [recorded(G + 3.5 * SPREAD, seed, 1.0 if seed == 0 else 1e-3) for seed in range(3)]
     assert found(frames, tmp_path) == []
 
 
-def test_what_wanders_is_uncertain_by_as_much_as_it_moves_means(tmp_path: Path) -> None:
+def test_what_wanders_is_uncertain_by_as_much_as_it_moves_means(tmp_path):
     """At rest all power leaves: by the block itself, and by two conductances in series."""
     share, over, hold, power = 0.02, 30.0, 6000, 40.0
     wander = f'[diagnosis.wander]\nGc = {{ share = {share}, over = "{over} s" }}\n'
@@ -111,7 +111,7 @@ def test_what_wanders_is_uncertain_by_as_much_as_it_moves_means(tmp_path: Path) 
     assert_allclose(variances[1] - variances[0], moved**2 * 2.0 * over / size, rtol=1e-3)
 
 
-def test_a_state_at_the_start_is_no_further_off_than_chance_makes_it(tmp_path: Path) -> None:
+def test_a_state_at_the_start_is_no_further_off_than_chance_makes_it(tmp_path):
     """A casing that is warm already, of which the file says that it is as the room within 1 K."""
     of = block(tmp_path / "block", "")
     known = replace(of, state_noise=(StateNoise("Tc", "Tc", walk=None, spread=1.0),))
@@ -139,14 +139,12 @@ def test_a_state_at_the_start_is_no_further_off_than_chance_makes_it(tmp_path: P
         ('[diagnosis.wander]\nGx = { share = 0.1, over = "1 s" }\n', "a parameter of the model"),
     ],
 )
-def test_a_wrong_rate_or_a_parameter_that_is_none_is_refused(
-    more: str, message: str, tmp_path: Path
-) -> None:
+def test_a_wrong_rate_or_a_parameter_that_is_none_is_refused(more, message, tmp_path):
     with pytest.raises(InputError, match=message):
         block(tmp_path / "block", more)
 
 
-def test_a_free_run_is_free_whatever_noise_an_input_declares(tmp_path: Path) -> None:
+def test_a_free_run_is_free_whatever_noise_an_input_declares(tmp_path):
     """Noise of the power makes outputs correct the run that is compared: its errors are smaller.
 
     A draught takes 0.1 W/K more; the same recordings, with a power that is exact and one that is
@@ -170,7 +168,7 @@ def test_a_free_run_is_free_whatever_noise_an_input_declares(tmp_path: Path) -> 
     assert np.all(np.array(corrected[1]) < 0.5 * np.array(free[1]))
 
 
-def test_a_level_that_hides_an_effect_is_said(tmp_path: Path) -> None:
+def test_a_level_that_hides_an_effect_is_said(tmp_path):
     """Losses half above their sheet: a draught has their signature, and is never found beside.
 
     The data tell the sum of both conductances of the block, of which one is a level here.
@@ -193,7 +191,7 @@ def test_a_level_that_hides_an_effect_is_said(tmp_path: Path) -> None:
     assert "Draught" in sound.to_dict()["not_visible"]
 
 
-def test_a_level_of_known_spread_hides_nothing(tmp_path: Path) -> None:
+def test_a_level_of_known_spread_hides_nothing(tmp_path):
     of = block(tmp_path / "block", f"[diagnosis.levels]\n{HALVES}")
     outcome = diagnosed(of, cases(of, [recorded(G, seed) for seed in range(3)]), tmp_path)
     assert outcome.to_dict()["not_visible"] == {}

@@ -23,11 +23,11 @@ LEAST = Interval(-0.2, -math.inf, -0.18, "1", "least")
         (ALONE, "no estimate: 0.015 N.m, beyond it, fits better, alone"),
     ],
 )
-def test_a_size_at_its_bound_is_no_estimate(size: Interval, text: str) -> None:
+def test_a_size_at_its_bound_is_no_estimate(size, text):
     assert size.text.endswith(text)
 
 
-def test_an_interval_is_open_to_the_side_of_a_bound() -> None:
+def test_an_interval_is_open_to_the_side_of_a_bound():
     """JSON has no infinity."""
     assert (GREATEST.to_dict()["low"], GREATEST.to_dict()["high"]) == (0.012, None)
     assert (LEAST.to_dict()["low"], LEAST.to_dict()["high"]) == (None, -0.18)

@@ -21,11 +21,11 @@ def total(x: np.ndarray) -> float:
     return found
 
 
-def test_a_loop_does_what_its_law_does_and_refuses_what_it_refuses() -> None:
+def test_a_loop_does_what_its_law_does_and_refuses_what_it_refuses():
     assert total(np.array([1.0, 4.0])) == 3.0
     with pytest.raises(ValueError, match="no root"):
         total(np.array([1.0, -4.0]))
 
 
-def test_what_a_loop_took_up_may_be_called_alone_too() -> None:
+def test_what_a_loop_took_up_may_be_called_alone_too():
     assert total(np.array([9.0])) == root(9.0) == 3.0

@@ -87,7 +87,7 @@ STEP = 2.0  # [s]
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("tanks")
     (folder / "package.mo").write_text(LIBRARY)
     for model in ("Linear", "Bent"):
@@ -102,14 +102,14 @@ def system(folder: Path, model: str, low: float = -1e-2, high: float = 1e-2) -> 
 
 
 @pytest.fixture(scope="module")
-def bent(folder: Path) -> Iterator[tuple[FMU, System]]:
+def bent(folder) -> Iterator[tuple[FMU, System]]:
     known = system(folder, "Bent")
     with open_model(known) as fmu:
         yield fmu, known
 
 
 @pytest.fixture(scope="module")
-def linear(folder: Path) -> Iterator[tuple[FMU, System]]:
+def linear(folder) -> Iterator[tuple[FMU, System]]:
     known = system(folder, "Linear")
     with open_model(known) as fmu:
         yield fmu, known
@@ -207,9 +207,7 @@ def kalman(fmu: FMU, known: System, samples: tuple[Vector, Matrix, Matrix]) -> E
     return ExtendedKalmanFilter(fmu, known, gains).run(*samples)
 
 
-def test_samples_that_come_late_count_as_if_they_had_come_in_time(
-    linear: tuple[FMU, System],
-) -> None:
+def test_samples_that_come_late_count_as_if_they_had_come_in_time(linear):
     """Reference: the same samples in time; the level of the first tank comes 5 steps late."""
     time, u, y = recording()
     late = 5
@@ -231,9 +229,7 @@ def test_samples_that_come_late_count_as_if_they_had_come_in_time(
 
 
 @pytest.mark.parametrize("samples", [1, 2, 7, 20, 200])
-def test_on_a_linear_model_it_is_the_kalman_filter(
-    linear: tuple[FMU, System], samples: int
-) -> None:
+def test_on_a_linear_model_it_is_the_kalman_filter(linear, samples):
     expected = kalman(*linear, recording())
     found = horizon(*linear, samples).run(*recording())
     # Rounding of double precision, over the 1e6 that lie between variances of levels and flows.
@@ -243,9 +239,7 @@ def test_on_a_linear_model_it_is_the_kalman_filter(
     assert_allclose(found.nis[1:], expected.nis[1:], rtol=1e-8, atol=1e-10)
 
 
-def test_a_full_horizon_solves_the_nonlinear_least_squares_problem(
-    bent: tuple[FMU, System],
-) -> None:
+def test_a_full_horizon_solves_the_nonlinear_least_squares_problem(bent):
     """Reference: scipy on the textbook terms, from the true levels."""
     samples = recording("Bent", 30)
     best = least(samples)
@@ -262,7 +256,7 @@ def test_a_full_horizon_solves_the_nonlinear_least_squares_problem(
     )
 
 
-def test_with_active_bounds_it_is_the_bounded_least_squares_solution(folder: Path) -> None:
+def test_with_active_bounds_it_is_the_bounded_least_squares_solution(folder):
     """Reference: scipy's BVLS on the dense problem; and the conditions of Karush, Kuhn, Tucker."""
     known = system(folder, "Linear", low=0.9e-4, high=1.5e-4)
     samples = recording("Linear", 40, after=4e-4)
@@ -301,7 +295,7 @@ def test_with_active_bounds_it_is_the_bounded_least_squares_solution(folder: Pat
     assert (window.multiplier[: window.filled[0]].ravel()[active != 0] >= 0.0).all()
 
 
-def test_a_sample_that_is_far_off_hardly_moves_it(linear: tuple[FMU, System]) -> None:
+def test_a_sample_that_is_far_off_hardly_moves_it(linear):
     clean = recording()
     spoiled = clean[0], clean[1], clean[2].copy()
     spoiled[2][40, 0] += 1.0  # two hundred standard deviations
@@ -315,7 +309,7 @@ def test_a_sample_that_is_far_off_hardly_moves_it(linear: tuple[FMU, System]) ->
     assert shifts[1] < 0.1 * shifts[0]
 
 
-def test_missing_samples_are_left_out(linear: tuple[FMU, System]) -> None:
+def test_missing_samples_are_left_out(linear):
     """Reference: the Kalman filter, in which the sample of so large a noise is worth nothing."""
     time, u, y = recording()
     gaps = y.copy()
@@ -331,7 +325,7 @@ def test_missing_samples_are_left_out(linear: tuple[FMU, System]) -> None:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_more_iterations_never_raise_the_cost(bent: tuple[FMU, System], seed: int) -> None:
+def test_more_iterations_never_raise_the_cost(bent, seed):
     """Levels a tenth off at the start, so that the first iterations go a long way."""
     time, u, y = recording("Bent", 25, seed)
     y[0, 1] += 0.3
@@ -347,7 +341,7 @@ def test_more_iterations_never_raise_the_cost(bent: tuple[FMU, System], seed: in
 # --- the smoother, the same problem over a whole recording ---
 
 
-def test_the_smoother_is_the_batch_least_squares_solution(linear: tuple[FMU, System]) -> None:
+def test_the_smoother_is_the_batch_least_squares_solution(linear):
     """Reference: the dense problem of a linear model, by an orthogonal factorisation."""
     samples = recording("Linear", 60)
     unit = np.tile([0.01, 0.01, 1e-5], 59)
@@ -366,9 +360,7 @@ def test_the_smoother_is_the_batch_least_squares_solution(linear: tuple[FMU, Sys
     assert_allclose(found.sigma[1:, 2], deviations.reshape(-1, 3)[:, 2], rtol=1e-9)
 
 
-def test_the_smoother_knows_no_less_than_the_filter_and_ends_where_it_does(
-    linear: tuple[FMU, System],
-) -> None:
+def test_the_smoother_knows_no_less_than_the_filter_and_ends_where_it_does(linear):
     samples = recording()
     found, filtered = smoother(*linear).run(*samples), kalman(*linear, samples)
     assert (found.sigma <= filtered.sigma * (1.0 + 1e-12)).all()
@@ -378,9 +370,7 @@ def test_the_smoother_knows_no_less_than_the_filter_and_ends_where_it_does(
     assert_allclose(found.sigma[-1], filtered.sigma[-1], rtol=1e-10)
 
 
-def test_the_smoother_solves_the_nonlinear_least_squares_problem(
-    bent: tuple[FMU, System],
-) -> None:
+def test_the_smoother_solves_the_nonlinear_least_squares_problem(bent):
     """Reference: scipy on the textbook terms, from the true levels."""
     samples = recording("Bent", 60)
     best = least(samples)
@@ -391,7 +381,7 @@ def test_the_smoother_solves_the_nonlinear_least_squares_problem(
     assert_allclose(found.values[1:, 2] / 1e-5, ends[:, 2] / 1e-5, rtol=0, atol=2e-3)
 
 
-def test_the_smoother_keeps_quantities_within_their_bounds(folder: Path) -> None:
+def test_the_smoother_keeps_quantities_within_their_bounds(folder):
     """Reference: the moving horizon that holds the whole recording, whose bounds are exact."""
     known = system(folder, "Linear", low=0.9e-4, high=1.5e-4)
     samples = recording("Linear", 40, after=4e-4)
@@ -406,7 +396,7 @@ def test_the_smoother_keeps_quantities_within_their_bounds(folder: Path) -> None
     assert_allclose(found.values[1:, 1], expected[:, 0], rtol=0, atol=1e-6 * 0.01)
 
 
-def test_the_smoother_refuses_a_recording_that_is_not_over(linear: tuple[FMU, System]) -> None:
+def test_the_smoother_refuses_a_recording_that_is_not_over(linear):
     time, u, y = recording()
     estimator = smoother(*linear)
     with pytest.raises(InputError, match="a part of a recording"):

@@ -25,7 +25,7 @@ def wheelset() -> Library:
 # --- what is read ---
 
 
-def test_classes_within_a_class_are_read_in_their_order(tmp_path: Path) -> None:
+def test_classes_within_a_class_are_read_in_their_order(tmp_path):
     found = library(
         tmp_path,
         'package P "Two" model A model B end B; end A; partial model C "Third" end C; end P;',
@@ -35,7 +35,7 @@ def test_classes_within_a_class_are_read_in_their_order(tmp_path: Path) -> None:
     assert found.find("C").description == found.find("P.C").description == "Third"
 
 
-def test_every_file_of_the_library_is_read_in_the_order_of_its_packages(wheelset: Library) -> None:
+def test_every_file_of_the_library_is_read_in_the_order_of_its_packages(wheelset):
     files = {path.stem for path in (ROOT / "modelica" / "WheelsetRig").rglob("*.mo")} - {"package"}
     names = [name.rpartition(".")[2] for name in wheelset.classes]
     assert files <= set(names)
@@ -44,7 +44,7 @@ def test_every_file_of_the_library_is_read_in_the_order_of_its_packages(wheelset
     assert of_effects == ["Effects", *order]
 
 
-def test_comments_are_none_of_the_code_and_strings_none_of_the_comments(tmp_path: Path) -> None:
+def test_comments_are_none_of_the_code_and_strings_none_of_the_comments(tmp_path):
     found = library(
         tmp_path,
         """package P "No // comment, no /* comment */, a \\"quote\\" and a \\\\"
@@ -66,7 +66,7 @@ end P;
     assert (x.modifier.value, found.unit(x), x.description) == ("1.0", "a;b", "First, joined")
 
 
-def test_a_component_has_its_prefixes_type_values_and_constraint(tmp_path: Path) -> None:
+def test_a_component_has_its_prefixes_type_values_and_constraint(tmp_path):
     found = library(
         tmp_path,
         """package P
@@ -104,9 +104,7 @@ end P;
     assert found.find("A").equations == {"y"}
 
 
-def test_names_are_looked_up_from_the_inside_out_through_extends_and_imports(
-    tmp_path: Path,
-) -> None:
+def test_names_are_looked_up_from_the_inside_out_through_extends_and_imports(tmp_path):
     found = library(
         tmp_path,
         """package P
@@ -139,7 +137,7 @@ end P;
     assert found.ancestors("P.S.G") == ("P.Q.B", "P.Q.A")
 
 
-def test_what_a_class_inherits_has_the_values_it_gives(wheelset: Library) -> None:
+def test_what_a_class_inherits_has_the_values_it_gives(wheelset):
     whole, single = (
         wheelset.components(f"WheelsetRig.Effects.{name}")
         for name in ("WaterFilm", "SingleDiscWaterFilm")
@@ -150,7 +148,7 @@ def test_what_a_class_inherits_has_the_values_it_gives(wheelset: Library) -> Non
     assert wheelset.unit(single["E0"]) == "J"  # by its type, whose unit is a modifier
 
 
-def test_a_vendor_annotation_is_numbers_texts_arrays_and_parts(tmp_path: Path) -> None:
+def test_a_vendor_annotation_is_numbers_texts_arrays_and_parts(tmp_path):
     found = library(
         tmp_path,
         """package P
@@ -202,15 +200,13 @@ end P;
         ("package P ?\nend P;", 1, "found '\\?'"),
     ],
 )
-def test_what_cannot_be_read_is_refused_with_its_line(
-    text: str, line: int, message: str, tmp_path: Path
-) -> None:
+def test_what_cannot_be_read_is_refused_with_its_line(text, line, message, tmp_path):
     with pytest.raises(InputError, match=message) as refused:
         library(tmp_path, text)
     assert re.search(rf"P\.mo:{line}\b", refused.value.where)
 
 
-def test_a_class_inherited_on_two_ways_has_what_either_says(tmp_path: Path) -> None:
+def test_a_class_inherited_on_two_ways_has_what_either_says(tmp_path):
     found = library(
         tmp_path,
         "package P partial model A input Real u; input Real w; end A; "
@@ -227,7 +223,7 @@ def test_a_class_inherited_on_two_ways_has_what_either_says(tmp_path: Path) -> N
     assert set(parts["p"].modifier.inner) == {"min", "max"}
 
 
-def test_a_file_must_stand_where_its_class_belongs(tmp_path: Path) -> None:
+def test_a_file_must_stand_where_its_class_belongs(tmp_path):
     (tmp_path / "package.mo").write_text("package P end P;")
     part = tmp_path / "A.mo"
     part.write_text("model A end A;")
@@ -250,12 +246,12 @@ def test_a_file_must_stand_where_its_class_belongs(tmp_path: Path) -> None:
         ("package Q end Q; model A extends Q.X; end A;", "P.Q has no class 'X'"),
     ],
 )
-def test_what_a_class_extends_must_lead_somewhere(text: str, message: str, tmp_path: Path) -> None:
+def test_what_a_class_extends_must_lead_somewhere(text, message, tmp_path):
     found = library(tmp_path, f"package P {text} end P;")
     with pytest.raises(InputError, match=message):
         found.components("P.A")
 
 
-def test_an_unknown_class_is_refused_with_the_closest(wheelset: Library) -> None:
+def test_an_unknown_class_is_refused_with_the_closest(wheelset):
     with pytest.raises(InputError, match=r"closest: 'WheelsetRig\.MinimalObserver'"):
         wheelset.find("MinimalObserve")

@@ -112,9 +112,7 @@ def check(construct: Construct, folder: Path, place: str) -> None:
 
 
 @pytest.mark.parametrize("construct", CONSTRUCTS, ids=lambda construct: construct.name)
-def test_a_construct_computes_what_it_means_or_is_refused_by_line(
-    construct: Construct, tmp_path: Path
-) -> None:
+def test_a_construct_computes_what_it_means_or_is_refused_by_line(construct, tmp_path):
     package = tmp_path / "Lib" / "package.mo"
     check(construct, tmp_path, rf"^{re.escape(str(package))}:{construct.place}$")
 
@@ -124,9 +122,7 @@ def test_a_construct_computes_what_it_means_or_is_refused_by_line(
     reason="needs the Modelica Standard Library in a folder of MODELICAPATH",
 )
 @pytest.mark.parametrize("construct", LIBRARY, ids=lambda construct: construct.name)
-def test_a_block_of_the_standard_library_computes_what_it_means_or_is_refused(
-    construct: Construct, tmp_path: Path
-) -> None:
+def test_a_block_of_the_standard_library_computes_what_it_means_or_is_refused(construct, tmp_path):
     check(construct, tmp_path, rf"/{construct.place}:\d+$")
 
 
@@ -139,9 +135,7 @@ FOLLOWING = (
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
-def test_starts_in_an_fmu_follow_what_is_set_and_yield_to_a_start_that_is_set(
-    fmi: int, tmp_path: Path
-) -> None:
+def test_starts_in_an_fmu_follow_what_is_set_and_yield_to_a_start_that_is_set(fmi, tmp_path):
     fmu = tmp_path / "M.fmu"
     package = write(tmp_path, FOLLOWING)
     compiler.build(package, "Lib.M", fmu, fmi=fmi, platforms=[compiler.native()])
@@ -164,7 +158,7 @@ def test_starts_in_an_fmu_follow_what_is_set_and_yield_to_a_start_that_is_set(
         assert begin({"x": 9.0, "x0": 2.0, "u": 6.0}, interface) == [9.0, 3.0, 7.0]
 
 
-def test_a_parameter_without_value_and_start_is_zero_and_said(tmp_path: Path) -> None:
+def test_a_parameter_without_value_and_start_is_zero_and_said(tmp_path):
     body = "model M parameter Real a; output Real x(start=1,fixed=true); equation der(x)=a; end M;"
     package = write(tmp_path, body)
     model = make_explicit(flatten(package, "Lib.M"))
@@ -173,7 +167,7 @@ def test_a_parameter_without_value_and_start_is_zero_and_said(tmp_path: Path) ->
     assert note.startswith(f"{package}:2: parameter 'a' has neither a value nor a start")
 
 
-def test_an_experiment_gives_start_stop_step_and_tolerance(tmp_path: Path) -> None:
+def test_an_experiment_gives_start_stop_step_and_tolerance(tmp_path):
     body = (
         'model M output Real x(start=0,fixed=true,unit="degC"); equation der(x)=1; '
         "annotation(experiment(StartTime=50, Interval=0.25, Tolerance=1e-9)); end M;"
@@ -189,7 +183,7 @@ def test_an_experiment_gives_start_stop_step_and_tolerance(tmp_path: Path) -> No
     assert [float(celsius.factor), float(celsius.offset)] == [1.0, 273.15]
 
 
-def test_refusals_name_no_other_file_than_the_users(tmp_path: Path) -> None:
+def test_refusals_name_no_other_file_than_the_users(tmp_path):
     """The front end, the C compiler and the cache work in temporary folders of their own."""
     for number, construct in enumerate(CONSTRUCTS):
         if construct.refusal:
@@ -225,7 +219,7 @@ def page(text: str) -> str:
     return text
 
 
-def test_the_page_lists_what_the_compiler_takes() -> None:
+def test_the_page_lists_what_the_compiler_takes():
     text = PAGE.read_text()
     assert text == page(text), f"write it again: python {Path(__file__).name}"
 

@@ -39,13 +39,13 @@ RECORDINGS = Path(__file__).parent.parent.parent / "shared" / "recordings" / "tr
 
 
 @pytest.mark.parametrize("level", [3.0, 4.0, 5.0, 6.0])
-def test_mean_run_lengths_are_those_of_the_closed_form(level: float) -> None:
+def test_mean_run_lengths_are_those_of_the_closed_form(level):
     """D. Siegmund (1985), Sequential Analysis, section 2.6: good to some 1 % for these levels."""
     b = 2.0 * 0.5 * (level + 1.166)
     assert_allclose(run_length(level, largest=np.inf), (np.exp(b) - b - 1.0) / 0.5, rtol=0.02)
 
 
-def test_surprises_of_a_sound_quantity_are_standard_normal_and_independent() -> None:
+def test_surprises_of_a_sound_quantity_are_standard_normal_and_independent():
     """From the third estimate on, whatever level, scatter and standard errors are."""
     random = np.random.default_rng(5)
     found = []
@@ -103,7 +103,7 @@ def changed(tracks: Sequence[Track]) -> dict[str, list[int]]:
     }
 
 
-def test_a_sound_machine_raises_alarms_at_the_stated_rate() -> None:
+def test_a_sound_machine_raises_alarms_at_the_stated_rate():
     """One in a hundred recordings: of 25 machines over 100 recordings each, 25 are expected."""
     machines = [Machine(seed, 100).watched() for seed in range(25)]
     alarms = [c for tracks in machines for track in tracks for c in track.changes if not c.returns]
@@ -111,7 +111,7 @@ def test_a_sound_machine_raises_alarms_at_the_stated_rate() -> None:
     assert 11 <= len(alarms) <= 42
 
 
-def test_a_quantity_that_falls_is_told_and_no_other() -> None:
+def test_a_quantity_that_falls_is_told_and_no_other():
     def falls(values: Matrix) -> None:
         values[20:, 6] -= 5.0
 
@@ -124,7 +124,7 @@ def test_a_quantity_that_falls_is_told_and_no_other() -> None:
     assert abs(size + 5.0) < 3.0 * known
 
 
-def test_a_quantity_alone_that_jumps_is_told_once_and_stays() -> None:
+def test_a_quantity_alone_that_jumps_is_told_once_and_stays():
     def jumps(values: Matrix) -> None:
         values[20:, 8] += 6.0
 
@@ -135,14 +135,14 @@ def test_a_quantity_alone_that_jumps_is_told_once_and_stays() -> None:
     assert abs(level - change.before[0] - 6.0) < 3.0 * np.hypot(known, change.before[1])
 
 
-def test_what_is_common_to_all_is_told_of_their_mean_alone() -> None:
+def test_what_is_common_to_all_is_told_of_their_mean_alone():
     def fall(values: Matrix) -> None:
         values[20:, :8] -= 9.0
 
     assert list(changed(Machine(3, 40).watched(fall))) == ["a"]
 
 
-def test_one_wild_estimate_hardly_raises_an_alarm_and_none_of_others() -> None:
+def test_one_wild_estimate_hardly_raises_an_alarm_and_none_of_others():
     """It counts as three deviations: an alarm only where the sum was nearly there before."""
 
     def jumps(values: Matrix) -> None:
@@ -155,7 +155,7 @@ def test_one_wild_estimate_hardly_raises_an_alarm_and_none_of_others() -> None:
     assert sum(map(len, found)) <= sum(map(len, usual)) + 1
 
 
-def test_an_alarm_that_is_taken_back_says_so() -> None:
+def test_an_alarm_that_is_taken_back_says_so():
     def renewed(values: Matrix) -> None:
         values[15:30, 2] -= 6.0
 
@@ -166,7 +166,7 @@ def test_an_alarm_that_is_taken_back_says_so() -> None:
     ]
 
 
-def test_a_recording_that_does_not_tell_a_quantity_leaves_it_alone() -> None:
+def test_a_recording_that_does_not_tell_a_quantity_leaves_it_alone():
     estimated: Any = [
         SimpleNamespace(name="b", label="b", unit="1", low=0.0, high=1.0, scatter=0.0)
     ]
@@ -176,7 +176,7 @@ def test_a_recording_that_does_not_tell_a_quantity_leaves_it_alone() -> None:
     assert np.isfinite(track.values).sum() == 9
 
 
-def test_a_lower_rate_of_false_alarms_asks_for_more() -> None:
+def test_a_lower_rate_of_false_alarms_asks_for_more():
     levels: Vector = np.array([threshold(rate) for rate in (0.1, 0.01, 1e-3, 1e-4)])
     assert (np.diff(levels) > 0.0).all()
     assert (levels > LARGEST - 0.5).sum() >= 2  # from there on, one estimate alone raises none
@@ -191,7 +191,7 @@ def train() -> System:
 
 
 @pytest.fixture(scope="module")
-def history(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def history(tmp_path_factory) -> Path:
     """Sixteen stops; from the ninth on, the pads of axle 3 have 15 % less friction."""
     folder = tmp_path_factory.mktemp("history")
     for k in range(1, 17):
@@ -201,9 +201,7 @@ def history(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def usual(
-    history: Path, train: System, tmp_path_factory: pytest.TempPathFactory
-) -> MonitoringResult:
+def usual(history, train, tmp_path_factory) -> MonitoringResult:
     """All at once."""
     return wb.monitor(train, history, out=tmp_path_factory.mktemp("usual"), workers=1)
 
@@ -215,7 +213,7 @@ def same(monitored: MonitoringResult, other: MonitoringResult) -> None:
     pd.testing.assert_frame_equal(monitored.worked(), other.worked(), check_exact=True)
 
 
-def test_pads_that_have_lost_friction_are_told_with_their_axle(usual: MonitoringResult) -> None:
+def test_pads_that_have_lost_friction_are_told_with_their_axle(usual):
     assert list(changed(usual.tracks)) == ["muDC[3] against"]
     track, change = usual.changes[0]
     assert usual.names[change.earliest] <= "08" <= usual.names[change.latest]
@@ -226,7 +224,7 @@ def test_pads_that_have_lost_friction_are_told_with_their_axle(usual: Monitoring
     assert "pad friction of axle 3" in sentence
 
 
-def test_work_of_friction_is_what_pads_take_from_the_train(usual: MonitoringResult) -> None:
+def test_work_of_friction_is_what_pads_take_from_the_train(usual):
     """Of 96 t at 20 m/s, 19.2 MJ; resistances and bearings take some 3 %, wheelsets hold 4 %."""
     sums = usual.work[:8].sum(axis=1)
     assert_allclose(sums, 0.5 * 96e3 * 20.0**2, rtol=0.08)
@@ -235,8 +233,8 @@ def test_work_of_friction_is_what_pads_take_from_the_train(usual: MonitoringResu
 
 
 def test_recordings_that_come_later_twice_or_damaged_change_nothing(
-    history: Path, train: System, usual: MonitoringResult, tmp_path: Path
-) -> None:
+    history, train, usual, tmp_path
+):
     """In parts and out of order; then a copy, a damaged one and one that is no recording."""
     inbox, out = tmp_path / "inbox", tmp_path / "out"
     names = sorted(path.name for path in history.iterdir())
@@ -267,9 +265,7 @@ def test_recordings_that_come_later_twice_or_damaged_change_nothing(
     assert set(found.refused) == {"05", "18"}
 
 
-def test_nothing_is_estimated_twice(
-    history: Path, train: System, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_nothing_is_estimated_twice(history, train, tmp_path, monkeypatch):
     for name in ("01", "02"):
         shutil.copytree(history / name, tmp_path / "in" / name)
     wb.monitor(train, tmp_path / "in", out=tmp_path / "out", workers=1)
@@ -278,9 +274,7 @@ def test_nothing_is_estimated_twice(
     assert found.names == ("01", "02")
 
 
-def test_a_state_of_another_model_or_a_damaged_one_is_refused(
-    history: Path, train: System, tmp_path: Path
-) -> None:
+def test_a_state_of_another_model_or_a_damaged_one_is_refused(history, train, tmp_path):
     shutil.copytree(history / "01", tmp_path / "in" / "01")
     wb.monitor(train, tmp_path / "in", out=tmp_path / "out", workers=1)
     state = tmp_path / "out" / STATE
@@ -296,9 +290,7 @@ def test_a_state_of_another_model_or_a_damaged_one_is_refused(
             wb.monitor(train, tmp_path / "in", out=tmp_path / "out", workers=1)
 
 
-def test_a_folder_without_a_recording_that_can_be_used_is_refused(
-    train: System, tmp_path: Path
-) -> None:
+def test_a_folder_without_a_recording_that_can_be_used_is_refused(train, tmp_path):
     with pytest.raises(InputError, match="what cannot be read"):
         wb.monitor(train, tmp_path / "none", workers=1)
     (tmp_path / "in").mkdir()
@@ -309,9 +301,7 @@ def test_a_folder_without_a_recording_that_can_be_used_is_refused(
         wb.monitor(train, tmp_path / "in", workers=1)
 
 
-def test_a_condition_that_the_model_needs_and_nobody_knows_is_told(
-    history: Path, train: System, tmp_path: Path
-) -> None:
+def test_a_condition_that_the_model_needs_and_nobody_knows_is_told(history, train, tmp_path):
     for name in ("01", "02"):
         shutil.copytree(history / name, tmp_path / "in" / name)
     toml = tmp_path / "in" / "02" / "case.toml"
@@ -330,9 +320,7 @@ then = () => {
 """
 
 
-def test_the_page_shows_what_has_changed_and_where(
-    usual: MonitoringResult, tmp_path: Path, probe: Callable[[Path, str], dict[str, Any]]
-) -> None:
+def test_the_page_shows_what_has_changed_and_where(usual, tmp_path, probe):
     provenance = {"run": run_of("monitor", usual.system, {})}
     page = write_monitoring(usual, provenance, tmp_path)
     told = check_page(page, json.loads((tmp_path / "summary.json").read_text()))
@@ -354,7 +342,7 @@ def test_the_page_shows_what_has_changed_and_where(
     assert found["read"] == "recording 9"
 
 
-def test_a_machine_that_has_not_changed_says_so(usual: MonitoringResult, tmp_path: Path) -> None:
+def test_a_machine_that_has_not_changed_says_so(usual, tmp_path):
     sound = replace(usual, tracks=tuple(replace(track, changes=()) for track in usual.tracks))
     page = write_monitoring(sound, {"run": run_of("monitor", usual.system, {})}, tmp_path)
     told = check_page(page, json.loads((tmp_path / "summary.json").read_text()))
@@ -362,9 +350,7 @@ def test_a_machine_that_has_not_changed_says_so(usual: MonitoringResult, tmp_pat
     assert not told.xpath("//ol[@class='strip']")
 
 
-def test_the_command_writes_what_it_says(
-    history: Path, usual: MonitoringResult, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_command_writes_what_it_says(history, usual, tmp_path, capsys):
     words = ["monitor", str(history), "--system", "train", "--workers", "2"]
     assert main([*words, "--out", str(tmp_path / "out")]) == 0
     said = capsys.readouterr()
@@ -382,7 +368,7 @@ def test_the_command_writes_what_it_says(
 # --- recordings of an independent simulator ---
 
 
-def test_a_slow_loss_over_months_is_told_before_it_has_reached_a_tenth(train: System) -> None:
+def test_a_slow_loss_over_months_is_told_before_it_has_reached_a_tenth(train):
     """12 % of the friction of axle 7, from stop 15 to 30: at the 28th it has reached 10 %."""
     if not RECORDINGS.exists():
         pytest.skip("the recordings are not at hand")
@@ -396,9 +382,7 @@ def test_a_slow_loss_over_months_is_told_before_it_has_reached_a_tenth(train: Sy
     assert abs(size + 0.12 * 0.30) < 3.0 * known
 
 
-def test_the_machine_is_known_from_before_a_change_and_diagnosed_after_it(
-    usual: MonitoringResult,
-) -> None:
+def test_the_machine_is_known_from_before_a_change_and_diagnosed_after_it(usual):
     assert recordings_after(usual) == [f"{k:02d}" for k in range(9, 17)]
     system = known_from_before(usual)
     nominal = usual.system
@@ -413,7 +397,7 @@ def test_the_machine_is_known_from_before_a_change_and_diagnosed_after_it(
 
 
 @pytest.mark.long
-def test_the_cause_of_a_slow_loss_is_named_with_its_axle(tmp_path: Path) -> None:
+def test_the_cause_of_a_slow_loss_is_named_with_its_axle(tmp_path):
     """Of eight stops without those before, nothing was said: tolerances blur it."""
     pytest.importorskip("rumoca")
     if not RECORDINGS.exists():

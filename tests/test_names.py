@@ -39,7 +39,7 @@ NAMES = {
 
 
 @pytest.fixture(scope="module")
-def renamed_path(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def renamed_path(root, tmp_path_factory) -> Path:
     """MinimalObserver with every variable that estimators use under another name."""
     pytest.importorskip("rumoca")
     pytest.importorskip("casadi")
@@ -60,15 +60,15 @@ def renamed_path(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def start_of_stop(dry_case: Case) -> Case:
+def start_of_stop(dry_case) -> Case:
     """Coasting, first contact and the first second of braking."""
     return dry_case.part(slice(1000))
 
 
 @pytest.mark.parametrize("kind", [OpenLoop, DisturbanceObserver, ExtendedKalmanFilter])
 def test_a_model_with_other_names_gives_the_same_estimate_bit_for_bit(
-    root: Path, renamed_path: Path, start_of_stop: Case, system: System, kind: type
-) -> None:
+    root, renamed_path, start_of_stop, system, kind
+):
     estimates = []
     with (
         FMU(root / "fmus" / "fmi2" / "MinimalObserver.fmu") as ours,
@@ -81,19 +81,17 @@ def test_a_model_with_other_names_gives_the_same_estimate_bit_for_bit(
     assert_array_equal(*estimates)
 
 
-def test_a_model_with_other_names_is_refused_without_mapping(
-    renamed_path: Path, system: System
-) -> None:
+def test_a_model_with_other_names_is_refused_without_mapping(renamed_path, system):
     with pytest.raises(InputError, match=r"no variable 'pB'.*--map"):
         check_model(system, read_description(renamed_path))
 
 
-def test_a_name_that_the_fmu_does_not_have_is_refused_with_the_closest(minimal_path: Path) -> None:
+def test_a_name_that_the_fmu_does_not_have_is_refused_with_the_closest(minimal_path):
     with pytest.raises(InputError, match=r"no variable 'tauRoll' \(closest: 'tauR'\).*'tauR'"):
         FMU(minimal_path, {"tauR": "tauRoll"})
 
 
-def test_a_variable_whose_name_is_given_to_another_stays_within_reach(minimal_path: Path) -> None:
+def test_a_variable_whose_name_is_given_to_another_stays_within_reach(minimal_path):
     """FxReading takes the place of Fx; the model's own Fx is fmu.Fx from then on."""
     with FMU(minimal_path) as plain, FMU(minimal_path, {"Fx": "FxReading"}) as mapped:
         pairs = [("FxReading", "Fx"), ("Fx", "fmu.Fx")]
@@ -115,9 +113,7 @@ def open_loop(fmu: FMU, system: System) -> OpenLoop:
         ({"slip": "Fx", "Fx": "FxReading"}, r"'Fx': found \[N\], a unit of another dimension"),
     ],
 )
-def test_a_variable_of_the_wrong_kind_is_refused(
-    minimal_path: Path, system: System, names: dict[str, str], match: str
-) -> None:
+def test_a_variable_of_the_wrong_kind_is_refused(minimal_path, system, names, match):
     with FMU(minimal_path, names) as fmu, pytest.raises(InputError, match=match):
         open_loop(fmu, system.with_names(names))
 
@@ -133,9 +129,7 @@ def with_units(fmu: FMU, units: dict[str, str | None]) -> FMU:
     ("ours", "unit"),
     [("pB", "bar"), ("tauR", "kN.m"), ("omegaR", "rpm"), ("Fx", "kN"), ("slip", "km/h")],
 )
-def test_another_unit_is_refused_and_both_are_named(
-    minimal: FMU, system: System, ours: str, unit: str
-) -> None:
+def test_another_unit_is_refused_and_both_are_named(minimal, system, ours, unit):
     other = with_units(minimal, {ours: unit})
     match = rf"'{ours}': found unit \[{unit}\]; expected \[{system.unit(ours)}\]"
     with pytest.raises(InputError, match=match):
@@ -144,7 +138,7 @@ def test_another_unit_is_refused_and_both_are_named(
         open_loop(other, system)
 
 
-def test_a_variable_without_a_unit_is_taken_as_si(minimal: FMU, system: System) -> None:
+def test_a_variable_without_a_unit_is_taken_as_si(minimal, system):
     bare = with_units(minimal, dict.fromkeys(minimal.units))
     check_model(system, bare.description)
 
@@ -157,9 +151,7 @@ def copy(case: Path, folder: Path, text: str, system: System) -> Case:
     return read_case(folder, system)
 
 
-def test_names_come_from_cases_and_from_the_command_line_which_wins(
-    root: Path, tmp_path: Path, system: System
-) -> None:
+def test_names_come_from_cases_and_from_the_command_line_which_wins(root, tmp_path, system):
     folder = root / "cases" / "03_dry_120_3.6"
     text = '[model.names]\npB = "pressure"\ntauR = "torque"'
     cases = [copy(folder, tmp_path / name, text, system) for name in ("a", "b")]
@@ -171,9 +163,7 @@ def test_names_come_from_cases_and_from_the_command_line_which_wins(
     assert model_names([], system) == read_case(folder, system).names == {}
 
 
-def test_cases_that_contradict_each_other_need_the_command_line(
-    root: Path, tmp_path: Path, system: System
-) -> None:
+def test_cases_that_contradict_each_other_need_the_command_line(root, tmp_path, system):
     folder = root / "cases" / "03_dry_120_3.6"
     cases = [copy(folder, tmp_path / n, f'[model.names]\npB = "{n}"', system) for n in ("a", "b")]
     match = r"b/case.toml, \[model.names\] pB: found 'b', in a case before it 'a'"
@@ -191,9 +181,7 @@ def test_cases_that_contradict_each_other_need_the_command_line(
         ('[model.names]\npB = "x"\ntauR = "x"', r"tauR: found variable 'x', which is already pB"),
     ],
 )
-def test_a_wrong_name_in_a_case_is_refused(
-    root: Path, tmp_path: Path, system: System, text: str, match: str
-) -> None:
+def test_a_wrong_name_in_a_case_is_refused(root, tmp_path, system, text, match):
     with pytest.raises(InputError, match=match):
         copy(root / "cases" / "03_dry_120_3.6", tmp_path / "case", text, system)
 
@@ -208,6 +196,6 @@ def test_a_wrong_name_in_a_case_is_refused(
         (["pB=a", "tauR=a"], "--map tauR: found variable 'a', which is already pB"),
     ],
 )
-def test_a_wrong_map_option_is_refused(system: System, mapped: list[str], match: str) -> None:
+def test_a_wrong_map_option_is_refused(system, mapped, match):
     with pytest.raises(InputError, match=match):
         model_names(mapped, system)

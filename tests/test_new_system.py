@@ -20,13 +20,13 @@ pytest.importorskip("ziglang", reason="needs the extra [compiler]")
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("new") / "tank"
     assert main(["new", str(folder)]) == 0
     return folder
 
 
-def test_a_folder_with_a_system_is_left_as_it_is(folder: Path) -> None:
+def test_a_folder_with_a_system_is_left_as_it_is(folder):
     with pytest.raises(InputError, match="expected a folder without a system"):
         write_system(folder)
 
@@ -39,7 +39,7 @@ def ran(command: str, folder: Path, out: Path, *options: str) -> dict[str, objec
     return summary
 
 
-def test_it_is_simulated_on_its_recordings(folder: Path, tmp_path: Path) -> None:
+def test_it_is_simulated_on_its_recordings(folder, tmp_path):
     summary = ran("simulate", folder, tmp_path, "--workers", "1")
     cases = summary["cases"]
     assert isinstance(cases, dict)
@@ -52,7 +52,7 @@ def test_it_is_simulated_on_its_recordings(folder: Path, tmp_path: Path) -> None
         assert max(errors.values()) < 0.2 * alone
 
 
-def test_it_is_tuned(folder: Path, tmp_path: Path) -> None:
+def test_it_is_tuned(folder, tmp_path):
     quick = ("--budget", "2", "--population", "3", "--workers", "1")
     summary = ran("tune disturbance_observer", folder, tmp_path, *quick)
     assert isinstance(summary["z"], float)
@@ -66,7 +66,7 @@ def diagnosed(folder: Path, out: Path, effects: Sequence[str] = ()) -> Outcome:
     return diagnose(system, cases, effects=effects, out=out, workers=1, report=lambda line: None)
 
 
-def test_the_wall_that_seeps_is_named(folder: Path, tmp_path: Path) -> None:
+def test_the_wall_that_seeps_is_named(folder, tmp_path):
     found = diagnosed(folder, tmp_path).diagnosis
     assert found.verdict == "found"
     (cause,) = found.causes
@@ -74,6 +74,6 @@ def test_the_wall_that_seeps_is_named(folder: Path, tmp_path: Path) -> None:
     assert cause.parameters["k"].low < SEEPAGE < cause.parameters["k"].high
 
 
-def test_a_tight_wall_is_not(tmp_path: Path) -> None:
+def test_a_tight_wall_is_not(tmp_path):
     write_system(tmp_path / "tight", 0.0)
     assert diagnosed(tmp_path / "tight", tmp_path).diagnosis.verdict == "nothing"

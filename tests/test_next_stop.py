@@ -3,7 +3,6 @@
 import json
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -62,7 +61,7 @@ from .schemas import check
 # --- criteria ---
 
 
-def test_what_is_left_is_the_criterion_of_buzzi_ferraris_and_forzatti() -> None:
+def test_what_is_left_is_the_criterion_of_buzzi_ferraris_and_forzatti():
     """Reference: d' (I + J N^-1 J')^-1 d, with the covariance of the rival's prediction."""
     rng = np.random.default_rng(1)
     d, J = rng.standard_normal(12), rng.standard_normal((12, 3))
@@ -86,7 +85,7 @@ _DISCOPT = {
 
 
 @pytest.mark.parametrize("x", _DISCOPT)
-def test_criteria_are_those_of_an_independent_package(x: float) -> None:
+def test_criteria_are_those_of_an_independent_package(x):
     """Responses 2 s x and 1.5 (s x)^2, of one unknown factor each, in s = 0.5, 1, 2; noise 0.1.
 
     discopt takes both models for uncertain, where here one is true: the unknowns are those of both.
@@ -106,7 +105,7 @@ def test_criteria_are_those_of_an_independent_package(x: float) -> None:
     assert_allclose(-2.0 * np.log(before), information, rtol=1e-7)
 
 
-def test_a_line_and_a_parabola_part_where_their_best_fits_do() -> None:
+def test_a_line_and_a_parabola_part_where_their_best_fits_do():
     """T-optimality by hand: x^2 less its best line in -1, 0, 0, 1 is 1/2 in size everywhere."""
     x = np.array([-1.0, 0.0, 0.0, 1.0])
     J, d = np.column_stack([np.ones(4), x]), 6.0 * x**2
@@ -114,7 +113,7 @@ def test_a_line_and_a_parabola_part_where_their_best_fits_do() -> None:
     assert_allclose(left, 4 * 3.0**2, rtol=1e-9)
 
 
-def test_what_belongs_to_one_recording_counts_as_noise_that_it_shares() -> None:
+def test_what_belongs_to_one_recording_counts_as_noise_that_it_shares():
     """Reference: d' (I + P P')^-1 d, the covariance of noise and of a tolerance of one sigma."""
     rng = np.random.default_rng(2)
     d, P = rng.standard_normal(9), rng.standard_normal((9, 2))
@@ -124,7 +123,7 @@ def test_what_belongs_to_one_recording_counts_as_noise_that_it_shares() -> None:
     assert_allclose(left, d @ np.linalg.solve(np.eye(9) + P @ P.T, d), rtol=1e-7)
 
 
-def test_chi_squared_counts_errors_tolerances_and_what_is_known() -> None:
+def test_chi_squared_counts_errors_tolerances_and_what_is_known():
     """Reference: eliminating what is at its best already changes nothing."""
     rng = np.random.default_rng(4)
     r, P = rng.standard_normal(9), rng.standard_normal((9, 2))
@@ -133,11 +132,11 @@ def test_chi_squared_counts_errors_tolerances_and_what_is_known() -> None:
     assert_allclose(joint.chi_squared, joint.total().c, rtol=1e-9)
 
 
-def test_what_is_nearer_than_the_true_cause_has_a_negative_distance() -> None:
+def test_what_is_nearer_than_the_true_cause_has_a_negative_distance():
     assert [distance(apart) for apart in (9.0, 0.0, -4.0)] == [3.0, 0.0, -2.0]
 
 
-def test_the_chance_is_the_share_of_simulated_decisions() -> None:
+def test_the_chance_is_the_share_of_simulated_decisions():
     """Two directions in noise, nearly alike: what the wrong one leaves beyond the right one."""
     rng, decides, count = np.random.default_rng(3), thresholds(28), 4000
     cosine, apart = 0.98, 49.0
@@ -152,7 +151,7 @@ def test_the_chance_is_the_share_of_simulated_decisions() -> None:
     assert 0.6 < expected < 0.9
 
 
-def test_precision_of_one_unknown_is_its_standard_deviation() -> None:
+def test_precision_of_one_unknown_is_its_standard_deviation():
     """Reference: information adds up, 1/9 and 1/16 make 1/5.76, whatever another unknown does."""
     known, new = np.diag([1.0 / 9.0, 5.0]), np.diag([1.0 / 16.0, 2.0])
     assert_allclose(precision(new, known, [0]), (3.0, 2.4), rtol=1e-12)
@@ -162,7 +161,7 @@ def test_precision_of_one_unknown_is_its_standard_deviation() -> None:
 
 
 @pytest.mark.parametrize("kind", [STEP, STAIRCASE, SINE])
-def test_a_demand_stays_in_its_range_and_begins_when_it_says(kind: str) -> None:
+def test_a_demand_stays_in_its_range_and_begins_when_it_says(kind):
     varied = VariedInput("u", (2.0, 5.0), (kind,), 3.0, 4.0, ())
     time = np.arange(0.0, 60.0, 0.1)
     levels = {STEP: (5.0,), STAIRCASE: (2.0, 3.5, 5.0), SINE: (2.0, 5.0)}[kind]
@@ -174,7 +173,7 @@ def test_a_demand_stays_in_its_range_and_begins_when_it_says(kind: str) -> None:
     assert begun.min() >= 2.0
 
 
-def test_a_lag_is_of_first_order() -> None:
+def test_a_lag_is_of_first_order():
     varied = VariedInput("u", (0.5, 1.0), (STEP,), 1.0, 4.0, (0.7,))
     time = np.arange(0.0, 6.0, 0.01)
     expected = np.where(time >= 1.0, 1.0 - np.exp(-(time - 1.0) / 0.7), 0.0)
@@ -201,7 +200,7 @@ def a_grid(counts: list[int]) -> Experiments:
     )
 
 
-def test_what_is_released_is_so_after_its_time_where_a_machine_allows_it() -> None:
+def test_what_is_released_is_so_after_its_time_where_a_machine_allows_it():
     varied = VariedInput("u", (2.0, 5.0), (RELEASE,), 3.0, 4.0, ())
     asked = replace(a_grid([1]), inputs=(varied,))
     (first,) = all_settings(asked)
@@ -216,9 +215,7 @@ def test_what_is_released_is_so_after_its_time_where_a_machine_allows_it() -> No
 @pytest.mark.parametrize(
     ("counts", "parts"), [([4, 12], 1), ([3, 2, 2, 2, 2, 2], 2), ([6, 6, 6], 5)]
 )
-def test_of_a_large_grid_a_fraction_is_tried_with_every_value(
-    counts: list[int], parts: int
-) -> None:
+def test_of_a_large_grid_a_fraction_is_tried_with_every_value(counts, parts):
     asked = a_grid(counts)
     every, some = all_settings(asked), settings_fraction(asked)
     assert len(some) <= 48
@@ -270,7 +267,7 @@ def heated(seed: int, power: np.ndarray, begin: float) -> pd.DataFrame:
 
 
 @pytest.fixture(scope="module")
-def block(tmp_path_factory: pytest.TempPathFactory) -> System:
+def block(tmp_path_factory) -> System:
     pytest.importorskip("rumoca", reason="no Modelica compiler")
     folder = tmp_path_factory.mktemp("heater") / "block"
     heater(folder)
@@ -280,7 +277,7 @@ def block(tmp_path_factory: pytest.TempPathFactory) -> System:
 
 
 @pytest.fixture(scope="module")
-def mild(block: System) -> list[Case]:
+def mild(block) -> list[Case]:
     """Powers so near each other that heat lost by temperature and by its square look alike."""
     rng = np.random.default_rng(0)
     powers = [np.repeat(rng.uniform(29.0, 31.0, 4), 50) for _ in range(3)]
@@ -288,12 +285,12 @@ def mild(block: System) -> list[Case]:
 
 
 @pytest.fixture(scope="module")
-def undecided(block: System, mild: list[Case], tmp_path_factory: pytest.TempPathFactory) -> Outcome:
+def undecided(block, mild, tmp_path_factory) -> Outcome:
     return diagnosed(block, mild, tmp_path_factory.mktemp("undecided"))
 
 
 @pytest.fixture(scope="module")
-def proposed(undecided: Outcome) -> NextStop:
+def proposed(undecided) -> NextStop:
     return wb.next_stop(undecided, workers=1, report=lambda _: None)
 
 
@@ -304,8 +301,8 @@ def made(block: System, experiment: RankedExperiment) -> list[Case]:
 
 
 def test_the_first_proposal_parts_what_the_recordings_before_did_not(
-    block: System, mild: list[Case], undecided: Outcome, proposed: NextStop, tmp_path: Path
-) -> None:
+    block, mild, undecided, proposed, tmp_path
+):
     (cause,) = undecided.diagnosis.causes
     assert cause.confusable_with == ("Radiation",)
     assert proposed.parts
@@ -315,9 +312,7 @@ def test_the_first_proposal_parts_what_the_recordings_before_did_not(
     assert (cause.effect.name, cause.confusable_with) == ("Draught", ())
 
 
-def test_what_is_beside_the_best_of_a_fraction_is_tried_too(
-    block: System, undecided: Outcome, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_is_beside_the_best_of_a_fraction_is_tried_too(block, undecided, monkeypatch):
     monkeypatch.setattr(candidates, "_GRID", 1)
     assert block.experiments is not None
     knob = FurtherSetting("knob", "a knob", "1", (Setting(0.0, "0"), Setting(1.0, "1")))
@@ -329,24 +324,20 @@ def test_what_is_beside_the_best_of_a_fraction_is_tried_too(
     assert turned == {0.0, 1.0}
 
 
-def test_an_experiment_drawn_at_random_parts_half_as_often_at_most(proposed: NextStop) -> None:
+def test_an_experiment_drawn_at_random_parts_half_as_often_at_most(proposed):
     likely = [one.prediction.right > 0.5 for one in proposed.tried]
     assert likely[0]
     assert np.mean(likely) <= 0.5
 
 
-def test_the_last_experiment_of_the_list_leaves_them_together(
-    block: System, mild: list[Case], proposed: NextStop, tmp_path: Path
-) -> None:
+def test_the_last_experiment_of_the_list_leaves_them_together(block, mild, proposed, tmp_path):
     assert proposed.tried[-1].prediction.right < 0.01
     new = named_anew(made(block, proposed.tried[-1]))
     (cause,) = diagnosed(block, [*mild, *new], tmp_path).diagnosis.causes
     assert "Radiation" in (cause.effect.name, *cause.confusable_with)
 
 
-def test_the_separation_is_what_recordings_then_show(
-    block: System, mild: list[Case], proposed: NextStop
-) -> None:
+def test_the_separation_is_what_recordings_then_show(block, mild, proposed):
     """Of every experiment, within 20 %: noise moves it by one standard deviation."""
     for one in proposed.tried:
         expected = np.sqrt(one.prediction.pairwise[0, 1])
@@ -354,9 +345,7 @@ def test_the_separation_is_what_recordings_then_show(
         assert shown == pytest.approx(expected, rel=0.2, abs=1.0), one.text
 
 
-def test_a_rival_cannot_use_what_its_recordings_so_far_hold(
-    block: System, undecided: Outcome, proposed: NextStop
-) -> None:
+def test_a_rival_cannot_use_what_its_recordings_so_far_hold(block, undecided, proposed):
     """States at the start of recordings that are made: free, as sure as they were, and known."""
     rivals = undecided.rivals
     assert rivals is not None
@@ -380,7 +369,7 @@ def test_a_rival_cannot_use_what_its_recordings_so_far_hold(
     assert apart[2] > 1.1 * apart[1]
 
 
-def test_each_experiment_is_drawn_as_often(block: System) -> None:
+def test_each_experiment_is_drawn_as_often(block):
     """Seven profiles in 7000 draws: chi-squared of six degrees of freedom, one in a thousand."""
     assert block.experiments is not None
     rng = np.random.default_rng(8)
@@ -392,15 +381,15 @@ def test_each_experiment_is_drawn_as_often(block: System) -> None:
     assert np.sum((counts - 1000.0) ** 2 / 1000.0) < chi2.isf(1e-3, 6)
 
 
-def test_the_cost_is_what_the_file_says(proposed: NextStop) -> None:
+def test_the_cost_is_what_the_file_says(proposed):
     """Half a Euro a minute, five minutes."""
     assert {one.cost for one in proposed.tried} == {2.5}
     assert proposed.to_dict()["tried"][0]["cost"] == {"value": 2.5, "unit": "Euro"}
 
 
 def test_of_a_single_cause_the_deviation_of_its_size_falls_as_predicted(
-    block: System, mild: list[Case], undecided: Outcome, tmp_path: Path
-) -> None:
+    block, mild, undecided, tmp_path
+):
     assert undecided.rivals is not None
     alone = replace(undecided.rivals, models=undecided.rivals.models[:1])
     found = next_stop(block, alone, ALONE)
@@ -415,7 +404,7 @@ def test_of_a_single_cause_the_deviation_of_its_size_falls_as_predicted(
     assert shown == pytest.approx(deviations[0], rel=0.2)
 
 
-def test_tolerances_of_recordings_so_far_are_where_they_do_best(undecided: Outcome) -> None:
+def test_tolerances_of_recordings_so_far_are_where_they_do_best(undecided):
     assert undecided.rivals is not None
     for model in undecided.rivals.models:
         still = np.zeros(len(model.sizes) + len(model.levels))
@@ -423,19 +412,13 @@ def test_tolerances_of_recordings_so_far_are_where_they_do_best(undecided: Outco
             assert_allclose(recording.moved(still).deviations, recording.deviations, atol=1e-6)
 
 
-def test_rivals_are_read_as_they_were_written(undecided: Outcome) -> None:
+def test_rivals_are_read_as_they_were_written(undecided):
     assert undecided.rivals is not None
     said = json.loads(json.dumps(undecided.rivals.to_dict()))
     assert read_rivals(said).to_dict() == undecided.rivals.to_dict()
 
 
-def test_the_command_writes_what_it_prints(
-    block: System,
-    mild: list[Case],
-    undecided: Outcome,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_the_command_writes_what_it_prints(block, mild, undecided, tmp_path, capsys):
     summary = {**undecided.to_dict(), "provenance": {"system": block.name}}
     (tmp_path / "summary.json").write_text(json.dumps(summary))
     out = tmp_path / "next"
@@ -465,17 +448,13 @@ def test_the_command_writes_what_it_prints(
         ({"verdict": "nothing", "provenance": {"system": "wheelset"}}, "diagnose more recordings"),
     ],
 )
-def test_what_is_no_undecided_diagnosis_is_refused(
-    summary: object, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_is_no_undecided_diagnosis_is_refused(summary, said, tmp_path, capsys):
     (tmp_path / "summary.json").write_text(json.dumps(summary))
     assert main(["next", str(tmp_path)]) == 2
     assert said in capsys.readouterr().err
 
 
-def test_a_system_that_does_not_say_what_may_be_varied_is_refused(
-    block: System, undecided: Outcome
-) -> None:
+def test_a_system_that_does_not_say_what_may_be_varied_is_refused(block, undecided):
     assert undecided.rivals is not None
     silent = replace(block, experiments=None)
     with pytest.raises(InputError, match=r"no table \[next\]"):
@@ -496,9 +475,7 @@ def test_a_system_that_does_not_say_what_may_be_varied_is_refused(
         ("[next.start]", SETTING.format("share", "'2 m'", "s"), "a unit of another dimension"),
     ],
 )
-def test_a_mistake_in_what_may_be_varied_is_refused(
-    block: System, old: str, new: str, said: str, tmp_path: Path
-) -> None:
+def test_a_mistake_in_what_may_be_varied_is_refused(block, old, new, said, tmp_path):
     for name in ("package.mo", "system.toml"):
         text = (block.source.parent / name).read_text()
         (tmp_path / name).write_text(text.replace(old, new))

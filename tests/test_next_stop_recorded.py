@@ -13,14 +13,13 @@ from workbench.studies.power.diagnosing import (
     library_effects,
     rivals_of_set,
 )
-from workbench.system.system import System
 
 ROOT = Path(__file__).parents[1]
 RADIUS = ROOT.parent / "shared" / "recordings" / "labelled" / "radius"
 
 
 @pytest.mark.long
-def test_a_faster_stop_is_proposed_and_parts_the_radii(system: System, tmp_path: Path) -> None:
+def test_a_faster_stop_is_proposed_and_parts_the_radii(system, tmp_path):
     """By the lightest stop alone, a wheel of 1.5 mm less and a roller of 2.3 mm more look alike."""
     if not RADIUS.is_dir():
         pytest.skip("needs the independent recordings, which have licences of their own")

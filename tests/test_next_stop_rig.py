@@ -35,7 +35,7 @@ PLANTED = plant(CONSTANT_PADS, ["pressure_exponent=0.04"])
 
 
 @pytest.fixture(scope="module")
-def one_speed(system: System) -> System:
+def one_speed(system) -> System:
     """The rig where only the pressure may be varied."""
     assert system.experiments is not None
     asked = system.experiments
@@ -52,21 +52,19 @@ def two_stops(system: System, effects: Effects, folder: Path) -> list[Case]:
 
 
 @pytest.fixture(scope="module")
-def alike(system: System, tmp_path_factory: pytest.TempPathFactory) -> list[Case]:
+def alike(system, tmp_path_factory) -> list[Case]:
     pytest.importorskip("rumoca", reason="no Modelica compiler")
     return two_stops(system, PLANTED, tmp_path_factory.mktemp("alike"))
 
 
 @pytest.fixture(scope="module")
-def undecided(
-    one_speed: System, alike: list[Case], tmp_path_factory: pytest.TempPathFactory
-) -> Outcome:
+def undecided(one_speed, alike, tmp_path_factory) -> Outcome:
     out = tmp_path_factory.mktemp("undecided")
     return wb.diagnose(one_speed, alike, effects=EFFECTS, out=out, workers=1, report=lambda _: None)
 
 
 @pytest.fixture(scope="module")
-def proposed(undecided: Outcome) -> NextStop:
+def proposed(undecided) -> NextStop:
     return wb.next_stop(undecided, workers=1, report=lambda _: None)
 
 
@@ -79,8 +77,8 @@ def made(experiment: RankedExperiment, system: System, folder: Path) -> Case:
 
 
 def test_the_proposed_stop_parts_what_stops_alike_did_not(
-    one_speed: System, alike: list[Case], undecided: Outcome, proposed: NextStop, tmp_path: Path
-) -> None:
+    one_speed, alike, undecided, proposed, tmp_path
+):
     (cause,) = undecided.diagnosis.causes
     assert {cause.effect.name, *cause.confusable_with} == set(EFFECTS)
     cases = [*alike, made(proposed.tried[0], one_speed, tmp_path)]
@@ -92,9 +90,7 @@ def test_the_proposed_stop_parts_what_stops_alike_did_not(
 
 
 @pytest.mark.parametrize("rank", [0, -1])
-def test_the_separation_is_what_the_stop_then_shows(
-    rank: int, one_speed: System, alike: list[Case], proposed: NextStop, tmp_path: Path
-) -> None:
+def test_the_separation_is_what_the_stop_then_shows(rank, one_speed, alike, proposed, tmp_path):
     """Of the best stop and of the last, within 20 %; noise moves it by one standard deviation."""
     one = proposed.tried[rank]
     true, other = (proposed.names.index(name) for name in EFFECTS)
@@ -105,8 +101,8 @@ def test_the_separation_is_what_the_stop_then_shows(
 
 
 def test_full_fits_end_within_half_a_deviation_of_where_more_rounds_lead(
-    one_speed: System, undecided: Outcome, proposed: NextStop, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    one_speed, undecided, proposed, monkeypatch
+):
     """Of some stops: what is left moves by half of what noise moves it by, at most."""
     rivals = undecided.rivals
     assert rivals is not None
@@ -125,9 +121,7 @@ def test_full_fits_end_within_half_a_deviation_of_where_more_rounds_lead(
 
 
 @pytest.mark.long
-def test_what_no_stop_parts_is_said_and_the_sensor_that_would(
-    one_speed: System, tmp_path: Path
-) -> None:
+def test_what_no_stop_parts_is_said_and_the_sensor_that_would(one_speed, tmp_path):
     """A load cell and a torque that read too much are told apart by neither pressure nor time."""
     pytest.importorskip("rumoca", reason="no Modelica compiler")
     asked = one_speed.experiments
@@ -189,8 +183,8 @@ def of_two(
     ],
 )
 def test_rivals_that_bend_far_are_fitted_again_in_full(
-    planted: str, names: list[str], rail: str, imitated: float, system: System, tmp_path: Path
-) -> None:
+    planted, names, rail, imitated, system, tmp_path
+):
     """Where friction is calibrated anew, both fit; what derivatives promise is not shown then.
 
     The decision is that of the diagnosis, which tells apart beyond 40 of chi-squared.
@@ -208,7 +202,7 @@ def test_rivals_that_bend_far_are_fitted_again_in_full(
 
 
 @pytest.mark.long
-def test_what_derivatives_alone_promise_is_not_proposed(system: System, tmp_path: Path) -> None:
+def test_what_derivatives_alone_promise_is_not_proposed(system, tmp_path):
     """On wet rails, derivatives part stiffness from load by ten deviations; full fits do not."""
     pytest.importorskip("rumoca", reason="no Modelica compiler")
     names = ["CreepStiffness", "WheelLoad"]
@@ -220,9 +214,7 @@ def test_what_derivatives_alone_promise_is_not_proposed(system: System, tmp_path
 
 
 @pytest.mark.long
-def test_what_one_rival_alone_takes_beyond_the_claims_is_proposed_last(
-    system: System, tmp_path: Path
-) -> None:
+def test_what_one_rival_alone_takes_beyond_the_claims_is_proposed_last(system, tmp_path):
     """On a light axle and a wet rail less load lets the wheel slide, a softer contact does not."""
     pytest.importorskip("rumoca", reason="no Modelica compiler")
     asked = system.experiments

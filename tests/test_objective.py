@@ -67,13 +67,13 @@ def constant() -> Case:
     return stop(np.full(n, -12e3))
 
 
-def test_a_gain_error_is_its_own_nrmse(system: System, constant: Case) -> None:
+def test_a_gain_error_is_its_own_nrmse(system, constant):
     judged = score(constant, run_of(system, constant, Fx=1.03 * constant["Fx"]), system)
     assert_allclose(judged.nrmse, 0.03, rtol=1e-12)
     assert_allclose(judged.rms, 360.0, rtol=1e-12)
 
 
-def test_only_braking_counts(system: System, constant: Case) -> None:
+def test_only_braking_counts(system, constant):
     """The window runs from first pressure (5 s) to the last sample above 1 m/s (15 s)."""
     window = judged_window(constant, system)
     assert_allclose([constant.time[window.start], constant.time[window.stop - 1]], [5.0, 14.995])
@@ -84,7 +84,7 @@ def test_only_braking_counts(system: System, constant: Case) -> None:
     assert judged.nrmse < 1e-6
 
 
-def test_ringing_of_the_load_cell_does_not_count(system: System, constant: Case) -> None:
+def test_ringing_of_the_load_cell_does_not_count(system, constant):
     ringing = 1000.0 * np.sin(2 * np.pi * 21.6 * constant.time)
     judged = score(constant, run_of(system, constant, Fx=constant["Fx"] + ringing), system)
     # Butterworth of order 2, forward and backward: (5/21.6)^4 = 0.3 % of 1 kN over 12 kN.
@@ -92,7 +92,7 @@ def test_ringing_of_the_load_cell_does_not_count(system: System, constant: Case)
     assert judged.nrmse < 0.003 / np.sqrt(2) * 1000 / 12e3 * 1.1
 
 
-def test_the_filter_shifts_no_phase() -> None:
+def test_the_filter_shifts_no_phase():
     t = np.arange(0.0, 10.0, 0.005)
     wave = np.sin(2 * np.pi * 0.5 * t)
     inner = slice(400, -400)
@@ -100,7 +100,7 @@ def test_the_filter_shifts_no_phase() -> None:
     assert_allclose(low_pass(t, wave, 5.0)[inner], wave[inner] / (1 + 1e-4), atol=1e-4)
 
 
-def test_z_is_the_weighted_mean_of_absolute_errors(system: System, constant: Case) -> None:
+def test_z_is_the_weighted_mean_of_absolute_errors(system, constant):
     """Reference: equation (12) for constant errors."""
     run = run_of(
         system,
@@ -114,14 +114,14 @@ def test_z_is_the_weighted_mean_of_absolute_errors(system: System, constant: Cas
     assert_allclose(score(constant, run, weighed).z, 2 * 0.2 + 3 * 0.1 + 0.5, rtol=1e-12)
 
 
-def test_without_measured_force_there_is_no_score_but_a_reason(system: System) -> None:
+def test_without_measured_force_there_is_no_score_but_a_reason(system):
     case = stop(None)
     judged = score(case, run_of(system, case, Fx=np.zeros(case.time.size)), system)
     assert (judged.rms, judged.nrmse, judged.z) == (None, None, None)
     assert "no Fx" in judged.reason
 
 
-def test_uneven_samples_give_the_same_score(system: System) -> None:
+def test_uneven_samples_give_the_same_score(system):
     """A signal below 1 Hz is known as well from samples with 20 % jitter."""
     rng = np.random.default_rng(3)
     even = stop(None)
@@ -136,7 +136,7 @@ def test_uneven_samples_give_the_same_score(system: System) -> None:
     assert_allclose(scores[1], scores[0], rtol=1e-3)
 
 
-def test_a_sensor_that_rectifies_is_scored_by_its_reading(tmp_path: Path) -> None:
+def test_a_sensor_that_rectifies_is_scored_by_its_reading(tmp_path):
     """A block that is heated and cooled in turn; the sensor reads how far it is off.
 
     The recording is the model's own, so that its free run errs by the noise alone. By the state,
@@ -174,7 +174,7 @@ def test_a_sensor_that_rectifies_is_scored_by_its_reading(tmp_path: Path) -> Non
     assert np.sqrt(np.mean(error**2)) == pytest.approx(score.rms, rel=0.01)
 
 
-def test_tuning_and_simulation_have_one_z(system: System, root: Path) -> None:
+def test_tuning_and_simulation_have_one_z(system, root):
     """Of the same gains on the same recording, to all digits."""
     cases = read_cases([root / "cases" / "08_wet_120_3.6"], system)
     problem = pose(system, "ekf", cases, scale_errors={})

@@ -27,20 +27,19 @@ from workbench.observers.run import Ending
 from workbench.observers.score import judged_window, low_pass, score
 from workbench.recordings.case import Case, read_cases
 from workbench.system.registry import load_system
-from workbench.system.system import System
 
 RR, JR, TRAIN_INERTIA = 0.70, 1500.0, 7840.0
 SECONDS, STEP = 24.0, 0.005
 
 
 @pytest.fixture(scope="module")
-def fmu(minimal_path: Path) -> Iterator[FMU]:
+def fmu(minimal_path) -> Iterator[FMU]:
     with FMU(minimal_path) as opened:
         yield opened
 
 
 @pytest.fixture(scope="module")
-def gains(fmu: FMU, system: System) -> Gains:
+def gains(fmu, system) -> Gains:
     return DisturbanceObserver.default_gains(fmu, system)
 
 
@@ -108,7 +107,7 @@ Stop = Callable[..., Case]
 
 
 @pytest.fixture(scope="module")
-def stop(fmu: FMU) -> Stop:
+def stop(fmu) -> Stop:
     """Simulates a stop, each once."""
     return cache(partial(recorded_stop, fmu))
 
@@ -121,7 +120,7 @@ COLUMNS = list(WHEELSET.columns)
 
 
 @pytest.fixture(scope="module")
-def made(fmu: FMU, root: Path, system: System) -> Iterator[dict[str, Estimator]]:
+def made(fmu, root, system) -> Iterator[dict[str, Estimator]]:
     """Every estimator, untuned."""
     with FMU(root / "fmus" / "fmi2" / "FullObserver.fmu") as full:
         by_role = {"observer": fmu, "full": full}
@@ -132,9 +131,7 @@ def made(fmu: FMU, root: Path, system: System) -> Iterator[dict[str, Estimator]]
 
 
 @pytest.mark.parametrize("name", ONLINE)
-def test_every_estimator_keeps_the_contract(
-    made: dict[str, Estimator], dry_case: Case, name: str
-) -> None:
+def test_every_estimator_keeps_the_contract(made, dry_case, name):
     """Shapes, finite force, and the same bits step by step, in the loop and when started again."""
     estimator = made[name]
     first = slice(0, 300)
@@ -151,9 +148,7 @@ def test_every_estimator_keeps_the_contract(
 
 
 @pytest.mark.parametrize("radius", [-1.5e-3, 1.5e-3])
-def test_a_wrong_radius_does_not_lead_the_smoother_astray(
-    made: dict[str, Estimator], dry_case: Case, radius: float
-) -> None:
+def test_a_wrong_radius_does_not_lead_the_smoother_astray(made, dry_case, radius):
     """A wheel 1.5 mm larger or smaller than the model's 0.46 m, as in the labelled recordings.
 
     What reads as slip is there all the time; one sample tells of it as much as all of them.
@@ -169,9 +164,7 @@ def test_a_wrong_radius_does_not_lead_the_smoother_astray(
 
 
 @pytest.mark.parametrize("name", OBSERVERS)
-def test_every_observer_recovers_friction_and_force(
-    stop: Stop, made: dict[str, Estimator], name: str
-) -> None:
+def test_every_observer_recovers_friction_and_force(stop, made, name):
     """Recovery: muDC within 0.01 and Fx within 2 % on a stop whose pads dry."""
     case = stop(drying)
     run = replay(case, made[name])
@@ -187,9 +180,7 @@ def test_every_observer_recovers_friction_and_force(
 
 
 @pytest.mark.parametrize("name", OBSERVERS)
-def test_nine_tenths_of_a_step_in_force_are_reached_within_half_a_second(
-    stop: Stop, made: dict[str, Estimator], name: str
-) -> None:
+def test_nine_tenths_of_a_step_in_force_are_reached_within_half_a_second(stop, made, name):
     case = stop(wetted)
     force = low_pass(case.time, replay(case, made[name]).signal("Fx"), 5.0)
     before, after = (force[np.searchsorted(case.time, t)] for t in (11.5, 13.5))
@@ -200,8 +191,8 @@ def test_nine_tenths_of_a_step_in_force_are_reached_within_half_a_second(
 @pytest.mark.parametrize("muWR", [0.15, 0.18])
 @pytest.mark.parametrize("name", OBSERVERS)
 def test_claimed_friction_of_the_rail_is_right_where_the_contact_is_the_models(
-    stop: Stop, made: dict[str, Estimator], name: str, muWR: float
-) -> None:
+    stop, made, name, muWR
+):
     """Within 10 % at 99 of 100 samples, which is what noise of the speeds makes of slip."""
     case = stop(drying, muWR)
     run = replay(case, made[name])
@@ -211,9 +202,7 @@ def test_claimed_friction_of_the_rail_is_right_where_the_contact_is_the_models(
 
 
 @pytest.mark.parametrize("method", [ExtendedKalmanFilter, UnscentedKalmanFilter])
-def test_kalman_filters_know_how_much_they_know(
-    fmu: FMU, stop: Stop, method: type[ExtendedKalmanFilter]
-) -> None:
+def test_kalman_filters_know_how_much_they_know(fmu, stop, method):
     """Consistency on a recording with exactly the assumed sensor noise (Bar-Shalom et al. 2001)."""
     case = stop(drying)
     assumed = method.default_gains(fmu, WHEELSET)
@@ -232,9 +221,7 @@ def test_kalman_filters_know_how_much_they_know(
     assert sigma.max() < 0.02
 
 
-def test_the_adhesion_that_is_used_is_estimated_with_the_force_and_its_band(
-    made: dict[str, Estimator], dry_case: Case
-) -> None:
+def test_the_adhesion_that_is_used_is_estimated_with_the_force_and_its_band(made, dry_case):
     """Over the load of both wheels, 80 kN each by the data sheet."""
     run = replay(dry_case, made["ekf"])
     assert_allclose(run.signal("adhesion"), np.abs(run.signal("Fx")) / 160e3)
@@ -246,9 +233,7 @@ def test_the_adhesion_that_is_used_is_estimated_with_the_force_and_its_band(
     assert np.isnan(replay(dry_case, made["open_loop"]).deviation("adhesion")).all()
 
 
-def test_ekf_and_ukf_agree_where_the_model_is_nearly_linear(
-    stop: Stop, made: dict[str, Estimator]
-) -> None:
+def test_ekf_and_ukf_agree_where_the_model_is_nearly_linear(stop, made):
     """Reference: both are the Kalman filter of a linear model; a dry stop is close to one."""
     case = stop(drying)
     runs = [replay(case, made[name]) for name in ("ekf", "ukf")]
@@ -260,7 +245,7 @@ def test_ekf_and_ukf_agree_where_the_model_is_nearly_linear(
 
 
 @pytest.mark.parametrize("name", ["disturbance_observer", "ekf", "ukf"])
-def test_observers_run_on_the_full_model_too(fmu: FMU, stop: Stop, root: Path, name: str) -> None:
+def test_observers_run_on_the_full_model_too(fmu, stop, root, name):
     """Whose suspension and rocker swing without being measured."""
     case = stop(drying)
     with FMU(root / "fmus" / "fmi2" / "FullObserver.fmu") as full:
@@ -273,9 +258,7 @@ def test_observers_run_on_the_full_model_too(fmu: FMU, stop: Stop, root: Path, n
 
 @pytest.mark.parametrize("fmi", ["fmi2", "fmi3"])
 @pytest.mark.parametrize("differences", [False, True])
-def test_any_fmu_runs_in_the_same_loop(
-    root: Path, fmu: FMU, gains: Gains, dry_case: Case, fmi: str, differences: bool
-) -> None:
+def test_any_fmu_runs_in_the_same_loop(root, fmu, gains, dry_case, fmi, differences):
     """FMI 2.0 and 3.0, with directional derivatives and without, give the same estimate."""
     expected = replay(dry_case, DisturbanceObserver(fmu, WHEELSET, gains))
     with FMU(root / "fmus" / fmi / "MinimalObserver.fmu") as other:
@@ -287,7 +270,7 @@ def test_any_fmu_runs_in_the_same_loop(
     assert np.abs(force[moving]).max() < (1.0 if differences else 1e-6)
 
 
-def test_parameter_estimator_has_the_poles_it_was_given(fmu: FMU) -> None:
+def test_parameter_estimator_has_the_poles_it_was_given(fmu):
     """Reference: eigenvalues of model and PI controller at the design point."""
     gains = WheelsetParameterEstimator.default_gains(fmu, WHEELSET)
     L = gains.values.reshape(2, 4)
@@ -303,9 +286,7 @@ def test_parameter_estimator_has_the_poles_it_was_given(fmu: FMU) -> None:
 
 
 @pytest.mark.parametrize("name", OBSERVERS)
-def test_forward_and_reverse_are_mirror_images(
-    fmu: FMU, stop: Stop, made: dict[str, Estimator], name: str
-) -> None:
+def test_forward_and_reverse_are_mirror_images(fmu, stop, made, name):
     """Property: speeds, torque and force change sign, friction does not."""
     case = stop(drying)
     turned = {name: -case[name] for name in ("tauR", "omegaW", "omegaR", "Fx")}
@@ -322,9 +303,7 @@ def test_forward_and_reverse_are_mirror_images(
     assert_allclose(reverse.estimate, signs * forward.estimate, rtol=1e-6, atol=1e-3)
 
 
-def test_without_gains_the_observer_is_the_open_loop_model(
-    fmu: FMU, stop: Stop, gains: Gains
-) -> None:
+def test_without_gains_the_observer_is_the_open_loop_model(fmu, stop, gains):
     case = stop(drying)
     zero = gains.with_values(np.array([0.0] * 16 + [-1.0, -1.0]))
     free = replay(case, DisturbanceObserver(fmu, WHEELSET, zero))
@@ -333,7 +312,7 @@ def test_without_gains_the_observer_is_the_open_loop_model(
     assert_allclose(free.estimate, open_loop.estimate, rtol=1e-6, atol=1e-3)
 
 
-def test_friction_deviations_decay_without_measurement(fmu: FMU, stop: Stop, gains: Gains) -> None:
+def test_friction_deviations_decay_without_measurement(fmu, stop, gains):
     """Reference: dmu(t) = dmu(0) exp(T t), equation (10), by implicit Euler."""
     forgetting = gains.with_values(np.append(gains.values[:16], [-0.5, -2.0]))
     observer = DisturbanceObserver(fmu, WHEELSET, forgetting)
@@ -349,9 +328,7 @@ def test_friction_deviations_decay_without_measurement(fmu: FMU, stop: Stop, gai
     assert_allclose(estimate, learned * np.exp([-1.0, -4.0]), rtol=0.05)
 
 
-def test_nothing_is_learned_about_pads_that_do_not_touch(
-    fmu: FMU, stop: Stop, gains: Gains
-) -> None:
+def test_nothing_is_learned_about_pads_that_do_not_touch(fmu, stop, gains):
     """Without pressure muDC has no effect (Schwarz et al. 2018): it stays where it is."""
     case = stop(drying)
     coasting = case.time < 2.9
@@ -360,7 +337,7 @@ def test_nothing_is_learned_about_pads_that_do_not_touch(
 
 
 @pytest.fixture(scope="module")
-def ends(root: Path) -> dict[str, Case]:
+def ends(root) -> dict[str, Case]:
     """The last 6 s of all recorded stops, in which the wheelset comes to rest."""
     return {
         case.name: case.part(slice(-1200, None)) for case in read_cases([root / "cases"], WHEELSET)
@@ -383,9 +360,7 @@ SPRINGING_BACK = ("08_wet_120_3.6", "09_wet_160_4.2_wsp")
 
 
 @pytest.mark.parametrize("name", OBSERVERS)
-def test_a_standing_wheelset_has_no_chattering_force(
-    made: dict[str, Estimator], ends: dict[str, Case], name: str
-) -> None:
+def test_a_standing_wheelset_has_no_chattering_force(made, ends, name):
     cases = [case for case in ends.values() if case.name not in SPRINGING_BACK]
     assert len(cases) == 12
     assert chattering(made[name], cases) == []
@@ -393,14 +368,12 @@ def test_a_standing_wheelset_has_no_chattering_force(
 
 @pytest.mark.parametrize("name", OBSERVERS)
 @pytest.mark.parametrize("case", SPRINGING_BACK)
-def test_a_wheelset_that_springs_back_has_no_chattering_force(
-    made: dict[str, Estimator], ends: dict[str, Case], name: str, case: str
-) -> None:
+def test_a_wheelset_that_springs_back_has_no_chattering_force(made, ends, name, case):
     """The suspension turns the stopped wheelset back by 0.2 m/s, which no observer model knows."""
     assert chattering(made[name], [ends[case]]) == []
 
 
-def test_stationary_gains_stabilise_the_linearised_model(fmu: FMU, gains: Gains) -> None:
+def test_stationary_gains_stabilise_the_linearised_model(fmu, gains):
     """Reference: eigenvalues of the extended error dynamics, all of the observer's poles."""
     settle(fmu, WHEELSET, WHEELSET.design)
     L, T = matrices(gains)
@@ -420,7 +393,7 @@ def test_stationary_gains_stabilise_the_linearised_model(fmu: FMU, gains: Gains)
     assert_allclose(P[:, :2] @ np.linalg.inv(R), K, rtol=1e-5, atol=1e-6 * np.abs(K).max())
 
 
-def test_direct_inversion_is_exact_where_nothing_changes(fmu: FMU) -> None:
+def test_direct_inversion_is_exact_where_nothing_changes(fmu):
     """Reference: Fx = (tauR - JR*a - loss)/rR at constant deceleration a, after the filter."""
     t = np.arange(0.0, 4.0, 0.005)
     omegaR = 40.0 - 1.5 * t
@@ -437,7 +410,7 @@ def test_direct_inversion_is_exact_where_nothing_changes(fmu: FMU) -> None:
     assert_allclose(estimate[6], (9000.0 + 1500.0 * 1.5 - loss) / RR, rtol=1e-5)
 
 
-def test_direct_inversion_lags_by_its_time_constant(fmu: FMU) -> None:
+def test_direct_inversion_lags_by_its_time_constant(fmu):
     """Reference: a first-order filter reaches 1 - 1/e of a step after its time constant."""
     assert inversion.TIME_CONSTANT == 0.2
     estimator = DirectInversion(fmu, WHEELSET, BLANK)
@@ -450,9 +423,7 @@ def test_direct_inversion_lags_by_its_time_constant(fmu: FMU) -> None:
     assert_allclose((estimate[6] - start) / 1e4, 1 - np.exp(-1.0), rtol=3e-3)
 
 
-def test_unstable_gains_end_as_a_value_not_as_an_exception(
-    fmu: FMU, gains: Gains, dry_case: Case
-) -> None:
+def test_unstable_gains_end_as_a_value_not_as_an_exception(fmu, gains, dry_case):
     wild = gains.with_values(np.append(-1e6 * np.ones(16), gains.values[16:]))
     run = replay(dry_case, DisturbanceObserver(fmu, WHEELSET, wild))
     judged = score(dry_case, run, WHEELSET)
@@ -462,9 +433,7 @@ def test_unstable_gains_end_as_a_value_not_as_an_exception(
         assert run.ending.value in judged.reason
 
 
-def test_estimator_that_is_called_tunable_must_say_where_gains_are_sought(
-    minimal: FMU, system: System
-) -> None:
+def test_estimator_that_is_called_tunable_must_say_where_gains_are_sought(minimal, system):
     class Silent(OpenLoop):
         name = "silent"
         tunable = True
@@ -477,7 +446,7 @@ def test_estimator_that_is_called_tunable_must_say_where_gains_are_sought(
 
 
 @pytest.mark.parametrize(("n", "q"), [(0, 2), (1, 0), (2, 2), (18, 17)])
-def test_a_covariance_is_carried_as_by_matrices(n: int, q: int) -> None:
+def test_a_covariance_is_carried_as_by_matrices(n, q):
     random = np.random.default_rng(1)
     root, rows = random.standard_normal((n + q, n + q)), random.standard_normal((n, n + q))
     before = root @ root.T
@@ -489,7 +458,7 @@ def test_a_covariance_is_carried_as_by_matrices(n: int, q: int) -> None:
 
 
 @pytest.mark.parametrize("n", [1, 2, 18])
-def test_equations_with_zeros_are_solved_as_by_lapack(n: int) -> None:
+def test_equations_with_zeros_are_solved_as_by_lapack(n):
     """Each unknown with the first and the last alone, which are zero where pivots are sought."""
     random = np.random.default_rng(1)
     A, b = np.zeros((n, n)), random.standard_normal((n, 3))

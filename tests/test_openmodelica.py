@@ -24,7 +24,7 @@ OFFERS = 'providesDirectionalDerivative="true"'
 
 
 @pytest.fixture
-def package(tmp_path: Path) -> Path:
+def package(tmp_path) -> Path:
     path = tmp_path / 'a "quoted" folder' / "Rig" / "package.mo"
     path.parent.mkdir(parents=True)
     path.write_text("package Rig model M end M; end Rig;")
@@ -49,9 +49,7 @@ def stand_in(folder: Path, monkeypatch: pytest.MonkeyPatch, prints: str, *, buil
     return calls
 
 
-def test_omc_is_asked_for_an_fmu_that_observers_can_use(
-    tmp_path: Path, package: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_omc_is_asked_for_an_fmu_that_observers_can_use(tmp_path, package, monkeypatch):
     calls = stand_in(tmp_path, monkeypatch, CHECKED.format(7, 7), builds=True)
     out = tmp_path / "out" / "omc"
     assert build_with_omc(package, ["Rig.M"], out) == [out / "M.fmu"]
@@ -87,8 +85,8 @@ def test_omc_is_asked_for_an_fmu_that_observers_can_use(
     ],
 )
 def test_what_omc_refuses_is_reported_and_nothing_is_written(
-    prints: str, match: str, tmp_path: Path, package: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    prints, match, tmp_path, package, monkeypatch
+):
     # An FMU with a missing equation may be left behind, and must not be taken.
     stand_in(tmp_path, monkeypatch, prints, builds="equation" in prints)
     with pytest.raises(InputError, match=match):
@@ -96,7 +94,7 @@ def test_what_omc_refuses_is_reported_and_nothing_is_written(
     assert not (tmp_path / "out").exists()
 
 
-def test_warnings_and_notifications_are_no_errors() -> None:
+def test_warnings_and_notifications_are_no_errors():
     output = (
         "[/lib/A.mo:1:2-3:4:readonly] Warning: Parameter k has no value.\n"
         "[/lib/B.mo:5:6-7:8:writable] Notification: From here:\n"
@@ -105,9 +103,7 @@ def test_warnings_and_notifications_are_no_errors() -> None:
     assert errors_in(output) == [Message(r"C:\lib\C.mo:9", "No viable alternative near token: end")]
 
 
-def test_without_omc_the_command_says_what_is_missing(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_without_omc_the_command_says_what_is_missing(tmp_path, monkeypatch, capsys):
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.chdir(tmp_path)
     assert main(["fmu", "build", "--all", "--compiler", "omc"]) == 2
@@ -115,6 +111,6 @@ def test_without_omc_the_command_says_what_is_missing(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_fmi_3_is_not_asked_of_omc(capsys: pytest.CaptureFixture[str]) -> None:
+def test_fmi_3_is_not_asked_of_omc(capsys):
     assert main(["fmu", "build", "--all", "--compiler", "omc", "--fmi", "3"]) == 2
     assert "--compiler omc: found --fmi 3" in capsys.readouterr().err

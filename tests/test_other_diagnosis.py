@@ -223,15 +223,13 @@ def simulated(
 
 
 @pytest.fixture(scope="module")
-def fan(tmp_path_factory: pytest.TempPathFactory) -> System:
+def fan(tmp_path_factory) -> System:
     folder = tmp_path_factory.mktemp("fan")
     return declare(folder, LIBRARY, SYSTEM)
 
 
 @pytest.fixture(scope="module")
-def diagnosed(
-    fan: System, tmp_path_factory: pytest.TempPathFactory
-) -> Callable[[Torque], tuple[Outcome, Path]]:
+def diagnosed(fan, tmp_path_factory) -> Callable[[Torque], tuple[Outcome, Path]]:
     """Diagnoses recordings under a load, once, and writes what was found."""
     known: dict[Torque, tuple[Outcome, Path]] = {}
 
@@ -251,10 +249,7 @@ def diagnosis(system: System, cases: list[Case], out: Path) -> Outcome:
     return diagnose(Problem(system, cases, library, effects), Engine(out=out))
 
 
-Diagnosed = Callable[[Torque], tuple[Outcome, Path]]
-
-
-def test_a_bearing_that_rubs_is_named_with_its_friction(diagnosed: Diagnosed) -> None:
+def test_a_bearing_that_rubs_is_named_with_its_friction(diagnosed):
     outcome, _ = diagnosed(rubbing)
     assert outcome.diagnosis.verdict == "found"
     (cause,) = outcome.diagnosis.causes
@@ -267,19 +262,19 @@ def test_a_bearing_that_rubs_is_named_with_its_friction(diagnosed: Diagnosed) ->
     assert friction.high - friction.low < 0.3 * FRICTION
 
 
-def test_nothing_is_found_in_a_motor_like_its_model(diagnosed: Diagnosed) -> None:
+def test_nothing_is_found_in_a_motor_like_its_model(diagnosed):
     outcome, _ = diagnosed(nothing)
     assert outcome.diagnosis.verdict == "nothing"
     assert outcome.extension is None
 
 
-def test_wind_that_the_library_lacks_is_unexplained(diagnosed: Diagnosed) -> None:
+def test_wind_that_the_library_lacks_is_unexplained(diagnosed):
     outcome, _ = diagnosed(gusts)
     assert outcome.diagnosis.verdict == "unexplained"
     assert outcome.diagnosis.causes == ()
 
 
-def test_a_logger_of_the_system_file_that_is_late_is_named(fan: System, tmp_path: Path) -> None:
+def test_a_logger_of_the_system_file_that_is_late_is_named(fan, tmp_path):
     """Without a line of Python or Modelica, and neither recording nor model has that clock."""
     system = declare(tmp_path, LIBRARY, f'{SYSTEM}\n[loggers]\nsupply = ["u"]\n')
     late = 3  # samples
@@ -308,7 +303,7 @@ def test_a_logger_of_the_system_file_that_is_late_is_named(fan: System, tmp_path
 
 
 @pytest.fixture(scope="module")
-def bounded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Outcome, Path]:
+def bounded(tmp_path_factory) -> tuple[Outcome, Path]:
     """A bearing that rubs by more than its class allows, and brushes that cannot stand for it."""
     folder = tmp_path_factory.mktemp("bounded")
     library = LIBRARY.replace("min=0.0, max=1.0", f"min=0.0, max={0.6 * FRICTION}")
@@ -317,7 +312,7 @@ def bounded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Outcome, Path]:
     return diagnosis(system, cases, folder / "results"), folder / "results"
 
 
-def test_a_cause_beyond_its_bound_is_told_with_it(bounded: tuple[Outcome, Path]) -> None:
+def test_a_cause_beyond_its_bound_is_told_with_it(bounded):
     """And not two causes, of which one stands for what the other may not be."""
     outcome, out = bounded
     assert outcome.diagnosis.verdict == "partly explained"
@@ -341,7 +336,7 @@ def windy(t: float, w: float) -> float:
     return rubbing(t, w) + 0.6 * gusts(t, w)
 
 
-def test_a_part_is_told_with_its_size_and_what_remains(diagnosed: Diagnosed) -> None:
+def test_a_part_is_told_with_its_size_and_what_remains(diagnosed):
     outcome, out = diagnosed(windy)
     assert outcome.diagnosis.verdict == "partly explained"
     (cause,) = outcome.diagnosis.causes
@@ -369,7 +364,7 @@ def bent(t: float, w: float) -> float:
     return rubbing(t, w) * (1.0 + 0.1 * np.cos(2.0 * np.pi * (w - 5.0) / 12.5))
 
 
-def test_an_interval_is_widened_where_a_law_is_wrong_in_form(diagnosed: Diagnosed) -> None:
+def test_an_interval_is_widened_where_a_law_is_wrong_in_form(diagnosed):
     """Alone in the catalogue, so that no other effect stands for what its form leaves."""
     outcome, out = diagnosed(bent)
     system, cases = outcome.system, list(outcome.cases)
@@ -387,7 +382,7 @@ def test_an_interval_is_widened_where_a_law_is_wrong_in_form(diagnosed: Diagnose
     assert "widened because what remains is no noise" in page
 
 
-def test_where_nothing_is_accepted_the_nearest_candidates_say_why(diagnosed: Diagnosed) -> None:
+def test_where_nothing_is_accepted_the_nearest_candidates_say_why(diagnosed):
     outcome, _ = diagnosed(gusts)
     assert "nearest candidates" in outcome.summary()
     assert "--propose" in outcome.summary()
@@ -396,7 +391,7 @@ def test_where_nothing_is_accepted_the_nearest_candidates_say_why(diagnosed: Dia
         assert candidate.reasons
 
 
-def test_drag_that_differs_by_nature_is_a_level_and_no_cause(diagnosed: Diagnosed) -> None:
+def test_drag_that_differs_by_nature_is_a_level_and_no_cause(diagnosed):
     outcome, _ = diagnosed(nothing)
     value, unit = outcome.levels["c", "all"]
     # Four recordings whose drag scatters by 2 %: their mean is known to 1 %.
@@ -404,9 +399,7 @@ def test_drag_that_differs_by_nature_is_a_level_and_no_cause(diagnosed: Diagnose
     assert unit == "N.m.s2/rad2"
 
 
-def test_the_extended_model_rubs_and_lacks_nothing(
-    fan: System, diagnosed: Diagnosed, tmp_path: Path
-) -> None:
+def test_the_extended_model_rubs_and_lacks_nothing(fan, diagnosed, tmp_path):
     outcome, out = diagnosed(rubbing)
     assert outcome.extension is not None
     assert outcome.extension.difference < 1e-3
@@ -418,7 +411,7 @@ def test_the_extended_model_rubs_and_lacks_nothing(
     assert diagnosis(better, cases, tmp_path).diagnosis.verdict == "nothing"
 
 
-def test_a_diagnosis_is_text_table_numbers_and_figure(diagnosed: Diagnosed) -> None:
+def test_a_diagnosis_is_text_table_numbers_and_figure(diagnosed):
     outcome, _ = diagnosed(rubbing)
     said = "The model lacks a bearing that rubs: BearingFriction (or BrushDrop), tau_c 0.0"
     assert outcome.summary().startswith(said)
@@ -440,7 +433,7 @@ def test_a_diagnosis_is_text_table_numbers_and_figure(diagnosed: Diagnosed) -> N
 
 
 @pytest.mark.parametrize("load", [rubbing, nothing, gusts])
-def test_page_and_files_speak_of_the_fan(load: Torque, diagnosed: Diagnosed) -> None:
+def test_page_and_files_speak_of_the_fan(load, diagnosed):
     outcome, out = diagnosed(load)
     page = write_diagnosis(outcome, {"run": run_of("diagnose", outcome.system, {})}, out, 1)
     tree = lxml.html.fromstring(page.read_bytes())

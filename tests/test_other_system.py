@@ -1,7 +1,6 @@
 """A machine of another kind, by its system file alone, is simulated, drawn and tested alike."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import lxml.html
 import numpy as np
@@ -99,12 +98,12 @@ TRUE_LOSS = 14.0  # [W/K], nominal is 10
 
 
 @pytest.fixture(scope="module")
-def boiler(tmp_path_factory: pytest.TempPathFactory) -> System:
+def boiler(tmp_path_factory) -> System:
     return declare(tmp_path_factory.mktemp("boiler"), MODEL, SYSTEM, Vessel="Boiler.Vessel")
 
 
 @pytest.fixture(scope="module")
-def case(boiler: System, tmp_path_factory: pytest.TempPathFactory) -> Case:
+def case(boiler, tmp_path_factory) -> Case:
     """Ten minutes of heating a vessel that loses more than its model says."""
     folder = tmp_path_factory.mktemp("case") / "01_heating"
     time = np.arange(0.0, 600.0, 0.5)
@@ -124,12 +123,12 @@ def case(boiler: System, tmp_path_factory: pytest.TempPathFactory) -> Case:
 
 
 @pytest.fixture(scope="module")
-def result(boiler: System, case: Case) -> CaseResult:
+def result(boiler, case) -> CaseResult:
     (result,) = simulate(prepare(boiler, choose(boiler, [])), [case])
     return result
 
 
-def test_every_general_estimator_finds_the_loss(result: CaseResult) -> None:
+def test_every_general_estimator_finds_the_loss(result):
     assert {"open_loop", "disturbance_observer", "parameter_estimator", "ekf", "ukf"} <= set(
         result.runs
     )
@@ -142,7 +141,7 @@ def test_every_general_estimator_finds_the_loss(result: CaseResult) -> None:
             assert result.scores[name].nrmse < 0.25 * result.scores["open_loop"].nrmse
 
 
-def test_panels_follow_from_signals_where_none_are_declared(result: CaseResult) -> None:
+def test_panels_follow_from_signals_where_none_are_declared(result):
     assert [panel.title for panel in case_figure(result).panels] == [
         "Temperature of the skin TSkin [K]",
         "Heating power P [kW]",
@@ -153,7 +152,7 @@ def test_panels_follow_from_signals_where_none_are_declared(result: CaseResult) 
     assert result.case["P"].max() / 1e3 < case_figure(result).panels[1].high < 1.0
 
 
-def test_outputs_of_one_unit_share_a_panel(boiler: System) -> None:
+def test_outputs_of_one_unit_share_a_panel(boiler):
     """Where another signal is judged, which has a panel of its own."""
     judged = replace(boiler.outputs[0], name="TRoom", label="temperature of the room")
     other = replace(
@@ -166,7 +165,7 @@ def test_outputs_of_one_unit_share_a_panel(boiler: System) -> None:
     assert "Temperature of the room TRoom" in titles
 
 
-def test_table_and_page_speak_of_the_judged_signal(result: CaseResult, tmp_path: Path) -> None:
+def test_table_and_page_speak_of_the_judged_signal(result, tmp_path):
     system = result.system
     table = format_table(system, [result])
     assert table.startswith("Error of T, rms / mean (over the whole recording)")
@@ -193,7 +192,7 @@ def test_table_and_page_speak_of_the_judged_signal(result: CaseResult, tmp_path:
         assert word not in text
 
 
-def test_columns_of_the_data_are_the_signals(result: CaseResult, tmp_path: Path) -> None:
+def test_columns_of_the_data_are_the_signals(result, tmp_path):
     write_estimates(result, tmp_path / "case.csv")
     columns = list(pd.read_csv(tmp_path / "case.csv"))
     assert columns[:4] == ["time [s]", "measured.P [W]", "measured.TSkin [K]", "measured.T [K]"]
@@ -201,7 +200,7 @@ def test_columns_of_the_data_are_the_signals(result: CaseResult, tmp_path: Path)
     assert not [name for name in columns if "claimed" in name]
 
 
-def test_results_are_tables_figures_and_text_in_a_notebook(result: CaseResult) -> None:
+def test_results_are_tables_figures_and_text_in_a_notebook(result):
     run = result.runs["ekf"]
     assert list(run.to_frame())[:2] == ["time [s]", "TSkin [K]"]
     assert len(run.plot().axes) == len(run.columns)
@@ -213,9 +212,7 @@ def test_results_are_tables_figures_and_text_in_a_notebook(result: CaseResult) -
     assert "T_nrmse" in result.summary()
 
 
-def test_outputs_that_are_no_states_tell_of_states_and_loss(
-    boiler: System, case: Case, tmp_path: Path
-) -> None:
+def test_outputs_that_are_no_states_tell_of_states_and_loss(boiler, case, tmp_path):
     with open_model(boiler) as fmu:
         linear = linear_test(fmu, boiler)
     assert linear.observable

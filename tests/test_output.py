@@ -57,12 +57,8 @@ def refused(command: str, out: Path, capsys: pytest.CaptureFixture[str]) -> str:
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_a_place_that_takes_no_results_is_refused_before_the_work(
-    root: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-    command: str,
-) -> None:
+    root, tmp_path, monkeypatch, capsys, command
+):
     if command in ("diagnose", "export", "power"):
         pytest.importorskip("casadi")
     monkeypatch.chdir(root)
@@ -85,7 +81,7 @@ def test_a_place_that_takes_no_results_is_refused_before_the_work(
     assert (tmp_path / "file").read_text() == "mine"
 
 
-def test_a_run_lets_go_of_its_folder_after_any_end(tmp_path: Path) -> None:
+def test_a_run_lets_go_of_its_folder_after_any_end(tmp_path):
     script = (
         "from pathlib import Path; import os, sys\n"
         "from workbench.runtime.files import locked_folder\n"
@@ -96,7 +92,7 @@ def test_a_run_lets_go_of_its_folder_after_any_end(tmp_path: Path) -> None:
         assert not list(tmp_path.iterdir())
 
 
-def test_a_child_that_outlives_its_run_does_not_hold_the_folder(tmp_path: Path) -> None:
+def test_a_child_that_outlives_its_run_does_not_hold_the_folder(tmp_path):
     script = (
         "from pathlib import Path; import os, sys, time\n"
         "from workbench.runtime.files import locked_folder\n"
@@ -115,22 +111,20 @@ def test_a_child_that_outlives_its_run_does_not_hold_the_folder(tmp_path: Path) 
         os.kill(child, signal.SIGKILL)
 
 
-def test_where_folders_cannot_be_locked_results_are_written(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_where_folders_cannot_be_locked_results_are_written(tmp_path, monkeypatch):
     monkeypatch.setattr(files, "fcntl", None)
     with locked_folder(tmp_path / "new"):
         assert list((tmp_path / "new").iterdir()) == []
 
 
-def test_the_rest_of_a_file_whose_run_was_killed_is_removed(tmp_path: Path) -> None:
+def test_the_rest_of_a_file_whose_run_was_killed_is_removed(tmp_path):
     for name in ("page.html.123.part", "mine.part", "other"):
         (tmp_path / name).write_text("")
     with locked_folder(tmp_path):
         assert sorted(path.name for path in tmp_path.iterdir()) == ["mine.part", "other"]
 
 
-def test_the_rest_of_a_file_whose_worker_was_ended_is_removed(tmp_path: Path) -> None:
+def test_the_rest_of_a_file_whose_worker_was_ended_is_removed(tmp_path):
     """As SIGTERM does while workers draw."""
     with suppress(SystemExit), locked_folder(tmp_path):
         (tmp_path / "figure.png.123.part").write_text("")
@@ -138,7 +132,7 @@ def test_the_rest_of_a_file_whose_worker_was_ended_is_removed(tmp_path: Path) ->
     assert not list(tmp_path.iterdir())
 
 
-def test_a_file_that_cannot_be_written_is_refused_before_the_work(tmp_path: Path) -> None:
+def test_a_file_that_cannot_be_written_is_refused_before_the_work(tmp_path):
     (tmp_path / "file").write_text("")
     for path, match in (
         (tmp_path, "a folder, and no file"),
@@ -151,9 +145,7 @@ def test_a_file_that_cannot_be_written_is_refused_before_the_work(tmp_path: Path
     assert sorted(len(path.name) for path in tmp_path.iterdir()) == [4, 255]
 
 
-def test_a_figure_that_cannot_be_written_costs_no_numbers(
-    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_figure_that_cannot_be_written_costs_no_numbers(root, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(root)
     name = "01_dry_80_1.5"
     for kind in ("png", "svg"):  # a folder stands where a figure is to be
@@ -167,7 +159,7 @@ def test_a_figure_that_cannot_be_written_costs_no_numbers(
     assert written == [f"{name}.csv", "index.html", "summary.json"]
 
 
-def test_what_fills_the_disk_leaves_no_half_of_a_file(tmp_path: Path) -> None:
+def test_what_fills_the_disk_leaves_no_half_of_a_file(tmp_path):
     with at_most(1000):
         with warning_if_unwritable():
             write_whole(tmp_path / "figure.svg", "x" * 2000)

@@ -27,9 +27,7 @@ def run(*command: str, **options: object) -> subprocess.CompletedProcess[str]:
     [("-c", "import workbench"), ("-m", "workbench", "--version"), ("-m", "workbench", "--help")],
     ids=" ".join,
 )
-def test_nothing_heavy_is_imported_before_it_is_needed(
-    root: Path, command: tuple[str, ...]
-) -> None:
+def test_nothing_heavy_is_imported_before_it_is_needed(root, command):
     done = run("-X", "importtime", *command, cwd=root)
     assert done.returncode == 0
     imported = {line.rpartition("|")[2].strip() for line in done.stderr.splitlines()}
@@ -37,16 +35,14 @@ def test_nothing_heavy_is_imported_before_it_is_needed(
     assert imported.isdisjoint(HEAVY)
 
 
-def test_matplotlib_is_loaded_only_where_something_is_drawn(root: Path) -> None:
+def test_matplotlib_is_loaded_only_where_something_is_drawn(root):
     done = run("-X", "importtime", "-c", "import workbench.api", cwd=root)
     imported = {line.rpartition("|")[2].strip() for line in done.stderr.splitlines()}
     assert "workbench.api" in imported
     assert "matplotlib" not in imported
 
 
-def test_the_help_lists_each_command_and_each_has_its_own(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_the_help_lists_each_command_and_each_has_its_own(capsys):
     with pytest.raises(SystemExit, match="0"):
         main(["--help"])
     listed = capsys.readouterr().out
@@ -57,7 +53,7 @@ def test_the_help_lists_each_command_and_each_has_its_own(
         assert capsys.readouterr().out.startswith(f"usage: workbench {name} ")
 
 
-def test_each_public_name_is_what_its_module_defines() -> None:
+def test_each_public_name_is_what_its_module_defines():
     assert dir(workbench) == sorted(workbench.__all__)
     for name in workbench.__all__:
         assert getattr(workbench, name).__name__ == name
@@ -66,12 +62,12 @@ def test_each_public_name_is_what_its_module_defines() -> None:
 @pytest.mark.parametrize(
     ("old", "new"), [("Monitored", "MonitoringResult"), ("Tuned", "TuningResult")]
 )
-def test_a_former_name_works_and_says_what_it_is_called_now(old: str, new: str) -> None:
+def test_a_former_name_works_and_says_what_it_is_called_now(old, new):
     with pytest.warns(DeprecationWarning, match=f"workbench.{old} is now workbench.{new}"):
         assert getattr(workbench, old) is getattr(workbench, new)
 
 
-def test_a_name_that_is_not_public_is_refused() -> None:
+def test_a_name_that_is_not_public_is_refused():
     with pytest.raises(AttributeError, match="'workbench' has no attribute 'read_case_s'"):
         _ = workbench.read_case_s
 
@@ -89,9 +85,7 @@ print(sum(solve.entry.stats.cache_hits.values()), sum(solve.entry.stats.cache_mi
 """
 
 
-def test_compiled_code_is_kept_and_the_setting_of_numba_is_not_touched(
-    root: Path, tmp_path: Path
-) -> None:
+def test_compiled_code_is_kept_and_the_setting_of_numba_is_not_touched(root, tmp_path):
     environment = os.environ | {"XDG_CACHE_HOME": str(tmp_path)}
     first = run("-c", SOLVE, cwd=root, env=environment)
     again = run("-c", SOLVE, cwd=root, env=environment)
@@ -99,7 +93,7 @@ def test_compiled_code_is_kept_and_the_setting_of_numba_is_not_touched(
     assert [p.name for p in tmp_path.iterdir()] == ["wheelset-workbench"]
 
 
-def test_code_is_compiled_where_nothing_can_be_kept(root: Path) -> None:
+def test_code_is_compiled_where_nothing_can_be_kept(root):
     for _ in range(2):
         done = run("-c", SOLVE, cwd=root, env=os.environ | {"XDG_CACHE_HOME": os.devnull})
         assert done.stdout == "0 1\n", done.stderr
@@ -108,7 +102,7 @@ def test_code_is_compiled_where_nothing_can_be_kept(root: Path) -> None:
 # --- what comes along ---
 
 
-def test_the_fmus_that_come_along_are_those_that_system_files_name(root: Path) -> None:
+def test_the_fmus_that_come_along_are_those_that_system_files_name(root):
     listed = json.loads((root / "fmus" / "manifest.json").read_text())["fmus"]
     named = [name for names in built_models().values() for name in names]
     assert {path: one["model"] for path, one in listed.items()} == {
@@ -120,7 +114,7 @@ def test_the_fmus_that_come_along_are_those_that_system_files_name(root: Path) -
 
 
 @pytest.fixture(scope="module")
-def installed(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def installed(root, tmp_path_factory) -> Path:
     """What pip installs of the wheel that is built from the source distribution."""
     folder = tmp_path_factory.mktemp("installed")
     sources = tmp_path_factory.mktemp("sources")
@@ -132,7 +126,7 @@ def installed(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def anywhere(installed: Path, tmp_path: Path):
+def anywhere(installed, tmp_path):
     """Runs the installed `workbench` in a folder with nothing in it."""
 
     def call(*arguments: str) -> subprocess.CompletedProcess[str]:
@@ -152,18 +146,18 @@ def files(folder: Path) -> dict[str, bytes]:
 
 
 @pytest.mark.parametrize("name", OWN)
-def test_the_wheel_holds_models_fmus_and_cases(root: Path, installed: Path, name: str) -> None:
+def test_the_wheel_holds_models_fmus_and_cases(root, installed, name):
     assert files(installed / "workbench" / "data" / name) == files(root / name)
 
 
-def test_the_wheel_holds_the_whole_package_and_nothing_else(root: Path, installed: Path) -> None:
+def test_the_wheel_holds_the_whole_package_and_nothing_else(root, installed):
     held = files(installed / "workbench")
     assert {k: v for k, v in held.items() if not k.startswith("data/")} == files(root / "workbench")
     others = {path.name for path in installed.iterdir()} - {"workbench", "bin"}
     assert all(name.endswith(".dist-info") for name in others)
 
 
-def test_the_wheel_simulates_its_own_cases_in_an_empty_folder(anywhere, tmp_path: Path) -> None:
+def test_the_wheel_simulates_its_own_cases_in_an_empty_folder(anywhere, tmp_path):
     done = anywhere("simulate", "--estimator", "open_loop")
     assert done.returncode == 0, done.stderr
     assert [path.name for path in tmp_path.iterdir()] == ["results"]
@@ -176,14 +170,14 @@ def test_the_wheel_simulates_its_own_cases_in_an_empty_folder(anywhere, tmp_path
 
 
 def test_a_folder_of_the_same_name_does_not_shadow_the_cases_of_the_wheel(
-    anywhere, installed: Path, tmp_path: Path
-) -> None:
+    anywhere, installed, tmp_path
+):
     (tmp_path / "cases").mkdir()
     own = installed / "workbench" / "data" / "cases"
     assert f"simulate {min(own.iterdir())} " in anywhere("simulate", "--help").stdout
 
 
-def test_messages_of_the_wheel_name_only_what_it_has(anywhere) -> None:
+def test_messages_of_the_wheel_name_only_what_it_has(anywhere):
     missing = anywhere("simulate", "--fmu", "missing.fmu")
     assert missing.returncode == 2
     assert "To do: give the path of one with --fmu." in missing.stderr

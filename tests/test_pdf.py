@@ -15,7 +15,7 @@ CASE = "01_dry_80_1.5"
 
 
 @pytest.fixture(scope="module")
-def results(tmp_path_factory: pytest.TempPathFactory, root: Path) -> Path:
+def results(tmp_path_factory, root) -> Path:
     """One estimator on one recorded stop, printed."""
     if shutil.which("chromium") is None:
         pytest.skip("no chromium")
@@ -25,13 +25,13 @@ def results(tmp_path_factory: pytest.TempPathFactory, root: Path) -> Path:
     return out
 
 
-def test_report_has_a_few_pages(results: Path) -> None:
+def test_report_has_a_few_pages(results):
     printed = (results / "report.pdf").read_bytes()
     assert printed.startswith(b"%PDF-")
     assert 2 <= len(re.findall(rb"/Type\s*/Page\b", printed)) <= 4
 
 
-def test_report_tells_number_version_and_data_and_has_lines_to_sign(results: Path) -> None:
+def test_report_tells_number_version_and_data_and_has_lines_to_sign(results):
     summary = json.loads((results / "summary.json").read_text())
     run = summary["provenance"]["run"]
     page = lxml.html.fromstring((results / "index.html").read_bytes())
@@ -44,7 +44,7 @@ def test_report_tells_number_version_and_data_and_has_lines_to_sign(results: Pat
         assert f"{line}: name, date, signature" in text
 
 
-def test_another_result_has_another_number(results: Path) -> None:
+def test_another_result_has_another_number(results):
     summary = json.loads((results / "summary.json").read_text())
     number = number_of(summary)
     assert number == number_of(json.loads(json.dumps(summary)))
@@ -52,12 +52,7 @@ def test_another_result_has_another_number(results: Path) -> None:
     assert number_of(summary) != number
 
 
-def test_without_a_browser_nothing_is_begun(
-    tmp_path: Path,
-    root: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_without_a_browser_nothing_is_begun(tmp_path, root, monkeypatch, capsys):
     monkeypatch.setenv("PATH", str(tmp_path))
     out = tmp_path / "out"
     assert main(["simulate", str(root / "cases" / CASE), "--pdf", "--out", str(out)]) == 2

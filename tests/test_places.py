@@ -64,7 +64,7 @@ def orchard(folder: Path, change: tuple[str, str] = ("", "")) -> Library:
     return read_library(folder / "Orchard.mo")
 
 
-def test_a_size_that_is_an_array_makes_an_effect_in_each_place(tmp_path: Path) -> None:
+def test_a_size_that_is_an_array_makes_an_effect_in_each_place(tmp_path):
     effects = read_effects(orchard(tmp_path), "Base")
     names = ["Clogging[1]", "Clogging[2]", "Clogging[3]", "Drought"]
     assert [effect.name for effect in effects] == names
@@ -74,7 +74,7 @@ def test_a_size_that_is_an_array_makes_an_effect_in_each_place(tmp_path: Path) -
     assert parameter_of(effects[3], "valves.drought.dry") == "dry"
 
 
-def test_all_places_or_one_are_chosen_by_name(tmp_path: Path) -> None:
+def test_all_places_or_one_are_chosen_by_name(tmp_path):
     effects = read_effects(orchard(tmp_path), "Base")
     assert [one.name for one in choose(["Clogging"], effects)] == [
         effect.name for effect in effects[:3]
@@ -84,7 +84,7 @@ def test_all_places_or_one_are_chosen_by_name(tmp_path: Path) -> None:
         choose(["Clogging[4]"], effects)
 
 
-def test_the_extended_model_has_a_size_in_its_place_alone(tmp_path: Path) -> None:
+def test_the_extended_model_has_a_size_in_its_place_alone(tmp_path):
     """Two places of one class are one component; the other effect of the slot follows it."""
     library = orchard(tmp_path)
     effects = read_effects(library, "Base")
@@ -109,8 +109,6 @@ def test_the_extended_model_has_a_size_in_its_place_alone(tmp_path: Path) -> Non
         ("Integer n = 3", "Integer n = 1 + 2", r"found lost = zeros\(n\); expected 'parameter Int"),
     ],
 )
-def test_places_that_cannot_be_counted_or_told_apart_are_refused(
-    old: str, new: str, message: str, tmp_path: Path
-) -> None:
+def test_places_that_cannot_be_counted_or_told_apart_are_refused(old, new, message, tmp_path):
     with pytest.raises(InputError, match=message):
         read_effects(orchard(tmp_path, (old, new)), "Base")

@@ -24,8 +24,7 @@ from workbench.observers import Gains, SearchSpace
 from workbench.observers.estimators.disturbance import DisturbanceObserver
 from workbench.observers.score import corner
 from workbench.recordings.case import Case
-from workbench.runtime.pool import Pool
-from workbench.tuning import Evaluator, Job, Plan, Search, evaluate_gains, recording, search
+from workbench.tuning import Job, Plan, Search, evaluate_gains, recording, search
 
 pytest.importorskip("casadi")
 pytest.importorskip("rumoca")
@@ -274,7 +273,7 @@ def gain(found: Search, name: str) -> float:
 
 
 @pytest.fixture(scope="module")
-def prepare_rolling(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Job]:
+def prepare_rolling(tmp_path_factory) -> Callable[..., Job]:
     """Prepares jobs on the linear model."""
     folder = tmp_path_factory.mktemp("rolling")
     rolling = declare(folder, MODEL, SYSTEM, RollingWheelset="Lib.RollingWheelset")
@@ -290,9 +289,7 @@ def prepare_rolling(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., J
 
 
 @pytest.mark.parametrize("step", [0.2, 0.02])
-def test_z_is_that_of_the_lyapunov_equation(
-    prepare_rolling: Callable[..., Job], inline: Callable[[Job], Pool[Evaluator]], step: float
-) -> None:
+def test_z_is_that_of_the_lyapunov_equation(prepare_rolling, inline, step):
     """The low-pass follows a deviation wholly within 0.2 s, and by 39 % within 0.02 s."""
     process, samples = Process(step), 100_000
     best, _ = kalman_gains(process)
@@ -316,8 +313,8 @@ def test_z_is_that_of_the_lyapunov_equation(
 
 
 def test_search_finds_the_kalman_gain_from_an_observer_without_feedback(
-    prepare_rolling: Callable[..., Job], inline: Callable[[Job], Pool[Evaluator]], tmp_path: Path
-) -> None:
+    prepare_rolling, inline, tmp_path
+):
     """Samples 0.2 s apart: the low-pass has settled, and least variance is least z.
 
     At the optimum the error e is independent of its derivative d by the gains, so that the slope of
@@ -372,9 +369,7 @@ def test_search_finds_the_kalman_gain_from_an_observer_without_feedback(
     assert expected(x) / z - 1.0 < np.pi / 4 / independent * chi2.ppf(0.9999, len(free))
 
 
-def test_search_ends_where_the_two_worst_cases_are_equally_bad(
-    prepare_rolling: Callable[..., Job], inline: Callable[[Job], Pool[Evaluator]], tmp_path: Path
-) -> None:
+def test_search_ends_where_the_two_worst_cases_are_equally_bad(prepare_rolling, inline, tmp_path):
     """A lively friction asks for more feedback, a noisy sensor for less; 5 Hz matter to both."""
     lively = Process(step=0.02)
     noisy = Process(step=0.02, spread=0.01, decay=0.2, noise=(0.2, 0.003))

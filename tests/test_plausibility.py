@@ -31,7 +31,7 @@ Table = dict[str, np.ndarray]
 
 
 @pytest.fixture(scope="module")
-def stop(root: Path) -> tuple[str, Table]:
+def stop(root) -> tuple[str, Table]:
     """A recorded stop: its case.toml, and its columns by header."""
     folder = root / "cases" / NAME
     header, *rows = (folder / "measured.csv").read_text().splitlines()

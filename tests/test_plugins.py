@@ -10,7 +10,6 @@ import pytest
 
 from workbench.errors import InputError
 from workbench.system.plugins import Plugin, find_plugin
-from workbench.system.system import System
 
 PROJECT = """
 [build-system]
@@ -85,7 +84,7 @@ class Coasting(OpenLoop):
 
 
 @pytest.fixture(scope="module")
-def installed(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def installed(root, tmp_path_factory) -> Path:
     """Where pip has installed the distribution."""
     sources, folder = tmp_path_factory.mktemp("sources"), tmp_path_factory.mktemp("installed")
     fmu = root / "fmus" / "fmi2" / "MinimalObserver.fmu"
@@ -118,7 +117,7 @@ def said(*command: str, beside: Path) -> str:
     return run.stdout + run.stderr
 
 
-def test_its_system_is_listed_and_its_command_runs(installed: Path) -> None:
+def test_its_system_is_listed_and_its_command_runs(installed):
     systems = json.loads(said("-m", "workbench", "systems", "--json", beside=installed))["result"]
     assert systems["systems"]["spinning"]["title"] == "A roller that spins down"
     assert "say how long a roller spins" in said("-m", "workbench", "--help", beside=installed)
@@ -129,7 +128,7 @@ def test_its_system_is_listed_and_its_command_runs(installed: Path) -> None:
     }
 
 
-def test_its_estimator_is_one_of_its_system_and_of_no_other(installed: Path) -> None:
+def test_its_estimator_is_one_of_its_system_and_of_no_other(installed):
     listing = "; ".join(
         [
             "import workbench as wb",
@@ -141,7 +140,7 @@ def test_its_estimator_is_one_of_its_system_and_of_no_other(installed: Path) -> 
     assert said("-c", listing, beside=installed) == "[True, False]\n"
 
 
-def test_one_that_is_broken_costs_a_warning_and_no_command(installed: Path, tmp_path: Path) -> None:
+def test_one_that_is_broken_costs_a_warning_and_no_command(installed, tmp_path):
     broken = tmp_path / "broken-1.0.dist-info"
     broken.mkdir()
     (broken / "METADATA").write_text("Metadata-Version: 2.1\nName: broken\nVersion: 1.0\n")
@@ -151,7 +150,7 @@ def test_one_that_is_broken_costs_a_warning_and_no_command(installed: Path, tmp_
     assert "plugin 'nowhere.at_all:X': found ModuleNotFoundError" in printed
 
 
-def test_a_plugin_that_is_not_there_is_refused(system: System) -> None:
+def test_a_plugin_that_is_not_there_is_refused(system):
     assert find_plugin(system.plugin).commands
     with pytest.raises(InputError, match=r"plugin 'not\.there:PLUGIN': found ModuleNotFoundError"):
         find_plugin("not.there:PLUGIN")
@@ -159,9 +158,7 @@ def test_a_plugin_that_is_not_there_is_refused(system: System) -> None:
         find_plugin("workbench.machines.train:NONE")
 
 
-def test_a_package_that_declares_none_is_read_by_module_names_with_a_warning(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_package_that_declares_none_is_read_by_module_names_with_a_warning(tmp_path, monkeypatch):
     package = tmp_path / "old_companion"
     (package / "gains").mkdir(parents=True)
     (package / "__init__.py").touch()
@@ -174,7 +171,7 @@ def test_a_package_that_declares_none_is_read_by_module_names_with_a_warning(
     )
 
 
-def test_a_companion_is_a_plugin_with_a_warning(root: Path, tmp_path: Path) -> None:
+def test_a_companion_is_a_plugin_with_a_warning(root, tmp_path):
     from workbench.recordings.datasets import published
 
     file = tmp_path / "system.toml"

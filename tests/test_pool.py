@@ -60,7 +60,7 @@ def counted(folder: Path) -> Iterator[Path]:
 
 @pytest.mark.parametrize("isolated", [False, True])
 @pytest.mark.parametrize("workers", [1, 2])
-def test_results_are_those_of_the_function(workers: int, isolated: bool) -> None:
+def test_results_are_those_of_the_function(workers, isolated):
     with Pool(workers, nullcontext, 2.0, isolated=isolated) as pool:
         assert pool.map(math.pow, range(5)) == [1.0, 2.0, 4.0, 8.0, 16.0]
         assert sorted(pool.completed(math.pow, [3, 1])) == [(0, 8.0), (1, 2.0)]
@@ -69,7 +69,7 @@ def test_results_are_those_of_the_function(workers: int, isolated: bool) -> None
 
 
 @pytest.mark.parametrize("isolated", [False, True])
-def test_an_error_of_a_task_is_raised_as_it_is_and_costs_no_worker(isolated: bool) -> None:
+def test_an_error_of_a_task_is_raised_as_it_is_and_costs_no_worker(isolated):
     with Pool(1, nullcontext, None, isolated=isolated) as pool:
         before = pool.submit(pid).result()
         with pytest.raises(InputError, match="found this; expected that"):
@@ -77,7 +77,7 @@ def test_an_error_of_a_task_is_raised_as_it_is_and_costs_no_worker(isolated: boo
         assert pool.submit(pid).result() == before
 
 
-def test_each_worker_is_prepared_once(tmp_path: Path) -> None:
+def test_each_worker_is_prepared_once(tmp_path):
     with Pool(2, counted, tmp_path) as pool:
         used = set(pool.map(_name_of_worker, range(50)))
     assert used <= {file.name for file in tmp_path.iterdir()}
@@ -88,20 +88,20 @@ def _name_of_worker(folder: Path, number: int) -> str:
     return str(os.getpid())
 
 
-def test_a_failed_preparation_is_raised_by_every_task() -> None:
+def test_a_failed_preparation_is_raised_by_every_task():
     with Pool(2, open, "/nowhere/at/all") as pool:
         for _ in range(3):
             with pytest.raises(FileNotFoundError, match="nowhere"):
                 pool.submit(pid).result(timeout=60.0)
 
 
-def test_a_task_whose_worker_dies_is_tried_again(tmp_path: Path) -> None:
+def test_a_task_whose_worker_dies_is_tried_again(tmp_path):
     with Pool(1, nullcontext, tmp_path / "mark", isolated=True) as pool:
         first = pool.submit(pid).result()
         assert pool.submit(kill_once).result() != first
 
 
-def test_a_task_that_kills_two_workers_is_lost_and_no_other() -> None:
+def test_a_task_that_kills_two_workers_is_lost_and_no_other():
     with Pool(2, nullcontext, 2.0) as pool:
         tasks: list[Future[float]] = [pool.submit(math.pow, k) for k in range(30)]
         deadly = pool.submit(kill)
@@ -111,7 +111,7 @@ def test_a_task_that_kills_two_workers_is_lost_and_no_other() -> None:
         assert [task.result() for task in tasks] == [2.0**k for k in range(30)] * 2
 
 
-def test_a_worker_that_is_killed_while_it_waits_is_replaced() -> None:
+def test_a_worker_that_is_killed_while_it_waits_is_replaced():
     with Pool(1, nullcontext, None, isolated=True) as pool:
         first = pool.submit(pid).result()
         os.kill(first, signal.SIGKILL)
@@ -119,7 +119,7 @@ def test_a_worker_that_is_killed_while_it_waits_is_replaced() -> None:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="there, no server starts workers")
-def test_a_server_of_workers_that_has_just_been_killed_is_replaced() -> None:
+def test_a_server_of_workers_that_has_just_been_killed_is_replaced():
     # What starts at once meets a server that refuses, and is not yet known to have ended: every
     # other time, so ten times in a row never.
     for _ in range(10):
@@ -129,7 +129,7 @@ def test_a_server_of_workers_that_has_just_been_killed_is_replaced() -> None:
                 assert another.submit(pid).result() != os.getpid()
 
 
-def test_a_task_beyond_the_limit_is_ended_and_the_next_is_done() -> None:
+def test_a_task_beyond_the_limit_is_ended_and_the_next_is_done():
     with Pool(1, nullcontext, 600.0, limit=0.2) as pool:
         begin = time.monotonic()
         with pytest.raises(WorkerError, match=r"longer than 0\.2 s"):
@@ -138,7 +138,7 @@ def test_a_task_beyond_the_limit_is_ended_and_the_next_is_done() -> None:
         assert time.monotonic() - begin < 60.0  # of 600; what it takes depends on the machine
 
 
-def test_leaving_a_pool_ends_what_is_under_way_and_drops_what_waits() -> None:
+def test_leaving_a_pool_ends_what_is_under_way_and_drops_what_waits():
     begin = time.monotonic()
     with Pool(1, nullcontext, 600.0, isolated=True) as pool:
         worker = pool.submit(pid).result()
@@ -161,7 +161,7 @@ def _until_gone(process: int) -> None:
         time.sleep(0.01)
 
 
-def test_finishing_keeps_what_is_under_way_and_drops_what_waits() -> None:
+def test_finishing_keeps_what_is_under_way_and_drops_what_waits():
     with Pool(1, nullcontext, 0.3, isolated=True) as pool:
         tasks = [pool.submit(time.sleep) for _ in range(3)]
         while not tasks[0].running():
@@ -171,7 +171,7 @@ def test_finishing_keeps_what_is_under_way_and_drops_what_waits() -> None:
         assert tasks[0].result() is None
 
 
-def test_workers_use_one_blas_thread() -> None:
+def test_workers_use_one_blas_thread():
     with Pool(1, nullcontext, np.zeros(1), isolated=True) as pool:
         assert set(pool.submit(blas_threads).result()) == {1}
 
@@ -234,7 +234,7 @@ def _started(program: str, folder: Path) -> "subprocess.Popen[str]":
     )
 
 
-def test_a_script_needs_no_guard(tmp_path: Path) -> None:
+def test_a_script_needs_no_guard(tmp_path):
     with ending(_started(PLAIN, tmp_path)) as program:
         out, errors = program.communicate(timeout=120)
     assert out == "program\n[3.0, 9.0]\n"
@@ -242,7 +242,7 @@ def test_a_script_needs_no_guard(tmp_path: Path) -> None:
     assert program.returncode == 0
 
 
-def test_a_program_from_the_prompt_needs_no_guard(tmp_path: Path) -> None:
+def test_a_program_from_the_prompt_needs_no_guard(tmp_path):
     """As in a notebook, where the program is no file."""
     program = PLAIN.replace('Path(__file__).exists() and __name__ == "__main__"', "True")
     run = subprocess.run(
@@ -258,7 +258,7 @@ def test_a_program_from_the_prompt_needs_no_guard(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("ctrl_c")
-def test_ctrl_c_is_the_programs_alone_and_ends_the_pool(tmp_path: Path) -> None:
+def test_ctrl_c_is_the_programs_alone_and_ends_the_pool(tmp_path):
     with ending(_started(WAITING, tmp_path)) as program:
         assert program.stdout is not None
         assert program.stdout.readline() == "under way\n"
@@ -268,7 +268,7 @@ def test_ctrl_c_is_the_programs_alone_and_ends_the_pool(tmp_path: Path) -> None:
     assert comes_true(lambda: not living(program.pid))
 
 
-def test_workers_end_with_a_program_that_is_killed(tmp_path: Path) -> None:
+def test_workers_end_with_a_program_that_is_killed(tmp_path):
     with ending(_started(WAITING, tmp_path)) as program:
         assert program.stdout is not None
         assert program.stdout.readline() == "under way\n"

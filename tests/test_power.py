@@ -91,7 +91,7 @@ def named(effect: str, *twins: str, **intervals: tuple[float, float, float]) -> 
 
 
 @pytest.fixture(scope="module")
-def all_effects(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def all_effects(tmp_path_factory) -> Path:
     path = tmp_path_factory.mktemp("fmu") / "AllEffects.fmu"
     build_everything(SYSTEM, REPERTOIRE.effects, path)
     return path
@@ -100,7 +100,7 @@ def all_effects(tmp_path_factory: pytest.TempPathFactory) -> Path:
 # --- plan ---
 
 
-def test_every_effect_of_the_catalogue_is_planted_and_every_other_one_is_outside() -> None:
+def test_every_effect_of_the_catalogue_is_planted_and_every_other_one_is_outside():
     assert sorted(plantable.effect for plantable in PLANTABLE if plantable.effect) == sorted(
         effect.name for effect in REPERTOIRE.effects
     )
@@ -110,7 +110,7 @@ def test_every_effect_of_the_catalogue_is_planted_and_every_other_one_is_outside
     assert {one.name for one in (*PLANTABLE, *SHEET_ERRORS)} == rig - clocks
 
 
-def test_sensed_effects_leave_the_stop_alone_and_others_do_not() -> None:
+def test_sensed_effects_leave_the_stop_alone_and_others_do_not():
     """That is what lets all their sizes share one simulation."""
 
     def truth(names: list[str]) -> np.ndarray:
@@ -125,7 +125,7 @@ def test_sensed_effects_leave_the_stop_alone_and_others_do_not() -> None:
     assert not np.array_equal(truth(["wheel_radius"]), none)
 
 
-def test_what_is_planted_lies_within_the_bounds_of_the_catalogue(all_effects: Path) -> None:
+def test_what_is_planted_lies_within_the_bounds_of_the_catalogue(all_effects):
     """Beyond them no fit could find it. A size that cannot be negative is never planted so."""
     with FMU(all_effects) as fmu:
         bounds = {v.name: (v.minimum, v.maximum) for v in fmu.description.variables}
@@ -142,7 +142,7 @@ def test_what_is_planted_lies_within_the_bounds_of_the_catalogue(all_effects: Pa
         assert set(plantable.shapes) == {name for name, _ in effect.shapes}
 
 
-def test_longer_plan_holds_the_shorter_one() -> None:
+def test_longer_plan_holds_the_shorter_one():
     """So that a run can be resumed with more sets."""
 
     def options(groups: list[Group]) -> set[str]:
@@ -154,19 +154,19 @@ def test_longer_plan_holds_the_shorter_one() -> None:
     assert options(shorter).isdisjoint(options(plan(REPERTOIRE, 2, [1.0, 4.0], 1, 2, 2)))
 
 
-def test_each_simulation_has_tolerances_of_its_own() -> None:
+def test_each_simulation_has_tolerances_of_its_own():
     groups = plan(REPERTOIRE, 50, [0.5, 1.0, 2.0, 4.0], 3, 30, 1)
     seeds = [group[0].seed for group in groups]
     assert len(set(seeds)) == len(seeds)
     assert all(one.seed == group[0].seed for group in groups for one in group)
 
 
-def test_plan_that_is_cut_short_has_something_of_each_kind() -> None:
+def test_plan_that_is_cut_short_has_something_of_each_kind():
     groups = plan(REPERTOIRE, 50, [0.5, 1.0, 2.0, 4.0], 3, 30, 1)
     assert {group[0].kind for group in groups[:20]} == {"clean", "single", "pair", "outside"}
 
 
-def test_what_is_planted_has_both_signs_where_it_may_and_the_size_asked_for() -> None:
+def test_what_is_planted_has_both_signs_where_it_may_and_the_size_asked_for():
     signs: dict[str, set[float]] = {}
     for one, *_ in plan(REPERTOIRE, 1, [3.0], 12, 1, 1):
         if one.kind == "single":
@@ -182,7 +182,7 @@ def test_what_is_planted_has_both_signs_where_it_may_and_the_size_asked_for() ->
 
 
 @pytest.mark.parametrize(("hits", "of"), [(0, 50), (1, 50), (7, 12), (12, 12)])
-def test_interval_of_a_share_leaves_2_5_percent_on_either_side(hits: int, of: int) -> None:
+def test_interval_of_a_share_leaves_2_5_percent_on_either_side(hits, of):
     """Definition of Clopper and Pearson (1934), by the binomial distribution itself."""
     found = share([True] * hits + [False] * (of - hits))
     assert found["share"] == hits / of
@@ -195,12 +195,12 @@ def test_interval_of_a_share_leaves_2_5_percent_on_either_side(hits: int, of: in
     assert (found["high"] == 1.0) == (hits == of)
 
 
-def test_share_of_no_trials_is_unknown() -> None:
+def test_share_of_no_trials_is_unknown():
     found = share([])
     assert (found["share"], found["low"], found["high"]) == (None, 0.0, 1.0)
 
 
-def test_right_name_is_the_first_one_or_in_its_group() -> None:
+def test_right_name_is_the_first_one_or_in_its_group():
     planted = {"fx_gain": 0.008}
     assert named_right(said(planted, named("FxGain")))
     assert named_right(said(planted, named("DriveTorqueGain", "FxGain")))
@@ -209,7 +209,7 @@ def test_right_name_is_the_first_one_or_in_its_group() -> None:
     assert not named_right(said({"friction_step": 0.04}, named("WaterFilm"), kind="outside"))
 
 
-def test_pair_is_found_if_each_effect_has_a_cause_of_its_own() -> None:
+def test_pair_is_found_if_each_effect_has_a_cause_of_its_own():
     planted = {"fx_gain": 0.008, "torque_gain": 0.008}
     both = named("FxGain", "DriveTorqueGain")
     assert named_all(said(planted, named("DriveTorqueGain"), named("BrakeFade"), named("FxGain")))
@@ -217,7 +217,7 @@ def test_pair_is_found_if_each_effect_has_a_cause_of_its_own() -> None:
     assert not named_all(said(planted, both, named("BrakeFade")))
 
 
-def test_intervals_are_judged_by_the_law_of_the_rig() -> None:
+def test_intervals_are_judged_by_the_law_of_the_rig():
     near, far = (2.1, 1.9, 2.3), (1.0, 0.9, 1.1)
     bedding = named("BeddingIn", loss=(-0.04, -0.05, -0.03), tau=far)
     assert intervals_cover(said({"bedding_in": -0.04}, bedding), REPERTOIRE) == [True, False]
@@ -229,7 +229,7 @@ def test_intervals_are_judged_by_the_law_of_the_rig() -> None:
     assert intervals_cover(said({"fx_gain": 1.0}, twin), REPERTOIRE) == []
 
 
-def test_summary_counts_what_was_said(tmp_path: Path) -> None:
+def test_summary_counts_what_was_said(tmp_path):
     results = [
         said({}, kind="clean"),
         said({}, kind="clean", other="unexplained"),
@@ -287,7 +287,7 @@ def test_summary_counts_what_was_said(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("results", [[], [said({}, kind="clean")]])
-def test_run_that_ended_early_is_reported(results: list[SetVerdict], tmp_path: Path) -> None:
+def test_run_that_ended_early_is_reported(results, tmp_path):
     found = summarise(results, REPERTOIRE)
     write_power(found, REPERTOIRE.effects, PROVENANCE, tmp_path)
     assert f"{len(results)} sets" in format_power(found)
@@ -296,7 +296,7 @@ def test_run_that_ended_early_is_reported(results: list[SetVerdict], tmp_path: P
 # --- verdicts on the disk ---
 
 
-def test_line_that_a_kill_cut_off_is_forgotten(tmp_path: Path) -> None:
+def test_line_that_a_kill_cut_off_is_forgotten(tmp_path):
     path = tmp_path / "sets.jsonl"
     first, second = (
         said({"fx_gain": 0.1}, named("FxGain", "ApexOffset", gain=(0.1, 0.0, 0.2))),
@@ -312,7 +312,7 @@ def test_line_that_a_kill_cut_off_is_forgotten(tmp_path: Path) -> None:
     assert Journal(path, IDENTITY, resume=True).results == [first, second]
 
 
-def test_a_damaged_verdict_is_left_out_and_the_file_before_is_kept(tmp_path: Path) -> None:
+def test_a_damaged_verdict_is_left_out_and_the_file_before_is_kept(tmp_path):
     path = tmp_path / "sets.jsonl"
     results = [said({"fx_gain": 0.1 * k}) for k in range(1, 4)]
     journal = Journal(path, IDENTITY, resume=False)
@@ -330,7 +330,7 @@ def test_a_damaged_verdict_is_left_out_and_the_file_before_is_kept(tmp_path: Pat
         Journal(path, IDENTITY, resume=True)
 
 
-def test_verdicts_of_another_run_are_refused(tmp_path: Path) -> None:
+def test_verdicts_of_another_run_are_refused(tmp_path):
     path = tmp_path / "sets.jsonl"
     Journal(path, IDENTITY, resume=False).append(said({}))
     with pytest.raises(InputError, match=r"another run \(other: seed\)"):
@@ -354,7 +354,7 @@ def run(out: Path, report: Callable[[str], None]) -> tuple[list[SetVerdict], boo
     return diagnose_sets(_GROUPS, study, Engine(report=report, out=out), seed=1, resume=True)
 
 
-def test_killed_run_leaves_no_process_and_goes_on_where_it_was(tmp_path: Path) -> None:
+def test_killed_run_leaves_no_process_and_goes_on_where_it_was(tmp_path):
     """Two short stops: a load cell's gain of 1.6 % is plain, one of 0.05 % is not worth a word."""
     script = (
         "import sys; from pathlib import Path; sys.path.insert(0, sys.argv[1]); "
@@ -384,7 +384,7 @@ def test_killed_run_leaves_no_process_and_goes_on_where_it_was(tmp_path: Path) -
     assert summarise(results, REPERTOIRE)["false_alarms"]["hits"] == 0
 
 
-def test_a_plan_foresees_what_its_recordings_show(tmp_path: Path) -> None:
+def test_a_plan_foresees_what_its_recordings_show(tmp_path):
     """Of the two short stops above: a gain of 1.6 % is plain in them, one of 0.05 % is not."""
     study = PowerStudy(SYSTEM, PlantedStops(tuple(STOPS), REFERENCE), library_effects(SYSTEM))
     sizes = (0.25, 8.0)
@@ -409,7 +409,7 @@ def test_a_plan_foresees_what_its_recordings_show(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("unknowns", [1, 7])
-def test_what_is_clear_is_found_in_19_of_20(unknowns: int) -> None:
+def test_what_is_clear_is_found_in_19_of_20(unknowns):
     """Estimates drawn by the law that the chance follows from, a share of 4 000 to 3 of its own
     standard deviations."""
     decides = thresholds(28)
@@ -420,7 +420,7 @@ def test_what_is_clear_is_found_in_19_of_20(unknowns: int) -> None:
     assert found == pytest.approx(SURE, abs=3.0 * np.sqrt(SURE * (1.0 - SURE) / 4000))
 
 
-def test_one_effect_at_one_size_is_one_set() -> None:
+def test_one_effect_at_one_size_is_one_set():
     repertoire = Repertoire(REPERTOIRE.plantables[:1], REPERTOIRE.effects)
     (group,) = plan(repertoire, 0, [4.0], 1, 5, 1)
     (planted,) = group
@@ -440,9 +440,7 @@ def test_one_effect_at_one_size_is_one_set() -> None:
         ["--clean", "0", "--pairs", "0", "--repeats", "0"],
     ],
 )
-def test_command_refuses_what_makes_no_sense(
-    arguments: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_command_refuses_what_makes_no_sense(arguments, tmp_path, capsys):
     try:
         status = main(["power", "--out", str(tmp_path), *arguments])
     except SystemExit as refused:

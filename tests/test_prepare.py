@@ -38,7 +38,7 @@ PUBLISHED = PublishedSet("Pumps", "a shop", "none", "Pumps.", (layout(NAMES),))
 
 
 @pytest.fixture
-def pumps(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Path]:
+def pumps(tmp_path, monkeypatch) -> Callable[..., Path]:
     """Publishes recordings of pumps by names; returns the system file."""
     monkeypatch.syspath_prepend(str(tmp_path / "modules"))
     (tmp_path / "modules").mkdir()
@@ -56,9 +56,7 @@ def pumps(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Path
     return publish
 
 
-def test_each_machine_of_a_set_has_its_own_next_command(
-    pumps: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_each_machine_of_a_set_has_its_own_next_command(pumps, tmp_path, capsys):
     system = str(pumps("a_1", "a_test", "b_1"))
     out = tmp_path / "cases"
     assert main(["prepare", system, "--from", str(tmp_path / "set"), "--out", str(out)]) == 0
@@ -70,9 +68,7 @@ def test_each_machine_of_a_set_has_its_own_next_command(
     ]
 
 
-def test_a_single_machine_has_one_command_with_the_whole_folder(
-    pumps: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_single_machine_has_one_command_with_the_whole_folder(pumps, tmp_path, capsys):
     system = str(pumps("a_1", "a_test"))
     out = tmp_path / "cases"
     assert main(["prepare", system, "--from", str(tmp_path / "set"), "--out", str(out)]) == 0
@@ -80,9 +76,7 @@ def test_a_single_machine_has_one_command_with_the_whole_folder(
     assert command == f"next: workbench diagnose --system {system} {out} --held-out a_test"
 
 
-def test_cases_of_an_earlier_run_go_unless_somebody_changed_them(
-    pumps: Callable[..., Path], tmp_path: Path
-) -> None:
+def test_cases_of_an_earlier_run_go_unless_somebody_changed_them(pumps, tmp_path):
     out = tmp_path / "cases"
     write_cases(str(pumps("a_1", "a_2", "a_3", "a_4")), tmp_path / "set", out)
     (out / "a_2" / "measured.csv").write_text("mine")
@@ -96,19 +90,19 @@ def test_cases_of_an_earlier_run_go_unless_somebody_changed_them(
     }
 
 
-def test_a_set_says_where_it_is_to_be_had(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_set_says_where_it_is_to_be_had(capsys):
     assert main(["prepare", "cascaded_tanks"]) == 0
     told = capsys.readouterr().out
     for part in ("https://doi.org/10.4121/12960104", "CC BY-SA 4.0", "dataBenchmark.mat"):
         assert part in told
 
 
-def test_a_system_whose_recordings_nobody_published_says_so() -> None:
+def test_a_system_whose_recordings_nobody_published_says_so():
     with pytest.raises(InputError, match="no plugin that knows of published recordings"):
         write_cases("wheelset", Path(), Path())
 
 
-def test_a_file_with_another_checksum_is_refused(tmp_path: Path) -> None:
+def test_a_file_with_another_checksum_is_refused(tmp_path):
     for name in TANKS:
         (tmp_path / "set" / name).parent.mkdir(parents=True)
         (tmp_path / "set" / name).write_text("time [s],pump [V],level2 [V]\n0,1,2\n")
@@ -117,28 +111,26 @@ def test_a_file_with_another_checksum_is_refused(tmp_path: Path) -> None:
     assert not (tmp_path / "out").exists()
 
 
-def test_a_set_that_is_not_complete_is_refused(tmp_path: Path) -> None:
+def test_a_set_that_is_not_complete_is_refused(tmp_path):
     (tmp_path / "test").mkdir()
     (tmp_path / TANKS[1]).write_text("")
     with pytest.raises(InputError, match=r"estimation/measured\.csv: found no such file"):
         write_cases("cascaded_tanks", tmp_path, tmp_path / "out")
 
 
-def test_a_folder_without_the_set_says_what_it_lacks(tmp_path: Path) -> None:
+def test_a_folder_without_the_set_says_what_it_lacks(tmp_path):
     with pytest.raises(InputError, match=r"a folder with dataBenchmark\.mat or estimation"):
         write_cases("cascaded_tanks", tmp_path, tmp_path / "out")
 
 
-def test_a_folder_with_other_files_is_left_as_it_is(tmp_path: Path) -> None:
+def test_a_folder_with_other_files_is_left_as_it_is(tmp_path):
     (tmp_path / "notes.txt").write_text("mine")
     with pytest.raises(InputError, match="a folder with other files"):
         write_cases("cascaded_tanks", tmp_path / "set", tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["notes.txt"]
 
 
-def test_what_was_read_and_cut_is_told_to_machines(
-    tmp_path: Path, published: Callable[[str], Path]
-) -> None:
+def test_what_was_read_and_cut_is_told_to_machines(tmp_path, published):
     for _ in range(2):  # over its own files it writes again
         write_cases("cascaded_tanks", published("cascaded_tanks"), tmp_path)
     told = json.loads((tmp_path / PREPARED).read_text())
@@ -149,9 +141,7 @@ def test_what_was_read_and_cut_is_told_to_machines(
     assert told["cases"]["test"]["rows"] == [0, 1023]
 
 
-def test_a_script_gets_recordings_to_fit_and_those_held_out(
-    tmp_path: Path, published: Callable[[str], Path]
-) -> None:
+def test_a_script_gets_recordings_to_fit_and_those_held_out(tmp_path, published):
     fitted, held_out = wb.prepare_cases("cascaded_tanks", published("cascaded_tanks"), tmp_path)
     assert [case.name for case in fitted] == ["estimation"]
     assert [case.name for case in held_out] == ["test"]

@@ -6,7 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 from workbench.runtime.progress import ProgressReporter, StepReporter
 
 
-def test_a_part_that_takes_long_says_how_much_is_left_of_it() -> None:
+def test_a_part_that_takes_long_says_how_much_is_left_of_it():
     lines: list[str] = []
     done = ProgressReporter(lines.append, "simulations", every=0.0).part(4)
     for one in range(4):
@@ -16,7 +16,7 @@ def test_a_part_that_takes_long_says_how_much_is_left_of_it() -> None:
     assert lines[-1] == "4 simulations"  # nothing is left
 
 
-def test_parts_add_up_from_any_thread() -> None:
+def test_parts_add_up_from_any_thread():
     lines: list[str] = []
     pace = ProgressReporter(lines.append, "simulations", every=0.0)
 
@@ -31,7 +31,7 @@ def test_parts_add_up_from_any_thread() -> None:
     assert counts == list(range(1, 251))
 
 
-def test_what_is_soon_done_says_nothing() -> None:
+def test_what_is_soon_done_says_nothing():
     lines: list[str] = []
     done = ProgressReporter(lines.append, "simulations", every=3600.0).part(100)
     for one in range(100):
@@ -39,7 +39,7 @@ def test_what_is_soon_done_says_nothing() -> None:
     assert lines == []
 
 
-def test_each_of_a_known_number_of_steps_says_what_came_of_it_and_what_is_left() -> None:
+def test_each_of_a_known_number_of_steps_says_what_came_of_it_and_what_is_left():
     lines: list[str] = []
     progress = StepReporter(lines.append, 12)
     for name in ("first", "second"):

@@ -57,7 +57,7 @@ Q = np.linspace(-4.0, 4.0, 81)
         ("Limiter", 4.0 * np.tanh(Q / 1.5)),
     ],
 )
-def test_forms_of_signed_quantities_are_what_they_are_called(name: str, law: Vector) -> None:
+def test_forms_of_signed_quantities_are_what_they_are_called(name, law):
     """But for kinks, which are rounded over a hundredth of the range: half of that at most."""
     (form,) = (form for form in SIGNED if form.name == name)
     shape = {form.shape: 1.5} if form.shape else {}
@@ -66,7 +66,7 @@ def test_forms_of_signed_quantities_are_what_they_are_called(name: str, law: Vec
     assert_allclose(4.0 * values, law, atol=0.04)
 
 
-def test_evidence_is_the_density_of_what_was_measured() -> None:
+def test_evidence_is_the_density_of_what_was_measured():
     """Reference: the multivariate normal distribution itself, of white noise and of a process."""
     rng = np.random.default_rng(1)
     basis = Knots(0.0, 1.0).basis(np.linspace(0.0, 1.0, 60))
@@ -81,7 +81,7 @@ def test_evidence_is_the_density_of_what_was_measured() -> None:
     assert_allclose(found.coefficients, gain @ y, rtol=1e-4, atol=1e-4)  # the prior's jitter
 
 
-def test_noise_alone_asks_for_no_function() -> None:
+def test_noise_alone_asks_for_no_function():
     """Odds above 12 would turn up by chance in at most one of twelve (Markov's inequality)."""
     rng = np.random.default_rng(2)
     basis = Knots(0.0, 1.0).basis(np.linspace(0.0, 1.0, 60))
@@ -91,7 +91,7 @@ def test_noise_alone_asks_for_no_function() -> None:
     assert np.mean(np.array(found) > np.log(12.0)) < 1.0 / 12.0
 
 
-def test_splines_hold_straight_lines_and_stay_beyond_their_ends() -> None:
+def test_splines_hold_straight_lines_and_stay_beyond_their_ends():
     """Reference: coefficients of a line are its values at the knots (de Boor 1978, chapter IX)."""
     knots = Knots(2.0, 9.0)
     at = knots.low + knots.step * (np.arange(COEFFICIENTS) - 1.0)
@@ -101,7 +101,7 @@ def test_splines_hold_straight_lines_and_stay_beyond_their_ends() -> None:
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(tmp_path_factory) -> Path:
     """The new system, recorded with a leak that begins at a level: no effect of its library."""
     return recorded(
         tmp_path_factory.mktemp("leaking"),
@@ -143,7 +143,7 @@ def levels(inflow: Vector, level: float, leaves: Callable[[float, float], float]
 
 
 @pytest.fixture(scope="module")
-def proposal(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def proposal(folder, tmp_path_factory) -> Path:
     out = tmp_path_factory.mktemp("proposal")
     options = ["--system", str(folder), "--out", str(out), "--workers", "1", "--propose"]
     assert main(["diagnose", str(folder / "recordings"), *options]) == 0
@@ -151,7 +151,7 @@ def proposal(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out / "proposed"
 
 
-def test_a_leak_that_begins_at_a_level_is_proposed(proposal: Path) -> None:
+def test_a_leak_that_begins_at_a_level_is_proposed(proposal):
     told = json.loads((proposal / "proposal.json").read_text())
     (law,) = told["laws"]
     assert law["class"].endswith("Threshold")
@@ -164,7 +164,7 @@ def test_a_leak_that_begins_at_a_level_is_proposed(proposal: Path) -> None:
     assert "not known physics" in told["sentence"]
 
 
-def test_a_proposed_law_is_an_effect_with_units_model_and_gain(proposal: Path) -> None:
+def test_a_proposed_law_is_an_effect_with_units_model_and_gain(proposal):
     summary = json.loads((proposal / "summary.json").read_text())
     assert summary["gain"]["after"] < 0.5 * summary["gain"]["before"]
     (cause,) = summary["causes"]
@@ -174,7 +174,7 @@ def test_a_proposed_law_is_an_effect_with_units_model_and_gain(proposal: Path) -
     assert (proposal / "model" / "Extended.fmu").is_file()
 
 
-def test_the_diagnosis_and_what_is_proposed_lead_to_each_other(proposal: Path) -> None:
+def test_the_diagnosis_and_what_is_proposed_lead_to_each_other(proposal):
     for here, there in (
         ("index.html", "proposed/index.html"),
         ("proposed/index.html", "index.html"),
@@ -186,7 +186,7 @@ def test_the_diagnosis_and_what_is_proposed_lead_to_each_other(proposal: Path) -
         assert led == [proposal.parent / there]
 
 
-def test_the_estimated_function_is_the_law(proposal: Path) -> None:
+def test_the_estimated_function_is_the_law(proposal):
     """A free function has no kink: 15 % of its range is what it may be off, but for a factor.
 
     The area of the outlet is calibrated beside it, so that flows are known but for that factor.
@@ -204,7 +204,7 @@ def test_the_estimated_function_is_the_law(proposal: Path) -> None:
 
 
 @pytest.mark.long
-def test_a_law_is_proposed_beside_a_cause_that_explains_most(tmp_path: Path) -> None:
+def test_a_law_is_proposed_beside_a_cause_that_explains_most(tmp_path):
     """Seepage is in the catalogue, an outlet that clogs by 0.3 % a minute is not."""
     seepage = 4e-3
     folder = recorded(
@@ -225,7 +225,7 @@ def test_a_law_is_proposed_beside_a_cause_that_explains_most(tmp_path: Path) -> 
     assert after["gain"]["after"] < 0.5 * before["gain"]["after"]
 
 
-def test_slots_that_are_proposed_rightly_are_counted() -> None:
+def test_slots_that_are_proposed_rightly_are_counted():
     shown = {"rig": "--seed 1", "verdict": "unexplained", "error": "", "named": [], "late": []}
     shown |= {"left_out": ["A"], "laws": ["a law"], "slots": ["a"], "asked": True}
     shown |= {"before": 11.0, "after": 3.0, "after_with_it": 1.0, "slot_right": True}
@@ -263,7 +263,7 @@ def swinging(rng: np.random.Generator, size: float) -> tuple[list[Matrix], list[
     return errors, clocks
 
 
-def test_a_period_is_found_whatever_its_phase_in_each_recording() -> None:
+def test_a_period_is_found_whatever_its_phase_in_each_recording():
     """Within what two frequencies have to differ by to lose a period over the longest way."""
     errors, clocks = swinging(np.random.default_rng(5), 1.0)
     found = strongest_period(errors, clocks, 20)
@@ -271,7 +271,7 @@ def test_a_period_is_found_whatever_its_phase_in_each_recording() -> None:
     assert abs(1.0 / found.length - 1.0 / PERIOD) < 0.5 / max(map(np.ptp, clocks))
 
 
-def test_white_noise_has_no_period_that_a_search_would_not_find_by_chance() -> None:
+def test_white_noise_has_no_period_that_a_search_would_not_find_by_chance():
     """The largest of M sums of 8 squares: by Boole, one in a hundred is beyond this quantile."""
     rng, beyond = np.random.default_rng(6), 0
     for _ in range(40):
@@ -289,13 +289,13 @@ def test_white_noise_has_no_period_that_a_search_would_not_find_by_chance() -> N
     assert beyond <= 2
 
 
-def test_too_few_periods_are_a_function_of_time() -> None:
+def test_too_few_periods_are_a_function_of_time():
     rng = np.random.default_rng(7)
     assert strongest_period([rng.standard_normal((12, 1))], [np.arange(12.0)], 5) is None
     assert strongest_period([rng.standard_normal((200, 1))], [np.zeros(200)], 5) is None
 
 
-def test_a_law_changes_an_output_by_its_own_size_beforehand() -> None:
+def test_a_law_changes_an_output_by_its_own_size_beforehand():
     """Reference: the normal distribution of one coefficient with a prior of that deviation."""
     N, g = np.array([[4.0]]), np.array([-40.0])
     free, held = smoothest(N, g), smoothest(N, g, most=1.0)
@@ -305,7 +305,7 @@ def test_a_law_changes_an_output_by_its_own_size_beforehand() -> None:
     assert held.evidence < free.evidence
 
 
-def test_the_time_since_an_input_began_does_not_count_before(folder: Path) -> None:
+def test_the_time_since_an_input_began_does_not_count_before(folder):
     system = load_system(folder)
     library = read_library(system.library)
     base = system.models[OBSERVER].name
@@ -319,7 +319,7 @@ def test_the_time_since_an_input_began_does_not_count_before(folder: Path) -> No
 
 
 @pytest.mark.long
-def test_an_outlet_that_pulses_is_proposed_with_its_period(tmp_path: Path) -> None:
+def test_an_outlet_that_pulses_is_proposed_with_its_period(tmp_path):
     folder = recorded(
         tmp_path / "tank",
         lambda time, level: outlet(level) * (1.0 + 0.1 * math.sin(2.0 * math.pi * time / 41.0)),
@@ -340,9 +340,7 @@ def test_an_outlet_that_pulses_is_proposed_with_its_period(tmp_path: Path) -> No
     assert (tmp_path / "out" / "proposed" / "functions.png").is_file()
 
 
-def test_nothing_is_proposed_where_nothing_is_missing(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_nothing_is_proposed_where_nothing_is_missing(tmp_path, capsys):
     write_system(tmp_path / "tight", 0.0)
     options = ["--system", str(tmp_path / "tight"), "--out", str(tmp_path / "out")]
     assert main(["diagnose", *options, "--workers", "1", "--propose"]) == 0
@@ -350,7 +348,7 @@ def test_nothing_is_proposed_where_nothing_is_missing(
     assert not (tmp_path / "out" / "proposed").exists()
 
 
-def test_a_law_acts_as_its_class_does(folder: Path, tmp_path: Path) -> None:
+def test_a_law_acts_as_its_class_does(folder, tmp_path):
     """Reference: seepage, an effect of the library, beside a probe that follows the level."""
     system = load_system(folder)
     cases = read_cases([folder / "recordings"], system)[:1]
@@ -372,7 +370,7 @@ def test_a_law_acts_as_its_class_does(folder: Path, tmp_path: Path) -> None:
         assert np.ptp(level) > 0.1
 
 
-def test_heat_that_is_lost_follows_its_closed_form(folder: Path) -> None:
+def test_heat_that_is_lost_follows_its_closed_form(folder):
     """Power that rises evenly: P = c t, of which c T (t - T (1 - exp(-t/T))) is left."""
     system = load_system(folder)
     library = read_library(system.library)
@@ -390,7 +388,7 @@ def test_heat_that_is_lost_follows_its_closed_form(folder: Path) -> None:
     assert_allclose(kept, 2.0 * time**2, rtol=1e-12)
 
 
-def test_slots_tell_where_a_law_may_act(folder: Path) -> None:
+def test_slots_tell_where_a_law_may_act(folder):
     system = load_system(folder)
     library = read_library(system.library)
     base = system.models[OBSERVER].name
@@ -399,7 +397,7 @@ def test_slots_tell_where_a_law_may_act(folder: Path) -> None:
     assert [(one.name, one.unit) for one in outlet.inputs] == [("nominal", "m3/s"), ("h", "m")]
 
 
-def test_an_input_without_a_unit_has_that_of_what_it_is_bound_to(tmp_path: Path) -> None:
+def test_an_input_without_a_unit_has_that_of_what_it_is_bound_to(tmp_path):
     """So that what turns once per turn of a shaft is looked for in the slot of any friction."""
     (tmp_path / "package.mo").write_text(
         """
@@ -447,7 +445,7 @@ def test_an_input_without_a_unit_has_that_of_what_it_is_bound_to(tmp_path: Path)
         ([(10.0, 8.0), (1.0, 1.4)], False),  # what is better in one channel is worse in another
     ],
 )
-def test_a_law_is_worth_a_tenth_of_an_error(rms: list[tuple[float, float]], falls: bool) -> None:
+def test_a_law_is_worth_a_tenth_of_an_error(rms, falls):
     errors = [
         Errors("new", f"channel {k}", "m", True, 100, pair, pair, "", pair)
         for k, pair in enumerate(rms)
@@ -459,9 +457,7 @@ def test_a_law_is_worth_a_tenth_of_an_error(rms: list[tuple[float, float]], fall
     ("law", "effect", "worse"),
     [((3.0, 2.0), (2.5, 1.5), True), ((3.0, 1.0), (2.5, 1.5), False), ((3.0, 2.0), (), False)],
 )
-def test_a_law_is_no_worse_than_effects_on_every_recording_held_out(
-    law: tuple[float, ...], effect: tuple[float, ...], worse: bool
-) -> None:
+def test_a_law_is_no_worse_than_effects_on_every_recording_held_out(law, effect, worse):
     with_law, with_effect = (
         [
             Errors(f"{k}", "w", "m", True, 9, (9.0, rms), (9.0, rms), "", (9.0, rms))
@@ -474,8 +470,8 @@ def test_a_law_is_no_worse_than_effects_on_every_recording_held_out(
 
 @pytest.mark.long
 def test_the_overflow_of_a_real_tank_is_proposed_as_a_threshold_of_its_level(
-    published_cases: Callable[[str, str], Path], tmp_path: Path
-) -> None:
+    published_cases, tmp_path
+):
     """Recovery: the overflow is left out of the catalogue; the record for tests is held out."""
     folder = published_cases("cascaded_tanks", "cascaded_tanks")
     system = load_system("cascaded_tanks")

@@ -25,9 +25,7 @@ def stops(system: System, seed: int, folder: Path) -> list[Case]:
 
 
 @pytest.mark.long
-def test_pads_that_bed_in_are_told_by_the_time_since_they_touch(
-    system: System, tmp_path: Path
-) -> None:
+def test_pads_that_bed_in_are_told_by_the_time_since_they_touch(system, tmp_path):
     """The catalogue knows the wheel's load alone. No inertia may mimic it, by seven times its size.
 
     What the law makes of the friction is within 15 % of the range of what the cause does, on stops

@@ -1,7 +1,6 @@
 """A real air supply: its record is read and cut. Its leak is in its tutorial."""
 
 import shutil
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +17,7 @@ pytest.importorskip("ziglang", reason="needs the extra [compiler]")
 
 
 @pytest.fixture(scope="module")
-def folder(published_cases: Callable[[str, str], Path]) -> Path:
+def folder(published_cases) -> Path:
     return published_cases("air_supply", "metro_air_supply")
 
 
@@ -28,9 +27,7 @@ def read(folder: Path) -> dict[str, Case]:
     }
 
 
-def test_both_layouts_hold_the_same_recordings(
-    folder: Path, published: Callable[[str], Path], tmp_path: Path
-) -> None:
+def test_both_layouts_hold_the_same_recordings(folder, published, tmp_path):
     shutil.copytree(published("metro_air_supply") / "20200201", tmp_path / "set" / "20200201")
     write_cases("air_supply", tmp_path / "set", tmp_path / "cases")
     published, digits = read(folder), read(tmp_path / "cases")
@@ -41,7 +38,7 @@ def test_both_layouts_hold_the_same_recordings(
             assert_allclose(case[signal], digits[name][signal], rtol=1e-12)
 
 
-def test_each_cycle_begins_with_the_compressor_off_and_has_one_start(folder: Path) -> None:
+def test_each_cycle_begins_with_the_compressor_off_and_has_one_start(folder):
     cases = read(folder)
     assert sum(case.time.size for case in cases.values()) == 1000
     for case in cases.values():

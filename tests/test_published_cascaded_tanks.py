@@ -1,7 +1,6 @@
 """Two real tanks: their recordings are read. What they do is in their tutorial."""
 
 import shutil
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +17,7 @@ pytest.importorskip("ziglang", reason="needs the extra [compiler]")
 
 
 @pytest.fixture(scope="module")
-def folder(published_cases: Callable[[str, str], Path]) -> Path:
+def folder(published_cases) -> Path:
     return published_cases("cascaded_tanks", "cascaded_tanks")
 
 
@@ -29,9 +28,7 @@ def read(folder: Path) -> dict[str, Case]:
     }
 
 
-def test_both_layouts_hold_the_same_recordings(
-    folder: Path, published: Callable[[str], Path], tmp_path: Path
-) -> None:
+def test_both_layouts_hold_the_same_recordings(folder, published, tmp_path):
     for name in ("estimation", "test"):
         shutil.copytree(published("cascaded_tanks") / name, tmp_path / "set" / name)
     write_cases("cascaded_tanks", tmp_path / "set", tmp_path / "cases")
@@ -45,7 +42,7 @@ def test_both_layouts_hold_the_same_recordings(
             assert_allclose(case[signal], digits[name][signal], rtol=0, atol=5.1e-5)
 
 
-def test_the_sensor_ends_at_its_limit(folder: Path) -> None:
+def test_the_sensor_ends_at_its_limit(folder):
     level = read(folder)["estimation"]["level2"]
     high = load_system("cascaded_tanks").signals["level2"].limits[1]
     assert level.max() == high

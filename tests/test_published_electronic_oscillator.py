@@ -1,8 +1,5 @@
 """A published oscillating circuit is read, and its stiffening spring is named."""
 
-from collections.abc import Callable
-from pathlib import Path
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -13,7 +10,7 @@ from workbench.recordings.case import read_cases
 from workbench.system.registry import load_system
 
 
-def test_lines_between_sharpened_samples_swing_as_the_signal_does() -> None:
+def test_lines_between_sharpened_samples_swing_as_the_signal_does():
     """Closed form: of the lines the first harmonic is the signal, at 9 samples a period."""
     n, cycles, fine = 900, 100, 64
     signal = np.sin(2.0 * np.pi * cycles * np.arange(n) / n)
@@ -25,7 +22,7 @@ def test_lines_between_sharpened_samples_swing_as_the_signal_does() -> None:
     assert_allclose(2.0 * np.mean(lines * wave), -1j, atol=1e-4)
 
 
-def test_the_arrow_is_held_out_and_realisations_follow_it(tmp_path: Path) -> None:
+def test_the_arrow_is_held_out_and_realisations_follow_it(tmp_path):
     rng = np.random.default_rng(1)
     rows = [f"{u:.6f},{y:.6f}," for u, y in 0.1 * rng.standard_normal((70000, 2))]
     (tmp_path / "SNLS80mV.csv").write_text("\n".join(['"V1","V2",', *rows]) + "\n")
@@ -37,9 +34,7 @@ def test_the_arrow_is_held_out_and_realisations_follow_it(tmp_path: Path) -> Non
     ]
 
 
-def test_the_stiffening_spring_alone_is_named(
-    published_cases: Callable[[str, str], Path], tmp_path: Path
-) -> None:
+def test_the_stiffening_spring_alone_is_named(published_cases, tmp_path):
     """Of 7.3 mV it leaves the 0.3 mV of cards and circuit."""
     pytest.importorskip("casadi", reason="needs the extra [compiler]")
     pytest.importorskip("rumoca", reason="needs the extra [compiler]")

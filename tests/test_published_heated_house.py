@@ -1,8 +1,5 @@
 """A published house is read, its walls are found to store heat, and held-out hours are foreseen."""
 
-from collections.abc import Callable
-from pathlib import Path
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -56,7 +53,7 @@ def rms(errors: Vector) -> float:
 
 
 @pytest.fixture(scope="module")
-def cases(published_cases: Callable[[str, str], Path]) -> dict[str, Case]:
+def cases(published_cases) -> dict[str, Case]:
     folder = published_cases("heated_house", "heated_house")
     return {
         read_case.name: read_case for read_case in read_cases([folder], load_system("heated_house"))
@@ -64,7 +61,7 @@ def cases(published_cases: Callable[[str, str], Path]) -> dict[str, Case]:
 
 
 @pytest.fixture(scope="module")
-def outcome(cases: dict[str, Case], tmp_path_factory: pytest.TempPathFactory) -> Outcome:
+def outcome(cases, tmp_path_factory) -> Outcome:
     pytest.importorskip("casadi", reason="needs the extra [compiler]")
     pytest.importorskip("rumoca", reason="needs the extra [compiler]")
     return diagnose(
@@ -77,7 +74,7 @@ def outcome(cases: dict[str, Case], tmp_path_factory: pytest.TempPathFactory) ->
     )
 
 
-def test_what_follows_the_fitted_hours_is_held_out(tmp_path: Path) -> None:
+def test_what_follows_the_fitted_hours_is_held_out(tmp_path):
     rows = [f'{k / 12:.12f},1.5,0.2,5.1,21.0,"2009"' for k in range(1300)]
     (tmp_path / "inputPRBS1.csv").write_text("\n".join(['"t","Ta","Ps","Ph","yTi"', *rows]))
     fitted, rest = PUBLISHED.layouts[0].read(tmp_path)
@@ -95,15 +92,13 @@ def test_what_follows_the_fitted_hours_is_held_out(tmp_path: Path) -> None:
     )
 
 
-def test_walls_that_store_heat_are_named(outcome: Outcome) -> None:
+def test_walls_that_store_heat_are_named(outcome):
     (cause,) = outcome.diagnosis.causes
     assert cause.effect.name == "ShellStore"
     assert set(cause.confusable_with) == {"InteriorStore"}
 
 
-def test_held_out_hours_are_foreseen_as_by_the_published_structure(
-    cases: dict[str, Case], outcome: Outcome
-) -> None:
+def test_held_out_hours_are_foreseen_as_by_the_published_structure(cases, outcome):
     """Fitted to the same hours; its published parameters were fitted to the held-out ones, too."""
     rest = cases["rest"]
     fit = least_squares(
@@ -118,9 +113,7 @@ def test_held_out_hours_are_foreseen_as_by_the_published_structure(
     assert extended < 1.15 * rms(free_run(np.array(PARAMETERS), rest)[FITTED:])
 
 
-def test_with_all_hours_fitted_it_errs_less_than_the_published_model(
-    cases: dict[str, Case], tmp_path: Path
-) -> None:
+def test_with_all_hours_fitted_it_errs_less_than_the_published_model(cases, tmp_path):
     """The protocol of its figure: parameters from all 141 h, theirs of one-step predictions."""
     pytest.importorskip("casadi", reason="needs the extra [compiler]")
     pytest.importorskip("rumoca", reason="needs the extra [compiler]")

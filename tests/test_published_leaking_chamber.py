@@ -1,6 +1,5 @@
 """Published pressures of closed chambers: read from each layout, and the leaking ones leak."""
 
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -44,7 +43,7 @@ def their_files(folder: Path, time: np.ndarray) -> None:
         (data / f"{name}.csv").write_text("".join(lines))
 
 
-def test_both_layouts_give_the_same_recordings(tmp_path: Path) -> None:
+def test_both_layouts_give_the_same_recordings(tmp_path):
     time = np.round(0.1 * np.arange(300), 3)
     their_files(tmp_path / "theirs", time)
     folders(tmp_path / "ours", time)
@@ -57,7 +56,7 @@ def test_both_layouts_give_the_same_recordings(tmp_path: Path) -> None:
             assert_allclose(values, other.columns[column], atol=1e-9, err_msg=column)
 
 
-def test_a_chamber_is_cut_where_it_is_closed_and_at_2_bar(tmp_path: Path) -> None:
+def test_a_chamber_is_cut_where_it_is_closed_and_at_2_bar(tmp_path):
     time = np.round(0.1 * np.arange(300), 3)
     folders(tmp_path, time)
     read = {one.name: one for one in PUBLISHED.layouts[1].read(tmp_path)}
@@ -86,9 +85,7 @@ MATTERS = 3e-14  # [kg/(s.Pa)] of a laminar leak
 
 
 @pytest.mark.parametrize("times", [100.0, 1000.0, 10_000.0])
-def test_a_leak_is_found_however_far_it_leads_from_the_tight_chamber(
-    tmp_path: Path, times: float
-) -> None:
+def test_a_leak_is_found_however_far_it_leads_from_the_tight_chamber(tmp_path, times):
     """Reference: the exact solution, p = p0 exp(-R T/V conductance t), of an ideal gas.
 
     Linearised about a tight chamber the pressure falls evenly, which tells nothing of a decay.
@@ -119,7 +116,7 @@ def test_a_leak_is_found_however_far_it_leads_from_the_tight_chamber(
 
 
 @pytest.fixture(scope="module")
-def cases(published_cases: Callable[[str, str], Path]) -> Path:
+def cases(published_cases) -> Path:
     return published_cases("leaking_chamber", "pneumatic_cylinder")
 
 
@@ -133,15 +130,13 @@ def diagnosed(cases: Path, name: str, out: Path) -> Outcome:
 
 # `Ultimaker_020`, and `Aluminium`, which is tight, are diagnosed by a tutorial.
 @pytest.mark.parametrize("name", ["Prusa", "Ultimaker_015"])
-def test_a_chamber_that_leaks_does_so_laminarly(cases: Path, tmp_path: Path, name: str) -> None:
+def test_a_chamber_that_leaks_does_so_laminarly(cases, tmp_path, name):
     diagnosis = diagnosed(cases, name, tmp_path).diagnosis
     assert diagnosis.verdict == "found"
     assert diagnosis.causes[0].effect.name == "LaminarLeak"
 
 
-def test_both_parts_of_a_chamber_that_empties_are_explained_by_its_leak(
-    cases: Path, tmp_path: Path
-) -> None:
+def test_both_parts_of_a_chamber_that_empties_are_explained_by_its_leak(cases, tmp_path):
     """The nominal chamber is thousands of times the noise off, where derivatives tell nothing."""
     pytest.importorskip("casadi", reason="needs the extra [compiler]")
     pytest.importorskip("rumoca", reason="needs the extra [compiler]")

@@ -1,8 +1,5 @@
 """A positioning stage's published records are read, and its friction is named, both ways."""
 
-from collections.abc import Callable
-from pathlib import Path
-
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
@@ -14,7 +11,7 @@ from workbench.recordings.case import read_cases
 from workbench.system.registry import load_system
 
 
-def test_the_record_with_pulses_is_held_out(tmp_path: Path) -> None:
+def test_the_record_with_pulses_is_held_out(tmp_path):
     goal = np.linspace(0.0, 0.2, 40)[:, None]
     content = {"qg": goal, "qm": goal - 1e-3, "vir": 2.0 * goal, "t": goal}
     savemat(tmp_path / "DATA_EMPS.mat", content)
@@ -28,9 +25,7 @@ def test_the_record_with_pulses_is_held_out(tmp_path: Path) -> None:
     assert fitted.columns["time [s]"][-1] == pytest.approx(0.039)
 
 
-def test_friction_and_its_slant_are_named(
-    published_cases: Callable[[str, str], Path], tmp_path: Path
-) -> None:
+def test_friction_and_its_slant_are_named(published_cases, tmp_path):
     """Published: 20.4 N and 203.5 N.s/m, or 166.7 one way and 240.4 the other."""
     pytest.importorskip("casadi", reason="needs the extra [compiler]")
     pytest.importorskip("rumoca", reason="needs the extra [compiler]")

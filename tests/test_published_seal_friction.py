@@ -1,7 +1,5 @@
 """Published friction of two seals: read from each layout. What it says is in its tutorial."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -10,12 +8,12 @@ from workbench.machines import published
 from workbench.machines.published import seal_friction
 
 
-def test_rate_of_a_steady_stroke_is_exact_between_uneven_samples() -> None:
+def test_rate_of_a_steady_stroke_is_exact_between_uneven_samples():
     time = np.cumsum(np.random.default_rng(1).choice([0.01, 0.011, 0.3], 200, p=[0.6, 0.38, 0.02]))
     assert_allclose(seal_friction.rate(time, 3.0 - 12.5 * time), -12.5)
 
 
-def test_rate_has_a_tenth_of_the_noise_of_differences() -> None:
+def test_rate_has_a_tenth_of_the_noise_of_differences():
     """Closed form: of n samples h apart, s/h*sqrt(12/(n^3 - n)), as of any line."""
     time = 0.01 * np.arange(5000)
     noise = 0.01 * np.random.default_rng(2).standard_normal(time.size)
@@ -24,7 +22,7 @@ def test_rate_has_a_tenth_of_the_noise_of_differences() -> None:
     assert found < 0.15 * np.std(np.diff(noise) / 0.01)
 
 
-def test_both_layouts_give_the_same_recordings(tmp_path: Path) -> None:
+def test_both_layouts_give_the_same_recordings(tmp_path):
     """The publisher's are without a header, in ms, with voltages of the sensors in between."""
     theirs, ours = tmp_path / "theirs", tmp_path / "ours"
     (theirs / "results_pneumatic-actuator" / "data" / "friction").mkdir(parents=True)

@@ -1,7 +1,6 @@
 """The servo's published records become cases; what they say is in its tutorial."""
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -15,18 +14,18 @@ SYSTEM = load_system("servo_pendulum")
 
 
 @pytest.fixture(scope="module")
-def cases(published_cases: Callable[[str, str], Path]) -> Path:
+def cases(published_cases) -> Path:
     return published_cases("servo_pendulum", "servo_pendulum")
 
 
-def test_records_of_one_gain_are_held_out(cases: Path) -> None:
+def test_records_of_one_gain_are_held_out(cases):
     told = json.loads((cases / PREPARED).read_text())
     assert len(told["cases"]) == 16
     assert sorted(told["held_out"]) == [name for name in sorted(told["cases"]) if "kp200" in name]
     assert len(told["held_out"]) == 4
 
 
-def test_a_record_has_its_gain_and_its_signals(cases: Path) -> None:
+def test_a_record_has_its_gain_and_its_signals(cases):
     case = read_case(cases / "kp400_lift_and_drop", SYSTEM)
     assert case.conditions == {"kp": 400}
     assert case.inputs == ("goal", "volts", "enabled")

@@ -49,9 +49,7 @@ def largest(points: Matrix) -> Vector:
         (largest, 20, -norm.isf(-np.expm1(np.log1p(-PROBABILITIES) / 20.0))),
     ],
 )
-def test_quantiles_are_those_of_closed_forms_down_to_one_in_1e9(
-    evaluate: Callable[[Matrix], Vector], dimension: int, exact: Vector
-) -> None:
+def test_quantiles_are_those_of_closed_forms_down_to_one_in_1e9(evaluate, dimension, exact):
     """Of 95 % intervals nine in ten hold: what runs miss together, they do not show."""
     tails = [tail(evaluate, dimension, 100 * k) for k in range(10)]
     found = [[tail.quantile(decade) for decade in DECADES] for tail in tails]
@@ -65,7 +63,7 @@ def test_quantiles_are_those_of_closed_forms_down_to_one_in_1e9(
     assert_allclose(mean, exact, rtol=0.01)
 
 
-def test_a_probability_scatters_as_it_says() -> None:
+def test_a_probability_scatters_as_it_says():
     """Coefficient of variation at 1e-6, over 25 tails whose quantiles have known probability."""
     found = [tail(summed, 10, 100 * k).quantile(6) for k in range(25)]
     scatter = np.std(np.log(norm.cdf([one.value for one in found])), ddof=1)
@@ -74,7 +72,7 @@ def test_a_probability_scatters_as_it_says() -> None:
     assert 0.6 < scatter / said < 1.4
 
 
-def test_what_is_added_with_a_heavy_tail_is_not_missed() -> None:
+def test_what_is_added_with_a_heavy_tail_is_not_missed():
     """Reference: the sum of a normal variable and one of Student's t, by numerical integration."""
     spread, left, freedom = 0.021, 0.003, 5
 
@@ -98,7 +96,7 @@ def test_what_is_added_with_a_heavy_tail_is_not_missed() -> None:
         assert_allclose(found.value, exact, rtol=0.03)
 
 
-def test_it_agrees_with_plain_sampling_of_a_function_that_bends() -> None:
+def test_it_agrees_with_plain_sampling_of_a_function_that_bends():
     def bent(points: Matrix) -> Vector:
         return points[:, 0] + 0.3 * points[:, 1] ** 2 - 0.2 * np.exp(points[:, 2])
 
@@ -110,13 +108,13 @@ def test_it_agrees_with_plain_sampling_of_a_function_that_bends() -> None:
     assert found.low < high
 
 
-def test_the_same_seed_gives_the_same_samples() -> None:
+def test_the_same_seed_gives_the_same_samples():
     one, other = (descend(summed, 5, 4, 100, seed=3) for _ in range(2))
     assert_allclose(one.values, other.values, rtol=0.0)
     assert_allclose(one.weights.sum(), 1.0, rtol=1e-12)  # of all that there is
     assert one.evaluations == 100 + 3 * 90
 
 
-def test_plain_sampling_takes_a_hundred_times_the_inverse_for_a_tenth() -> None:
+def test_plain_sampling_takes_a_hundred_times_the_inverse_for_a_tenth():
     """Variance of a share: p (1 - p)/n."""
     assert_allclose(plain_runs(1e-5, 0.1), 99.999e5, rtol=1e-12)

@@ -112,14 +112,12 @@ def simulate_stop(
     return Stop(grid, RADIUS_ROLLER * np.array(rotation)[0], outputs["Fx"], outputs)
 
 
-def test_reference_has_two_states_for_each_of_21_degrees_of_freedom(
-    reference: StateSpace,
-) -> None:
+def test_reference_has_two_states_for_each_of_21_degrees_of_freedom(reference):
     assert len(reference.states) == 42
     assert reference.state_outputs == ["omegaW", "omegaR"]
 
 
-def test_nothing_moves_at_rest(reference: StateSpace) -> None:
+def test_nothing_moves_at_rest(reference):
     """Gravity, preloads and contact balance; the greatest single force is 80 kN."""
     rates = ca.Function("f", [reference.x, reference.u, reference.p], [reference.f])(
         values(reference, "states", {}), 0, values(reference, "parameters", {})
@@ -131,9 +129,7 @@ def test_nothing_moves_at_rest(reference: StateSpace) -> None:
 @pytest.mark.parametrize(
     "change", [{"Fz": 88e3}, {"side[2]": -1.0}, {"lG": -0.4}, {"rW": 0.425}, {"lC": 0.1}]
 )
-def test_nothing_moves_at_rest_in_other_rigs(
-    reference: StateSpace, change: dict[str, float]
-) -> None:
+def test_nothing_moves_at_rest_in_other_rigs(reference, change):
     """The preloads follow from masses, levers and wheel load."""
     rates = ca.Function("f", [reference.x, reference.u, reference.p], [reference.f])(
         values(reference, "states", {}), 0, values(reference, "parameters", change)
@@ -142,7 +138,7 @@ def test_nothing_moves_at_rest_in_other_rigs(
 
 
 @pytest.mark.parametrize("name", ["Reference", "FullObserver", "MinimalObserver"])
-def test_no_parameter_within_its_bounds_divides_by_zero(name: str) -> None:
+def test_no_parameter_within_its_bounds_divides_by_zero(name):
     """Each parameter in turn at its lower bound, or at zero where that is within bounds.
 
     A value that the model's own assertions refuse is out of bounds.
@@ -167,9 +163,7 @@ def test_no_parameter_within_its_bounds_divides_by_zero(name: str) -> None:
 @pytest.mark.parametrize(
     ("change", "match"), [({"lG": 0.0}, "guidance arms"), ({"Fz": 30e3}, "less than the weight")]
 )
-def test_a_rig_that_cannot_stand_is_refused_with_a_reason(
-    reference_path: Path, change: dict[str, float], match: str
-) -> None:
+def test_a_rig_that_cannot_stand_is_refused_with_a_reason(reference_path, change, match):
     with FMU(reference_path) as fmu, pytest.raises(FMUError, match=match):
         fmu.start({}, change)
 
@@ -214,15 +208,11 @@ def frequency_of(model: StateSpace, state: str, parameters: Mapping[str, float])
         ("unit[2].pitch.w", 39.8, 0.03),
     ],
 )
-def test_mode_has_the_frequency_of_its_mass_and_spring(
-    reference: StateSpace, state: str, frequency: float, tolerance: float
-) -> None:
+def test_mode_has_the_frequency_of_its_mass_and_spring(reference, state, frequency, tolerance):
     assert frequency_of(reference, state, {}) == pytest.approx(frequency, rel=tolerance)
 
 
-def test_rigid_rig_on_its_longitudinal_cylinders_is_one_mass_on_one_spring(
-    reference: StateSpace,
-) -> None:
+def test_rigid_rig_on_its_longitudinal_cylinders_is_one_mass_on_one_spring(reference):
     """With stiff bushings and guides, 6.53 t and the rolling inertia move on two cylinders."""
     stiff = {f"axleBox[{j}].c[1]": 60e10 for j in (1, 2)} | {"guide.cRot[2]": 2e13}
     # At rest the wheels do not slip: wheelset and roller turn along, in series.
@@ -247,14 +237,8 @@ def test_rigid_rig_on_its_longitudinal_cylinders_is_one_mass_on_one_spring(
     ],
 )
 def test_dry_stop_takes_the_time_and_force_of_its_case(
-    reference: StateSpace,
-    speed: float,
-    pressure: float,
-    direction: float,
-    stop: float,
-    early: float,
-    late: float,
-) -> None:
+    reference, speed, pressure, direction, stop, early, late
+):
     """Six dry cases under the same friction law, against numbers of a two-mass calculation.
 
     Forces are those at 5 s and just before the stop.
@@ -271,9 +255,7 @@ def test_dry_stop_takes_the_time_and_force_of_its_case(
     assert np.ptp(heat) < 1e-3 * energy  # three units alike
 
 
-def test_minimal_model_stops_as_the_reference_does(
-    reference: StateSpace, minimal: StateSpace
-) -> None:
+def test_minimal_model_stops_as_the_reference_does(reference, minimal):
     """Constant friction, 160 km/h, 4.2 bar: the frame's motion costs little of either."""
     full = simulate_stop(reference, 160.0 / 3.6, 4.2e5, {}, 34.0, truth=False)
     small = simulate_stop(minimal, 160.0 / 3.6, 4.2e5, {"muWR": 0.40}, 34.0, truth=False)
@@ -286,7 +268,7 @@ def test_minimal_model_stops_as_the_reference_does(
 
 
 @pytest.mark.parametrize("direction", [1.0, -1.0])
-def test_braking_shifts_the_wheel_load(reference: StateSpace, direction: float) -> None:
+def test_braking_shifts_the_wheel_load(reference, direction):
     """Pads push the frame down on primary springs and vertical cylinders; these give it back."""
     run = simulate_stop(reference, direction * 40.0, 4.2e5, {}, 8.0, truth=False)
     shift = run.outputs["FzL"][-1] - 80e3
@@ -297,7 +279,7 @@ def test_braking_shifts_the_wheel_load(reference: StateSpace, direction: float) 
     assert 0.04 < abs(shift) / 80e3 < 0.055
 
 
-def test_one_wet_unit_takes_its_share_of_the_force(reference: StateSpace) -> None:
+def test_one_wet_unit_takes_its_share_of_the_force(reference):
     dry = simulate_stop(reference, 30.0, 2.7e5, {}, 8.0, truth=False)
     wet = simulate_stop(reference, 30.0, 2.7e5, {"muDCunit[2]": 0.4}, 8.0, truth=False)
     # Bearing friction and rotation of the wheelset take 2 % of Fx unchanged.
@@ -335,7 +317,7 @@ def creep_by_strips(creepage: float, load: float, friction: float, *, ellipsoid:
     return force
 
 
-def test_strips_start_with_kalkers_slope_and_end_at_friction() -> None:
+def test_strips_start_with_kalkers_slope_and_end_at_friction():
     """The independent solution itself, at both ends where it is known."""
     stiffness = 80.5e9 * 5.23e-3 * 5.51e-3 * 4.17
     for ellipsoid in (True, False):
@@ -359,8 +341,8 @@ def test_strips_start_with_kalkers_slope_and_end_at_friction() -> None:
 )
 @pytest.mark.parametrize("creepage", [1e-4, 5e-4, 1e-3, 2e-3, 3e-3, 5e-3, 1e-2, 2e-2])
 def test_creep_force_agrees_with_fastsim_at_constant_friction(
-    minimal: StateSpace, creepage: float, ellipsoid: bool, tolerance: float
-) -> None:
+    minimal, creepage, ellipsoid, tolerance
+):
     speed = 20.0
     constant = {"polach.kA": 1.0, "polach.kS": 1.0, "polach.A": 1.0, "muWR": 0.40}
     state = {

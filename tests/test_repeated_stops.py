@@ -2,7 +2,6 @@
 
 import json
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -28,7 +27,7 @@ WARM = replace(STOP, conditions=replace(STOP.conditions, disc_temperature=450.0)
 FADE = plant(CONSTANT_PADS, ["fade=4e-4"])
 
 
-def test_fade_begins_where_the_stop_before_left_it() -> None:
+def test_fade_begins_where_the_stop_before_left_it():
     cold, warm = (simulate(one, 3, FADE, REFERENCE) for one in (STOP, WARM))
     for stop, temperature in ((cold, 333.15), (warm, 450.0)):
         expected = 0.30 * stop.drawn.muDC * (1.0 - 4e-4 * (temperature - 373.15))
@@ -38,7 +37,7 @@ def test_fade_begins_where_the_stop_before_left_it() -> None:
     assert end[0] < end[1] < end[0] + (450.0 - 333.15)
 
 
-def test_what_is_said_of_the_discs_reaches_the_model(tmp_path: Path) -> None:
+def test_what_is_said_of_the_discs_reaches_the_model(tmp_path):
     record(WARM, 3, FADE, tmp_path / "warm")
     record(STOP, 3, FADE, tmp_path / "cold")
     warm, cold = (read_case(tmp_path / name, SYSTEM) for name in ("warm", "cold"))
@@ -46,7 +45,7 @@ def test_what_is_said_of_the_discs_reaches_the_model(tmp_path: Path) -> None:
     assert "TDisc" not in SYSTEM.set_by(cold.conditions)
 
 
-def test_fade_of_the_model_begins_there_too(tmp_path: Path) -> None:
+def test_fade_of_the_model_begins_there_too(tmp_path):
     pytest.importorskip("rumoca", reason="no Modelica compiler")
     library = read_library(SYSTEM.library)
     (fade,) = (
@@ -86,7 +85,7 @@ def losses(omega: np.ndarray, c0: float, c1: float, c2: float) -> np.ndarray:
     return c0 + c1 * omega + c2 * omega**2
 
 
-def test_the_rig_coasts_down_by_its_losses_alone(coasting: Experiment) -> None:
+def test_the_rig_coasts_down_by_its_losses_alone(coasting):
     """By those of the data sheet; what rolls slips a little, too."""
     said = {
         "conditions": {**{n: s.value for n, s in coasting.settings.items()}, "discs": ["dry"] * 3},
@@ -108,7 +107,7 @@ def test_the_rig_coasts_down_by_its_losses_alone(coasting: Experiment) -> None:
     assert momentum[0] - momentum[-1] == pytest.approx(lost, rel=0.02)
 
 
-def test_a_coast_down_counts_from_its_brake_on(coasting: Experiment) -> None:
+def test_a_coast_down_counts_from_its_brake_on(coasting):
     assert SYSTEM.experiments is not None
     with CoSimulation(model_path(SYSTEM, "observer")) as model:
         case = predict_recording(model, SYSTEM, coasting, {}, ("Fx",), 1)

@@ -6,7 +6,6 @@ import re
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +19,6 @@ from workbench.__main__ import main
 from workbench.observers import label
 from workbench.observers.gains import matrix_names
 from workbench.observers.report import standings, usual_error
-from workbench.system.system import System
 
 from .page_rules import check_page
 
@@ -30,7 +28,7 @@ UNJUDGED = '15 vehicle "A&B" <50 %>'  # a name that every quoting has to survive
 
 
 @pytest.fixture(scope="module")
-def results(tmp_path_factory: pytest.TempPathFactory, root: Path) -> Path:
+def results(tmp_path_factory, root) -> Path:
     """Three recorded stops and one without Fx, through the command line."""
     folder = tmp_path_factory.mktemp("report")
     source = root / "cases" / "02_dry_100_2.7"
@@ -48,16 +46,16 @@ def results(tmp_path_factory: pytest.TempPathFactory, root: Path) -> Path:
 
 
 @pytest.fixture(scope="module")
-def summary(results: Path) -> dict[str, Any]:
+def summary(results) -> dict[str, Any]:
     return json.loads((results / "summary.json").read_text())
 
 
 @pytest.fixture(scope="module")
-def page(results: Path) -> Any:
+def page(results) -> Any:
     return lxml.html.fromstring((results / "index.html").read_bytes())
 
 
-def test_page_is_as_all_are(results: Path, summary: dict[str, Any]) -> None:
+def test_page_is_as_all_are(results, summary):
     check_page(results / "index.html", summary)
 
 
@@ -69,7 +67,7 @@ def rows(table: Any) -> list[list[Any]]:
     return [list(row) for row in table.xpath("./tbody/tr")]
 
 
-def test_every_picture_states_its_finding(page: Any, summary: dict[str, Any]) -> None:
+def test_every_picture_states_its_finding(page, summary):
     drawings = page.xpath("//svg[not(ancestor::svg)]")
     assert len(drawings) == len(summary["cases"])
     for article, drawing in zip(page.xpath("//article"), drawings, strict=True):
@@ -83,14 +81,12 @@ def test_every_picture_states_its_finding(page: Any, summary: dict[str, Any]) ->
             assert error is None or f"{100 * error:.2f} %" in drawing.get("aria-label")
 
 
-def test_each_recording_has_links_to_its_files(page: Any) -> None:
+def test_each_recording_has_links_to_its_files(page):
     links = [address for address in page.xpath("//a/@href") if address.endswith(FILES)]
     assert len(links) == 3 * (len(CASES) + 1)
 
 
-def test_numbers_are_those_of_the_summary(
-    page: Any, summary: dict[str, Any], system: System
-) -> None:
+def test_numbers_are_those_of_the_summary(page, summary, system):
     table = page.get_element_by_id("case-table")
     titles = columns(table)
     best = standings(summary, "Fx")[0].name
@@ -124,9 +120,7 @@ def best_estimator(summary: dict[str, Any]) -> str:
     return min(next(iter(summary["cases"].values()))["estimators"], key=worst)
 
 
-def test_worst_case_of_the_best_estimator_comes_first(
-    page: Any, summary: dict[str, Any], system: System
-) -> None:
+def test_worst_case_of_the_best_estimator_comes_first(page, summary, system):
     best = best_estimator(summary)
     errors = {n: c["estimators"][best]["Fx_nrmse"] for n, c in summary["cases"].items()}
     judged = sorted(CASES, key=lambda name: -errors[name])
@@ -139,7 +133,7 @@ def test_worst_case_of_the_best_estimator_comes_first(
     assert f"{100 * errors[judged[0]]:.2f} %" in headline
 
 
-def test_the_answer_says_how_sure_it_is(page: Any, summary: dict[str, Any]) -> None:
+def test_the_answer_says_how_sure_it_is(page, summary):
     """The interval of the page and of the summary, by hand: Student's t of two degrees, 4.303."""
     best = best_estimator(summary)
     errors = [summary["cases"][name]["estimators"][best]["Fx_nrmse"] for name in CASES]
@@ -153,7 +147,7 @@ def test_the_answer_says_how_sure_it_is(page: Any, summary: dict[str, Any]) -> N
     assert shown in page.find_class("headline")[0].text_content()
 
 
-def test_intervals_hold_the_usual_error_as_often_as_they_say() -> None:
+def test_intervals_hold_the_usual_error_as_often_as_they_say():
     """Of 2000 sets of three recordings, 95 % but for two standard deviations of that count."""
     errors = np.random.default_rng(1).lognormal(np.log(0.2), 0.5, (2000, 3))
     ends = np.array([usual_error(error.tolist()) for error in errors])
@@ -161,7 +155,7 @@ def test_intervals_hold_the_usual_error_as_often_as_they_say() -> None:
     assert abs(held - 0.95) < 2 * np.sqrt(0.95 * 0.05 / 2000)
 
 
-def test_page_says_what_was_run(page: Any, summary: dict[str, Any]) -> None:
+def test_page_says_what_was_run(page, summary):
     text = page.text_content()
     provenance = summary["provenance"]
     assert provenance["fmu"]["sha256"] in text
@@ -171,14 +165,14 @@ def test_page_says_what_was_run(page: Any, summary: dict[str, Any]) -> None:
         assert f"{provenance['disturbance_observer'][name]:.4g}" in text
 
 
-def test_missing_scores_are_explained(page: Any) -> None:
+def test_missing_scores_are_explained(page):
     warnings = [" ".join(p.text_content().split()) for p in page.find_class("warning")]
     assert any(UNJUDGED in text and "no Fx" in text for text in warnings)
 
 
 def test_a_recording_without_the_cells_shows_the_smoother_as_reference(
-    results: Path, page: Any, summary: dict[str, Any], root: Path
-) -> None:
+    results, page, summary, root
+):
     for name, case in summary["cases"].items():
         article = page.get_element_by_id(name.replace(" ", "_"))
         legend = [entry.text_content() for entry in article.xpath(".//ul[@class='legend']/li")]
@@ -198,7 +192,7 @@ def test_a_recording_without_the_cells_shows_the_smoother_as_reference(
     assert not [c for c in pd.read_csv(results / f"{CASES[0]}.csv") if c.startswith("smoother")]
 
 
-def test_curve_of_the_page_is_that_of_the_data(results: Path, page: Any) -> None:
+def test_curve_of_the_page_is_that_of_the_data(results, page):
     name = CASES[2]
     data = pd.read_csv(results / f"{name}.csv")
     plot = page.get_element_by_id(name).xpath(".//svg[@role='img']")[0]
@@ -294,21 +288,19 @@ then = () => {
 
 
 @pytest.fixture(scope="module")
-def browser(results: Path, probe: Callable[[Path, str], dict[str, Any]]) -> dict[str, Any]:
+def browser(results, probe) -> dict[str, Any]:
     """What a script that uses the page finds."""
     return probe(results / "index.html", PROBE)
 
 
-def test_page_opens_without_errors_and_draws_every_panel(browser: dict[str, Any]) -> None:
+def test_page_opens_without_errors_and_draws_every_panel(browser):
     assert browser["errors"] == []
     assert len(browser["visible"]) == 8
     assert min(browser["visible"]) > 40  # [px] a panel that can be read
     assert min(browser["curves"]) > 0
 
 
-def test_table_sorts_on_click(
-    browser: dict[str, Any], page: Any, summary: dict[str, Any], system: System
-) -> None:
+def test_table_sorts_on_click(browser, page, summary, system):
     """The script of the browser clicks the fourth heading twice, then the first."""
     fourth = columns(page.get_element_by_id("case-table"))[3]
     estimators = next(iter(summary["cases"].values()))["estimators"]
@@ -327,7 +319,7 @@ def test_table_sorts_on_click(
         assert sorts.count("none") == len(sorts) - 1
 
 
-def test_zoom_changes_the_view_of_all_panels_together(browser: dict[str, Any]) -> None:
+def test_zoom_changes_the_view_of_all_panels_together(browser):
     whole = np.array(browser["whole"])
     duration = whole[0, 2]
 
@@ -349,14 +341,14 @@ def test_zoom_changes_the_view_of_all_panels_together(browser: dict[str, Any]) -
     assert np.array(browser["closest"])[0, 2] == 200.0  # [ms]
 
 
-def test_zoomed_panels_fit_what_is_visible(browser: dict[str, Any]) -> None:
+def test_zoomed_panels_fit_what_is_visible(browser):
     """Within a quarter of a stop, some signal moves less than half of its way."""
     whole, zoomed = np.array(browser["whole"]), np.array(browser["dragged"])
     assert (zoomed[:, 3] <= 1.13 * whole[:, 3]).all()  # the margin is 6 % on either side
     assert (zoomed[:, 3] < 0.5 * whole[:, 3]).any()
 
 
-def test_zoom_draws_every_sample_in_view(browser: dict[str, Any]) -> None:
+def test_zoom_draws_every_sample_in_view(browser):
     """0.2 s at 200 Hz are 40 samples, and one beside the view at either end."""
     assert 39 <= browser["drawn"] <= 43
 
@@ -366,9 +358,7 @@ def shown_table(results: Path, page: Any) -> pd.DataFrame:
     return pd.read_csv(results / f"{page.xpath('string(//article/h3)')}.csv")
 
 
-def test_cursor_reads_the_recorded_values_with_units(
-    browser: dict[str, Any], results: Path, page: Any
-) -> None:
+def test_cursor_reads_the_recorded_values_with_units(browser, results, page):
     """One sample after the middle, by the keyboard."""
     table = shown_table(results, page)
     time = table["time [s]"]
@@ -387,7 +377,7 @@ def test_cursor_reads_the_recorded_values_with_units(
     assert browser["hidden_again"]
 
 
-def test_cursor_follows_the_pointer(browser: dict[str, Any], results: Path, page: Any) -> None:
+def test_cursor_follows_the_pointer(browser, results, page):
     time = shown_table(results, page)["time [s]"]
     middle = (time.iloc[0] + time.iloc[-1]) / 2
     # A pixel of the pointer is 1/900 of the time.
@@ -395,9 +385,7 @@ def test_cursor_follows_the_pointer(browser: dict[str, Any], results: Path, page
     assert at == pytest.approx(middle, abs=2e-3 * (time.iloc[-1] - time.iloc[0]))
 
 
-def test_figures_fit_a_narrow_screen_with_letters_as_large_as_ever(
-    browser: dict[str, Any],
-) -> None:
+def test_figures_fit_a_narrow_screen_with_letters_as_large_as_ever(browser):
     narrow = browser["narrow"]
     assert narrow["room"] <= 376
     assert narrow["drawn"] == narrow["room"] == narrow["scrolls"]  # one unit is one pixel
@@ -409,7 +397,7 @@ def test_figures_fit_a_narrow_screen_with_letters_as_large_as_ever(
     assert browser["wide"] == [988, narrow["captions"]]
 
 
-def test_legend_hides_an_estimator_everywhere(browser: dict[str, Any]) -> None:
+def test_legend_hides_an_estimator_everywhere(browser):
     pressed, displays = browser["hidden"]
     assert pressed == "false"
     # Force, residual, two frictions, and muWR in two parts where only some of it is claimed.
@@ -417,7 +405,7 @@ def test_legend_hides_an_estimator_everywhere(browser: dict[str, Any]) -> None:
     assert len(displays) >= 4
 
 
-def test_live_without_a_display_gives_status_2_and_a_message(root: Path, tmp_path: Path) -> None:
+def test_live_without_a_display_gives_status_2_and_a_message(root, tmp_path):
     headless = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
     command = [sys.executable, "-m", "workbench", "simulate", f"cases/{CASES[0]}", "--live"]
     run = subprocess.run(
@@ -454,7 +442,7 @@ window.wait()
 
 
 @pytest.mark.skipif(shutil.which("xvfb-run") is None, reason="no virtual screen")
-def test_live_window_draws_whole_runs_and_may_be_closed(root: Path) -> None:
+def test_live_window_draws_whole_runs_and_may_be_closed(root):
     pytest.importorskip("tkinter", reason="no toolkit for windows")
     case = root / "cases" / CASES[0]
     environment = {k: v for k, v in os.environ.items() if k != "MPLBACKEND"}

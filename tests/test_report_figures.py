@@ -22,9 +22,7 @@ from workbench.observers.simulation import CaseResult, case_figure, prepare
 from workbench.pages.drawing import drawing, extremes, packed
 from workbench.pages.figures import DARK, LIGHT
 from workbench.pages.provenance import run_of
-from workbench.recordings.case import Case
 from workbench.system.registry import load_system
-from workbench.system.system import System
 
 PROVENANCE = {
     "run": run_of("simulate", load_system("wheelset"), {}),
@@ -41,7 +39,7 @@ SCORE = {"Fx_nrmse": None, "Fx_rms_N": 1.0, "z": 1.0, "seconds": 1.0, "reason": 
     values=st.lists(st.floats(-1e6, 1e6), min_size=2, max_size=200),
     blocks=st.integers(1, 50),
 )
-def test_decimation_keeps_ends_and_extremes(values: list[float], blocks: int) -> None:
+def test_decimation_keeps_ends_and_extremes(values, blocks):
     signal = np.array(values)
     kept = extremes(signal, blocks)
     assert kept[0] == 0
@@ -65,7 +63,7 @@ def contrast(one: str, other: str) -> float:
 
 
 @pytest.mark.parametrize(("theme", "curves"), [(0, LIGHT), (1, DARK)])
-def test_contrast_is_enough_in_both_themes(root: Path, theme: int, curves: dict[str, str]) -> None:
+def test_contrast_is_enough_in_both_themes(root, theme, curves):
     """WCAG 2.2 AA: 4.5 for text, 3 for graphics."""
     css = (root / "workbench" / "pages" / "page.css").read_text()
     named = dict(re.findall(r"--(\w+): (#\w{6});", css.split(":root {")[1 + theme]))
@@ -77,7 +75,7 @@ def test_contrast_is_enough_in_both_themes(root: Path, theme: int, curves: dict[
 
 
 @pytest.fixture(scope="module")
-def uncertain(dry_case: Case, system: System) -> CaseResult:
+def uncertain(dry_case, system) -> CaseResult:
     """Two estimators, the second with a standard deviation of Fx in the first half."""
     chosen = choose(system, ["open_loop", "direct_inversion"])
     result = prepare(system, chosen).run(dry_case)
@@ -94,9 +92,7 @@ def write(result: CaseResult, path: Path, planned: int) -> Any:
     return lxml.html.fromstring(path.read_bytes())
 
 
-def test_standard_deviations_become_bands_and_columns(
-    uncertain: CaseResult, tmp_path: Path
-) -> None:
+def test_standard_deviations_become_bands_and_columns(uncertain, tmp_path):
     page = write(uncertain, tmp_path / "index.html", planned=1)
     bands = page.xpath("//path[contains(@class, 'band')]")
     assert [band.get("data-style") for band in bands] == ["1"]
@@ -114,7 +110,7 @@ def test_standard_deviations_become_bands_and_columns(
     assert [c for c in table if "sigma" in c] == ["direct_inversion.sigma_Fx [N]"]
 
 
-def test_speeds_are_told_in_kilometres_per_hour_beside(uncertain: CaseResult) -> None:
+def test_speeds_are_told_in_kilometres_per_hour_beside(uncertain):
     """10 m/s are 36 km/h: both scales of a panel agree at every tick."""
     figure = case_figure(uncertain)
     panel = replace(figure.panels[0], unit="m/s", low=-1.0, high=21.0)
@@ -127,7 +123,7 @@ def test_speeds_are_told_in_kilometres_per_hour_beside(uncertain: CaseResult) ->
     assert not any(other["further"] for other in others if other["unit"] != "m/s")
 
 
-def test_samples_are_those_of_the_curves(uncertain: CaseResult) -> None:
+def test_samples_are_those_of_the_curves(uncertain):
     """What packing.py says of its codes, taken back by hand."""
     figure = case_figure(uncertain)
     told, text = packed(figure)
@@ -150,9 +146,7 @@ def test_samples_are_those_of_the_curves(uncertain: CaseResult) -> None:
             assert_allclose(found, values, rtol=0, atol=0.51 * (most - least) / 65534 + 1e-12)
 
 
-def test_pages_of_fourteen_cases_and_six_noisy_estimators_stay_below_3_MB(
-    uncertain: CaseResult, tmp_path: Path
-) -> None:
+def test_pages_of_fourteen_cases_and_six_noisy_estimators_stay_below_3_MB(uncertain, tmp_path):
     run = uncertain.runs["direct_inversion"]
     rng = np.random.default_rng(1)
     noise = rng.normal(1.0, 0.1, (run.time.size, 1))
@@ -182,13 +176,13 @@ def test_pages_of_fourteen_cases_and_six_noisy_estimators_stay_below_3_MB(
     assert sum(len(page.xpath("//*[@class='samples']")) for page in pages.values()) == 14
 
 
-def test_an_interrupted_run_says_so(uncertain: CaseResult, tmp_path: Path) -> None:
+def test_an_interrupted_run_says_so(uncertain, tmp_path):
     page = write(uncertain, tmp_path / "index.html", planned=3)
     assert "1 of 3 cases" in page.find_class("warning")[0].text_content()
     assert not write(uncertain, tmp_path / "index.html", planned=1).find_class("warning")
 
 
-def test_an_estimator_that_fails_on_a_hard_case_does_not_win() -> None:
+def test_an_estimator_that_fails_on_a_hard_case_does_not_win():
     cases = {
         "easy": {
             "estimators": {

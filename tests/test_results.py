@@ -18,7 +18,7 @@ NAME = "worst error of Fx, ekf"
 
 
 @pytest.fixture(scope="module")
-def results(tmp_path_factory: pytest.TempPathFactory, root: Path) -> Path:
+def results(tmp_path_factory, root) -> Path:
     """One estimator on one recorded stop, through the command line."""
     out = tmp_path_factory.mktemp("results") / "before"
     case = root / "cases" / CASE
@@ -44,9 +44,7 @@ def verdicts(before: Path, after: Path) -> dict[str, str]:
     return {compare_run.name: compare_run.verdict for compare_run in compare_runs(first, last)}
 
 
-def test_a_folder_says_command_date_version_system_answer_and_files(
-    results: Path, root: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_folder_says_command_date_version_system_answer_and_files(results, root, capsys):
     capsys.readouterr()
     assert main(["results", str(results.parent), "--json"]) == 0
     (one,) = json.loads(capsys.readouterr().out)["result"]["runs"]
@@ -64,7 +62,7 @@ def test_a_folder_says_command_date_version_system_answer_and_files(
     assert summary["answer"]["sentence"] in said
 
 
-def test_a_run_compared_with_itself_is_unchanged(results: Path) -> None:
+def test_a_run_compared_with_itself_is_unchanged(results):
     assert set(verdicts(results, results).values()) == {"unchanged"}
     (one,) = read_runs(results)
     assert differences(one, one) == []
@@ -80,17 +78,15 @@ def test_a_run_compared_with_itself_is_unchanged(results: Path) -> None:
         ({"value": 0.9, "better": "higher"}, "better"),
     ],
 )
-def test_the_way_that_is_better_decides(
-    results: Path, tmp_path: Path, changed: dict[str, Any], verdict: str
-) -> None:
+def test_the_way_that_is_better_decides(results, tmp_path, changed, verdict):
     after = other(results, tmp_path / "after", error=changed)
     assert verdicts(results, after)[NAME] == verdict
 
 
 @pytest.mark.parametrize(("low", "verdict"), [(3.0, "unclear"), (3.6, "better")])
 def test_shares_whose_intervals_overlap_are_neither_better_nor_worse(
-    results: Path, tmp_path: Path, low: float, verdict: str
-) -> None:
+    results, tmp_path, low, verdict
+):
     ways = {"unit": "%", "better": "higher"}
     first = {"value": 3.0, "low": 2.5, "high": 3.5, **ways}
     before = other(results, tmp_path / "before", share=first)
@@ -100,15 +96,13 @@ def test_shares_whose_intervals_overlap_are_neither_better_nor_worse(
     assert verdicts(before, after)["share"] == verdict
 
 
-def test_a_number_in_another_unit_is_not_compared(results: Path, tmp_path: Path) -> None:
+def test_a_number_in_another_unit_is_not_compared(results, tmp_path):
     after = other(results, tmp_path / "after", error={"value": 0.1, "unit": "N"})
     changes = compare_runs(*read_runs(results), *read_runs(after))
     assert [change.verdict for change in changes if change.name == NAME] == ["gone", "new"]
 
 
-def test_what_else_differs_is_said(
-    results: Path, root: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_else_differs_is_said(results, root, tmp_path, capsys):
     """The same case with one reading changed, and another estimator."""
     case = shutil.copytree(root / "cases" / CASE, tmp_path / CASE)
     measured = case / "measured.csv"
@@ -127,7 +121,7 @@ def test_what_else_differs_is_said(
     assert f"gone     {NAME}" in said
 
 
-def test_runs_of_two_commands_are_not_compared(results: Path, tmp_path: Path) -> None:
+def test_runs_of_two_commands_are_not_compared(results, tmp_path):
     after = shutil.copytree(results, tmp_path / "after")
     summary = json.loads((after / "summary.json").read_text())
     summary["provenance"]["run"]["command"] = "tune"
@@ -145,18 +139,14 @@ def test_runs_of_two_commands_are_not_compared(results: Path, tmp_path: Path) ->
         ("[" * 100_000, "does not say what made it"),
     ],
 )
-def test_a_folder_without_results_is_refused_in_words(
-    tmp_path: Path, content: str | None, match: str
-) -> None:
+def test_a_folder_without_results_is_refused_in_words(tmp_path, content, match):
     if content is not None:
         (tmp_path / "summary.json").write_text(content)
     with pytest.raises(InputError, match=match):
         read_runs(tmp_path)
 
 
-def test_what_does_not_say_what_made_it_is_warned_of_beside_others(
-    results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_does_not_say_what_made_it_is_warned_of_beside_others(results, tmp_path, capsys):
     shutil.copytree(results, tmp_path / "one")
     (tmp_path / "old").mkdir()
     (tmp_path / "old" / "summary.json").write_text('{"cases": {}}')
@@ -167,7 +157,7 @@ def test_what_does_not_say_what_made_it_is_warned_of_beside_others(
     assert "one: simulate" in told.out
 
 
-def test_results_of_other_places_are_told(results: Path, tmp_path: Path) -> None:
+def test_results_of_other_places_are_told(results, tmp_path):
     """Two runs each, and no place that both folders have."""
     for folder, names in (("a", "12"), ("b", "34")):
         for name in names:

@@ -87,7 +87,7 @@ def friction_power(stop: StopTruth, disc: int) -> np.ndarray:
         ("14_twodiscs_160_3.6_rev", 36.7),
     ],
 )
-def test_standard_stop_takes_the_time_of_a_two_mass_calculation(name: str, seconds: float) -> None:
+def test_standard_stop_takes_the_time_of_a_two_mass_calculation(name, seconds):
     """Reference: independent calculation with the same laws of brake and pads, no tolerances.
 
     The pads' level is drawn for each stop (2 %); time after filling (1.1 s) goes with its inverse.
@@ -100,7 +100,7 @@ def test_standard_stop_takes_the_time_of_a_two_mass_calculation(name: str, secon
 
 
 @pytest.mark.parametrize("name", ["04_dry_160_4.2", "07_wet_80_1.5", "09_wet_160_4.2_wsp"])
-def test_kinetic_energy_of_the_train_becomes_heat(name: str) -> None:
+def test_kinetic_energy_of_the_train_becomes_heat(name):
     """Discs, contact and bearings take all; the drive gives back what the roller loses."""
     stop = make(name)
     stopping = (stop.time >= 0.0) & (stop.time <= stop.standstill)
@@ -119,7 +119,7 @@ def test_kinetic_energy_of_the_train_becomes_heat(name: str) -> None:
     assert heat == pytest.approx(kinetic, rel=3e-3)
 
 
-def test_drive_imitates_the_inertia_of_the_train() -> None:
+def test_drive_imitates_the_inertia_of_the_train():
     """Momentum that the contact takes from the roller, from coasting to 1 m/s."""
     stop = make("14_twodiscs_160_3.6_rev")
     omega = stop.truth["omegaR"]
@@ -131,7 +131,7 @@ def test_drive_imitates_the_inertia_of_the_train() -> None:
     assert -impulse / (omega[end] - omega[begin]) == pytest.approx(TRAIN_INERTIA, rel=2.5e-3)
 
 
-def test_patch_of_low_adhesion_makes_the_wheel_slide_and_recover() -> None:
+def test_patch_of_low_adhesion_makes_the_wheel_slide_and_recover():
     stop = make("09_wet_160_4.2_wsp")
     t = stop.time - stop.drawn.coasting
     slip = stop.truth["slip"] / (ROLLER_RADIUS * abs(stop.truth["omegaR"]))
@@ -145,7 +145,7 @@ def test_patch_of_low_adhesion_makes_the_wheel_slide_and_recover() -> None:
     assert float(np.interp(12.0, t, force)) > before
 
 
-def test_load_cell_rings_with_the_structure_when_the_patch_begins() -> None:
+def test_load_cell_rings_with_the_structure_when_the_patch_begins():
     """Between contact force and load cell lies the longitudinal mode of 21.6 Hz."""
     stop = make("09_wet_160_4.2_wsp")
     begin = int(np.searchsorted(stop.time, stop.drawn.coasting + 8.0))
@@ -158,7 +158,7 @@ def test_load_cell_rings_with_the_structure_when_the_patch_begins() -> None:
 
 
 @pytest.mark.parametrize("name", [name for name in STANDARD if not name.endswith("wsp")])
-def test_protection_leaves_a_wheel_alone_that_does_not_slide(name: str) -> None:
+def test_protection_leaves_a_wheel_alone_that_does_not_slide(name):
     """Without intervention the pressure only rises until standstill."""
     made = json.loads((CASES / name / "truth.json").read_text())
     truth = pd.read_csv(CASES / name / "truth.csv")
@@ -167,7 +167,7 @@ def test_protection_leaves_a_wheel_alone_that_does_not_slide(name: str) -> None:
     assert pressure.is_monotonic_increasing
 
 
-def test_wheel_locks_and_stays_locked_without_protection() -> None:
+def test_wheel_locks_and_stays_locked_without_protection():
     stop = make("15_locked_wheel")
     t = stop.time - stop.drawn.coasting
     locked = (t > 3.0) & (abs(stop.truth["omegaR"]) * ROLLER_RADIUS > 1.0)
@@ -177,7 +177,7 @@ def test_wheel_locks_and_stays_locked_without_protection() -> None:
     assert braking_time(stop) > 40.0  # a full brake with grip takes 19 s
 
 
-def test_wet_disc_dries_with_energy_not_with_time() -> None:
+def test_wet_disc_dries_with_energy_not_with_time():
     low, high = make("07_wet_80_1.5"), make("08_wet_120_3.6")
     grid = np.linspace(0.05e6, 1.0e6, 50)  # J on disc 2
     films = []
@@ -193,7 +193,7 @@ def test_wet_disc_dries_with_energy_not_with_time() -> None:
     assert later[0] > 2.0 * later[1]
 
 
-def test_only_the_wet_disc_has_less_friction_and_stays_cooler() -> None:
+def test_only_the_wet_disc_has_less_friction_and_stays_cooler():
     stop = make("13_onedisc_100_2.7")
     early = np.searchsorted(stop.time, stop.drawn.coasting + 1.5)
     assert stop.truth["muDC2"][early] < 0.6 * stop.truth["muDC1"][early]
@@ -212,7 +212,7 @@ PROPOSED = {
 }
 
 
-def test_a_stop_that_is_proposed_follows_its_profile(tmp_path: Path) -> None:
+def test_a_stop_that_is_proposed_follows_its_profile(tmp_path):
     (tmp_path / "next.json").write_text(json.dumps({"tried": [PROPOSED]}))
     stop = proposed_stop(tmp_path, SYSTEM)
     assert (stop.conditions.initial_speed, stop.conditions.direction) == (40.0, -1)
@@ -226,7 +226,7 @@ def test_a_stop_that_is_proposed_follows_its_profile(tmp_path: Path) -> None:
     ]
 
 
-def test_a_stop_that_is_proposed_has_the_load_and_the_sensors_that_it_asks_for() -> None:
+def test_a_stop_that_is_proposed_has_the_load_and_the_sensors_that_it_asks_for():
     assert SYSTEM.experiments is not None
     asked = PROPOSED | {"conditions": {**PROPOSED["conditions"], "wheel_load": 60e3}}
     (surface,) = (sensor for sensor in SYSTEM.experiments.sensors if sensor.name == "surface")
@@ -235,7 +235,7 @@ def test_a_stop_that_is_proposed_has_the_load_and_the_sensors_that_it_asks_for()
     assert (light.conditions.wheel_load, light.sensors) == (60e3, ("surface",))
 
 
-def test_protection_is_off_where_the_roller_stops_faster_than_a_train() -> None:
+def test_protection_is_off_where_the_roller_stops_faster_than_a_train():
     """It would take that for a slide, and vent."""
     held = {"pB": {"profile": "step", "levels": [2.7e5], "every": 5.0}}
     light = stop_of(PROPOSED | {"inputs": held}, SYSTEM)
@@ -251,7 +251,7 @@ def test_protection_is_off_where_the_roller_stops_faster_than_a_train() -> None:
     assert made.standstill - made.drawn.coasting == pytest.approx(expected, rel=0.06)
 
 
-def test_a_drive_that_imitates_the_roller_alone_gives_back_its_losses() -> None:
+def test_a_drive_that_imitates_the_roller_alone_gives_back_its_losses():
     """As heavy as it is: nothing of what brakes it is carried, and it stops five times as fast."""
     losses = Losses(20.0, 1.5, 0.02)
     drive = Drive(1500.0, 1500.0, losses, 60.0, 0.001)
@@ -277,13 +277,13 @@ def test_a_drive_that_imitates_the_roller_alone_gives_back_its_losses() -> None:
         ),
     ],
 )
-def test_what_the_rig_cannot_make_is_refused(text: str, tmp_path: Path) -> None:
+def test_what_the_rig_cannot_make_is_refused(text, tmp_path):
     (tmp_path / "next.json").write_text(text)
     with pytest.raises(InputError, match="no experiment that says speed, direction, surfaces"):
         proposed_stop(tmp_path, SYSTEM)
 
 
-def test_a_folder_without_a_proposal_is_refused(tmp_path: Path) -> None:
+def test_a_folder_without_a_proposal_is_refused(tmp_path):
     with pytest.raises(InputError, match=r"next\.json"):
         proposed_stop(tmp_path, SYSTEM)
 
@@ -292,7 +292,7 @@ def test_a_folder_without_a_proposal_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.fixture(scope="module")
-def recordings(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def recordings(tmp_path_factory) -> Path:
     out = tmp_path_factory.mktemp("rig")
     assert main(arguments(out, "--workers", "2")) == 0
     return out
@@ -307,15 +307,13 @@ def files(folder: Path) -> dict[str, bytes]:
     return {str(p.relative_to(folder)): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
 
 
-def test_same_seed_gives_the_same_bytes_with_any_number_of_workers(
-    recordings: Path, tmp_path: Path
-) -> None:
+def test_same_seed_gives_the_same_bytes_with_any_number_of_workers(recordings, tmp_path):
     assert main(arguments(tmp_path, "--workers", "1")) == 0
     assert len(files(tmp_path)) == 8
     assert files(tmp_path) == files(recordings)
 
 
-def test_a_case_does_not_depend_on_which_others_are_made(recordings: Path, tmp_path: Path) -> None:
+def test_a_case_does_not_depend_on_which_others_are_made(recordings, tmp_path):
     alone = ["rig", "--case", "10_wet_100_2.7_rev", "--reference", str(REFERENCE)]
     assert main([*alone, "--out", str(tmp_path)]) == 0
     name = "10_wet_100_2.7_rev/measured.csv"
@@ -326,14 +324,14 @@ def test_a_case_does_not_depend_on_which_others_are_made(recordings: Path, tmp_p
     sys.platform != "linux" or platform.machine() != "x86_64",
     reason="another mathematical library rounds otherwise",
 )
-def test_the_recordings_of_the_repository_are_what_the_rig_makes(recordings: Path) -> None:
+def test_the_recordings_of_the_repository_are_what_the_rig_makes(recordings):
     made = sorted(recordings.glob("*/measured.csv"))
     assert len(made) == 2
     for file in made:
         assert file.read_bytes() == (CASES / file.parent.name / file.name).read_bytes()
 
 
-def test_another_seed_gives_another_stop() -> None:
+def test_another_seed_gives_another_stop():
     name = "03_dry_120_3.6"
     stops = [make(name), simulate(SCENARIOS[name], SEED + 1, ORDINARY_PADS, REFERENCE)]
     assert stops[0].drawn.muDC != stops[1].drawn.muDC
@@ -341,7 +339,7 @@ def test_another_seed_gives_another_stop() -> None:
     assert not np.array_equal(noise[0], noise[1])
 
 
-def test_recordings_are_cases_with_their_conditions(recordings: Path) -> None:
+def test_recordings_are_cases_with_their_conditions(recordings):
     for case in read_cases([recordings], SYSTEM):
         wanted = SCENARIOS[case.name].conditions
         assert case.title == SCENARIOS[case.name].title
@@ -362,7 +360,7 @@ def test_recordings_are_cases_with_their_conditions(recordings: Path) -> None:
         assert "Fx" in case
 
 
-def test_truth_stands_in_files_of_its_own(recordings: Path) -> None:
+def test_truth_stands_in_files_of_its_own(recordings):
     folder = recordings / "10_wet_100_2.7_rev"
     truth = pd.read_csv(folder / "truth.csv")
     case = read_case(folder, SYSTEM)
@@ -375,7 +373,7 @@ def test_truth_stands_in_files_of_its_own(recordings: Path) -> None:
     assert set(made["drawn"]) == {"JW", "JR", "Fz", "muDC", "muWR", "coasting"}
 
 
-def test_scenarios_are_named_with_or_without_number() -> None:
+def test_scenarios_are_named_with_or_without_number():
     assert [s.name for s in select([])] == list(STANDARD)
     assert [s.name for s in select(["locked_wheel"])] == ["15_locked_wheel"]
 
@@ -394,9 +392,7 @@ def test_scenarios_are_named_with_or_without_number() -> None:
         (["--reference", str(ROOT / "fmus" / "fmi2" / "MinimalObserver.fmu")], r"no variable"),
     ],
 )
-def test_a_users_mistake_gives_status_2_and_a_message(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], options: list[str], match: str
-) -> None:
+def test_a_users_mistake_gives_status_2_and_a_message(tmp_path, capsys, options, match):
     command = ["rig", "--reference", str(REFERENCE), "--out", str(tmp_path / "out"), *options]
     assert main(command) == 2
     message = capsys.readouterr().err
@@ -404,7 +400,7 @@ def test_a_users_mistake_gives_status_2_and_a_message(
     assert "expected" in message
 
 
-def test_a_measured_recording_is_never_overwritten(tmp_path: Path) -> None:
+def test_a_measured_recording_is_never_overwritten(tmp_path):
     folder = tmp_path / "01_dry_80_1.5"
     folder.mkdir()
     (folder / "measured.csv").write_text("measured")
@@ -413,7 +409,7 @@ def test_a_measured_recording_is_never_overwritten(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("ctrl_c")
-def test_interrupt_keeps_finished_cases(tmp_path: Path) -> None:
+def test_interrupt_keeps_finished_cases(tmp_path):
     command = [sys.executable, "-m", "workbench", "rig", "--workers", "1", "--out", str(tmp_path)]
     process = subprocess.Popen(
         command,

@@ -26,14 +26,14 @@ COMMAND = [
 ]
 
 
-def test_cases_are_the_standard_stops_of_the_rig() -> None:
+def test_cases_are_the_standard_stops_of_the_rig():
     assert tuple(case.name for case in read_cases([CASES], load_system("wheelset"))) == STANDARD
     for name in STANDARD:
         made = json.loads((CASES / name / "truth.json").read_text())
         assert (made["seed"], made["rate"]) == (1, 200)
 
 
-def test_makefile_and_this_file_make_the_same_cases() -> None:
+def test_makefile_and_this_file_make_the_same_cases():
     """`make cases` needs the command that is tried below."""
     recipe = re.search(r"^cases:.*\n\t(.+)$", (ROOT / "Makefile").read_text(), re.MULTILINE)
     assert recipe is not None
@@ -44,7 +44,7 @@ def test_makefile_and_this_file_make_the_same_cases() -> None:
     sys.platform != "linux" or platform.machine() != "x86_64",
     reason="another mathematical library rounds otherwise",
 )
-def test_a_case_made_anew_has_the_same_bytes(tmp_path: Path) -> None:
+def test_a_case_made_anew_has_the_same_bytes(tmp_path):
     """The case with the slide, where the smallest difference grows.
 
     truth.json also holds the hash of the FMU, which any change of its files moves.
@@ -59,7 +59,7 @@ def test_a_case_made_anew_has_the_same_bytes(tmp_path: Path) -> None:
     assert old | {"fmu_sha256": None} == new | {"fmu_sha256": None}
 
 
-def test_nothing_but_accuracy_reads_the_truth_of_the_rig() -> None:
+def test_nothing_but_accuracy_reads_the_truth_of_the_rig():
     """What estimates, tunes or diagnoses cannot import it either: its layer is above."""
     package = ROOT / "workbench"
     readers = {

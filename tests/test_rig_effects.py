@@ -79,7 +79,7 @@ def waves(signal: np.ndarray, angle: np.ndarray) -> np.ndarray:
 # --- what planting leaves alone ---
 
 
-def test_effects_that_vanish_change_no_byte(tmp_path: Path) -> None:
+def test_effects_that_vanish_change_no_byte(tmp_path):
     """All at once; beside 1, a gain of 1e-300 is lost in rounding, and no branch is skipped."""
     names = [field.name for field in dataclasses.fields(Effects)]
     # A limit of 1e-300 N is not one that vanishes, and the truth tells of a film of any size.
@@ -94,12 +94,12 @@ def test_effects_that_vanish_change_no_byte(tmp_path: Path) -> None:
         assert (folders[0] / file).read_bytes() == (folders[1] / file).read_bytes()
 
 
-def test_constant_pads_have_the_nominal_friction() -> None:
+def test_constant_pads_have_the_nominal_friction():
     stop = make()
     assert np.array_equal(stop.truth["muDC2"], np.full(stop.time.size, 0.30 * stop.drawn.muDC))
 
 
-def test_phases_differ_from_stop_to_stop_and_effect_to_effect() -> None:
+def test_phases_differ_from_stop_to_stop_and_effect_to_effect():
     stops = [make(), make(speed=20.0), make(name="02_dry_100_2.7", speed=20.0)]
     stops.append(simulate(scenario("03_dry_120_3.6", 20.0), SEED + 1, CONSTANT_PADS, REFERENCE))
     phases = [dataclasses.astuple(stop.phases) for stop in stops]
@@ -109,7 +109,7 @@ def test_phases_differ_from_stop_to_stop_and_effect_to_effect() -> None:
     assert (abs(values) <= np.pi).all()
 
 
-def test_phase_is_told_where_its_effect_is_planted(tmp_path: Path) -> None:
+def test_phase_is_told_where_its_effect_is_planted(tmp_path):
     stop = make()
     write_recording(stop, plant(CONSTANT_PADS, ["pole_ring=0.002"]), 200, tmp_path)
     made = json.loads((tmp_path / "truth.json").read_text())
@@ -135,7 +135,7 @@ def test_phase_is_told_where_its_effect_is_planted(tmp_path: Path) -> None:
         ("structure", 0.25),
     ],
 )
-def test_effect_of_the_plant_changes_the_stop_itself(effect: str, gain: float) -> None:
+def test_effect_of_the_plant_changes_the_stop_itself(effect, gain):
     nominal, planted = make(), make(f"{effect}={gain}")
     assert planted.drawn == nominal.drawn
     n = int(np.searchsorted(nominal.time, nominal.drawn.coasting + 3.0))
@@ -147,7 +147,7 @@ def test_effect_of_the_plant_changes_the_stop_itself(effect: str, gain: float) -
 
 
 @pytest.mark.parametrize("gain", [0.25, -0.25])
-def test_longitudinal_mode_moves_and_is_damped_as_before(gain: float) -> None:
+def test_longitudinal_mode_moves_and_is_damped_as_before(gain):
     """Eigenvalues at 30 m/s: of what moves, the mode of the sheet, 21.6 Hz, with 5 %."""
     modes = []
     for change in (0.0, gain):
@@ -164,7 +164,7 @@ def test_longitudinal_mode_moves_and_is_damped_as_before(gain: float) -> None:
     assert damping[0] == pytest.approx(0.05, abs=0.01)
 
 
-def test_tolerances_scatter_in_proportion() -> None:
+def test_tolerances_scatter_in_proportion():
     usual = dataclasses.asdict(make(speed=20.0).drawn)
     wide = dataclasses.asdict(make("tolerances=1", speed=20.0).drawn)
     assert wide.pop("coasting") == usual.pop("coasting")
@@ -178,9 +178,7 @@ def test_tolerances_scatter_in_proportion() -> None:
 @pytest.mark.parametrize(
     ("effect", "discs"), [("water_film", (1, 2, 3)), ("single_disc_film", (2,))]
 )
-def test_planted_film_leaves_with_the_energy_of_its_disc(
-    effect: str, discs: tuple[int, ...]
-) -> None:
+def test_planted_film_leaves_with_the_energy_of_its_disc(effect, discs):
     stop = make(f"{effect}=0.3")
     for disc in (1, 2, 3):
         energy = friction_energy(stop, disc)
@@ -191,7 +189,7 @@ def test_planted_film_leaves_with_the_energy_of_its_disc(
         assert energy[-1] > 0.2e6  # enough to tell energy from none
 
 
-def test_a_wet_disc_is_no_wetter_for_a_planted_film() -> None:
+def test_a_wet_disc_is_no_wetter_for_a_planted_film():
     effects = plant(CONSTANT_PADS, ["water_film=0.2"])
     pads = Pads(
         effects,
@@ -204,7 +202,7 @@ def test_a_wet_disc_is_no_wetter_for_a_planted_film() -> None:
     assert pads.friction(10.0, 35e3, 0.0) == pytest.approx(expected, rel=1e-12)
 
 
-def test_disc_thickness_modulates_friction_with_the_angle_of_the_wheel() -> None:
+def test_disc_thickness_modulates_friction_with_the_angle_of_the_wheel():
     stop = make("disc_thickness=0.02")
     # Inputs are held for 1 ms: they are those of its middle.
     angle = stop.truth["phiW"] + 0.5e-3 * stop.truth["omegaW"] + stop.phases.disc_thickness
@@ -215,7 +213,7 @@ def test_disc_thickness_modulates_friction_with_the_angle_of_the_wheel() -> None
     assert np.array_equal(stop.truth["Fx"][:n], make().truth["Fx"][:n])
 
 
-def test_calipers_give_less_force_while_pressure_rises() -> None:
+def test_calipers_give_less_force_while_pressure_rises():
     """Torque of the brake from the wheelset's balance, held at full pressure."""
     stop = make("caliper_hysteresis=0.05", speed=80.0)
     t = stop.time - stop.drawn.coasting
@@ -229,7 +227,7 @@ def test_calipers_give_less_force_while_pressure_rises() -> None:
     assert (torque[held] / ideal[held]).mean() == pytest.approx(0.95, abs=2e-4)
 
 
-def test_calipers_change_side_over_the_play_and_keep_it_in_hold() -> None:
+def test_calipers_change_side_over_the_play_and_keep_it_in_hold():
     brake = Brake(pad_lag=0.0, hysteresis=0.05, dt=1e-3)
     seen: dict[str, list[float]] = {"rise": [], "hold": [], "fall": []}
     pressure = []
@@ -251,7 +249,7 @@ def test_calipers_change_side_over_the_play_and_keep_it_in_hold() -> None:
 # --- contact and wheel ---
 
 
-def test_out_of_round_wheel_turns_slower_where_its_radius_is_larger() -> None:
+def test_out_of_round_wheel_turns_slower_where_its_radius_is_larger():
     stop = make("out_of_round=2e-4")
     t = coasting(stop)
     ratio = stop.truth["omegaW"][t] / stop.truth["omegaR"][t]
@@ -264,9 +262,7 @@ def test_out_of_round_wheel_turns_slower_where_its_radius_is_larger() -> None:
 
 @pytest.mark.parametrize("direction", [1, -1])
 @pytest.mark.parametrize("speed", [20.0, 40.0, 80.0])
-def test_force_of_an_out_of_round_wheel_grows_with_the_square_of_speed(
-    speed: float, direction: int
-) -> None:
+def test_force_of_an_out_of_round_wheel_grows_with_the_square_of_speed(speed, direction):
     """F = m*v^2*amplitude/rW^2, m of wheelset and train in series at the rim."""
     stop = make("out_of_round=2e-4", speed=speed, direction=direction)
     t = coasting(stop)
@@ -282,7 +278,7 @@ def test_force_of_an_out_of_round_wheel_grows_with_the_square_of_speed(
 
 @pytest.mark.parametrize("omega", [40.0, -40.0])
 @pytest.mark.parametrize("phi", [0.0, 0.7, 2.0, 4.0])
-def test_wheel_out_of_round_balances_its_momentum(omega: float, phi: float) -> None:
+def test_wheel_out_of_round_balances_its_momentum(omega, phi):
     """J*d(omega)/dt = r*Fx - brake for the true wheel, while the model's has r = rW."""
     wheel = OutOfRoundWheel(1e-5, 0.3, WHEEL_RADIUS, WHEELSET_INERTIA)
     force, brake, dt = 20e3, 9e3, 1e-6
@@ -295,13 +291,13 @@ def test_wheel_out_of_round_balances_its_momentum(omega: float, phi: float) -> N
     assert effect == pytest.approx((lever - WHEEL_RADIUS) * force, abs=0.01)
 
 
-def test_braked_wheel_out_of_round_keeps_its_mean_speed_and_time_of_stopping() -> None:
+def test_braked_wheel_out_of_round_keeps_its_mean_speed_and_time_of_stopping():
     round_wheel, bumpy = make(), make("out_of_round=2e-4")
     # Terms of second order, (2e-4/0.46)^2 of the speed, are all that could shift it.
     assert bumpy.standstill == pytest.approx(round_wheel.standstill, abs=2e-3)
 
 
-def test_roller_radius_shows_as_the_ratio_of_speeds_in_coasting() -> None:
+def test_roller_radius_shows_as_the_ratio_of_speeds_in_coasting():
     stop = make("roller_radius=0.001")
     t = coasting(stop)
     assert stop.truth["slip"][0] == pytest.approx(0.0, abs=1e-12)  # both start at one speed
@@ -310,14 +306,14 @@ def test_roller_radius_shows_as_the_ratio_of_speeds_in_coasting() -> None:
     assert ratio == pytest.approx(0.701 / WHEEL_RADIUS, rel=3e-5)
 
 
-def test_wheel_radius_shows_as_the_ratio_of_speeds_in_coasting() -> None:
+def test_wheel_radius_shows_as_the_ratio_of_speeds_in_coasting():
     stop = make("wheel_radius=-0.0015")
     t = coasting(stop)
     ratio = stop.truth["omegaW"][t] / stop.truth["omegaR"][t]
     assert ratio == pytest.approx(ROLLER_RADIUS / 0.4585, rel=3e-5)
 
 
-def test_slip_of_a_dry_stop_goes_with_the_inverse_of_creep_stiffness() -> None:
+def test_slip_of_a_dry_stop_goes_with_the_inverse_of_creep_stiffness():
     stiff, soft = (make(*e, name="01_dry_80_1.5") for e in ((), ("creep_stiffness=-0.2",)))
     held = slice(*np.searchsorted(stiff.time, stiff.drawn.coasting + np.array([5.0, 10.0])))
     more = soft.truth["slip"][held] / stiff.truth["slip"][held]
@@ -325,7 +321,7 @@ def test_slip_of_a_dry_stop_goes_with_the_inverse_of_creep_stiffness() -> None:
     assert more == pytest.approx(1.0 / 0.8, rel=5e-3)
 
 
-def test_adhesion_recovers_with_the_energy_of_slip_at_each_wheel() -> None:
+def test_adhesion_recovers_with_the_energy_of_slip_at_each_wheel():
     stop = make("adhesion_recovery=0.5", name="15_locked_wheel")
     power = 0.5 * abs(stop.truth["Fx"] * stop.truth["slip"])
     energy = np.concatenate([[0.0], np.cumsum(power[:-1]) * 1e-3])
@@ -335,7 +331,7 @@ def test_adhesion_recovers_with_the_energy_of_slip_at_each_wheel() -> None:
     assert stop.truth["muWR"][-1] > 1.3 * usual  # more than one 250 kJ
 
 
-def test_twice_the_roller_loss_is_what_the_drive_does_not_give_back() -> None:
+def test_twice_the_roller_loss_is_what_the_drive_does_not_give_back():
     """The drive knows the nominal losses: the other half slows the train."""
     stop = make("roller_losses=1", speed=160.0)
     t = coasting(stop)
@@ -351,7 +347,7 @@ def test_twice_the_roller_loss_is_what_the_drive_does_not_give_back() -> None:
 # --- outside the catalogue ---
 
 
-def test_friction_steps_at_90_degrees_of_the_disc() -> None:
+def test_friction_steps_at_90_degrees_of_the_disc():
     discs = ("dry", "dry", "dry")
     effects = plant(CONSTANT_PADS, ["friction_step=-0.1"])
     pads = Pads(
@@ -366,7 +362,7 @@ def test_friction_steps_at_90_degrees_of_the_disc() -> None:
     assert pads.friction(10.0, 35e3, 0.0) == pytest.approx([0.30, 0.285, 0.27], abs=2e-5)
 
 
-def test_friction_ripples_from_first_contact() -> None:
+def test_friction_ripples_from_first_contact():
     stop = make("friction_ripple=0.05")
     touched = int(np.flatnonzero(normal_force(stop) > 0.0)[0])
     since = np.maximum(0.0, stop.time - stop.time[touched])

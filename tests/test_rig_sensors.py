@@ -54,7 +54,7 @@ def added(planted: str, stop: StopTruth) -> dict[str, np.ndarray]:
 # --- noise ---
 
 
-def test_noise_of_every_sensor_grows_by_the_same_factor() -> None:
+def test_noise_of_every_sensor_grows_by_the_same_factor():
     stop = make()
     time = recorded(stop)
     silent, usual, loud = (
@@ -76,9 +76,7 @@ def test_noise_of_every_sensor_grows_by_the_same_factor() -> None:
         ("Fx", "Fcell", 80.0, 0.0, 10.0),
     ],
 )
-def test_sensor_has_the_white_noise_of_the_data_sheet(
-    name: str, signal: str, noise: float, relative: float, resolution: float
-) -> None:
+def test_sensor_has_the_white_noise_of_the_data_sheet(name, signal, noise, relative, resolution):
     stop = make(speed=160.0)
     time = stop.time[stop.time >= 0.0][::5]
     truth = stop.at(time, signal)
@@ -92,7 +90,7 @@ def test_sensor_has_the_white_noise_of_the_data_sheet(
     assert scaled[1:] @ scaled[:-1] / n == pytest.approx(0.0, abs=4.0 / np.sqrt(n))
 
 
-def test_sensors_that_are_fitted_besides_read_the_truth_with_their_noise() -> None:
+def test_sensors_that_are_fitted_besides_read_the_truth_with_their_noise():
     stop = make(speed=160.0)
     fitted = dataclasses.replace(
         stop, scenario=dataclasses.replace(stop.scenario, sensors=tuple(FURTHER))
@@ -118,7 +116,7 @@ def test_sensors_that_are_fitted_besides_read_the_truth_with_their_noise() -> No
         assert error.std() == pytest.approx(1.0, abs=4.0 / np.sqrt(2.0 * error.size)), name
 
 
-def test_the_disc_that_brakes_least_is_the_wet_one() -> None:
+def test_the_disc_that_brakes_least_is_the_wet_one():
     """Also where it is wet no more, and its friction differs from that of others by noise alone."""
     usual = SCENARIOS["03_dry_120_3.6"]
     scenario = dataclasses.replace(usual, sensors=("disc",))
@@ -157,14 +155,12 @@ def test_the_disc_that_brakes_least_is_the_wet_one() -> None:
         ("spikes", 1.0, set(CHANNELS)),
     ],
 )
-def test_effect_of_a_sensor_shows_in_its_channels_alone(
-    effect: str, gain: float, channels: set[str]
-) -> None:
+def test_effect_of_a_sensor_shows_in_its_channels_alone(effect, gain, channels):
     differences = added(f"{effect}={gain}", make())
     assert {name for name, difference in differences.items() if difference.any()} == channels
 
 
-def test_pole_ring_ripples_with_the_phase_of_its_stop() -> None:
+def test_pole_ring_ripples_with_the_phase_of_its_stop():
     stop = make()
     time = recorded(stop)
     reading = sample(stop, plant(CONSTANT_PADS, ["pole_ring=0.01"]), time)["omegaW"]
@@ -179,9 +175,7 @@ def test_pole_ring_ripples_with_the_phase_of_its_stop() -> None:
 
 
 @pytest.mark.parametrize(("direction", "load"), [(1, 80e3), (-1, 80e3), (1, 60e3)])
-def test_apex_offset_adds_a_share_of_the_load_in_both_directions(
-    direction: int, load: float
-) -> None:
+def test_apex_offset_adds_a_share_of_the_load_in_both_directions(direction, load):
     stop = make(speed=20.0, direction=direction, load=load)
     slope = 2.0 * load * stop.drawn.Fz / (WHEEL_RADIUS + ROLLER_RADIUS)
     # Readings are rounded to 10 N: the mean of 1500 differences to 0.3 N.
@@ -189,7 +183,7 @@ def test_apex_offset_adds_a_share_of_the_load_in_both_directions(
     assert slope == pytest.approx(138e3 * load / 80e3, rel=0.01)
 
 
-def test_fx_gain_is_the_slope_between_load_cell_and_recording() -> None:
+def test_fx_gain_is_the_slope_between_load_cell_and_recording():
     stop = make()
     time = recorded(stop)
     measured = sample(stop, plant(CONSTANT_PADS, ["fx_gain=0.015"]), time)["Fx"]
@@ -199,7 +193,7 @@ def test_fx_gain_is_the_slope_between_load_cell_and_recording() -> None:
     assert slope == pytest.approx(1.015, abs=4.0 * 80.0 / np.sqrt(cell @ cell))
 
 
-def test_beat_of_the_drive_multiplies_the_measured_torque() -> None:
+def test_beat_of_the_drive_multiplies_the_measured_torque():
     stop = make()
     time = recorded(stop)
     expected = 0.02 * stop.at(time, "tauR") * np.sin(2.0 * np.pi * 0.2 * time)
@@ -207,7 +201,7 @@ def test_beat_of_the_drive_multiplies_the_measured_torque() -> None:
     assert added("drive_beat=0.02", stop)["tauR"] == pytest.approx(expected, abs=5.0)
 
 
-def test_load_cell_drifts_in_time_in_both_directions() -> None:
+def test_load_cell_drifts_in_time_in_both_directions():
     for direction in (1, -1):
         stop = make(speed=20.0, direction=direction)
         # Both readings are rounded to 10 N.
@@ -218,7 +212,7 @@ def test_load_cell_drifts_in_time_in_both_directions() -> None:
 # --- corrupted samples ---
 
 
-def test_spikes_are_rare_isolated_and_large() -> None:
+def test_spikes_are_rare_isolated_and_large():
     stop = make()
     time = recorded(stop)
     without = sample(stop, CONSTANT_PADS, time)
@@ -233,7 +227,7 @@ def test_spikes_are_rare_isolated_and_large() -> None:
     assert len({tuple(where) for where in struck.values()}) == len(CHANNELS)
 
 
-def test_dropouts_leave_out_rows_and_nothing_else(tmp_path: Path) -> None:
+def test_dropouts_leave_out_rows_and_nothing_else(tmp_path):
     stop = make()
     rate = 5.0
     lossy = plant(CONSTANT_PADS, [f"dropouts={rate}", "spikes=1"])
@@ -253,7 +247,7 @@ def test_dropouts_leave_out_rows_and_nothing_else(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("direction", [1, -1])
-def test_load_cell_saturates_at_its_limit(direction: int) -> None:
+def test_load_cell_saturates_at_its_limit(direction):
     stop = make(direction=direction)
     time = recorded(stop)
     without = sample(stop, CONSTANT_PADS, time)["Fx"]

@@ -24,7 +24,7 @@ def recording(rng: np.random.Generator, common: int, furthest: float) -> Recordi
 
 
 @pytest.mark.parametrize("furthest", [0.1, 0.3, 9.0])
-def test_a_recording_in_few_rows_has_the_same_chi_squared(furthest: float) -> None:
+def test_a_recording_in_few_rows_has_the_same_chi_squared(furthest):
     rng = np.random.default_rng(1)
     whole = recording(rng, 2, furthest)
     few = whole.compressed()
@@ -43,7 +43,7 @@ def brute(r: Vector, P: Matrix, begun: Vector, prior: Vector, bounds: Vector) ->
 
 
 @pytest.mark.parametrize("furthest", [0.25, 0.6, 9.0])
-def test_tolerances_follow_a_step_as_far_as_their_bounds(furthest: float) -> None:
+def test_tolerances_follow_a_step_as_far_as_their_bounds(furthest):
     rng = np.random.default_rng(2)
     one = recording(rng, 2, furthest)
     begun, prior = np.append(one.deviations, 0.0), np.array([1.0, 1.0, 0.0])
@@ -68,7 +68,7 @@ def rival(rng: np.random.Generator, furthest: float) -> Rival:
 
 # What has met a bound is not let go again, as a solver does that frees it where others have moved.
 @pytest.mark.parametrize(("furthest", "above"), [(0.3, 1e-3), (9.0, 1e-6)])
-def test_recordings_so_far_hold_the_unknowns_of_new_ones(furthest: float, above: float) -> None:
+def test_recordings_so_far_hold_the_unknowns_of_new_ones(furthest, above):
     """Reference: all of them side by side, with what new ones do not have among their own."""
     one = rival(np.random.default_rng(3), furthest)
     shared = (SIZE, ("friction", "greasy"), DRY)
@@ -90,7 +90,7 @@ def test_recordings_so_far_hold_the_unknowns_of_new_ones(furthest: float, above:
         assert least * (1.0 - 1e-6) <= found <= least * (1.0 + above)
 
 
-def test_information_is_that_of_all_recordings_and_of_what_was_known() -> None:
+def test_information_is_that_of_all_recordings_and_of_what_was_known():
     one = rival(np.random.default_rng(5), 9.0)
     keys = (*one.sizes, *one.levels)
     joint = Joint(keys, keys, tuple(one.levels), one.recordings, one.prior)

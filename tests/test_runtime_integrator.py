@@ -29,7 +29,7 @@ Step = Callable[[list[float], list[float], float, float], list[float]]
 
 
 @pytest.fixture(scope="session")
-def fixed_step(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Step]:
+def fixed_step(tmp_path_factory) -> Callable[[str], Step]:
     """Gives `step(x, p, t, h)` of a model: one step of the method without error control."""
     root = tmp_path_factory.mktemp("integrator")
 

@@ -28,7 +28,7 @@ def test_refused(value, tmp_path):
 
 
 @pytest.fixture
-def kept(tmp_path: Path) -> tuple[Path, Path]:
+def kept(tmp_path) -> tuple[Path, Path]:
     """Two folders of the same results."""
     before, after = tmp_path / "before", tmp_path / "after"
     for name, text in {
@@ -51,24 +51,18 @@ def difference(kept: tuple[Path, Path], capsys: pytest.CaptureFixture[str], *opt
     return text if status else ""
 
 
-def test_equal_results_are_the_same(
-    kept: tuple[Path, Path], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_equal_results_are_the_same(kept, capsys):
     assert difference(kept, capsys) == ""
 
 
-def test_a_number_that_changed_is_told_with_its_line(
-    kept: tuple[Path, Path], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_number_that_changed_is_told_with_its_line(kept, capsys):
     (kept[1] / "tank" / TABLE).write_text("time [s],h [m]\n0,1.25\n1,1.5000000001\n")
     assert difference(kept, capsys) == (
         f"tank: 1\n  tank/{TABLE}, line 3\n    - 1,1.5\n    + 1,1.5000000001\n"
     )
 
 
-def test_a_file_or_a_part_that_one_lacks_is_told(
-    kept: tuple[Path, Path], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_file_or_a_part_that_one_lacks_is_told(kept, capsys):
     (kept[0] / "tank" / "files/out/old.csv").touch()
     (kept[1] / "tank" / "files/out/more.csv").touch()
     (kept[1] / "train").mkdir()
@@ -79,7 +73,7 @@ def test_a_file_or_a_part_that_one_lacks_is_told(
     assert "train" not in difference(kept, capsys, "--only", "tank")
 
 
-def test_pages_may_be_left_out(kept: tuple[Path, Path], capsys: pytest.CaptureFixture[str]) -> None:
+def test_pages_may_be_left_out(kept, capsys):
     (kept[1] / "tank" / "files/out/index.html").write_text("<p>1.25 metres</p>\n")
     assert difference(kept, capsys).startswith("pages: 1\n")
     assert difference(kept, capsys, "--no-pages") == ""
@@ -97,15 +91,11 @@ def test_pages_may_be_left_out(kept: tuple[Path, Path], capsys: pytest.CaptureFi
         ("a.csv", "0.0,12.3,2026-11-27", "0.0,12.3,2026-11-27"),
     ],
 )
-def test_rules_take_out_what_differs_from_run_to_run_and_no_result(
-    name: str, line: str, kept: str
-) -> None:
+def test_rules_take_out_what_differs_from_run_to_run_and_no_result(name, line, kept):
     assert applied(RESULTS, name, line) == kept
 
 
-def test_refusals_are_kept_by_the_name_of_the_test_and_compared(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_refusals_are_kept_by_the_name_of_the_test_and_compared(tmp_path, capsys):
     """The same test in two files, on workers and without."""
     texts = {}
     for name, remedy, workers in (("a", "mend it", "0"), ("b", "leave it", "2")):
@@ -130,6 +120,6 @@ def test_refusals_are_kept_by_the_name_of_the_test_and_compared(
     )
 
 
-def test_places_of_tests_are_taken_out() -> None:
+def test_places_of_tests_are_taken_out():
     text = "/tmp/pytest-of-me/pytest-3/popen-gw1/test_x0/a/b.csv, line 3: found /tmp/tmpab12cd_e/c"
     assert applied(PLACES, "", text) == "<tmp>/a/b.csv, line 3: found <tmp>/c"

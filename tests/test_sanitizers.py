@@ -14,7 +14,7 @@ SANITIZE = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 
 
 @pytest.fixture(scope="module", autouse=True)
-def sanitizers(tmp_path_factory: pytest.TempPathFactory) -> None:
+def sanitizers(tmp_path_factory) -> None:
     """Skip where a program with sanitizers does not build or run."""
     if COMPILER is None:
         pytest.skip("needs a C compiler")
@@ -49,7 +49,7 @@ def run_life(fmi: int, sources: Path) -> subprocess.CompletedProcess[str]:
         *(pytest.param(fmi, "Reference", marks=pytest.mark.long) for fmi in (2, 3)),
     ],
 )
-def test_a_life_with_right_and_wrong_calls_is_clean(fmi: int, model: str, tmp_path: Path) -> None:
+def test_a_life_with_right_and_wrong_calls_is_clean(fmi, model, tmp_path):
     run = run_life(fmi, unpack_sources(fmi, model, tmp_path))
     assert (run.returncode, run.stderr) == (0, "")
 
@@ -62,7 +62,7 @@ def test_a_life_with_right_and_wrong_calls_is_clean(fmi: int, model: str, tmp_pa
         ("i->work[NX + column.row[n]]", "i->work[NX + NW + column.row[n]]", "out of bounds"),
     ],
 )
-def test_a_planted_fault_is_found(right: str, wrong: str, found: str, tmp_path: Path) -> None:
+def test_a_planted_fault_is_found(right, wrong, found, tmp_path):
     """The counterexamples: without them a clean run might mean that nothing was looked at."""
     sources = unpack_sources(2, "MinimalObserver", tmp_path)
     code = (sources / "instance.c").read_text()

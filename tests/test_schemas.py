@@ -25,7 +25,7 @@ SYSTEMS = {
 
 
 @pytest.mark.parametrize("name", SYSTEMS)
-def test_every_system_file_is_as_the_schema_says(name: str) -> None:
+def test_every_system_file_is_as_the_schema_says(name):
     validator(system_schema()).validate(tomllib.loads(SYSTEMS[name].read_text()))
 
 
@@ -40,7 +40,7 @@ WRONG: dict[str, Callable[[dict[str, Any]], object]] = {
 
 
 @pytest.mark.parametrize("name", WRONG)
-def test_a_wrong_system_file_is_refused(name: str) -> None:
+def test_a_wrong_system_file_is_refused(name):
     content = tomllib.loads(SYSTEMS["template"].read_text())
     WRONG[name](content)
     assert not validator(system_schema()).is_valid(content)
@@ -58,13 +58,13 @@ OF_A_STOP: dict[str, Callable[[dict[str, Any]], object]] = {
 
 
 @pytest.mark.parametrize("name", OF_A_STOP)
-def test_a_wrong_table_of_how_a_machine_stops_is_refused(name: str) -> None:
+def test_a_wrong_table_of_how_a_machine_stops_is_refused(name):
     content = tomllib.loads(SYSTEMS["train"].read_text())
     OF_A_STOP[name](content["distance"])
     assert not validator(system_schema()).is_valid(content)
 
 
-def test_tuned_gains_that_come_along_are_as_the_schema_says_and_others_are_not() -> None:
+def test_tuned_gains_that_come_along_are_as_the_schema_says_and_others_are_not():
     schema = validator(gains_schema(load_system("wheelset")))
     files = sorted((PACKAGE / "machines" / "wheelset" / "gains").glob("*.toml"))
     assert files
@@ -81,7 +81,7 @@ def test_tuned_gains_that_come_along_are_as_the_schema_says_and_others_are_not()
 
 
 @pytest.fixture(scope="module")
-def summary(tmp_path_factory: pytest.TempPathFactory, root: Path) -> dict[str, Any]:
+def summary(tmp_path_factory, root) -> dict[str, Any]:
     """Of one estimator on one recorded stop, through the command line."""
     out = tmp_path_factory.mktemp("schemas")
     case = root / "cases" / "01_dry_80_1.5"
@@ -90,7 +90,7 @@ def summary(tmp_path_factory: pytest.TempPathFactory, root: Path) -> dict[str, A
     return read
 
 
-def test_a_summary_is_as_its_schema_says_and_of_no_other_command(summary: dict[str, Any]) -> None:
+def test_a_summary_is_as_its_schema_says_and_of_no_other_command(summary):
     check("simulate", summary)
     assert {"accuracy", "tune", "diagnose", "observability", "next", "power"} < set(summaries())
     for command, schema in summaries().items():
@@ -109,9 +109,7 @@ def test_a_summary_is_as_its_schema_says_and_of_no_other_command(summary: dict[s
         (("more",), {}),
     ],
 )
-def test_a_wrong_summary_is_refused(
-    summary: dict[str, Any], path: tuple[str, ...], value: object
-) -> None:
+def test_a_wrong_summary_is_refused(summary, path, value):
     wrong = copy.deepcopy(summary)
     inner = wrong
     for key in path[:-1]:

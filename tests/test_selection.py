@@ -5,8 +5,6 @@ of it. Either alone is no match for a law between the two; the recordings are so
 equations by SciPy, not of the compiled model.
 """
 
-from pathlib import Path
-
 import numpy as np
 import pandas as pd
 import pytest
@@ -52,7 +50,7 @@ def recorded(seed: int) -> pd.DataFrame:
     return pd.DataFrame({"time [s]": time, "P [W]": np.repeat(powers, HELD), "T [K]": measured})
 
 
-def test_a_law_that_stands_for_two_gives_way_to_them(tmp_path: Path) -> None:
+def test_a_law_that_stands_for_two_gives_way_to_them(tmp_path):
     block = system(tmp_path / "block", effect=CONVECTION)
     found = diagnosed(block, cases(block, [recorded(k) for k in range(3)]), tmp_path).diagnosis
     assert "Convection" in [step.rivals[0].active[-1].name for step in found.steps]

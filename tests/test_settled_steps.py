@@ -1,7 +1,5 @@
 """Steps are as fine as a machine swings: sampled nine times a period, it is not damped by them."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -49,7 +47,7 @@ scale = "1 m"
 
 
 @pytest.mark.parametrize(("samples", "fine"), [(9, True), (400, False)])
-def test_a_fading_swing_leaves_noise_alone(samples: int, fine: bool, tmp_path: Path) -> None:
+def test_a_fading_swing_leaves_noise_alone(samples, fine, tmp_path):
     damped = 2.0 * np.pi / (samples * H)
     (tmp_path / "package.mo").write_text(LIBRARY)
     omega = float(np.hypot(damped, FADES))

@@ -8,20 +8,20 @@ from workbench.models import fmu_cache
 
 
 @pytest.fixture
-def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def cache(tmp_path, monkeypatch) -> Path:
     monkeypatch.setattr(fmu_cache.platformdirs, "user_cache_dir", lambda name: str(tmp_path / name))
     return fmu_cache.folder()
 
 
 @pytest.fixture
-def library(tmp_path: Path) -> Path:
+def library(tmp_path) -> Path:
     folder = tmp_path / "Library"
     folder.mkdir()
     (folder / "package.mo").write_text("package Library end Library;")
     return folder
 
 
-def test_what_was_built_before_is_not_built_again(cache: Path, tmp_path: Path) -> None:
+def test_what_was_built_before_is_not_built_again(cache, tmp_path):
     built = []
 
     def make(path: Path) -> None:
@@ -36,7 +36,7 @@ def test_what_was_built_before_is_not_built_again(cache: Path, tmp_path: Path) -
 
 
 @pytest.mark.parametrize("content", [b"", b"an FM", b"AN FMU"])
-def test_what_was_damaged_is_built_again(cache: Path, tmp_path: Path, content: bytes) -> None:
+def test_what_was_damaged_is_built_again(cache, tmp_path, content):
     def make(path: Path) -> None:
         path.write_bytes(b"an FMU")
 
@@ -49,7 +49,7 @@ def test_what_was_damaged_is_built_again(cache: Path, tmp_path: Path, content: b
     assert fmu_cache.keep("name", make).read_bytes() == b"an FMU"
 
 
-def test_a_change_of_library_or_model_is_another_fmu(library: Path) -> None:
+def test_a_change_of_library_or_model_is_another_fmu(library):
     package = library / "package.mo"
     before = fmu_cache.key(package, "Model", "model Model end Model;")
     assert before == fmu_cache.key(package, "Model", "model Model end Model;")
@@ -58,15 +58,13 @@ def test_a_change_of_library_or_model_is_another_fmu(library: Path) -> None:
     assert before != fmu_cache.key(package, "Model", "model Model end Model;")
 
 
-def test_a_cache_that_cannot_be_written_costs_only_time(cache: Path, tmp_path: Path) -> None:
+def test_a_cache_that_cannot_be_written_costs_only_time(cache, tmp_path):
     cache.parent.write_text("a file where the folder should be")
     fmu_cache.fetch("name", tmp_path / "one.fmu", lambda path: path.write_bytes(b"an FMU"))
     assert (tmp_path / "one.fmu").read_bytes() == b"an FMU"
 
 
-def test_the_least_used_are_dropped(
-    cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_least_used_are_dropped(cache, tmp_path, monkeypatch):
     monkeypatch.setattr(fmu_cache, "_MOST", 8)
     for number in range(12):
         fmu_cache.fetch(f"{number}", tmp_path / "a.fmu", lambda path: path.write_bytes(b"an FMU"))
@@ -74,7 +72,7 @@ def test_the_least_used_are_dropped(
     assert (cache / "11.fmu").exists()
 
 
-def test_a_build_that_fails_keeps_nothing(cache: Path, tmp_path: Path) -> None:
+def test_a_build_that_fails_keeps_nothing(cache, tmp_path):
     def fail(path: Path) -> None:
         raise ValueError("no such class")
 

@@ -12,7 +12,6 @@ from workbench.__main__ import main
 from workbench.observers.gains import matrix_names
 from workbench.observers.score import low_pass
 from workbench.recordings.case import read_case
-from workbench.system.system import System
 
 from .test_figures import figures
 
@@ -20,7 +19,7 @@ OBSERVERS = ("disturbance_observer", "parameter_estimator", "ekf", "ukf")
 
 
 @pytest.fixture(scope="module")
-def results(tmp_path_factory: pytest.TempPathFactory, root: Path) -> Path:
+def results(tmp_path_factory, root) -> Path:
     """All fourteen cases through the command line."""
     out = tmp_path_factory.mktemp("simulate")
     with pytest.MonkeyPatch.context() as patch:
@@ -30,7 +29,7 @@ def results(tmp_path_factory: pytest.TempPathFactory, root: Path) -> Path:
 
 
 @pytest.fixture(scope="module")
-def nrmse(results: Path) -> pd.DataFrame:
+def nrmse(results) -> pd.DataFrame:
     """Error of Fx by case (rows) and estimator (columns)."""
     cases = json.loads((results / "summary.json").read_text())["cases"]
     return pd.DataFrame(
@@ -41,25 +40,25 @@ def nrmse(results: Path) -> pd.DataFrame:
     ).T
 
 
-def test_all_fourteen_cases_run(nrmse: pd.DataFrame) -> None:
+def test_all_fourteen_cases_run(nrmse):
     assert len(nrmse) == 14
     assert tuple(nrmse.columns) == ("open_loop", "direct_inversion", *OBSERVERS)
     assert nrmse.notna().all(axis=None)
 
 
 @pytest.mark.parametrize("observer", OBSERVERS)
-def test_observers_beat_the_open_loop_on_every_case(nrmse: pd.DataFrame, observer: str) -> None:
+def test_observers_beat_the_open_loop_on_every_case(nrmse, observer):
     assert (nrmse[observer] < nrmse.open_loop).all()
 
 
 @pytest.mark.parametrize("observer", OBSERVERS)
-def test_observers_beat_direct_inversion_on_most_cases(nrmse: pd.DataFrame, observer: str) -> None:
+def test_observers_beat_direct_inversion_on_most_cases(nrmse, observer):
     better = nrmse[observer] < nrmse.direct_inversion
     assert better.sum() >= 10, nrmse[~better]
 
 
 @pytest.mark.parametrize("observer", OBSERVERS)
-def test_accuracy_of_untuned_gains(nrmse: pd.DataFrame, observer: str) -> None:
+def test_accuracy_of_untuned_gains(nrmse, observer):
     """Goals for gains that nobody tuned: 2 % dry, 4 % wet and drying."""
     dry = nrmse.index.str.contains("_dry_")
     assert nrmse[observer][dry].max() < 0.02
@@ -67,9 +66,7 @@ def test_accuracy_of_untuned_gains(nrmse: pd.DataFrame, observer: str) -> None:
 
 
 @pytest.mark.parametrize("observer", OBSERVERS)
-def test_the_minimum_of_the_force_in_the_slide_is_reached(
-    results: Path, root: Path, system: System, observer: str
-) -> None:
+def test_the_minimum_of_the_force_in_the_slide_is_reached(results, root, system, observer):
     """The wheel-slide protection acts at about 12 s; the paper's observer misses the minimum."""
     case = read_case(root / "cases" / "09_wet_160_4.2_wsp", system)
     estimate = pd.read_csv(results / "09_wet_160_4.2_wsp.csv")[f"{observer}.Fx [N]"]
@@ -82,9 +79,7 @@ def test_the_minimum_of_the_force_in_the_slide_is_reached(
     assert abs(reached - measured) < 0.15 * (level - measured)
 
 
-def test_chosen_estimators_alone_are_run(
-    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_chosen_estimators_alone_are_run(root, tmp_path, monkeypatch):
     """The physical model of the discs lowers the error where discs dry under way."""
     chosen = ["disturbance_observer", "disturbance_observer_disc"]
     monkeypatch.chdir(root)
@@ -97,7 +92,7 @@ def test_chosen_estimators_alone_are_run(
     assert "slope" in summary["provenance"]["disturbance_observer_disc"]["disc"]
 
 
-def test_summary_keeps_its_contract(results: Path) -> None:
+def test_summary_keeps_its_contract(results):
     summary = json.loads((results / "summary.json").read_text())
     assert summary["weights"] == {"omegaW": 1.0, "omegaR": 1.0, "Fx": 1e-3}
     assert len(summary["provenance"]["fmu"]["sha256"]) == 64
@@ -108,7 +103,7 @@ def test_summary_keeps_its_contract(results: Path) -> None:
             assert values["z"] > 0.0
 
 
-def test_the_table_of_the_documentation_is_that_of_the_command(results: Path) -> None:
+def test_the_table_of_the_documentation_is_that_of_the_command(results):
     summary = json.loads((results / "summary.json").read_text())
     (text,) = figures.block("simulate").findall((figures.PAGES / "accuracy.md").read_text())
     rows = [line.strip("| ").split(" | ") for line in text.splitlines() if line.startswith("|")]
@@ -121,9 +116,7 @@ def test_the_table_of_the_documentation_is_that_of_the_command(results: Path) ->
         np.testing.assert_allclose(ours, theirs, rtol=0.0, atol=0.0101)
 
 
-def test_estimates_and_figures_are_written_for_every_case(
-    results: Path, root: Path, system: System
-) -> None:
+def test_estimates_and_figures_are_written_for_every_case(results, root, system):
     names = sorted(p.name for p in (root / "cases").iterdir())
     assert sorted(p.stem for p in results.glob("*.csv")) == names
     assert sorted(p.stem for p in results.glob("*.png")) == names
@@ -134,9 +127,7 @@ def test_estimates_and_figures_are_written_for_every_case(
     assert not list(results.glob("*.part"))
 
 
-def test_gains_from_a_file_are_used_and_named(
-    results: Path, root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_gains_from_a_file_are_used_and_named(results, root, tmp_path, monkeypatch):
     """The same gains give the same error; with none, nothing is learned."""
     default = json.loads((results / "summary.json").read_text())
     values = default["provenance"]["disturbance_observer"]
@@ -169,13 +160,8 @@ def test_gains_from_a_file_are_used_and_named(
     ],
 )
 def test_a_users_mistake_gives_status_2_and_a_message(
-    root: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-    arguments: list[str],
-    match: str,
-) -> None:
+    root, tmp_path, monkeypatch, capsys, arguments, match
+):
     monkeypatch.chdir(root)
     assert main([*arguments, "--out", str(tmp_path)]) == 2
     captured = capsys.readouterr().err
@@ -184,9 +170,7 @@ def test_a_users_mistake_gives_status_2_and_a_message(
     assert "Traceback" not in captured
 
 
-def test_a_recording_without_force_is_estimated_but_not_judged(
-    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_recording_without_force_is_estimated_but_not_judged(root, tmp_path, monkeypatch, capsys):
     source = root / "cases" / "02_dry_100_2.7"
     case = tmp_path / "02_vehicle"
     case.mkdir()
@@ -204,9 +188,7 @@ def test_a_recording_without_force_is_estimated_but_not_judged(
     assert (out / "02_vehicle.png").stat().st_size > 10_000
 
 
-def test_an_estimator_that_fails_in_every_case_is_no_success(
-    root: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_an_estimator_that_fails_in_every_case_is_no_success(root, tmp_path, capsys):
     tuned = (root / "workbench/machines/wheelset/gains/disturbance_observer.toml").read_text()
     gains = tmp_path / "gains.toml"
     gains.write_text(re.sub(r"^(L\w+ = ).*", r"\g<1>1e100", tuned, flags=re.MULTILINE))

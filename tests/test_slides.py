@@ -93,7 +93,7 @@ def slip_errors(samples: Samples, values: dict[str, float]) -> Vector:
     return samples.channels(errors)[:, 0]
 
 
-def test_a_slide_is_predicted_from_one_restart_to_the_next() -> None:
+def test_a_slide_is_predicted_from_one_restart_to_the_next():
     samples = ready(sliding(0.0))
     spans = samples.restarted
     assert 2.0 < 0.05 * spans.sum() < 10.0  # seconds of slides
@@ -110,7 +110,7 @@ def test_a_slide_is_predicted_from_one_restart_to_the_next() -> None:
     assert late == pytest.approx(expected, rel=0.1)
 
 
-def test_errors_of_slides_are_as_large_as_their_weights_say() -> None:
+def test_errors_of_slides_are_as_large_as_their_weights_say():
     """Noise alone, which a restart passes on to its block, and the wheel to the next ones."""
     exclusions = tuple(
         replace(exclusion, uncertain={}) for exclusion in SYSTEM.comparison.exclusions
@@ -136,7 +136,7 @@ def test_errors_of_slides_are_as_large_as_their_weights_say() -> None:
 
 
 @pytest.fixture(scope="module")
-def everything(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def everything(tmp_path_factory) -> Path:
     path = tmp_path_factory.mktemp("library") / "AllEffects.fmu"
     text = ExtendedModel(
         LIBRARY, "MinimalObserver", "AllEffects", EFFECTS, "Every effect at zero"
@@ -166,8 +166,8 @@ def diagnosed(
     ],
 )
 def test_what_slip_makes_of_friction_is_named_from_three_slides(
-    planted: str, name: str, size: float, everything: Path, tmp_path: Path
-) -> None:
+    planted, name, size, everything, tmp_path
+):
     scenarios = [SCENARIOS[slide] for slide in SLIDES]
     found, aside = diagnosed(everything, tmp_path, scenarios, 801, Effects(**{planted: size}))
     assert [cause.effect.name for cause in found.causes] == [name]
@@ -176,9 +176,7 @@ def test_what_slip_makes_of_friction_is_named_from_three_slides(
     assert not any(one["slide"] for one in aside)
 
 
-def test_nothing_is_found_in_slides_where_nothing_is_missing(
-    everything: Path, tmp_path: Path
-) -> None:
+def test_nothing_is_found_in_slides_where_nothing_is_missing(everything, tmp_path):
     scenarios = [SCENARIOS[slide] for slide in SLIDES]
     found, aside = diagnosed(everything, tmp_path, scenarios, 802, Effects())
     assert found.verdict == "nothing"
@@ -186,7 +184,7 @@ def test_nothing_is_found_in_slides_where_nothing_is_missing(
 
 
 @pytest.mark.long
-def test_a_patch_that_no_law_explains_is_left_out(everything: Path, tmp_path: Path) -> None:
+def test_a_patch_that_no_law_explains_is_left_out(everything, tmp_path):
     """Low adhesion from the sixth to the eighth second, on a rail that is said to be dry."""
     patched = replace(SCENARIOS["04_dry_160_4.2"], patch=Patch(6.0, 8.0, 0.12))
     others = [SCENARIOS[one] for one in ("03_dry_120_3.6", "05_dry_120_2.7_rev")]

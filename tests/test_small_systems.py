@@ -196,7 +196,7 @@ def recorded(folder: Path, name: str, columns: dict[str, np.ndarray]) -> None:
 
 
 @pytest.fixture(scope="module")
-def balance(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def balance(tmp_path_factory) -> Path:
     """Three pulls, sampled unevenly, with a pivot that rubs."""
     folder = written(tmp_path_factory.mktemp("small") / "balance", BALANCE, BALANCE_FILE)
     rng = np.random.default_rng(1)
@@ -212,7 +212,7 @@ def balance(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def bottle(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def bottle(tmp_path_factory) -> Path:
     """Three bottles that leak."""
     folder = written(tmp_path_factory.mktemp("small") / "bottle", BOTTLE, BOTTLE_FILE)
     rng = np.random.default_rng(2)
@@ -233,7 +233,7 @@ def diagnosed(folder: Path, out: Path, effects: Sequence[str] = ()) -> Outcome:
     return diagnose(system, cases, effects=effects, out=out, workers=1, report=lambda line: None)
 
 
-def test_a_unit_may_begin_with_one_over() -> None:
+def test_a_unit_may_begin_with_one_over():
     assert quantity("0.3 1/s", "1/s", "here") == 0.3
 
 
@@ -241,7 +241,7 @@ def test_a_unit_may_begin_with_one_over() -> None:
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
-def test_an_fmu_without_states_is_built_and_fit(balance: Path, tmp_path: Path, fmi: int) -> None:
+def test_an_fmu_without_states_is_built_and_fit(balance, tmp_path, fmi):
     file = tmp_path / "Balance.fmu"
     build_here(balance / "package.mo", "Balance.Observer", file, fmi)
     findings = check(file, instantiations=10)
@@ -259,7 +259,7 @@ def test_an_fmu_without_states_is_built_and_fit(balance: Path, tmp_path: Path, f
             assert_allclose(fmu.get(fmu.variables(["F"])), 20.6)
 
 
-def test_estimators_find_the_stiffness_without_a_state(balance: Path, tmp_path: Path) -> None:
+def test_estimators_find_the_stiffness_without_a_state(balance, tmp_path):
     options = ["--system", str(balance), "--out", str(tmp_path), "--workers", "1"]
     # The pivot rubs, which the model lacks: bands cannot hold, and the status says so.
     assert main(["simulate", str(balance / "recordings" / "00_pull"), *options]) == 1
@@ -272,7 +272,7 @@ def test_estimators_find_the_stiffness_without_a_state(balance: Path, tmp_path: 
         assert found == pytest.approx(STIFFNESS, rel=0.02)
 
 
-def test_noise_of_an_input_that_the_output_shows_at_once_counts(balance: Path) -> None:
+def test_noise_of_an_input_that_the_output_shows_at_once_counts(balance):
     """Closed form: a deviation of 0.1 mm is one of 10 mN, by a stiffness of 100 N/m."""
     system = loaded(balance)
     with open_model(system) as fmu:
@@ -283,7 +283,7 @@ def test_noise_of_an_input_that_the_output_shows_at_once_counts(balance: Path) -
     assert_allclose(lead.ahead, [[1e-4]])
 
 
-def test_the_pivot_that_rubs_is_named(balance: Path, tmp_path: Path) -> None:
+def test_the_pivot_that_rubs_is_named(balance, tmp_path):
     """Beside an effect that brings a state to a model that has none."""
     outcome = diagnosed(balance, tmp_path)
     assert outcome.diagnosis.verdict == "found"
@@ -298,7 +298,7 @@ def test_the_pivot_that_rubs_is_named(balance: Path, tmp_path: Path) -> None:
     assert set(bands(best)["extended_model"]) == {"c"}
 
 
-def test_states_of_an_extension_are_not_corrected(balance: Path, tmp_path: Path) -> None:
+def test_states_of_an_extension_are_not_corrected(balance, tmp_path):
     """They follow from the model alone, also where it has none of its own."""
     library = BALANCE.replace("replaceable Pivot pivot(v=v)", "replaceable Grease pivot(v=v)")
     extended = written(tmp_path / "Balance", library, BALANCE_FILE)
@@ -310,16 +310,14 @@ def test_states_of_an_extension_are_not_corrected(balance: Path, tmp_path: Path)
         assert corrected_states(fmu, loaded(extended)) == ("pivot.late",)
 
 
-def test_observability_of_a_quantity_without_a_state(balance: Path, tmp_path: Path) -> None:
+def test_observability_of_a_quantity_without_a_state(balance, tmp_path):
     options = ["--system", str(balance), "--out", str(tmp_path), "--workers", "1"]
     assert main(["observability", str(balance / "recordings" / "00_pull"), *options]) == 0
     windows = pd.read_csv(tmp_path / "00_pull.csv")
     assert windows["Observer.bound_dc [N/m]"].median() < 0.5
 
 
-def test_a_model_without_anything_to_estimate_is_refused(
-    balance: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_a_model_without_anything_to_estimate_is_refused(balance, capsys, tmp_path):
     """By estimators; the diagnosis asks for none."""
     known = BALANCE_FILE[: BALANCE_FILE.index("[estimated.c]")] + "[diagnosis.levels]\nc = {}\n"
     folder = written(tmp_path / "known", BALANCE, known)
@@ -332,9 +330,7 @@ def test_a_model_without_anything_to_estimate_is_refused(
     assert best_estimate(outcome, "00_pull") is None
 
 
-def test_a_correction_has_the_sign_by_which_the_output_shows_it(
-    balance: Path, tmp_path: Path
-) -> None:
+def test_a_correction_has_the_sign_by_which_the_output_shows_it(balance, tmp_path):
     """Pressed instead of pulled, a stiffer spring gives less force and not more."""
     folder = written(tmp_path / "pressed", BALANCE, BALANCE_FILE)
     table = pd.read_csv(balance / "recordings" / "00_pull" / "measured.csv")
@@ -356,7 +352,7 @@ def test_a_correction_has_the_sign_by_which_the_output_shows_it(
 # --- without inputs, and few samples ---
 
 
-def test_estimators_follow_a_leak_without_an_input(bottle: Path, tmp_path: Path) -> None:
+def test_estimators_follow_a_leak_without_an_input(bottle, tmp_path):
     options = ["--system", str(bottle), "--out", str(tmp_path), "--workers", "1"]
     assert main(["simulate", str(bottle / "recordings" / "00_leak"), *options]) == 0
     estimates = pd.read_csv(tmp_path / "00_leak.csv")
@@ -365,7 +361,7 @@ def test_estimators_follow_a_leak_without_an_input(bottle: Path, tmp_path: Path)
         assert found == pytest.approx(LEAK, rel=0.05)
 
 
-def test_the_pore_is_named_and_not_the_wall(bottle: Path, tmp_path: Path) -> None:
+def test_the_pore_is_named_and_not_the_wall(bottle, tmp_path):
     diagnosis = diagnosed(bottle, tmp_path).diagnosis
     assert diagnosis.verdict == "found"
     (cause,) = diagnosis.causes
@@ -373,7 +369,7 @@ def test_the_pore_is_named_and_not_the_wall(bottle: Path, tmp_path: Path) -> Non
     assert cause.parameters["k"].low < LEAK < cause.parameters["k"].high
 
 
-def test_a_single_recording_will_do(bottle: Path, tmp_path: Path) -> None:
+def test_a_single_recording_will_do(bottle, tmp_path):
     system = loaded(bottle)
     cases = read_cases([bottle / "recordings" / "01_leak"], system)
     diagnosis = diagnose(system, cases, out=tmp_path, workers=1, report=lambda line: None).diagnosis
@@ -382,7 +378,7 @@ def test_a_single_recording_will_do(bottle: Path, tmp_path: Path) -> None:
     assert cause.parameters["k"].value == pytest.approx(LEAK, rel=2e-3)
 
 
-def test_a_system_says_how_few_samples_will_do(bottle: Path) -> None:
+def test_a_system_says_how_few_samples_will_do(bottle):
     system = loaded(bottle)
     case = read_cases([bottle / "recordings" / "00_leak"], system)[0].part(slice(12))
     check_recording(case.time, replace(system, fewest=12), "here, column 'time'")
@@ -390,7 +386,7 @@ def test_a_system_says_how_few_samples_will_do(bottle: Path) -> None:
         check_recording(case.time, system, "here, column 'time'")
 
 
-def test_what_is_before_only_leads_to_what_counts(bottle: Path, tmp_path: Path) -> None:
+def test_what_is_before_only_leads_to_what_counts(bottle, tmp_path):
     case = tmp_path / "02_leak"
     shutil.copytree(bottle / "recordings" / "02_leak", case)
     toml = (case / "case.toml").read_text()
@@ -416,7 +412,7 @@ def test_what_is_before_only_leads_to_what_counts(bottle: Path, tmp_path: Path) 
         read_cases([case], system)
 
 
-def test_curvature_of_a_signal_sampled_slowly_is_no_noise() -> None:
+def test_curvature_of_a_signal_sampled_slowly_is_no_noise():
     """A decay of a seventh from sample to sample bends by more than the noise of 3 mbar."""
     rng = np.random.default_rng(3)
     noise = 3e2 * rng.standard_normal(40)
@@ -425,7 +421,7 @@ def test_curvature_of_a_signal_sampled_slowly_is_no_noise() -> None:
     assert deviation_of(noise) == pytest.approx(3e2, rel=0.4)
 
 
-def test_observability_without_an_input(bottle: Path, tmp_path: Path) -> None:
+def test_observability_without_an_input(bottle, tmp_path):
     options = ["--system", str(bottle), "--out", str(tmp_path), "--workers", "1"]
     assert main(["observability", str(bottle / "recordings" / "00_leak"), *options]) == 0
     assert (tmp_path / "00_leak.png").is_file()

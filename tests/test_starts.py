@@ -86,9 +86,7 @@ def ran(folder: Path, name: str, step: float, more: str = "") -> tuple[CaseResul
 
 @pytest.mark.parametrize("step", [0.2, 1.0, 5.0])
 @pytest.mark.parametrize("name", ["ekf", "ukf"])
-def test_a_hidden_state_is_found_from_wherever_it_is(
-    tmp_path: Path, name: str, step: float
-) -> None:
+def test_a_hidden_state_is_found_from_wherever_it_is(tmp_path, name, step):
     _, run, body = ran(tmp_path / "kettle", name, step)
     error, sigma = run.signal("body") - body, run.deviation("body")
     # Its nominal value is what is not known of it, until outputs show it.
@@ -98,19 +96,19 @@ def test_a_hidden_state_is_found_from_wherever_it_is(
     assert np.abs(error[-1]) < 1.0
 
 
-def test_what_is_said_of_a_start_is_what_is_not_known_of_it(tmp_path: Path) -> None:
+def test_what_is_said_of_a_start_is_what_is_not_known_of_it(tmp_path):
     _, run, _ = ran(tmp_path / "kettle", "ekf", 1.0, '[states.body]\nspread = "3 K"\n')
     assert run.deviation("body")[0] == pytest.approx(3.0, rel=1e-6)
 
 
-def test_an_output_starts_the_state_that_it_shows_under_another_name(tmp_path: Path) -> None:
+def test_an_output_starts_the_state_that_it_shows_under_another_name(tmp_path):
     _, run, _ = ran(tmp_path / "kettle", "open_loop", 1.0)
     # What is read is the water's temperature with another zero.
     assert run.signal("water")[0] == pytest.approx(WATER, abs=0.5)
     assert run.signal("body")[0] == 0.0  # of this, nothing is known
 
 
-def test_a_start_of_which_the_system_says_how_sure_it_is_stays(tmp_path: Path) -> None:
+def test_a_start_of_which_the_system_says_how_sure_it_is_stays(tmp_path):
     _, run, _ = ran(tmp_path / "kettle", "open_loop", 1.0, '[states.water]\nspread = "1 K"\n')
     assert run.signal("water")[0] == 10.0
 
@@ -176,16 +174,14 @@ def recorded_room(step: float = 10.0, **factors: float) -> pd.DataFrame:
         ({"T": -1.0}, "what the model allows, from 200 K"),
     ],
 )
-def test_another_unit_of_a_column_is_asked_about(
-    tmp_path: Path, factors: dict[str, float], said: str
-) -> None:
+def test_another_unit_of_a_column_is_asked_about(tmp_path, factors, said):
     system = declare(tmp_path / "room", ROOM, ROOM_FILE)
     with pytest.warns(UserWarning, match=re.escape(said)):
         case = case_from_frame(system, recorded_room(**factors))
     assert all("check the unit of the column" in doubt for doubt in case.doubts if said in doubt)
 
 
-def test_nothing_is_asked_of_a_recording_in_its_units(tmp_path: Path) -> None:
+def test_nothing_is_asked_of_a_recording_in_its_units(tmp_path):
     system = declare(tmp_path / "room", ROOM, ROOM_FILE)
     assert not case_from_frame(system, recorded_room()).doubts
     assert (
@@ -196,9 +192,7 @@ def test_nothing_is_asked_of_a_recording_in_its_units(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("factor", [1e3, 1e-6])
-def test_times_in_another_unit_are_asked_about_by_the_models_time_constants(
-    tmp_path: Path, factor: float
-) -> None:
+def test_times_in_another_unit_are_asked_about_by_the_models_time_constants(tmp_path, factor):
     """Though `sample_time` is wrong with them: the room forgets in 2000 s."""
     text = ROOM_FILE.replace('"10 s"', f'"{10.0 * factor:g} s"')
     system = declare(tmp_path / "room", ROOM, text)
@@ -207,7 +201,7 @@ def test_times_in_another_unit_are_asked_about_by_the_models_time_constants(
     assert any("motion of the model" in text for text in result.warnings())
 
 
-def test_a_first_sample_that_contradicts_the_start_is_told_first(tmp_path: Path) -> None:
+def test_a_first_sample_that_contradicts_the_start_is_told_first(tmp_path):
     """The kettle's water is 35 K above the room, its model says 10 K, and how sure that is."""
     result, _, _ = ran(tmp_path / "kettle", "ekf", 1.0, '[states.water]\nspread = "1 K"\n')
     assert result.warnings()[0].startswith("the first sample of reading is 7")

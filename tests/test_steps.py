@@ -34,7 +34,7 @@ H = 0.005
 
 
 @pytest.fixture(scope="module")
-def block(tmp_path_factory: pytest.TempPathFactory) -> Iterator[FMU]:
+def block(tmp_path_factory) -> Iterator[FMU]:
     with FMU(build_text(tmp_path_factory.mktemp("block"), MODEL)) as fmu:
         yield fmu
 
@@ -53,7 +53,7 @@ def moved(block: FMU, force: Callable[[float], float], start: float, end: float)
     return np.array(found)
 
 
-def test_a_block_comes_to_rest_where_its_energy_is_spent(block: FMU) -> None:
+def test_a_block_comes_to_rest_where_its_energy_is_spent(block):
     x, v = moved(block, lambda t: 0.0, 1.0, 3.0).T
     # m v^2/(2 coulomb), after m v/coulomb; half a step of deceleration over a step is 2e-5 m.
     assert x[-1] == pytest.approx(1.0 / 3.0, abs=4e-5)
@@ -61,7 +61,7 @@ def test_a_block_comes_to_rest_where_its_energy_is_spent(block: FMU) -> None:
     assert x[60] == pytest.approx(0.3 - 0.75 * 0.3**2, abs=1e-6)
 
 
-def test_a_block_sticks_without_chatter_until_it_breaks_away(block: FMU) -> None:
+def test_a_block_sticks_without_chatter_until_it_breaks_away(block):
     x, v = moved(block, lambda t: 2.0 * t, 0.0, 2.5).T
     stuck = slice(0, round(1.45 / H))
     # Below 0.97 of the friction it creeps at less than 2.1 v0.
@@ -73,9 +73,7 @@ def test_a_block_sticks_without_chatter_until_it_breaks_away(block: FMU) -> None
 
 
 @pytest.mark.parametrize("amplitude", [3.3, 4.0, 8.0])
-def test_stick_and_slip_agree_with_an_error_controlled_integrator(
-    amplitude: float, block: FMU
-) -> None:
+def test_stick_and_slip_agree_with_an_error_controlled_integrator(amplitude, block):
     def force(t: float) -> float:
         return amplitude * float(np.sin(2.0 * np.pi * t))
 

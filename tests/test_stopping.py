@@ -54,13 +54,13 @@ def train() -> System:
 
 
 @pytest.fixture(scope="module")
-def stopping(train: System) -> Stopping:
+def stopping(train) -> Stopping:
     assert train.stopping is not None
     return train.stopping
 
 
 @pytest.fixture(scope="module")
-def forecaster(train: System) -> Iterator[Forecaster]:
+def forecaster(train) -> Iterator[Forecaster]:
     with open_forecaster(train) as one:
         yield one
 
@@ -68,7 +68,7 @@ def forecaster(train: System) -> Iterator[Forecaster]:
 # --- formulas of standards ---
 
 
-def test_a_published_calculation_of_a_wagon_is_reproduced() -> None:
+def test_a_published_calculation_of_a_wagon_is_reproduced():
     """RailProfAC, RailwayBrakeCalculation, BrakeCalculationAverageValuesWagon, after EN 14531-1.
 
     Printed there: 478362 N on the blocks, 1412.6 N of resistance, 2.2 s, 0.6 m/s2, 461.7 m.
@@ -81,7 +81,7 @@ def test_a_published_calculation_of_a_wagon_is_reproduced() -> None:
     assert_allclose(equivalent_rate(speed, response, distance), rate, rtol=1e-12)
 
 
-def test_a_published_calculation_of_a_multiple_unit_is_reproduced() -> None:
+def test_a_published_calculation_of_a_multiple_unit_is_reproduced():
     """The same source, BrakeCalculationAverageValues: 1.598264 s, 0.899829 m/s2, 1803.796711 m."""
     distance = stopping_distance(200.0 / 3.6, 1.598264, 0.899829)
     # The sixth digits of both leave 1e-3 m.
@@ -95,18 +95,16 @@ def test_a_published_calculation_of_a_multiple_unit_is_reproduced() -> None:
         *[(70, 1.07, 177), (80, 1.07, 230), (90, 1.08, 290), (100, 1.09, 355)],
     ],
 )
-def test_the_table_of_a_law_is_reproduced_to_its_digits(
-    speed: float, rate: float, distance: float
-) -> None:
+def test_the_table_of_a_law_is_reproduced_to_its_digits(speed, rate, distance):
     """Austrian Strassenbahnverordnung, annex 1, table 1: mean deceleration, one unit failed."""
     assert f"{equivalent_rate(speed / 3.6, 0.0, distance):.2f}" == f"{rate:.2f}"
 
 
-def test_a_percentage_falls_to_nothing_where_its_constants_say() -> None:
+def test_a_percentage_falls_to_nothing_where_its_constants_say():
     assert_allclose(percentage(83634.0 / 119.0, (83634.0, 19.0)), 100.0, rtol=1e-12)
 
 
-def test_a_correction_undoes_what_gradient_and_mass_do() -> None:
+def test_a_correction_undoes_what_gradient_and_mass_do():
     """Force in proportion to mass, m a = F - g m i, with rotating masses that stay."""
     turning, per_mass, slope = 4000.0, 1.1, -0.008
 
@@ -120,9 +118,7 @@ def test_a_correction_undoes_what_gradient_and_mass_do() -> None:
 # --- one stop on the model ---
 
 
-def test_a_stop_is_that_of_the_models_own_integrator(
-    train: System, stopping: Stopping, forecaster: Forecaster
-) -> None:
+def test_a_stop_is_that_of_the_models_own_integrator(train, stopping, forecaster):
     """Independent: the FMU's Co-Simulation, whose inputs are set every 20 ms."""
     stop = asked_stop({"speed": "100 km/h", "gradient": -0.005}, train, stopping)
     found = forecaster.stop(stop, {})
@@ -149,9 +145,7 @@ def test_a_stop_is_that_of_the_models_own_integrator(
     assert_allclose(found.time, t, atol=0.15)
 
 
-def test_more_asked_of_a_stop_makes_it_longer_and_more_force_shorter(
-    train: System, stopping: Stopping, forecaster: Forecaster
-) -> None:
+def test_more_asked_of_a_stop_makes_it_longer_and_more_force_shorter(train, stopping, forecaster):
     def distance(**said: object) -> float:
         return forecaster.stop(asked_stop(said, train, stopping), {}).distance
 
@@ -162,17 +156,13 @@ def test_more_asked_of_a_stop_makes_it_longer_and_more_force_shorter(
     assert_allclose(distance(mass1="55 t", mass2="55 t"), usual, rtol=0.01)
 
 
-def test_a_stop_that_does_not_end_is_told(
-    train: System, stopping: Stopping, forecaster: Forecaster
-) -> None:
+def test_a_stop_that_does_not_end_is_told(train, stopping, forecaster):
     stop = asked_stop({"gradient": -0.2}, train, stopping)
     with pytest.raises(wb.FMUError, match="not at rest after 200 s"):
         forecaster.stop(stop, {})
 
 
-def test_corrected_stops_are_those_under_nominal_conditions(
-    train: System, stopping: Stopping, forecaster: Forecaster
-) -> None:
+def test_corrected_stops_are_those_under_nominal_conditions(train, stopping, forecaster):
     """Made too fast, downhill and light; pads and air are not corrected for speed."""
     said = {"speed": "123 km/h", "gradient": -0.006, "mass1": "45 t", "mass2": "46 t"}
     stop, response = asked_stop(said, train, stopping), stopping.response
@@ -194,9 +184,7 @@ def question(train: System, stop: Stop, left: float) -> Question:
     return Question(stop, MachineLevels(keys, mean, np.diag((0.01 * mean) ** 2)), left, 5)
 
 
-def test_a_distribution_is_that_of_its_parts(
-    train: System, stopping: Stopping, forecaster: Forecaster
-) -> None:
+def test_a_distribution_is_that_of_its_parts(train, stopping, forecaster):
     """Variances of a function that is nearly linear add up: parts by differences, one by one."""
     stop = asked_stop({}, train, stopping)
     asked = question(train, stop, left=0.01)
@@ -211,9 +199,7 @@ def test_a_distribution_is_that_of_its_parts(
     assert drawn[1].std() < drawn[0].std()
 
 
-def test_a_stop_that_is_drawn_is_the_one_before_the_steps_were_longer(
-    train: System, stopping: Stopping, forecaster: Forecaster
-) -> None:
+def test_a_stop_that_is_drawn_is_the_one_before_the_steps_were_longer(train, stopping, forecaster):
     """Ten centimetres in a kilometre, which is what the step is chosen by."""
     stop = asked_stop({}, train, stopping)
     asked = question(train, stop, left=0.0)
@@ -223,9 +209,7 @@ def test_a_stop_that_is_drawn_is_the_one_before_the_steps_were_longer(
     assert drawn != found  # they are longer
 
 
-def test_a_stop_does_not_depend_on_the_one_before(
-    train: System, stopping: Stopping, forecaster: Forecaster
-) -> None:
+def test_a_stop_does_not_depend_on_the_one_before(train, stopping, forecaster):
     """A Jacobian at rest that is kept for the first steps of the next stop moves one of these."""
     asked = question(train, asked_stop({}, train, stopping), left=0.0)
     points = np.random.default_rng(4).standard_normal((510, dimension(asked, train, stopping)))
@@ -233,9 +217,7 @@ def test_a_stop_does_not_depend_on_the_one_before(
     np.testing.assert_array_equal(there, back[::-1])
 
 
-def test_the_safety_level_agrees_with_plain_samples(
-    train: System, stopping: Stopping, forecaster: Forecaster
-) -> None:
+def test_the_safety_level_agrees_with_plain_samples(train, stopping, forecaster):
     stop = asked_stop({}, train, stopping)
     asked = question(train, stop, left=0.005)
     count = dimension(asked, train, stopping)
@@ -249,7 +231,7 @@ def test_the_safety_level_agrees_with_plain_samples(
     assert found.low < high
 
 
-def test_ranks_of_a_sample_hold_its_quantile_as_often_as_they_say() -> None:
+def test_ranks_of_a_sample_hold_its_quantile_as_often_as_they_say():
     random = np.random.default_rng(5)
     held = [
         low <= 0.01 <= high
@@ -263,9 +245,7 @@ def test_ranks_of_a_sample_hold_its_quantile_as_often_as_they_say() -> None:
 
 
 @pytest.mark.long
-def test_the_safety_level_agrees_with_many_plain_samples(
-    train: System, stopping: Stopping, forecaster: Forecaster
-) -> None:
+def test_the_safety_level_agrees_with_many_plain_samples(train, stopping, forecaster):
     stop = asked_stop({}, train, stopping)
     asked = question(train, stop, left=0.005)
     points = np.random.default_rng(3).standard_normal((100_000, dimension(asked, train, stopping)))
@@ -299,9 +279,7 @@ def made(train: System, *, rest: bool = True) -> Case:
 
 
 @pytest.mark.filterwarnings("ignore::UserWarning")  # no noise, which a recorder has
-def test_a_recording_tells_its_command_its_distance_and_what_was_asked(
-    train: System, stopping: Stopping
-) -> None:
+def test_a_recording_tells_its_command_its_distance_and_what_was_asked(train, stopping):
     found = read_stop(made(train), train, stopping)
     # Half the rise is met between two samples in a line, which is 3 ms off a bent curve.
     assert_allclose(found.command, 20.02, atol=0.01)
@@ -314,7 +292,7 @@ def test_a_recording_tells_its_command_its_distance_and_what_was_asked(
 
 
 @pytest.mark.filterwarnings("ignore::UserWarning")
-def test_a_recording_without_a_stop_is_refused(train: System, stopping: Stopping) -> None:
+def test_a_recording_without_a_stop_is_refused(train, stopping):
     with pytest.raises(InputError, match="a recording until standstill"):
         read_stop(made(train, rest=False), train, stopping)
     coasting = made(train).with_signals({"pB1": np.zeros(600)})
@@ -331,14 +309,12 @@ def test_a_recording_without_a_stop_is_refused(train: System, stopping: Stopping
         ({"mass1": 48.0}, "a text with a unit"),
     ],
 )
-def test_what_no_stop_can_be_asked_for_is_refused(
-    said: dict[str, object], message: str, train: System, stopping: Stopping
-) -> None:
+def test_what_no_stop_can_be_asked_for_is_refused(said, message, train, stopping):
     with pytest.raises(InputError, match=message):
         asked_stop(said, train, stopping)
 
 
-def test_a_system_that_does_not_say_how_it_stops_is_refused(system: System, dry_case: Case) -> None:
+def test_a_system_that_does_not_say_how_it_stops_is_refused(system, dry_case):
     with pytest.raises(InputError, match=r"no table \[distance\]"):
         wb.distance(system, [dry_case, dry_case], report=lambda line: None)
 
@@ -347,7 +323,7 @@ def test_a_system_that_does_not_say_how_it_stops_is_refused(system: System, dry_
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(tmp_path_factory) -> Path:
     if not RECORDINGS.exists():
         pytest.skip("the recordings are not at hand")
     out = tmp_path_factory.mktemp("stops")
@@ -356,7 +332,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def result(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def result(folder, tmp_path_factory) -> Path:
     out = tmp_path_factory.mktemp("result")
     told = ["--out", str(out), "--ask", "speed=140 km/h", "--samples", "400", "--safety", "1"]
     told += ["--plain", "2100"]
@@ -364,7 +340,7 @@ def result(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
-def test_bands_hold_stops_that_were_not_used(result: Path) -> None:
+def test_bands_hold_stops_that_were_not_used(result):
     truth = json.loads((RECORDINGS / "healthy" / "truth.json").read_text())["cases"]
     stops = pd.read_csv(result / "stops.csv", keep_default_na=False).set_index("stop")
     true = pd.Series({name: one["stop_distance"] for name, one in truth.items()})
@@ -380,7 +356,7 @@ def test_bands_hold_stops_that_were_not_used(result: Path) -> None:
     assert_allclose(stops["distance [m]"].astype(float)[claimed], true[claimed], rtol=4e-3)
 
 
-def test_results_say_what_was_asked_and_what_data_do_not_carry(result: Path) -> None:
+def test_results_say_what_was_asked_and_what_data_do_not_carry(result):
     said = json.loads((result / "distance.json").read_text())
     check("distance", said)
     assert_allclose(said["asked"]["speed"], 140.0 / 3.6)
@@ -402,7 +378,7 @@ def test_results_say_what_was_asked_and_what_data_do_not_carry(result: Path) -> 
     }
 
 
-def test_the_page_shows_the_distance_and_each_stop_beside_what_the_others_say(result: Path) -> None:
+def test_the_page_shows_the_distance_and_each_stop_beside_what_the_others_say(result):
     said = json.loads((result / "distance.json").read_text())
     page = check_page(result / "index.html", said)
     assert page.xpath("//svg[@data-axis='distance' and @data-unit='m']")
@@ -419,7 +395,7 @@ def test_the_page_shows_the_distance_and_each_stop_beside_what_the_others_say(re
 
 
 @pytest.mark.long
-def test_bands_hold_forty_stops_of_months(train: System, tmp_path: Path) -> None:
+def test_bands_hold_forty_stops_of_months(train, tmp_path):
     """One axle loses 12 % of its friction on the way; each stop by the others."""
     if not RECORDINGS.exists():
         pytest.skip("the recordings are not at hand")
@@ -440,7 +416,7 @@ def test_bands_hold_forty_stops_of_months(train: System, tmp_path: Path) -> None
     assert np.mean(held) >= 0.93
 
 
-def test_the_old_name_of_valid_stops_warns(train: System) -> None:
+def test_the_old_name_of_valid_stops_warns(train):
     forecast = Forecast(np.ones(2), np.ones(2), 0.0)
     stop = asked_stop({}, train, stopping_of(train))
     empty = Distance(train, stop, forecast, 1.0, (), None, None, interrupted=False)
@@ -481,7 +457,7 @@ MISTAKES = {
 
 
 @pytest.mark.parametrize("mistake", MISTAKES)
-def test_a_mistake_in_what_is_said_of_stops_is_refused(mistake: str, tmp_path: Path) -> None:
+def test_a_mistake_in_what_is_said_of_stops_is_refused(mistake, tmp_path):
     (old, new), message = MISTAKES[mistake]
     text = OWN.read_text().replace("../../fmus", str(OWN.parents[2] / "fmus"))
     assert old in text

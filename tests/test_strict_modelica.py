@@ -187,7 +187,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize(("text", "message"), WRONG.values(), ids=WRONG)
-def test_what_is_not_so_is_refused_with_its_line(text: str, message: str, tmp_path: Path) -> None:
+def test_what_is_not_so_is_refused_with_its_line(text, message, tmp_path):
     with pytest.raises(InputError, match=message) as refused:
         check(read_library(write(tmp_path, text)), "Lib.M")
     assert re.search(r"Lib/package\.mo:\d+$", refused.value.where)
@@ -235,18 +235,16 @@ RIGHT = {
 
 
 @pytest.mark.parametrize("text", RIGHT.values(), ids=RIGHT)
-def test_what_is_so_is_accepted(text: str, tmp_path: Path) -> None:
+def test_what_is_so_is_accepted(text, tmp_path):
     check(read_library(write(tmp_path, text)), "Lib.M")
 
 
 @pytest.mark.parametrize("library", LIBRARIES, ids=lambda library: library.name)
-def test_every_class_that_comes_with_the_workbench_says_what_is_so(library: Path) -> None:
+def test_every_class_that_comes_with_the_workbench_says_what_is_so(library):
     check(read_library(library / "package.mo"))
 
 
-def test_either_compiler_refuses_it_before_its_front_end_is_asked(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_either_compiler_refuses_it_before_its_front_end_is_asked(tmp_path, monkeypatch):
     pytest.importorskip("rumoca")
     pytest.importorskip("casadi")
     from workbench.models.compiler import build, openmodelica  # needs the extra
@@ -266,7 +264,7 @@ def test_either_compiler_refuses_it_before_its_front_end_is_asked(
     assert not out.exists()
 
 
-def test_what_the_front_end_would_drop_is_refused(tmp_path: Path) -> None:
+def test_what_the_front_end_would_drop_is_refused(tmp_path):
     """A component that the base inherits stays as it was, however right its redeclaration is."""
     pytest.importorskip("rumoca")
     from workbench.models.compiler.flat import flatten  # needs the extra
@@ -286,7 +284,7 @@ def test_what_the_front_end_would_drop_is_refused(tmp_path: Path) -> None:
         "model H replaceable A a; end H; model M H h(redeclare A a(k(max=2.0)=1.0)); end M;",
     ],
 )
-def test_a_value_that_the_front_end_would_lose_is_refused(text: str, tmp_path: Path) -> None:
+def test_a_value_that_the_front_end_would_lose_is_refused(text, tmp_path):
     """It would go on with the default: a model with another number, and no word of it."""
     pytest.importorskip("rumoca")
     from workbench.models.compiler.flat import flatten  # needs the extra

@@ -49,8 +49,8 @@ def left(folder: Path) -> list[Path]:
     ],
 )
 def test_a_model_that_ends_its_process_does_not_end_a_command_in_silence(
-    command: tuple[str, ...], hostile_path: Path, home: Path
-) -> None:
+    command, hostile_path, home
+):
     # A cache of its own: other tests find the same file sound, which is then not tried again.
     own = {"HOSTILE": "exit fmi2GetReal 2", "XDG_CACHE_HOME": str(home / "cache")}
     run = workbench(home, *command, hostile_path, **own)
@@ -63,8 +63,8 @@ def test_a_model_that_ends_its_process_does_not_end_a_command_in_silence(
 @needs_compiler
 @pytest.mark.parametrize(("attack", "how"), [("exit", "status 0"), ("crash", "SIGSEGV")])
 def test_a_model_that_ends_its_process_late_is_told_by_the_process_beside(
-    attack: str, how: str, hostile_path: Path, home: Path
-) -> None:
+    attack, how, hostile_path, home
+):
     # Long after the trial, whose calls of this function are few.
     plan = f"{attack} fmi2SetReal 1000"
     command = ("simulate", CASE, "--workers", "1", "--out", "out", "--fmu", hostile_path)
@@ -101,9 +101,7 @@ sys.exit(supervised(work))
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="the command is no process of its own")
 @pytest.mark.parametrize(("request_", "status"), [("SIGTERM", 143), ("SIGINT", 130)])
-def test_who_asks_for_an_end_while_a_module_is_imported_sees_no_traceback(
-    request_: str, status: int, home: Path
-) -> None:
+def test_who_asks_for_an_end_while_a_module_is_imported_sees_no_traceback(request_, status, home):
     """Python makes another error of what comes while a class names its members."""
     (home / "work.py").write_text(IN_A_CLASS.format(request=request_))
     command = [sys.executable, "work.py"]
@@ -138,9 +136,7 @@ sys.exit(supervised(lambda: 0))
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="the command is no process of its own")
 @pytest.mark.parametrize("which", ["_held", "_remove"])
-def test_who_asks_for_an_end_while_temporary_files_are_made_or_removed_leaves_none(
-    which: str, home: Path
-) -> None:
+def test_who_asks_for_an_end_while_temporary_files_are_made_or_removed_leaves_none(which, home):
     (home / "work.py").write_text(BESIDE_FILES.format(which=which))
     (home / "tmp").mkdir()
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "TMPDIR": str(home / "tmp")}
@@ -165,9 +161,7 @@ def waiting(folder: Path, hostile_path: Path) -> "Iterator[subprocess.Popen[str]
 @pytest.mark.parametrize(
     ("number", "status"), [(signal.SIGTERM, 143), (signal.SIGINT, 130), (signal.SIGHUP, 129)]
 )
-def test_a_command_that_is_asked_to_end_leaves_nothing(
-    number: int, status: int, hostile_path: Path, home: Path
-) -> None:
+def test_a_command_that_is_asked_to_end_leaves_nothing(number, status, hostile_path, home):
     with waiting(home, hostile_path) as command:
         command.send_signal(number)
         command.communicate(timeout=60)
@@ -177,7 +171,7 @@ def test_a_command_that_is_asked_to_end_leaves_nothing(
 
 
 @needs_compiler
-def test_what_a_killed_command_left_is_removed_by_the_next(hostile_path: Path, home: Path) -> None:
+def test_what_a_killed_command_left_is_removed_by_the_next(hostile_path, home):
     with waiting(home, hostile_path) as command:
         command.kill()
     assert comes_true(lambda: not living(command.pid))
@@ -204,9 +198,7 @@ def served(session: int) -> list[int]:
 
 
 @pytest.mark.parametrize("victim", [pytest.param("server", marks=pytest.mark.long), "worker"])
-def test_a_command_goes_on_without_a_process_of_its_pool_and_leaves_nothing(
-    victim: str, home: Path
-) -> None:
+def test_a_command_goes_on_without_a_process_of_its_pool_and_leaves_nothing(victim, home):
     cases = (CASE, ROOT / "cases" / "02_dry_100_2.7")
     command = ("simulate", *cases, "--estimator", "open_loop", "--out", "out", "--workers", "2")
     with running(home, *command) as process:
@@ -227,13 +219,13 @@ def test_a_command_goes_on_without_a_process_of_its_pool_and_leaves_nothing(
 
 
 @pytest.fixture
-def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def place(tmp_path, monkeypatch) -> Path:
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     files.sweep.cache_clear()
     return tmp_path
 
 
-def test_folders_that_are_held_or_not_ours_stay(place: Path) -> None:
+def test_folders_that_are_held_or_not_ours_stay(place):
     held, linked, other = place / "workbench-held", place / "workbench-link", place / "else"
     named = place / "workbench-results"  # by someone who keeps them there
     for folder in (held, other, named):
@@ -256,7 +248,7 @@ def test_folders_that_are_held_or_not_ours_stay(place: Path) -> None:
     assert linked.is_symlink()
 
 
-def test_folders_of_living_processes_stay(place: Path) -> None:
+def test_folders_of_living_processes_stay(place):
     with closing(TemporaryFolder()) as mine:
         files.sweep.cache_clear()
         with closing(TemporaryFolder()) as second:
@@ -265,9 +257,7 @@ def test_folders_of_living_processes_stay(place: Path) -> None:
     assert list(place.iterdir()) == []
 
 
-def test_an_fmu_that_is_refused_or_forgotten_leaves_no_folder(
-    place: Path, minimal_path: Path
-) -> None:
+def test_an_fmu_that_is_refused_or_forgotten_leaves_no_folder(place, minimal_path):
     fmu = FMU(minimal_path)
     assert len(list(place.iterdir())) == 1
     del fmu
@@ -279,9 +269,7 @@ def test_an_fmu_that_is_refused_or_forgotten_leaves_no_folder(
 
 @needs_compiler
 @linux_only
-def test_an_isolated_model_can_neither_write_elsewhere_nor_reach_a_network(
-    hostile_path: Path, home: Path
-) -> None:
+def test_an_isolated_model_can_neither_write_elsewhere_nor_reach_a_network(hostile_path, home):
     place = home / "elsewhere"
     command = ("fmu", "check", hostile_path, "--instantiations", "5", "--json")
     plan = {"HOSTILE": "touch fmi2Reset 3", "PLACE": str(place)}
@@ -299,7 +287,7 @@ def test_an_isolated_model_can_neither_write_elsewhere_nor_reach_a_network(
 
 
 @linux_only
-def test_an_isolated_command_does_its_work(home: Path) -> None:
+def test_an_isolated_command_does_its_work(home):
     """With workers, figures and all."""
     command = ("simulate", CASE, "--estimator", "open_loop", "--workers", "2", "--isolated")
     run = workbench(home, *command, "--out", "out")
@@ -309,7 +297,7 @@ def test_an_isolated_command_does_its_work(home: Path) -> None:
 
 
 @linux_only
-def test_a_program_that_asks_for_isolation_stays_free_itself(home: Path) -> None:
+def test_a_program_that_asks_for_isolation_stays_free_itself(home):
     program = (
         "from workbench.__main__ import main\n"
         f"status = main(['fmu', 'check', {str(ROOT / 'fmus' / 'fmi2' / 'MinimalObserver.fmu')!r},"

@@ -10,10 +10,8 @@ from numpy.testing import assert_array_equal
 from workbench.errors import InputError
 from workbench.models.fmu import FMU
 from workbench.observers import choose
-from workbench.recordings.case import Case
 from workbench.system.reader import read_system
 from workbench.system.registry import load_system, model_path, open_model
-from workbench.system.system import System
 
 ROOT = Path(__file__).parent.parent
 OWN = ROOT / "modelica" / "WheelsetRig" / "system.toml"
@@ -251,37 +249,37 @@ MISTAKES = {
 
 
 @pytest.mark.parametrize("mistake", MISTAKES)
-def test_a_mistake_is_refused_where_it_stands(tmp_path: Path, mistake: str) -> None:
+def test_a_mistake_is_refused_where_it_stands(tmp_path, mistake):
     change, message = MISTAKES[mistake]
     with pytest.raises(InputError, match=message) as refusal:
         read_system(changed(tmp_path, change))
     assert "To do: " in str(refusal.value)
 
 
-def test_the_file_without_a_mistake_is_read(tmp_path: Path, system: System) -> None:
+def test_the_file_without_a_mistake_is_read(tmp_path, system):
     read = read_system(changed(tmp_path))
     assert read.signals == system.signals
     assert read.values == system.values
 
 
-def test_an_fmu_that_is_missing_is_refused(tmp_path: Path) -> None:
+def test_an_fmu_that_is_missing_is_refused(tmp_path):
     path = changed(tmp_path, (f"{ROOT}/fmus/fmi2/MinimalObserver.fmu", "Other.fmu"))
     with pytest.raises(InputError, match=r"Other\.fmu: found"):
         read_system(path)
 
 
-def test_a_model_with_neither_fmu_nor_library_is_refused(tmp_path: Path) -> None:
+def test_a_model_with_neither_fmu_nor_library_is_refused(tmp_path):
     path = changed(tmp_path, (f', fmu = "{ROOT}/fmus/fmi2/MinimalObserver.fmu"', ""))
     with pytest.raises(InputError, match=r"found no FMU of MinimalObserver, and no library"):
         load_system(path)
 
 
-def test_a_system_of_no_such_name_is_refused() -> None:
+def test_a_system_of_no_such_name_is_refused():
     with pytest.raises(InputError, match=r"'wheelst'.* \(closest: 'wheelset'\)"):
         load_system("wheelst")
 
 
-def test_a_role_without_a_model_is_refused_when_it_is_needed(tmp_path: Path) -> None:
+def test_a_role_without_a_model_is_refused_when_it_is_needed(tmp_path):
     line = f'reference = {{ class = "Reference", fmu = "{ROOT}/fmus/fmi2/Reference.fmu" }}\n'
     system = read_system(changed(tmp_path, (line, "")))
     with pytest.raises(InputError, match=r"\[models\] reference: found no such model"):
@@ -289,8 +287,8 @@ def test_a_role_without_a_model_is_refused_when_it_is_needed(tmp_path: Path) -> 
 
 
 def test_parameters_of_this_machine_act_as_the_defaults_of_its_model_would(
-    tmp_path: Path, minimal_path: Path, dry_case: Case
-) -> None:
+    tmp_path, minimal_path, dry_case
+):
     """Reference: an FMU whose radius is set by hand before each start."""
     mine = read_system(changed(tmp_path, ("[parameters]", '[parameters]\nrW = "0.42 m"')))
     usual = read_system(changed(tmp_path))
@@ -307,9 +305,7 @@ def test_parameters_of_this_machine_act_as_the_defaults_of_its_model_would(
     assert np.abs(found.values - other.values).max() > 1.0
 
 
-def test_bands_change_what_a_filter_says_it_knows_and_no_estimate(
-    system: System, dry_case: Case
-) -> None:
+def test_bands_change_what_a_filter_says_it_knows_and_no_estimate(system, dry_case):
     plain = replace(system, bands={})
     wider = replace(system, bands={"ekf": {"Fx": 1.5}})
     part = slice(0, 2000)
@@ -324,7 +320,7 @@ def test_bands_change_what_a_filter_says_it_knows_and_no_estimate(
     assert_array_equal(found.sigma, expected.sigma * factors)
 
 
-def test_what_is_derived_by_a_sensor_that_only_judges_is_asked_of_no_model(system: System) -> None:
+def test_what_is_derived_by_a_sensor_that_only_judges_is_asked_of_no_model(system):
     """Another model may have no wheel load: then the adhesion that is used is not estimated."""
     assert system.constants == {"rR"}
     assert set(system.indirect) == {"speed", "adhesion"}
@@ -332,7 +328,7 @@ def test_what_is_derived_by_a_sensor_that_only_judges_is_asked_of_no_model(syste
     assert set(replace(system, values=without).indirect) == {"speed"}
 
 
-def test_bands_of_no_estimator_are_refused(system: System) -> None:
+def test_bands_of_no_estimator_are_refused(system):
     with pytest.raises(InputError, match=r"\[bands\.efk\]: .* name \(closest: 'ekf'\)"):
         choose(replace(system, bands={"efk": {"Fx": 1.0}}), [])
 
@@ -346,8 +342,6 @@ def test_bands_of_no_estimator_are_refused(system: System) -> None:
         ('a = ["pB", "tauR", "omegaW", "omegaR", "Fx"]', set()),
     ],
 )
-def test_clocks_of_all_loggers_but_one_may_be_late(
-    loggers: str, late: set[str], tmp_path: Path
-) -> None:
+def test_clocks_of_all_loggers_but_one_may_be_late(loggers, late, tmp_path):
     path = changed(tmp_path, ('speeds = ["omegaW", "omegaR"]', loggers))
     assert set(read_system(path).clocks) == late

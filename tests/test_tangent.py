@@ -36,7 +36,7 @@ END = 2.0  # [s]
 
 
 @pytest.fixture(scope="module", params=[2, 3])
-def tank(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[FMU]:
+def tank(request, tmp_path_factory) -> Iterator[FMU]:
     with FMU(build_text(tmp_path_factory.mktemp("tank"), MODEL, request.param)) as fmu:
         yield fmu
 
@@ -58,7 +58,7 @@ def derivatives(tank: FMU, columns: list[tuple[str, ...]], inflow: float, count:
     return -along.errors[:, 0, :]  # an error is what was measured without what is predicted
 
 
-def test_derivatives_are_those_of_the_closed_form(tank: FMU) -> None:
+def test_derivatives_are_those_of_the_closed_form(tank):
     inflow, k, c, count = 0.3, 0.8, 1.5, 200
     found = derivatives(tank, [("k",), ("c",), ("T",), ("h", "s")], inflow, count)
     t = np.linspace(0.0, END, count + 1)
@@ -73,7 +73,7 @@ def test_derivatives_are_those_of_the_closed_form(tank: FMU) -> None:
     np.testing.assert_allclose(found[:, 3], c * np.exp(-k * t), atol=5e-4)
 
 
-def test_halving_the_step_quarters_the_error(tank: FMU) -> None:
+def test_halving_the_step_quarters_the_error(tank):
     errors = []
     k, c, T = 0.8, 1.5, 1e-4
     for count in (20, 40):
@@ -86,7 +86,7 @@ def test_halving_the_step_quarters_the_error(tank: FMU) -> None:
     assert 0.2 < errors[1] / errors[0] < 0.3
 
 
-def test_variables_that_one_value_sets_add_up(tank: FMU) -> None:
+def test_variables_that_one_value_sets_add_up(tank):
     alone = derivatives(tank, [("k",), ("c",)], 0.3, 50)
     together = derivatives(tank, [("k", "c")], 0.3, 50)
     # Sums in another order.

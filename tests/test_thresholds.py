@@ -52,7 +52,7 @@ counts = st.integers(1, 500)
 
 
 @given(rates, counts)
-def test_thresholds_are_the_quantiles_of_their_statistics(rate: float, candidates: int) -> None:
+def test_thresholds_are_the_quantiles_of_their_statistics(rate, candidates):
     one = thresholds(candidates, rate)
     # To rounding: inverse functions of double precision.
     assert 2.0 * candidates * norm.sf(one.significant) == pytest.approx(rate, rel=1e-9)
@@ -62,7 +62,7 @@ def test_thresholds_are_the_quantiles_of_their_statistics(rate: float, candidate
 
 
 @given(rates, st.floats(1.01, 4.0), counts)
-def test_fewer_false_alarms_ask_for_more(rate: float, times: float, candidates: int) -> None:
+def test_fewer_false_alarms_ask_for_more(rate, times, candidates):
     rare, usual = (threshold_values(thresholds(candidates, one)) for one in (rate, times * rate))
     for name in DERIVED:
         assert rare[name] > usual[name], name
@@ -72,13 +72,13 @@ def test_fewer_false_alarms_ask_for_more(rate: float, times: float, candidates: 
 
 
 @given(rates, counts)
-def test_more_candidates_ask_for_more(rate: float, candidates: int) -> None:
+def test_more_candidates_ask_for_more(rate, candidates):
     few, many = thresholds(candidates, rate), thresholds(candidates + 1, rate)
     assert many.significant > few.significant
     assert many.fall > few.fall
 
 
-def test_the_largest_of_all_candidates_is_significant_at_the_stated_rate() -> None:
+def test_the_largest_of_all_candidates_is_significant_at_the_stated_rate():
     """By chance: sizes over their deviations, of 28 candidates in 50 000 clean sets."""
     sets = 50_000
     sizes = np.random.default_rng(1).standard_normal((sets, 28))
@@ -92,7 +92,7 @@ def test_the_largest_of_all_candidates_is_significant_at_the_stated_rate() -> No
 
 @pytest.mark.parametrize("factor", FACTORS)
 @pytest.mark.parametrize("name", threshold_values(thresholds(28)))
-def test_one_threshold_is_changed_and_no_other(name: str, factor: float) -> None:
+def test_one_threshold_is_changed_and_no_other(name, factor):
     usual = threshold_values(thresholds(28))
     found = threshold_values(scaled(thresholds(28), name, factor))
     # What is counted stays a whole number.
@@ -108,7 +108,7 @@ def short(name: str, speed: float) -> Scenario:
 
 
 @pytest.mark.long
-def test_what_is_clear_is_said_by_half_and_by_twice_of_a_threshold(tmp_path: Path) -> None:
+def test_what_is_clear_is_said_by_half_and_by_twice_of_a_threshold(tmp_path):
     """Two short stops, a load cell's gain of 1.6 %; simulations that are kept change nothing."""
     rig = PlantedStops((short("01_dry_80_1.5", 30.0), short("03_dry_120_3.6", 40.0)), REFERENCE)
     setup = Setup(SYSTEM, rig, tmp_path / "AllEffects.fmu", EFFECTS)
@@ -121,7 +121,7 @@ def test_what_is_clear_is_said_by_half_and_by_twice_of_a_threshold(tmp_path: Pat
     assert (found.said[0], found.changed) == ("found", ())
 
 
-def test_sets_are_of_all_kinds_alike() -> None:
+def test_sets_are_of_all_kinds_alike():
     groups = [
         (Planting(kind, seed, 1.0, {}, ()),)
         for kind, count in (("clean", 9), ("single", 90), ("pair", 2))
@@ -133,7 +133,7 @@ def test_sets_are_of_all_kinds_alike() -> None:
     ] == [3, 4, 2]
 
 
-def test_what_changes_is_told_and_what_does_not_is_listed() -> None:
+def test_what_changes_is_told_and_what_does_not_is_listed():
     varied = ThresholdSensitivity(Planting("clean", 5, 0.0, {}, ()), ("nothing",), ())
     assert (
         "nothing changes by: significant" in thresholds_check([varied], {"significant": 4.0}).text
@@ -143,7 +143,7 @@ def test_what_changes_is_told_and_what_does_not_is_listed() -> None:
 # --- a data sheet that is wrong ---
 
 
-def test_sheet_errors_are_those_that_the_rig_knows_and_the_library_may_name() -> None:
+def test_sheet_errors_are_those_that_the_rig_knows_and_the_library_may_name():
     names = {effect.name for effect in EFFECTS}
     assert {sheet_error.effect for sheet_error in SHEET_ERRORS} - {""} <= names
     (rig,) = {type(open_virtual_rig(SYSTEM, [], REFERENCE))}
@@ -158,7 +158,7 @@ def said(effect: str, *causes: tuple[str, ...]) -> SetVerdict:
     return SetVerdict(planting, "found" if named else "nothing", named, None, None, 1.0)
 
 
-def test_only_the_error_itself_or_its_stated_twin_may_be_named() -> None:
+def test_only_the_error_itself_or_its_stated_twin_may_be_named():
     twins = ("DriveTorqueGain", "RollerInertia")
     assert not named_wrong(said("RollerInertia"))
     assert not named_wrong(said("RollerInertia", ("RollerInertia",)))
@@ -174,7 +174,7 @@ def test_only_the_error_itself_or_its_stated_twin_may_be_named() -> None:
 
 @pytest.mark.long
 @pytest.mark.parametrize("gain", [0.015, -0.015])
-def test_a_wrong_inertia_of_the_roller_never_gets_a_wrong_name(gain: float, tmp_path: Path) -> None:
+def test_a_wrong_inertia_of_the_roller_never_gets_a_wrong_name(gain, tmp_path):
     """Of three stops: two directions, three speeds."""
     names = ("01_dry_80_1.5", "03_dry_120_3.6", "05_dry_120_2.7_rev")
     rig = PlantedStops(tuple(SCENARIOS[name] for name in names), REFERENCE)
@@ -190,7 +190,7 @@ def test_a_wrong_inertia_of_the_roller_never_gets_a_wrong_name(gain: float, tmp_
     assert not named_wrong(found)
 
 
-def test_command_makes_one_check_at_a_time(capsys: pytest.CaptureFixture[str]) -> None:
+def test_command_makes_one_check_at_a_time(capsys):
     with pytest.raises(SystemExit, match="2"):
         main(["power", "--thresholds", "--sheet-error"])
     assert "not allowed with" in capsys.readouterr().err

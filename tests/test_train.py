@@ -68,7 +68,7 @@ def stop(folder: Path, change: tuple[str, str] = ("", "")) -> Path:
     return folder / "set"
 
 
-def test_gradients_and_curves_are_those_under_the_vehicles(tmp_path: Path, train: System) -> None:
+def test_gradients_and_curves_are_those_under_the_vehicles(tmp_path, train):
     write_cases("train", stop(tmp_path), tmp_path / "cases")
     (case,) = read_cases([tmp_path / "cases"], train)
     assert_allclose(case.time, TIME.reshape(-1, 5).mean(axis=1), atol=1e-12)
@@ -91,21 +91,19 @@ def test_gradients_and_curves_are_those_under_the_vehicles(tmp_path: Path, train
         ('"track.csv"', '"way.csv"', r"way\.csv"),
     ],
 )
-def test_a_stop_that_lacks_something_is_refused(
-    old: str, new: str, message: str, tmp_path: Path
-) -> None:
+def test_a_stop_that_lacks_something_is_refused(old, new, message, tmp_path):
     with pytest.raises(InputError, match=message):
         write_cases("train", stop(tmp_path, (old, new)), tmp_path / "cases")
 
 
-def test_a_folder_without_stops_is_refused(tmp_path: Path) -> None:
+def test_a_folder_without_stops_is_refused(tmp_path):
     (tmp_path / "set" / "01").mkdir(parents=True)
     (tmp_path / "set" / "01" / "notes.txt").write_text("nothing")
     with pytest.raises(InputError, match=r"no folder with a case\.toml"):
         write_cases("train", tmp_path / "set", tmp_path / "cases")
 
 
-def test_an_axle_that_turns_unlike_the_others_is_refused(tmp_path: Path, train: System) -> None:
+def test_an_axle_that_turns_unlike_the_others_is_refused(tmp_path, train):
     """Its speed is in rad/s, and said to be in rpm."""
     recorded = stop(tmp_path) / "01" / "measured.csv"
     recorded.write_text(recorded.read_text().replace("omega3 [rad/s]", "omega3 [rpm]"))
@@ -117,7 +115,7 @@ def test_an_axle_that_turns_unlike_the_others_is_refused(tmp_path: Path, train: 
 # --- effects ---
 
 
-def test_what_an_axle_may_have_is_sought_on_each(train: System) -> None:
+def test_what_an_axle_may_have_is_sought_on_each(train):
     names = [
         effect.name
         for effect in read_effects(read_library(train.library), train.model(OBSERVER).name)
@@ -131,7 +129,7 @@ def test_what_an_axle_may_have_is_sought_on_each(train: System) -> None:
     assert not {"CylinderLag[5]", "WrongMass[3]", "Glazing[1]"} & set(names)
 
 
-def test_an_extended_model_keeps_what_is_known_of_each_axle(train: System) -> None:
+def test_an_extended_model_keeps_what_is_known_of_each_axle(train):
     known = {f"muDC[{axle}]": axle / 16 for axle in (2, 1, 3, 4, 5, 6, 7, 8)}
     text = ExtendedModel(
         read_library(train.library),
@@ -158,7 +156,7 @@ LABELLED = {  # set: what is planted, as it is called here
 
 @pytest.mark.long
 @pytest.mark.parametrize("name", LABELLED)
-def test_a_labelled_fault_is_named_with_its_place(name: str, train: System, tmp_path: Path) -> None:
+def test_a_labelled_fault_is_named_with_its_place(name, train, tmp_path):
     """Pads by what they have beside the other axles': a tolerance of theirs is no other loss."""
     pytest.importorskip("rumoca")
     cases, truth = cases_of(f"labelled/{name}", train, tmp_path / "cases")
@@ -175,7 +173,7 @@ def test_a_labelled_fault_is_named_with_its_place(name: str, train: System, tmp_
 
 
 @pytest.mark.long
-def test_a_wrong_radius_is_named_with_its_axle(train: System, tmp_path: Path) -> None:
+def test_a_wrong_radius_is_named_with_its_axle(train, tmp_path):
     """Among three causes on every axle, in two stops of the four."""
     pytest.importorskip("rumoca")
     cases, truth = cases_of("labelled/radius_axle", train, tmp_path / "cases")
@@ -188,7 +186,7 @@ def test_a_wrong_radius_is_named_with_its_axle(train: System, tmp_path: Path) ->
     assert size.low < 1e-3 * planted["size"] < size.high
 
 
-def test_friction_and_radius_of_each_axle_are_estimated(train: System, tmp_path: Path) -> None:
+def test_friction_and_radius_of_each_axle_are_estimated(train, tmp_path):
     """Pads of axle 3 have lost 15 %; profiles and loads of a sound train blur axles by 2 %."""
     cases, truth = cases_of("labelled/pads_axle", train, tmp_path / "cases")
     case = next(case for case in cases if case.name == "01_120_service_dry")
@@ -205,9 +203,7 @@ def test_friction_and_radius_of_each_axle_are_estimated(train: System, tmp_path:
 @pytest.mark.parametrize(
     "name", ["healthy", *(f"labelled/{one}" for one in LABELLED if "radius" not in one)]
 )
-def test_satellites_tell_radii_and_speed_when_brakes_are_told_to_act(
-    name: str, train: System, tmp_path: Path
-) -> None:
+def test_satellites_tell_radii_and_speed_when_brakes_are_told_to_act(name, train, tmp_path):
     """But of a train with a brake that drags, which slows while it coasts as another would not."""
     cases, truth = cases_of(name, train, tmp_path / "cases")
     radii, speeds = [], []
@@ -225,9 +221,7 @@ def test_satellites_tell_radii_and_speed_when_brakes_are_told_to_act(
     assert np.sqrt(np.mean(np.square(radii))) < (0.15 if "dragging" in name else 0.025)
 
 
-def test_a_wet_rail_is_told_from_a_dry_one_by_the_slip_of_axles_that_brake(
-    train: System, tmp_path: Path
-) -> None:
+def test_a_wet_rail_is_told_from_a_dry_one_by_the_slip_of_axles_that_brake(train, tmp_path):
     """`imm` weighs both, whatever the crew says; slides are on patches, which are neither."""
     said = []
     for name in ("healthy", "labelled/pads_axle", "labelled/cylinder_lag_bogie"):
@@ -242,9 +236,7 @@ def test_a_wet_rail_is_told_from_a_dry_one_by_the_slip_of_axles_that_brake(
     assert min(said) > 0.95
 
 
-def test_masses_of_a_sound_train_stay_as_weighed_where_no_axle_slides(
-    train: System, tmp_path: Path
-) -> None:
+def test_masses_of_a_sound_train_stay_as_weighed_where_no_axle_slides(train, tmp_path):
     """Weighed to 1.5 % of the train, 1.3 % of the stop; what a slide would say is none of it."""
     cases, truth = cases_of("healthy", train, tmp_path / "cases")
     rolled = [case for case in cases if not any(truth["cases"][case.name]["slide_seconds"])]

@@ -4,9 +4,8 @@ import ctypes
 import math
 import shutil
 import subprocess
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -172,7 +171,7 @@ LAWS = (
 
 
 @pytest.fixture(scope="module")
-def library(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
+def library(tmp_path_factory) -> ctypes.CDLL:
     """All of the laws, in one library; warnings of the compiler are errors."""
     if COMPILER is None:
         pytest.skip("needs a C compiler")
@@ -199,9 +198,7 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
 
 @pytest.mark.parametrize("law", LAWS, ids=lambda law: law.__name__)
 @pytest.mark.parametrize("x", [-2.5, -0.5, 0.0, 0.5, 2.5, 3.0])
-def test_c_gives_the_bits_that_compiled_python_gives(
-    library: ctypes.CDLL, law: Callable[..., float], x: float
-) -> None:
+def test_c_gives_the_bits_that_compiled_python_gives(library, law, x):
     rng = np.random.default_rng(4)
     a, m = rng.standard_normal(LENGTH), rng.standard_normal((ROWS, COLUMNS))
     b, n = a.copy(), m.copy()
@@ -281,9 +278,7 @@ def calls_itself(a, m, x):  # type: ignore[no-untyped-def]
     ],
     ids=lambda one: getattr(one, "__name__", None),
 )
-def test_what_has_no_translation_is_refused_with_file_and_line(
-    law: Any, line: int, found: str
-) -> None:
+def test_what_has_no_translation_is_refused_with_file_and_line(law, line, found):
     # A decorator is the first line, the second has the name.
     first = law.py_func.__code__.co_firstlineno
     where = rf"test_translation\.py, line {first + 1 + line}: found {found}"
@@ -291,7 +286,7 @@ def test_what_has_no_translation_is_refused_with_file_and_line(
         Program({}).add(law, [VECTOR, MATRIX, Number(DOUBLE)])
 
 
-def test_settings_are_not_written_to() -> None:
+def test_settings_are_not_written_to():
     constant = Array(DOUBLE, (LENGTH,), (1,), constant=True)
     with pytest.raises(InputError, match="what the law may only read, but is assigned to"):
         Program({}).add(from_the_end, [constant, MATRIX, Number(DOUBLE)])
@@ -308,7 +303,7 @@ class _Outer(NamedTuple):
     on: bool
 
 
-def test_named_tuples_become_structs_of_the_same_contents() -> None:
+def test_named_tuples_become_structs_of_the_same_contents():
     inner = _Inner(np.array([3, -1]), math.inf)
     value = _Outer((inner, inner._replace(short=0.1)), np.zeros((2, 3)), True)
     data = Data("here")
@@ -332,6 +327,6 @@ def test_named_tuples_become_structs_of_the_same_contents() -> None:
     ],
     ids=["text", "column", "single", "tuple", "far", "large"],
 )
-def test_what_has_no_fixed_size_is_refused(value: Any, found: str) -> None:
+def test_what_has_no_fixed_size_is_refused(value, found):
     with pytest.raises(InputError, match=rf"here, memory\.grid: found {found}"):
         Data("here").type_of(_Outer((_Inner(np.zeros(1), 0.0),), value, True), "memory")

@@ -36,7 +36,7 @@ def default_gains(system: System, name: str) -> Gains:
 
 
 @pytest.mark.parametrize("name", ["disturbance_observer", "parameter_estimator", "ekf", "ukf"])
-def test_gains_read_back_to_the_bit(system: System, tmp_path: Path, name: str) -> None:
+def test_gains_read_back_to_the_bit(system, tmp_path, name):
     gains = default_gains(system, name)
     provenance = {"z": 0.1, "cases": ['a "b"'], "z_k": {"a.b": 1}}
     path = tmp_path / "gains.toml"
@@ -54,7 +54,7 @@ def test_gains_read_back_to_the_bit(system: System, tmp_path: Path, name: str) -
 @pytest.mark.parametrize(
     "name", ['a "quoted" one', "back\\slash", "two\nlines", "a'b", 'x"""', "é"]
 )
-def test_gains_tuned_on_cases_of_any_name_can_be_read_back(tmp_path: Path, name: str) -> None:
+def test_gains_tuned_on_cases_of_any_name_can_be_read_back(tmp_path, name):
     gains = Gains("ekf", ("a", "b"), np.array([0.1, 1e-300]), {}, "")
     came_from = {"cases": [name], "z_k": {name: 0.1}, "fmu": {"file": name}}
     path = tmp_path / "gains.toml"
@@ -76,9 +76,7 @@ def test_gains_tuned_on_cases_of_any_name_can_be_read_back(tmp_path: Path, name:
         ),
     ],
 )
-def test_a_wrong_file_of_gains_is_refused(
-    system: System, tmp_path: Path, text: str, match: str
-) -> None:
+def test_a_wrong_file_of_gains_is_refused(system, tmp_path, text, match):
     path = tmp_path / "gains.toml"
     path.write_text(text)
     known = {name: default_gains(system, name) for name in ("ekf", "parameter_estimator")}
@@ -90,7 +88,7 @@ def test_a_wrong_file_of_gains_is_refused(
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory, root: Path) -> Path:
+def folder(tmp_path_factory, root) -> Path:
     """Two short recordings."""
     cases = tmp_path_factory.mktemp("cases")
     for name in CASES:
@@ -108,8 +106,8 @@ def command(folder: Path, out: Path, *options: str) -> list[str]:
 
 
 def test_a_run_that_is_killed_resumes_to_the_result_of_one_that_is_not(
-    root: Path, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    root, folder, tmp_path, monkeypatch
+):
     killed, whole = tmp_path / "killed", tmp_path / "whole"
     checkpoint = killed / "checkpoint.json"
     arguments = [sys.executable, "-m", "workbench", *command(folder, killed)]
@@ -157,14 +155,7 @@ def alive(pid: int) -> bool:
         return False
 
 
-def test_results_keep_their_contract(
-    root: Path,
-    system: System,
-    folder: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_results_keep_their_contract(root, system, folder, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(root)
     arguments = command(folder, tmp_path, "--folds", "2", "--budget", "2", "--live")
     assert main(arguments) == 0
@@ -198,14 +189,8 @@ def test_results_keep_their_contract(
     ],
 )
 def test_a_users_mistake_gives_status_2_and_a_message(
-    root: Path,
-    folder: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-    options: list[str],
-    match: str,
-) -> None:
+    root, folder, tmp_path, monkeypatch, capsys, options, match
+):
     monkeypatch.chdir(root)
     assert main(command(folder, tmp_path, *options)) == 2
     captured = capsys.readouterr().err

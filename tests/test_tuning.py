@@ -1,30 +1,23 @@
 """Tuning: it finds what was planted, wastes nothing, and judges what it has found."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from workbench.errors import InputError
-from workbench.models.fmu import FMU
 from workbench.observers import estimators_of
 from workbench.observers.estimators.disturbance import DisturbanceObserver
 from workbench.observers.gains_file import usual_gains
 from workbench.observers.replay import replay
 from workbench.observers.score import score
-from workbench.recordings.case import Case
-from workbench.runtime.pool import Pool
 from workbench.system.registry import open_model
 from workbench.system.system import System
 from workbench.tuning import (
     Candidate,
-    Evaluator,
-    Job,
     Plan,
-    Problem,
     Search,
     TuningResult,
     cross_validate,
@@ -45,13 +38,7 @@ FASTEST = 200.0  # [rad/s] that the samples of a recording carry
 
 
 @pytest.mark.long
-def test_planted_gains_are_found(
-    system: System,
-    prepare: Callable[[str, Sequence[Case]], Problem],
-    stop_beginnings: list[Case],
-    inline: Callable[[Job], Pool[Evaluator]],
-    tmp_path: Path,
-) -> None:
+def test_planted_gains_are_found(system, prepare, stop_beginnings, inline, tmp_path):
     """The force is replaced by what known gains estimate, so that these have z = 0."""
     name = "parameter_estimator"
     kind = estimators_of(system)[name]
@@ -83,9 +70,7 @@ def judging_force_alone(system: System) -> System:
 
 
 @pytest.mark.parametrize("name", ["disturbance_observer", "parameter_estimator", "ekf"])
-def test_search_starts_at_the_reasoned_gains(
-    prepare: Callable[[str, Sequence[Case]], Problem], stop_beginnings: list[Case], name: str
-) -> None:
+def test_search_starts_at_the_reasoned_gains(prepare, stop_beginnings, name):
     problem = prepare(name, stop_beginnings[:1])
     gains, space = problem.job.gains, problem.space
     # Rounding of sinh(asinh), with arguments up to 30.
@@ -94,9 +79,7 @@ def test_search_starts_at_the_reasoned_gains(
     assert len(gains.names) == gains.values.size
 
 
-def test_every_gain_of_the_observer_reaches_both_signs_and_no_disturbance_grows(
-    problem: Problem,
-) -> None:
+def test_every_gain_of_the_observer_reaches_both_signs_and_no_disturbance_grows(problem):
     space = problem.space
     lower, upper = space.gains(np.zeros(18)), space.gains(np.ones(18))
     assert (lower < 0.0).all()
@@ -105,7 +88,7 @@ def test_every_gain_of_the_observer_reaches_both_signs_and_no_disturbance_grows(
     assert_array_equal(space.gains(np.full(18, 0.5))[:16], 0.0)
 
 
-def test_bounds_are_the_loops_that_samples_can_carry(problem: Problem) -> None:
+def test_bounds_are_the_loops_that_samples_can_carry(problem):
     """A gain of a speed on itself: 1/h; one of omegaW on muDC: the loop's frequency is 1/h."""
     effect = np.abs(problem.job.gains.design["effect"])
     largest = problem.space.gains(np.ones(18)).reshape(-1)
@@ -116,13 +99,7 @@ def test_bounds_are_the_loops_that_samples_can_carry(problem: Problem) -> None:
 # --- the cost ---
 
 
-def test_cost_is_z_of_the_objective(
-    problem: Problem,
-    pool: Pool[Evaluator],
-    system: System,
-    minimal: FMU,
-    stop_beginnings: list[Case],
-) -> None:
+def test_cost_is_z_of_the_objective(problem, pool, system, minimal, stop_beginnings):
     gains = problem.job.gains
     z_k = evaluate_gains(pool, problem.job, [gains.values])[0]
     estimator = DisturbanceObserver(minimal, system, gains)
@@ -131,14 +108,12 @@ def test_cost_is_z_of_the_objective(
     assert_allclose(z_k, expected, rtol=1e-12)
 
 
-def test_a_case_without_force_is_refused(system: System, stop_beginnings: list[Case]) -> None:
+def test_a_case_without_force_is_refused(system, stop_beginnings):
     with pytest.raises(InputError, match="no column 'Fx'"):
         recording(stop_beginnings[0].without(["Fx"]), system)
 
 
-def test_a_lost_candidate_is_dropped_where_it_has_lost(
-    problem: Problem, pool: Pool[Evaluator]
-) -> None:
+def test_a_lost_candidate_is_dropped_where_it_has_lost(problem, pool):
     job = problem.job
     values = job.gains.values
     cases = len(job.recordings)
@@ -153,9 +128,7 @@ def test_a_lost_candidate_is_dropped_where_it_has_lost(
     assert early.samples < first_case
 
 
-def test_unstable_candidates_are_counted_and_cost_little(
-    problem: Problem, pool: Pool[Evaluator]
-) -> None:
+def test_unstable_candidates_are_counted_and_cost_little(problem, pool):
     """The roller's deviation fed back with the wrong sign, as fast as the samples allow."""
     job = problem.job
     values = job.gains.values.copy()
@@ -170,13 +143,8 @@ def test_unstable_candidates_are_counted_and_cost_little(
 
 
 def test_folds_are_judged_by_gains_that_have_not_seen_them(
-    system: System,
-    problem: Problem,
-    pool: Pool[Evaluator],
-    stop_beginnings: list[Case],
-    minimal: FMU,
-    tmp_path: Path,
-) -> None:
+    system, problem, pool, stop_beginnings, minimal, tmp_path
+):
     job, space = problem.job, problem.space
     plan = Plan(generations=1, population=1, seed=3)
     seen: list[Sequence[int]] = []
@@ -201,9 +169,7 @@ def test_folds_are_judged_by_gains_that_have_not_seen_them(
     assert all(0.0 < fold.error != fold.error_reasoned for fold in folds)
 
 
-def test_a_gain_without_effect_does_not_matter(
-    problem: Problem, pool: Pool[Evaluator], tmp_path: Path
-) -> None:
+def test_a_gain_without_effect_does_not_matter(problem, pool, tmp_path):
     """A decay of 0.02 1/s forgets 12 % of a deviation in 6 s; L42 is the loop of muDC."""
     job, space = problem.job, problem.space
     plan = Plan(generations=1, population=1, seed=3)
@@ -215,8 +181,8 @@ def test_a_gain_without_effect_does_not_matter(
 
 
 def test_gains_are_as_good_as_the_last_candidates_that_lose_one_percent_at_most(
-    problem: Problem, pool: Pool[Evaluator], tmp_path: Path
-) -> None:
+    problem, pool, tmp_path
+):
     job, space = problem.job, problem.space
     plan = Plan(generations=0, population=1, seed=3)
     found = search(pool, job, space, range(len(job.recordings)), plan, tmp_path / "c.json")
@@ -236,11 +202,7 @@ def test_gains_are_as_good_as_the_last_candidates_that_lose_one_percent_at_most(
 # --- what gains are judged by ---
 
 
-def test_without_a_load_cell_gains_are_judged_as_with_one(
-    system: System,
-    stop_beginnings: list[Case],
-    inline: Callable[[Job], Pool[Evaluator]],
-) -> None:
+def test_without_a_load_cell_gains_are_judged_as_with_one(system, stop_beginnings, inline):
     """What a sensor and the smoother differ by is added to every z: what gains change is alike.
 
     3e-3 is a mean of 3 N, of forces of 10 kN; the observer gains up to 42 N by being tuned.
@@ -258,8 +220,6 @@ def test_without_a_load_cell_gains_are_judged_as_with_one(
     assert by_cell.min() < -0.03
 
 
-def test_what_is_judged_by_must_know_the_whole_recording(
-    system: System, stop_beginnings: list[Case]
-) -> None:
+def test_what_is_judged_by_must_know_the_whole_recording(system, stop_beginnings):
     with pytest.raises(InputError, match=r"knows whole recordings.* expected one of smoother"):
         pose(system, "disturbance_observer", stop_beginnings, {}, "ekf")

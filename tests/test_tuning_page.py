@@ -7,7 +7,6 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +31,7 @@ SAMPLES = slice(700, 1900)  # 6 s: first pressure and the beginning of the stop
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory, root: Path) -> Path:
+def folder(tmp_path_factory, root) -> Path:
     """Two short recordings."""
     cases = tmp_path_factory.mktemp("cases")
     for name, source in CASES.items():
@@ -51,7 +50,7 @@ def command(folder: Path, out: Path, *options: str) -> list[str]:
 
 
 @pytest.fixture(scope="module")
-def results(root: Path, folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def results(root, folder, tmp_path_factory) -> Path:
     """Through the command line, its last line beside the results."""
     out = tmp_path_factory.mktemp("tuned")
     arguments = command(folder, out, "--budget", "2", "--folds", "2")
@@ -67,17 +66,17 @@ def results(root: Path, folder: Path, tmp_path_factory: pytest.TempPathFactory) 
 
 
 @pytest.fixture(scope="module")
-def summary(results: Path) -> dict[str, Any]:
+def summary(results) -> dict[str, Any]:
     return json.loads((results / "summary.json").read_text())
 
 
-def test_summary_and_page_are_as_all_are(results: Path, summary: dict[str, Any]) -> None:
+def test_summary_and_page_are_as_all_are(results, summary):
     check("tune", summary)
     check_page(results / "index.html", summary)
 
 
 @pytest.fixture(scope="module")
-def page(results: Path) -> Any:
+def page(results) -> Any:
     return lxml.html.fromstring((results / "index.html").read_bytes())
 
 
@@ -112,7 +111,7 @@ def written(summary: dict[str, Any], folder: Path) -> Any:
 
 
 @pytest.fixture
-def changed(summary: dict[str, Any]) -> dict[str, Any]:
+def changed(summary) -> dict[str, Any]:
     """A copy of the summary, to be changed."""
     return copy.deepcopy(summary)
 
@@ -120,27 +119,25 @@ def changed(summary: dict[str, Any]) -> dict[str, Any]:
 # --- the page as a whole ---
 
 
-def test_command_ends_with_the_name_of_the_page(results: Path) -> None:
+def test_command_ends_with_the_name_of_the_page(results):
     last = (results / "printed").read_text().splitlines()[-1]
     assert str(results / "index.html") in last
 
 
-def test_page_follows_from_the_summary_alone(
-    results: Path, summary: dict[str, Any], tmp_path: Path
-) -> None:
+def test_page_follows_from_the_summary_alone(results, summary, tmp_path):
     (tmp_path / "elsewhere").mkdir()
     again = write_tuning_page(summary, tmp_path / "elsewhere").read_text()
     there = again.replace(str(tmp_path / "elsewhere"), str(results))
     assert there == (results / "index.html").read_text()
 
 
-def test_page_links_to_the_files_beside_it_and_its_drawings_tell_numbers(page: Any) -> None:
+def test_page_links_to_the_files_beside_it_and_its_drawings_tell_numbers(page):
     links = set(page.xpath("//a/@href"))
     assert links >= {"gains.toml", "summary.json", "convergence.png", "cases.png"}
     assert all(re.search(r"\d", drawing.get("aria-label")) for drawing in page.xpath("//svg"))
 
 
-def test_a_hostile_name_of_a_case_stays_text(page: Any) -> None:
+def test_a_hostile_name_of_a_case_stays_text(page):
     assert HOSTILE in data(page, "case-table").index
     assert HOSTILE in data(page, "fold-table").index
     assert HOSTILE in page.xpath("//svg/@aria-label")[0]
@@ -162,9 +159,7 @@ then = () => {
 """
 
 
-def test_page_opens_without_errors_and_draws_its_curve(
-    results: Path, probe: Callable[[Path, str], dict[str, Any]]
-) -> None:
+def test_page_opens_without_errors_and_draws_its_curve(results, probe):
     curve = "document.querySelector('.dots .curve')"
     found = probe(
         results / "index.html",
@@ -180,18 +175,14 @@ def test_page_opens_without_errors_and_draws_its_curve(
     assert set(found["names"]) == {0}
 
 
-def test_the_convergence_and_all_else_fit_a_narrow_screen(
-    results: Path, narrow: Callable[[Path], None]
-) -> None:
+def test_the_convergence_and_all_else_fit_a_narrow_screen(results, narrow):
     narrow(results / "index.html")
 
 
 # --- the result ---
 
 
-def test_headline_tells_z_the_worst_case_and_the_bounds_in_one_sentence(
-    page: Any, summary: dict[str, Any]
-) -> None:
+def test_headline_tells_z_the_worst_case_and_the_bounds_in_one_sentence(page, summary):
     told = headline(page)
     z_k = sorted(((case["z_k"], name) for name, case in summary["cases"].items()), reverse=True)
     (worst, first), (next_worst, second) = z_k
@@ -202,7 +193,7 @@ def test_headline_tells_z_the_worst_case_and_the_bounds_in_one_sentence(
     assert not re.search(r"\. [A-Z]", told)
 
 
-def test_gains_at_a_bound_are_named_and_flagged(changed: dict[str, Any], tmp_path: Path) -> None:
+def test_gains_at_a_bound_are_named_and_flagged(changed, tmp_path):
     for name, gain in changed["gains"].items():
         gain["at_bound"] = name in ("L12", "T_muWR")
     page = written(changed, tmp_path)
@@ -213,15 +204,13 @@ def test_gains_at_a_bound_are_named_and_flagged(changed: dict[str, Any], tmp_pat
     assert all("at bound" in text(row[-1]) for row in flagged)
 
 
-def test_gains_that_were_not_improved_are_not_praised(
-    changed: dict[str, Any], tmp_path: Path
-) -> None:
+def test_gains_that_were_not_improved_are_not_praised(changed, tmp_path):
     changed["z"] = changed["z_reasoned"]
     changed["convergence"] = [changed["z"]]
     assert headline(written(changed, tmp_path)).startswith(f"z stays at {changed['z']:.4g}")
 
 
-def test_one_case_has_no_next(changed: dict[str, Any], tmp_path: Path) -> None:
+def test_one_case_has_no_next(changed, tmp_path):
     del changed["cases"][HOSTILE]
     changed["provenance"]["cases"].remove(HOSTILE)
     changed["folds"] = []
@@ -233,9 +222,7 @@ def test_one_case_has_no_next(changed: dict[str, Any], tmp_path: Path) -> None:
 # --- tables and figures ---
 
 
-def test_every_case_is_shown_with_its_numbers_the_worst_first(
-    page: Any, summary: dict[str, Any]
-) -> None:
+def test_every_case_is_shown_with_its_numbers_the_worst_first(page, summary):
     table = data(page, "case-table")
     assert sorted(table.index) == sorted(CASES)
     assert table["z_k, tuned"].is_monotonic_decreasing
@@ -247,7 +234,7 @@ def test_every_case_is_shown_with_its_numbers_the_worst_first(
         assert row["change"] == case["z_k"] / case["z_k_reasoned"] - 1
 
 
-def test_every_gain_is_shown_with_its_numbers_and_unit(page: Any, summary: dict[str, Any]) -> None:
+def test_every_gain_is_shown_with_its_numbers_and_unit(page, summary):
     table = data(page, "gain-table")
     assert list(table.index) == list(summary["gains"])
     for name, gain in summary["gains"].items():
@@ -280,17 +267,13 @@ def told(system: System, estimator: str) -> tuple[Gains, dict[str, tuple[str, st
 
 
 @pytest.mark.parametrize("estimator", TUNABLE)
-def test_every_gain_that_can_be_tuned_has_a_meaning_and_a_unit(
-    system: System, estimator: str
-) -> None:
+def test_every_gain_that_can_be_tuned_has_a_meaning_and_a_unit(system, estimator):
     gains, meanings = told(system, estimator)
     assert set(meanings) == set(gains.names)
     assert all(meaning and unit for meaning, unit in meanings.values())
 
 
-def test_levels_of_noise_are_shown_in_the_units_of_what_they_disturb(
-    system: System, changed: dict[str, Any], tmp_path: Path
-) -> None:
+def test_levels_of_noise_are_shown_in_the_units_of_what_they_disturb(system, changed, tmp_path):
     gain, effect = changed["gains"]["L11"], changed["sensitivity"]["L11"]
     _, meanings = told(system, "ekf")
     changed |= {"estimator": "ekf", "label": estimators_of(system)["ekf"].label}
@@ -306,9 +289,7 @@ def test_levels_of_noise_are_shown_in_the_units_of_what_they_disturb(
     assert units[["muWR", "muDC"]].eq("1/sqrt(s)").all()
 
 
-def test_a_gain_without_which_the_estimate_diverges_says_so(
-    changed: dict[str, Any], tmp_path: Path
-) -> None:
+def test_a_gain_without_which_the_estimate_diverges_says_so(changed, tmp_path):
     changed["sensitivity"]["L42"] |= {"without": None, "matters": True}
     table = written(changed, tmp_path).get_element_by_id("gain-table")
     (row,) = (row for row in table.find("tbody") if text(row[0]) == "L42")
@@ -316,7 +297,7 @@ def test_a_gain_without_which_the_estimate_diverges_says_so(
     assert row[-2].get("data-value") == "Infinity"  # sorts as the worst
 
 
-def test_dots_of_cases_lie_on_one_axis_from_zero(page: Any, summary: dict[str, Any]) -> None:
+def test_dots_of_cases_lie_on_one_axis_from_zero(page, summary):
     drawing = page.xpath("//section[@aria-labelledby='cases']//svg")[0]
     names = [text(label) for label in drawing.xpath("./text[@text-anchor='end']")]
     cases = [summary["cases"][name] for name in names]
@@ -333,9 +314,7 @@ def test_dots_of_cases_lie_on_one_axis_from_zero(page: Any, summary: dict[str, A
     assert_allclose(places, z_k * places[0] / z_k[0], atol=0.2)  # [px] as rounded, twice
 
 
-def test_curve_of_the_convergence_holds_z_of_every_generation(
-    page: Any, summary: dict[str, Any]
-) -> None:
+def test_curve_of_the_convergence_holds_z_of_every_generation(page, summary):
     drawing = page.xpath("//section[@aria-labelledby='search']//svg")[0]
     path = drawing.xpath("./path[contains(@class, 'curve')]/@d")[0]
     points = np.array(re.findall(r"H([\d.]+)V([\d.]+)", path), float)
@@ -347,9 +326,7 @@ def test_curve_of_the_convergence_holds_z_of_every_generation(
     assert_allclose(heights, heights[-1] + slope * (z[-1] - z), atol=0.2)  # [px] as rounded, twice
 
 
-def test_folds_are_shown_and_lost_ones_are_bad_news(
-    page: Any, summary: dict[str, Any], changed: dict[str, Any], tmp_path: Path
-) -> None:
+def test_folds_are_shown_and_lost_ones_are_bad_news(page, summary, changed, tmp_path):
     table = data(page, "fold-table")
     assert table["z, tuned without them"].is_monotonic_decreasing
     for fold in summary["folds"]:
@@ -377,13 +354,13 @@ def test_folds_are_shown_and_lost_ones_are_bad_news(
     assert "not seen" not in news(without)
 
 
-def test_folds_that_were_not_done_are_told(changed: dict[str, Any], tmp_path: Path) -> None:
+def test_folds_that_were_not_done_are_told(changed, tmp_path):
     assert "interrupted after" not in news(written(changed, tmp_path))
     del changed["folds"][1]
     assert "without each fold was interrupted after 1 of 2" in news(written(changed, tmp_path))
 
 
-def test_work_and_provenance_are_told(page: Any, summary: dict[str, Any], results: Path) -> None:
+def test_work_and_provenance_are_told(page, summary, results):
     told = {text(entry): text(entry.getnext()) for entry in page.xpath("//dl[@class='grid']/dt")}
     work, provenance = summary["work"], summary["provenance"]
     assert told["Generations"] == str(work["generations"])
@@ -407,7 +384,7 @@ def searched(page: Any) -> Any:
     return section
 
 
-def test_a_search_that_converged_says_so(changed: dict[str, Any], tmp_path: Path) -> None:
+def test_a_search_that_converged_says_so(changed, tmp_path):
     assert "then converged" not in text(searched(written(changed, tmp_path)))
     changed["work"]["converged"] = True
     assert "then converged" in text(searched(written(changed, tmp_path)))
@@ -417,9 +394,7 @@ def test_a_search_that_converged_says_so(changed: dict[str, Any], tmp_path: Path
 
 
 @pytest.mark.usefixtures("ctrl_c")
-def test_an_interrupted_run_says_so_and_claims_no_sensitivity(
-    root: Path, folder: Path, tmp_path: Path
-) -> None:
+def test_an_interrupted_run_says_so_and_claims_no_sensitivity(root, folder, tmp_path):
     arguments = [sys.executable, "-m", "workbench", *command(folder, tmp_path, "--budget", "9999")]
     search = subprocess.Popen(arguments, cwd=root, stdout=subprocess.DEVNULL, text=True)
     with ending(search) as run:
@@ -436,11 +411,11 @@ def test_an_interrupted_run_says_so_and_claims_no_sensitivity(
     assert list(data(page, "gain-table").columns)[-2:] == ["unit", "remark"]
 
 
-def test_an_uninterrupted_run_does_not_say_so(page: Any) -> None:
+def test_an_uninterrupted_run_does_not_say_so(page):
     assert not re.search("[Ii]nterrupted|Incomplete", text(page))
 
 
-def test_what_got_worse_comes_before_the_tables(changed: dict[str, Any], tmp_path: Path) -> None:
+def test_what_got_worse_comes_before_the_tables(changed, tmp_path):
     for case in changed["cases"].values():
         case["z_k_reasoned"] = 2.0 * case["z_k"]
     assert "Worse" not in news(written(changed, tmp_path))
@@ -453,9 +428,7 @@ def test_what_got_worse_comes_before_the_tables(changed: dict[str, Any], tmp_pat
     assert "blocked their worker: 3" in told
 
 
-def test_a_search_that_could_go_on_says_with_which_gain(
-    changed: dict[str, Any], tmp_path: Path
-) -> None:
+def test_a_search_that_could_go_on_says_with_which_gain(changed, tmp_path):
     for effect in changed["sensitivity"].values():
         effect |= {"less": 0.02, "more": -0.009, "without": None, "matters": True}
     assert "converged" not in news(written(changed, tmp_path))
@@ -466,9 +439,7 @@ def test_a_search_that_could_go_on_says_with_which_gain(
     assert [name for name in remarks.index if "not converged" in remarks[name]] == ["L31"]
 
 
-def test_other_estimators_are_compared_and_better_ones_are_bad_news(
-    page: Any, changed: dict[str, Any], tmp_path: Path
-) -> None:
+def test_other_estimators_are_compared_and_better_ones_are_bad_news(page, changed, tmp_path):
     assert "extended Kalman filter" in data(page, "beside-table").index
     assert not written(changed | {"beside": {}}, tmp_path).xpath("//*[@id='beside-table']")
     z, name = changed["z"], "disturbance observer"

@@ -49,9 +49,7 @@ def run(pool: Workers, problem: Problem, path: Path, plan: Plan, **options) -> S
     return found
 
 
-def test_economy_changes_nothing_but_the_work(
-    problem: Problem, pool: Pool[Evaluator], tmp_path: Path
-) -> None:
+def test_economy_changes_nothing_but_the_work(problem, pool, tmp_path):
     plan = replace(SMALL, generations=8)
     thrifty = run(pool, problem, tmp_path / "a.json", plan)
     full = run(pool, problem, tmp_path / "b.json", replace(plan, economy=False))
@@ -72,8 +70,8 @@ def test_economy_changes_nothing_but_the_work(
 
 
 def test_gains_do_not_depend_on_the_number_of_workers_nor_on_the_death_of_one(
-    problem: Problem, pool: Pool[Evaluator], tmp_path: Path
-) -> None:
+    problem, pool, tmp_path
+):
     """One process of two is killed while it works."""
     job = problem.job
     alone = run(pool, problem, tmp_path / "alone.json", SMALL)
@@ -96,9 +94,7 @@ def pid(evaluator: Evaluator) -> int:
     return os.getpid()
 
 
-def test_a_cluster_finds_the_same_gains(
-    problem: Problem, pool: Pool[Evaluator], tmp_path: Path
-) -> None:
+def test_a_cluster_finds_the_same_gains(problem, pool, tmp_path):
     distributed = pytest.importorskip("distributed")
     from workbench.runtime.cluster import DaskPool
 
@@ -140,7 +136,7 @@ except ValueError:
 """
 
 
-def test_a_worker_that_could_not_be_prepared_is_not_ended_for_it_later() -> None:
+def test_a_worker_that_could_not_be_prepared_is_not_ended_for_it_later():
     """It may belong to somebody else's process, and may be of use to the next who asks."""
     pytest.importorskip("distributed")
     command = [sys.executable, "-c", LATE]
@@ -181,7 +177,7 @@ def worker(
 
 
 @pytest.fixture
-def scheduler(tmp_path: Path) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
+def scheduler(tmp_path) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
     """Address and process of a scheduler."""
     pytest.importorskip("distributed")
     file = tmp_path / "scheduler.json"
@@ -192,18 +188,14 @@ def scheduler(tmp_path: Path) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
         yield json.loads(file.read_text())["address"], process
 
 
-def test_a_cluster_without_workers_is_refused_in_words(
-    scheduler: tuple[str, object], problem: Problem
-) -> None:
+def test_a_cluster_without_workers_is_refused_in_words(scheduler, problem):
     from workbench.runtime.cluster import DaskPool
 
     with pytest.raises(InputError, match=r"found no workers; .* start workers with 'dask worker"):
         DaskPool(scheduler[0], Evaluator, problem.job, 60.0, patience=1.0)
 
 
-def test_only_workers_with_the_same_code_get_work(
-    scheduler: tuple[str, object], problem: Problem, pool: Pool[Evaluator], tmp_path: Path
-) -> None:
+def test_only_workers_with_the_same_code_get_work(scheduler, problem, pool, tmp_path):
     """One lacks the project, one has a constant of its objective otherwise."""
     distributed = pytest.importorskip("distributed")
     from workbench.runtime.cluster import DaskPool
@@ -236,11 +228,8 @@ def test_only_workers_with_the_same_code_get_work(
 
 
 def test_a_scheduler_that_dies_keeps_the_best_and_resuming_changes_nothing(
-    scheduler: tuple[str, subprocess.Popen[bytes]],
-    problem: Problem,
-    pool: Pool[Evaluator],
-    tmp_path: Path,
-) -> None:
+    scheduler, problem, pool, tmp_path
+):
     from workbench.runtime.cluster import DaskPool
 
     address, process = scheduler
@@ -267,9 +256,7 @@ def test_a_scheduler_that_dies_keeps_the_best_and_resuming_changes_nothing(
     assert_array_equal(rest.best, whole.best)
 
 
-def test_a_cluster_whose_workers_are_gone_says_so(
-    scheduler: tuple[str, object], problem: Problem, tmp_path: Path
-) -> None:
+def test_a_cluster_whose_workers_are_gone_says_so(scheduler, problem, tmp_path):
     from workbench.runtime.cluster import DaskPool
 
     address, _ = scheduler
@@ -288,10 +275,8 @@ def test_a_cluster_whose_workers_are_gone_says_so(
 
 
 def test_an_answer_that_a_dead_scheduler_owes_holds_up_no_other_pool(
-    scheduler: tuple[str, subprocess.Popen[bytes]],
-    problem: Problem,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    scheduler, problem, monkeypatch
+):
     """Dask hands over the answers of all clients of a process in one thread, which the end of the
     interpreter waits for; a client may wait for ever there for a result that it knows is made."""
     import distributed
@@ -319,9 +304,7 @@ def test_an_answer_that_a_dead_scheduler_owes_holds_up_no_other_pool(
     assert handing_over.submit(pid, None).result(timeout=30) == os.getpid()
 
 
-def test_a_candidate_that_hangs_ends_its_worker_and_is_infinitely_bad(
-    problem: Problem,
-) -> None:
+def test_a_candidate_that_hangs_ends_its_worker_and_is_infinitely_bad(problem):
     job = problem.job
     endless = (0,) * 100_000  # at 1 ms a case, two minutes
     with evaluators(job, 1, limit=0.3) as hasty:
@@ -350,9 +333,7 @@ def die(evaluator: Evaluator) -> Evaluation:
     raise AssertionError("it lives")
 
 
-def test_only_the_candidate_that_kills_workers_is_lost(
-    problem: Problem, pool: Pool[Evaluator]
-) -> None:
+def test_only_the_candidate_that_kills_workers_is_lost(problem, pool):
     job, space = problem.job, problem.space
     values = [space.gains(np.clip(space.start + 0.001 * i, 0, 1)) for i in range(20)]
     candidates = [Candidate(v, np.inf, (0, 1, 2)) for v in values]
@@ -368,11 +349,8 @@ def test_only_the_candidate_that_kills_workers_is_lost(
 
 
 def test_a_full_disk_costs_a_warning_and_keeps_the_checkpoint_before(
-    problem: Problem,
-    pool: Pool[Evaluator],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    problem, pool, tmp_path, monkeypatch
+):
     undisturbed = run(pool, problem, tmp_path / "undisturbed.json", SMALL)
     path = tmp_path / "checkpoint.json"
     warnings: list[str] = []
@@ -395,9 +373,7 @@ def test_a_full_disk_costs_a_warning_and_keeps_the_checkpoint_before(
     assert_array_equal(found.best, undisturbed.best)
 
 
-def test_interruption_keeps_the_best_so_far_and_resuming_changes_nothing(
-    problem: Problem, pool: Pool[Evaluator], tmp_path: Path
-) -> None:
+def test_interruption_keeps_the_best_so_far_and_resuming_changes_nothing(problem, pool, tmp_path):
     whole = run(pool, problem, tmp_path / "whole.json", SMALL)
 
     def interrupt(history: Sequence[object]) -> None:
@@ -413,9 +389,7 @@ def test_interruption_keeps_the_best_so_far_and_resuming_changes_nothing(
     assert [g.z for g in rest.history] == [g.z for g in whole.history]
 
 
-def test_another_search_does_not_go_on_from_a_checkpoint(
-    problem: Problem, pool: Pool[Evaluator], tmp_path: Path
-) -> None:
+def test_another_search_does_not_go_on_from_a_checkpoint(problem, pool, tmp_path):
     path = tmp_path / "checkpoint.json"
     run(pool, problem, path, SMALL)
     with pytest.raises(InputError, match="another search"):
@@ -426,9 +400,7 @@ def test_another_search_does_not_go_on_from_a_checkpoint(
         run(pool, problem, path, SMALL, resume=True)
 
 
-def test_a_damaged_checkpoint_gives_way_to_the_one_before(
-    problem: Problem, pool: Pool[Evaluator], tmp_path: Path
-) -> None:
+def test_a_damaged_checkpoint_gives_way_to_the_one_before(problem, pool, tmp_path):
     path = tmp_path / "checkpoint.json"
     whole = run(pool, problem, path, SMALL)
     path.write_text(path.read_text().replace('"z":', '"z": ', 1).replace("0.", "0.1", 1))
@@ -440,7 +412,7 @@ def test_a_damaged_checkpoint_gives_way_to_the_one_before(
 
 
 @pytest.fixture
-def saved(tmp_path: Path) -> tuple[Path, Checkpoint]:
+def saved(tmp_path) -> tuple[Path, Checkpoint]:
     rng = np.random.default_rng(1)
     population = Population(rng.random((6, 3)), rng.random(6), rng.random((6, 2)))
     generation = Generation(0.1, "a", "b", 0.2, 6, 100, 120, {"a": 1}, 0, 0.5)
@@ -450,7 +422,7 @@ def saved(tmp_path: Path) -> tuple[Path, Checkpoint]:
     return path, checkpoint
 
 
-def test_no_damage_of_a_checkpoint_goes_unseen(saved: tuple[Path, Checkpoint]) -> None:
+def test_no_damage_of_a_checkpoint_goes_unseen(saved):
     """Bytes replaced, cut out, doubled: what is read is what was written, or refused."""
     path, checkpoint = saved
     written = path.read_bytes()

@@ -29,7 +29,7 @@ Names = dict[str, Any]
 
 
 @pytest.fixture
-def run(root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Names]:
+def run(root, tmp_path, monkeypatch) -> Callable[..., Names]:
     """Runs a tutorial; returns its names."""
     mpl.use("agg")
 
@@ -76,14 +76,12 @@ def own(found: wb.Outcome, case: wb.Case, measure: str = "rms") -> float:
 
 
 @pytest.mark.parametrize("tutorial", DATA)
-def test_a_folder_without_the_recordings_is_refused(
-    tutorial: str, run: Callable[..., Names], tmp_path: Path
-) -> None:
+def test_a_folder_without_the_recordings_is_refused(tutorial, run, tmp_path):
     with pytest.raises(wb.InputError, match="no such folder"):
         run(tutorial, tmp_path / "nowhere")
 
 
-def test_both_tanks_overflow_and_the_pump_has_a_dead_zone(run: Callable[..., Names]) -> None:
+def test_both_tanks_overflow_and_the_pump_has_a_dead_zone(run):
     names = run("cascaded_tanks")
     found = names["found"]
     groups = causes(found)
@@ -104,7 +102,7 @@ def test_both_tanks_overflow_and_the_pump_has_a_dead_zone(run: Callable[..., Nam
 
 
 @pytest.mark.long
-def test_servo_has_viscous_friction_and_more_under_load(run: Callable[..., Names]) -> None:
+def test_servo_has_viscous_friction_and_more_under_load(run):
     names = run("servo_pendulum")
     found = names["found"]
     named = [cause.effect.name for cause in found.diagnosis.causes]
@@ -132,7 +130,7 @@ def test_servo_has_viscous_friction_and_more_under_load(run: Callable[..., Names
 
 
 @pytest.mark.long
-def test_friction_of_both_seals_grows_with_pressure(run: Callable[..., Names]) -> None:
+def test_friction_of_both_seals_grows_with_pressure(run):
     names = run("pneumatic_cylinder")
     found = names["found"]
     # What three parameters, fitted by hand, leave of the force at 1, 3 and 7 bar: of 5.9 N 1.0, of
@@ -154,7 +152,7 @@ def test_friction_of_both_seals_grows_with_pressure(run: Callable[..., Names]) -
     assert found["Aluminium"].diagnosis.verdict == "nothing"
 
 
-def test_train_loses_air_in_one_of_five_ways(run: Callable[..., Names]) -> None:
+def test_train_loses_air_in_one_of_five_ways(run):
     names = run("air_supply")
     found = names["found"]
     (group,) = causes(found)

@@ -83,14 +83,14 @@ def own_effects(folder: Path) -> Path:
     return folder / "Effects" / "package.mo"
 
 
-def test_a_library_is_taken_from_beside_before_from_the_workbench(tmp_path: Path) -> None:
+def test_a_library_is_taken_from_beside_before_from_the_workbench(tmp_path):
     file = stage(tmp_path)
     assert packages(file) == (file, resources.modelica() / "Effects" / "package.mo")
     own = own_effects(tmp_path)
     assert packages(file) == (file, own)
 
 
-def test_libraries_are_used_through_others_and_once(tmp_path: Path) -> None:
+def test_libraries_are_used_through_others_and_once(tmp_path):
     for name, uses in (("A", 'B(version="1"), C(version="1")'), ("B", "C()"), ("C", "A()")):
         (tmp_path / name).mkdir()
         text = f'package {name} "uses(X())" annotation (uses({uses})); end {name};'
@@ -98,7 +98,7 @@ def test_libraries_are_used_through_others_and_once(tmp_path: Path) -> None:
     assert [file.parent.name for file in packages(tmp_path / "A" / "package.mo")] == ["A", "B", "C"]
 
 
-def test_a_library_that_is_nowhere_is_refused_with_its_line(tmp_path: Path) -> None:
+def test_a_library_that_is_nowhere_is_refused_with_its_line(tmp_path):
     file = stage(tmp_path, ("uses(Effects", "uses(Efects"))
     message = rf"{file}:43: found uses\(Efects\), but no such library; expected {tmp_path}"
     with pytest.raises(InputError, match=message):
@@ -109,7 +109,7 @@ def test_a_library_that_is_nowhere_is_refused_with_its_line(tmp_path: Path) -> N
         compiler.build(file, "Stage.Base", tmp_path / "a.fmu", platforms=[compiler.native()])
 
 
-def test_a_change_of_a_used_library_is_another_fmu(tmp_path: Path) -> None:
+def test_a_change_of_a_used_library_is_another_fmu(tmp_path):
     file, own = stage(tmp_path), own_effects(tmp_path)
     before = fmu_cache.key(file), compiler.source_hash(file)
     law = own.parent / "Friction" / "Dry.mo"
@@ -119,14 +119,14 @@ def test_a_change_of_a_used_library_is_another_fmu(tmp_path: Path) -> None:
     assert before[1] != after[1]
 
 
-def test_friction_adds_up_and_signals_form_a_chain(tmp_path: Path) -> None:
+def test_friction_adds_up_and_signals_form_a_chain(tmp_path):
     slots = {slot.name: slot for slot in read_slots(read_library(stage(tmp_path)), "Base")}
     assert (slots["friction"].inputs, slots["friction"].outputs) == (("v", "load"), ("f",))
     assert not slots["friction"].chained
     assert slots["tacho"].chained
 
 
-def test_common_laws_are_no_effects_of_the_library_and_what_extends_them_is(tmp_path: Path) -> None:
+def test_common_laws_are_no_effects_of_the_library_and_what_extends_them_is(tmp_path):
     effects = read_effects(read_library(stage(tmp_path)), "Base")
     assert [(effect.name, effect.slots) for effect in effects] == [
         ("BearingFriction", ("friction",)),
@@ -137,7 +137,7 @@ def test_common_laws_are_no_effects_of_the_library_and_what_extends_them_is(tmp_
 
 
 @pytest.mark.parametrize("beside", [False, True], ids=["of the workbench", "beside"])
-def test_an_extended_model_has_the_common_laws(beside: bool, tmp_path: Path) -> None:
+def test_an_extended_model_has_the_common_laws(beside, tmp_path):
     """Closed forms, at 0.5 m/s."""
     file = stage(tmp_path)
     if beside:
@@ -173,7 +173,7 @@ def test_an_extended_model_has_the_common_laws(beside: bool, tmp_path: Path) -> 
         ("Quadratic", {"drag": "N.m.s2/rad2"}),
     ],
 )
-def test_laws_of_turning_motion_have_its_units(law: str, units: dict[str, str]) -> None:
+def test_laws_of_turning_motion_have_its_units(law, units):
     file, name = (
         resources.modelica() / "Effects" / "package.mo",
         f"Effects.RotationalFriction.{law}",
@@ -185,13 +185,13 @@ def test_laws_of_turning_motion_have_its_units(law: str, units: dict[str, str]) 
     assert read == compiled == units
 
 
-def test_a_name_that_a_package_hides_is_refused_with_a_way_out(tmp_path: Path) -> None:
+def test_a_name_that_a_package_hides_is_refused_with_a_way_out(tmp_path):
     file = stage(tmp_path, ("extends Common.Friction.Viscous", "extends Effects.Friction.Viscous"))
     with pytest.raises(InputError, match=r"Stage\.Effects has no class 'Friction'.*import it"):
         read_effects(read_library(file), "Base")
 
 
-def test_a_bound_that_the_compiler_would_lose_is_refused(tmp_path: Path) -> None:
+def test_a_bound_that_the_compiler_would_lose_is_refused(tmp_path):
     file = stage(tmp_path, ("coulomb(max=5.0)", "v0(max=5.0)=0.02"))
     with pytest.raises(InputError, match=r"v0\(\.\.\.\) = 0\.02 where it extends"):
         read_effects(read_library(file), "Base")

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -23,13 +22,13 @@ Slide = tuple[Case, Run]
 
 
 @pytest.fixture(scope="module")
-def fmu(minimal_path: Path) -> Iterator[FMU]:
+def fmu(minimal_path) -> Iterator[FMU]:
     with FMU(minimal_path) as opened:
         yield opened
 
 
 @pytest.fixture(scope="module")
-def peak_force(fmu: FMU, system: System) -> PeakForce:
+def peak_force(fmu, system) -> PeakForce:
     return PeakForce(fmu, system)
 
 
@@ -52,9 +51,7 @@ def estimates(
 @pytest.mark.parametrize(
     ("muWR", "used"), [(0.55, [0.15, 0.29, 0.45]), (0.40, [0.19, 0.38, 0.59]), (0.15, [0.44, 0.87])]
 )
-def test_utilisation_is_that_of_polachs_law(
-    peak_force: PeakForce, muWR: float, used: list[float]
-) -> None:
+def test_utilisation_is_that_of_polachs_law(peak_force, muWR, used):
     """Reference: peaks of the law found apart from the FMU, 40 m/s, 4, 8 and 12.5 kN a wheel."""
     force = [4e3, 8e3, 12.5e3][: len(used)]
     found = peak_force.utilisation(estimates([muWR] * len(used), force))
@@ -62,7 +59,7 @@ def test_utilisation_is_that_of_polachs_law(
     np.testing.assert_allclose(found, used, atol=0.01)
 
 
-def test_peak_agrees_with_a_fine_scan_of_the_written_law(peak_force: PeakForce) -> None:
+def test_peak_agrees_with_a_fine_scan_of_the_written_law(peak_force):
     """Reference: data sheet of the rig, F = 2 Q mu/pi (kA eps/(1+(kA eps)^2) + atan(kS eps))."""
     Q, K, kA, kS, A, B = 80e3, 9.68e6, 1.0, 0.4, 0.4, 0.6
     w = np.linspace(1e-3, 5.0, 50_000)
@@ -78,16 +75,14 @@ def test_peak_agrees_with_a_fine_scan_of_the_written_law(peak_force: PeakForce) 
             assert found == pytest.approx(0.5, rel=0.02)
 
 
-def test_a_sliding_wheel_uses_all_adhesion_though_its_force_has_fallen(
-    peak_force: PeakForce,
-) -> None:
+def test_a_sliding_wheel_uses_all_adhesion_though_its_force_has_fallen(peak_force):
     """A locked wheel at 44 m/s has 0.65 of the peak force; what it shows is the friction."""
     locked = estimates([0.55], [0.220 * 80e3], speed=44.4, slip=44.4)
     assert peak_force.utilisation(locked) == 1.0
     assert peak_force.valid(locked)
 
 
-def test_direction_does_not_matter(peak_force: PeakForce) -> None:
+def test_direction_does_not_matter(peak_force):
     forward = estimates([0.2, 0.3], [10e3, 10e3], slip=0.1)
     signs = np.ones(len(COLUMNS))
     signs[[COLUMNS.index(name) for name in ("omegaR", "Fx", "slip")]] = -1.0
@@ -96,7 +91,7 @@ def test_direction_does_not_matter(peak_force: PeakForce) -> None:
     )
 
 
-def test_claims_begin_above_six_tenths(peak_force: PeakForce) -> None:
+def test_claims_begin_above_six_tenths(peak_force):
     """8 kN of 13.4 (0.60), at muWR 0.25, where 0.01 in muWR is worth some 100 N."""
     force = np.linspace(2e3, 14e3, 121)
     rows = estimates([0.25] * force.size, list(force))
@@ -105,13 +100,13 @@ def test_claims_begin_above_six_tenths(peak_force: PeakForce) -> None:
     assert 0 < claimed.sum() < claimed.size
 
 
-def test_what_was_not_learned_is_not_claimed(peak_force: PeakForce) -> None:
+def test_what_was_not_learned_is_not_claimed(peak_force):
     assert peak_force.valid(estimates([NOMINAL + 0.001], [8e3]))
     assert not peak_force.valid(estimates([NOMINAL], [8e3]))
     assert not peak_force.valid(estimates([float("nan")], [8e3]))
 
 
-def test_nothing_is_claimed_at_walking_pace(peak_force: PeakForce) -> None:
+def test_nothing_is_claimed_at_walking_pace(peak_force):
     assert not peak_force.valid(estimates([0.2], [20e3], speed=0.4))
 
 
@@ -122,18 +117,18 @@ def made(fmu: FMU, system: System, name: str) -> Estimator:
 
 
 @pytest.fixture(scope="module")
-def slide(root: Path, fmu: FMU, system: System) -> Slide:
+def slide(root, fmu, system) -> Slide:
     case = read_case(root / "cases" / "09_wet_160_4.2_wsp", system)
     return case, replay(case, made(fmu, system, DisturbanceObserver.name))
 
 
-def test_a_dry_stop_claims_nothing(fmu: FMU, system: System, dry_case: Case) -> None:
+def test_a_dry_stop_claims_nothing(fmu, system, dry_case):
     """An ordinary dry stop uses half of the adhesion at most: muWR is not observable in it."""
     for name in ("open_loop", "direct_inversion", "disturbance_observer", "ekf"):
         assert not replay(dry_case, made(fmu, system, name)).claimed["muWR"].any(), name
 
 
-def test_a_slide_uses_all_adhesion_throughout(peak_force: PeakForce, slide: Slide) -> None:
+def test_a_slide_uses_all_adhesion_throughout(peak_force, slide):
     """Slip beyond 2 m/s is beyond the peak of any contact (at most 1 m/s with this law)."""
     case, run = slide
     sliding = RR * case["omegaR"] - 0.46 * case["omegaW"] > 2.0
@@ -143,7 +138,7 @@ def test_a_slide_uses_all_adhesion_throughout(peak_force: PeakForce, slide: Slid
     assert not claimed[case.time < 2.0].any()  # coasting
 
 
-def test_on_a_wet_rail_a_model_of_the_dry_contact_claims_nothing(slide: Slide) -> None:
+def test_on_a_wet_rail_a_model_of_the_dry_contact_claims_nothing(slide):
     assert not slide[1].claimed["muWR"].any()
 
 
@@ -151,15 +146,11 @@ def called_dry(case: Case) -> Case:
     return replace(case, conditions={**case.conditions, "wheel_rail": "dry"})
 
 
-def test_the_same_recording_from_a_dry_rail_would_be_claimed(
-    slide: Slide, fmu: FMU, system: System
-) -> None:
+def test_the_same_recording_from_a_dry_rail_would_be_claimed(slide, fmu, system):
     observer = made(fmu, system, DisturbanceObserver.name)
     assert replay(called_dry(slide[0]), observer).claimed["muWR"].any()
 
 
 @pytest.mark.parametrize("name", ["open_loop", "direct_inversion"])
-def test_methods_that_estimate_no_friction_claim_none(
-    fmu: FMU, system: System, slide: Slide, name: str
-) -> None:
+def test_methods_that_estimate_no_friction_claim_none(fmu, system, slide, name):
     assert not replay(called_dry(slide[0]), made(fmu, system, name)).claimed["muWR"].any()

@@ -33,7 +33,7 @@ def stop(folder: Path, gains: dict[str, float], rig: PlantedTrain = RIG) -> Case
     return case
 
 
-def test_a_train_that_is_true_to_its_sheet_stops_as_its_model(tmp_path: Path) -> None:
+def test_a_train_that_is_true_to_its_sheet_stops_as_its_model(tmp_path):
     case = stop(tmp_path, TRUE_TO_SHEET)
     with open_model(SYSTEM) as model:
         start = {output.name: case[output.name][0] for output in SYSTEM.outputs}
@@ -51,7 +51,7 @@ def test_a_train_that_is_true_to_its_sheet_stops_as_its_model(tmp_path: Path) ->
 @pytest.mark.parametrize(
     "name", [plantable.name for plantable in PLANTABLE if plantable.name.endswith("[3]")]
 )
-def test_a_fault_acts_in_its_place(name: str, tmp_path: Path) -> None:
+def test_a_fault_acts_in_its_place(name, tmp_path):
     sound = stop(tmp_path / "sound", TRUE_TO_SHEET)
     size = next(4.0 * plantable.unit_size for plantable in PLANTABLE if plantable.name == name)
     faulty = stop(tmp_path / "faulty", {**TRUE_TO_SHEET, name: size})
@@ -71,7 +71,7 @@ def test_a_fault_acts_in_its_place(name: str, tmp_path: Path) -> None:
     assert set(np.argsort(-moved)[: len(axles)]) == axles
 
 
-def test_all_that_is_planted_is_known_to_the_library_and_within_its_bounds() -> None:
+def test_all_that_is_planted_is_known_to_the_library_and_within_its_bounds():
     repertoire = Repertoire(PLANTABLE, library_effects(SYSTEM))
     known = {effect.name for effect in repertoire.effects}
     assert {plantable.effect for plantable in PLANTABLE} <= known
@@ -82,9 +82,7 @@ def test_all_that_is_planted_is_known_to_the_library_and_within_its_bounds() -> 
     ("names", "model", "message"),
     [(["07_night"], None, "no stop of this name"), ([], Path("x.fmu"), "equations of its own")],
 )
-def test_the_rig_refuses_what_it_cannot_do(
-    names: list[str], model: Path | None, message: str
-) -> None:
+def test_the_rig_refuses_what_it_cannot_do(names, model, message):
     with pytest.raises(InputError, match=message):
         virtual_rig(names, model)
 
@@ -98,7 +96,7 @@ def told(folder: Path, effects: object) -> Path:
     return folder
 
 
-def test_the_rig_plants_what_it_is_told(tmp_path: Path) -> None:
+def test_the_rig_plants_what_it_is_told(tmp_path):
     out, stop_ = tmp_path / "made", "01_120_service_dry"
     told = ["--system", "train", "--case", stop_, "--seed", "5", "--effect", "pads[3]=0.15"]
     assert main(["rig", *told, "--out", str(out), "--quiet"]) == 0
@@ -121,16 +119,14 @@ def test_the_rig_plants_what_it_is_told(tmp_path: Path) -> None:
         ("--pads constant", "an option of the roller rig"),
     ],
 )
-def test_a_planted_set_that_is_asked_for_wrongly_is_refused(
-    told: str, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_planted_set_that_is_asked_for_wrongly_is_refused(told, message, tmp_path, capsys):
     out = tmp_path / "made"
     assert main(["rig", "--system", "train", "--out", str(out), *told.split()]) == 2
     assert message in capsys.readouterr().err
     assert not out.exists()
 
 
-def test_what_a_truth_says_is_what_is_asked_for(tmp_path: Path) -> None:
+def test_what_a_truth_says_is_what_is_asked_for(tmp_path):
     sets = read_recorded_sets(SYSTEM, [told(tmp_path, {"radius_axle": {"at": 2, "size": -2.5}})])
     assert sets.groups == [
         (Planting("single", 0, 4.0, {"radius[2]": -2.5e-3}, ("WheelRadius[2]",)),)
@@ -140,22 +136,22 @@ def test_what_a_truth_says_is_what_is_asked_for(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "effects", [{"rust": {"size": 1}}, {"radius_axle": {"at": 12, "size": 1}}, [1], {"glazing": {}}]
 )
-def test_a_truth_that_is_not_understood_is_refused(effects: object, tmp_path: Path) -> None:
+def test_a_truth_that_is_not_understood_is_refused(effects, tmp_path):
     with pytest.raises(InputError, match="a truth that is not understood"):
         read_recorded_sets(SYSTEM, [told(tmp_path, effects)])
 
 
-def test_folders_without_a_truth_are_refused(tmp_path: Path) -> None:
+def test_folders_without_a_truth_are_refused(tmp_path):
     with pytest.raises(InputError, match="no set with a truth"):
         read_recorded_sets(SYSTEM, [tmp_path])
 
 
-def test_a_system_that_reads_no_recorded_sets_says_so(tmp_path: Path) -> None:
+def test_a_system_that_reads_no_recorded_sets_says_so(tmp_path):
     with pytest.raises(InputError, match="no plugin that reads what is wrong"):
         read_recorded_sets(load_system("wheelset"), [tmp_path])
 
 
-def test_sets_of_the_independent_simulator_are_understood() -> None:
+def test_sets_of_the_independent_simulator_are_understood():
     folder = SHARED / "train" / "labelled"
     if not folder.exists():
         pytest.skip("the recordings are not at hand")
@@ -166,7 +162,7 @@ def test_sets_of_the_independent_simulator_are_understood() -> None:
 # --- trains of any length ---
 
 
-def test_a_generated_train_of_two_vehicles_is_the_one_that_is_known(tmp_path: Path) -> None:
+def test_a_generated_train_of_two_vehicles_is_the_one_that_is_known(tmp_path):
     pytest.importorskip("rumoca")
     generated, estimates = growth.build(2, tmp_path, pitching=False), []
     samples = growth.stop(generated)
@@ -193,9 +189,7 @@ def test_a_generated_train_of_two_vehicles_is_the_one_that_is_known(tmp_path: Pa
         pytest.param(("04_120_service_wet",), 0.8, id="wet"),
     ],
 )
-def test_force_and_adhesion_of_each_axle_are_estimated(
-    stops: tuple[str, ...], within: float, tmp_path: Path
-) -> None:
+def test_force_and_adhesion_of_each_axle_are_estimated(stops, within, tmp_path):
     """While trains within their tolerances brake at constant pressure, 3 s after the command."""
     rig = virtual_rig(stops, None)
     ratios: dict[str, list[Matrix]] = {"axleForce": [], "utilised": []}
@@ -230,7 +224,7 @@ def rms(ratios: list[Matrix]) -> float:
 
 
 @pytest.fixture(scope="module")
-def everything(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def everything(tmp_path_factory) -> Path:
     pytest.importorskip("casadi", reason="needs the extra [compiler]")
     pytest.importorskip("rumoca", reason="needs the extra [compiler]")
     path = tmp_path_factory.mktemp("everything") / "everything.fmu"
@@ -256,8 +250,8 @@ def named(planted: dict[str, float], seed: int, everything: Path, folder: Path) 
     ],
 )
 def test_faults_are_named_of_which_held_out_stops_say_nothing(
-    seed: int, name: str, size: float, right: str, everything: Path, tmp_path: Path
-) -> None:
+    seed, name, size, right, everything, tmp_path
+):
     """Among drawn tolerances, levels explain such stops as well as pads or a sensor do."""
     cause = named({name: size}, seed, everything, tmp_path)
     assert right in (cause.effect.name, *cause.confusable_with)
@@ -273,8 +267,8 @@ def test_faults_are_named_of_which_held_out_stops_say_nothing(
     ],
 )
 def test_water_and_a_wrong_track_file_are_named(
-    name: str, size: float, right: str, told: str, within: float, everything: Path, tmp_path: Path
-) -> None:
+    name, size, right, told, within, everything, tmp_path
+):
     cause = named({name: size}, 81, everything, tmp_path)
     assert cause.effect.name == right
     assert_allclose(cause.parameters[told].value, size, rtol=within)

@@ -1,7 +1,6 @@
 """A wheel load that is set: a condition that is a parameter of the model, and need not be said."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -29,14 +28,14 @@ SOFTER = (80.0 / 60.0) ** (2.0 / 3.0)
 
 
 @pytest.fixture(scope="module")
-def light(tmp_path_factory: pytest.TempPathFactory) -> Case:
+def light(tmp_path_factory) -> Case:
     folder = tmp_path_factory.mktemp("light") / "01_light"
     record(LIGHT, 3, CONSTANT_PADS, folder)
     return read_case(folder, SYSTEM)
 
 
 @pytest.fixture(scope="module")
-def unsaid(light: Case) -> Case:
+def unsaid(light) -> Case:
     """As if nobody had said how heavy the axle was."""
     kept = {name: said for name, said in light.conditions.items() if name != "wheel_load"}
     return replace(light, conditions=kept)
@@ -49,7 +48,7 @@ def open_loop(case: Case, role: str) -> Run:
         return replay(case, kind(fmu, SYSTEM, kind.default_gains(fmu, SYSTEM)))
 
 
-def test_what_sets_a_parameter_is_said_or_is_as_in_the_model(light: Case, unsaid: Case) -> None:
+def test_what_sets_a_parameter_is_said_or_is_as_in_the_model(light, unsaid):
     assert SYSTEM.set_by(light.conditions)["Fz"] == 60e3
     assert "Fz" not in SYSTEM.set_by(unsaid.conditions)
     assert "Fz" not in SYSTEM.set_by({**light.conditions, "wheel_load": "unknown"})
@@ -62,7 +61,7 @@ def test_what_sets_a_parameter_is_said_or_is_as_in_the_model(light: Case, unsaid
     ("written", "found"),
     [("-1 kN", "found '-1 kN'; expected above 0 N"), ("60 kg", r"found \[kg\]")],
 )
-def test_a_load_that_is_none_is_refused(written: str, found: str, tmp_path: Path) -> None:
+def test_a_load_that_is_none_is_refused(written, found, tmp_path):
     record(LIGHT, 3, CONSTANT_PADS, tmp_path / "stop")
     toml = tmp_path / "stop" / "case.toml"
     toml.write_text(toml.read_text().replace("60 kN", written))
@@ -70,7 +69,7 @@ def test_a_load_that_is_none_is_refused(written: str, found: str, tmp_path: Path
         read_case(tmp_path / "stop", SYSTEM)
 
 
-def test_slip_of_a_light_axle_goes_with_its_contact() -> None:
+def test_slip_of_a_light_axle_goes_with_its_contact():
     usual, less = (simulate(one, 3, CONSTANT_PADS, REFERENCE) for one in (STOP, LIGHT))
     held = slice(*np.searchsorted(usual.time, usual.drawn.coasting + np.array([5.0, 10.0])))
     more = less.truth["slip"][held] / usual.truth["slip"][held]
@@ -78,7 +77,7 @@ def test_slip_of_a_light_axle_goes_with_its_contact() -> None:
     assert more == pytest.approx(SOFTER, rel=0.015)
 
 
-def test_estimators_run_with_the_load_that_was_said(light: Case, unsaid: Case) -> None:
+def test_estimators_run_with_the_load_that_was_said(light, unsaid):
     runs = [open_loop(one, "observer") for one in (light, unsaid)]
     # Where the contact carries little: the model's friction is that of a slippery rail.
     begins = np.argmax(runs[0].signal("Fx") > 500.0)
@@ -88,7 +87,7 @@ def test_estimators_run_with_the_load_that_was_said(light: Case, unsaid: Case) -
     assert runs[0].signal("adhesion") == pytest.approx(np.abs(runs[0].signal("Fx")) / 120e3)
 
 
-def test_samples_are_excluded_by_the_load_that_was_said(light: Case, unsaid: Case) -> None:
+def test_samples_are_excluded_by_the_load_that_was_said(light, unsaid):
     (slide, *_) = SYSTEM.comparison.exclusions
     usage = Expression("Fx/(2*Fz)", "a test")
     much = replace(slide, reason="much adhesion", formula=usage, above=0.04, from_rest=False)
@@ -102,7 +101,7 @@ def test_samples_are_excluded_by_the_load_that_was_said(light: Case, unsaid: Cas
         assert np.array_equal(found.excluded["much adhesion"][5:-5], beyond[5:-5])
 
 
-def test_a_model_without_that_parameter_runs_as_it_is(light: Case, unsaid: Case) -> None:
+def test_a_model_without_that_parameter_runs_as_it_is(light, unsaid):
     """The full model has the wheel load as an output."""
     runs = [open_loop(one, "full") for one in (light, unsaid)]
     assert np.array_equal(runs[0].signal("slip"), runs[1].signal("slip"))
