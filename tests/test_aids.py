@@ -23,9 +23,6 @@ from workbench.studies.monitoring.estimate import watched
 from workbench.system.registry import load_system, open_model
 from workbench.system.system import System
 
-pytest.importorskip("casadi")
-pytest.importorskip("rumoca")
-
 from .built import declare
 
 STILL = """

@@ -6,15 +6,12 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import workbench as wb
 from workbench.system.template import write_system
-
-pytest.importorskip("casadi", reason="needs the extra [compiler]")
-pytest.importorskip("rumoca", reason="needs the extra [compiler]")
-pytest.importorskip("ziglang", reason="needs the extra [compiler]")
 
 SCRIPT = """
 import workbench as wb
@@ -70,8 +67,6 @@ def test_a_script_needs_no_guard_from_file_to_diagnosis(root, folder):
 
 
 def test_a_table_is_the_recording_that_a_file_holds(system, case):
-    import pandas as pd
-
     frame = pd.read_csv(case.source)
     again = wb.case_from_frame(system, frame)
     assert_array_equal(again.time, case.time)
@@ -82,8 +77,6 @@ def test_a_table_is_the_recording_that_a_file_holds(system, case):
 
 
 def test_a_table_without_a_signal_or_its_unit_is_refused(system, case):
-    import pandas as pd
-
     frame = pd.read_csv(case.source)
     with pytest.raises(wb.InputError, match=r"found no column 'h' .* expected a column 'h \[m\]'"):
         wb.case_from_frame(system, frame.drop(columns="h [mm]"))

@@ -23,9 +23,6 @@ from workbench.observers.operating import walks
 from workbench.system.registry import load_system, open_model
 from workbench.system.system import System
 
-pytest.importorskip("casadi")
-pytest.importorskip("rumoca")
-
 from . import growth
 from .built import declare
 

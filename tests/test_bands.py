@@ -16,9 +16,6 @@ from workbench.system.system import System
 from .built import declare
 from .test_held_inputs import SYSTEM, VESSEL
 
-pytest.importorskip("rumoca", reason="needs the extra [compiler]")
-pytest.importorskip("ziglang", reason="needs the extra [compiler]")
-
 NAMES = ["open_loop", "ekf", "mhe"]
 
 

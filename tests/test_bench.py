@@ -8,10 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-pytest.importorskip("casadi", reason="needs the extra [compiler]")
-pytest.importorskip("rumoca", reason="needs the extra [compiler]")
-pytest.importorskip("ziglang", reason="needs the extra [compiler]")
-
 from workbench.arrays import Matrix
 from workbench.benchmark.calls import points
 from workbench.benchmark.horizon import HorizonTimes

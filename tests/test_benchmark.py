@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from workbench.benchmark.horizon import time_horizon
 from workbench.benchmark.observers import plain_filters, resample
 from workbench.benchmark.other_loops import open_loop
 from workbench.machines.wheelset.benchmark import LOOPS, by_fmpy
+from workbench.machines.wheelset.benchmark.c_loop import CLoop
 from workbench.observers import choose
 from workbench.observers.estimators.disturbance import DisturbanceObserver
 from workbench.observers.estimators.open_loop import OpenLoop
@@ -48,9 +50,6 @@ def test_the_model_alone_goes_the_same_way_by_fmpy(system, minimal, dry_case):
 
 def test_plain_c_gives_the_same_bits_as_the_compiled_law(system, minimal, dry_case):
     """Same arithmetic in the same order, and neither compiler may contract or reorder it."""
-    pytest.importorskip("ziglang")
-    from workbench.machines.wheelset.benchmark.c_loop import CLoop
-
     gains = DisturbanceObserver.default_gains(minimal, system)
     observer = DisturbanceObserver(minimal, system, gains)
     ours = observer.run(dry_case.time, dry_case.u, dry_case.y)
@@ -69,10 +68,6 @@ def test_a_sample_of_the_moving_horizon_takes_a_twentieth_of_the_same_problem_in
     system, dry_case
 ):
     """That both find the same cost is part of the measurement; it takes about a thousandth."""
-    pytest.importorskip("casadi")
-    pytest.importorskip("rumoca")
-    from workbench.benchmark.horizon import time_horizon
-
     times = time_horizon(dry_case, system)
     assert (times.unknowns, times.samples) == (4, 20)
     assert times.ratios()["ipopt"] > 20.0

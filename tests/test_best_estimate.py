@@ -6,9 +6,6 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-pytest.importorskip("casadi")
-pytest.importorskip("rumoca")
-
 from workbench.api import diagnose
 from workbench.diagnosis import Outcome
 from workbench.diagnosis.inference.best_estimate import bands, best_estimate

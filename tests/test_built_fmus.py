@@ -5,9 +5,6 @@ import json
 
 import pytest
 
-pytest.importorskip("casadi")
-pytest.importorskip("rumoca")
-
 from workbench.__main__ import main
 from workbench.models.compiler import source_hash
 from workbench.runtime.resources import fmus

@@ -13,10 +13,6 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.optimize import minimize_scalar
 
-pytest.importorskip("casadi", reason="needs the extra [compiler]")
-pytest.importorskip("rumoca", reason="needs the extra [compiler]")
-pytest.importorskip("ziglang", reason="needs the extra [compiler]")
-
 from workbench import case_from_frame
 from workbench.diagnosis import build_everything, read_effects
 from workbench.diagnosis.data.motion import ModelSource

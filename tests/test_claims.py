@@ -8,9 +8,6 @@ from typing import Any
 import fmpy
 import pytest
 
-pytest.importorskip("casadi")
-pytest.importorskip("rumoca")
-
 from .built import build_here
 
 LIBRARIES = sorted(

@@ -11,6 +11,7 @@ import shutil
 from collections.abc import Callable
 from pathlib import Path
 
+import casadi
 import fmpy
 import numpy as np
 import pytest
@@ -85,7 +86,6 @@ def test_model_exchange_under_fmpy_follows_a_ramp_whose_rows_stand_twice(fmi):
 
 def run_casadi(path: Path) -> np.ndarray:
     """Outputs at `TIMES`, (16, 3), by CasADi's own FMI import and its CVODES."""
-    casadi = pytest.importorskip("casadi")
     builder = casadi.DaeBuilder("rig", str(path))
     states, inputs, outputs = builder.x(), builder.u(), builder.y()
     variables = fmpy.read_model_description(str(path)).modelVariables

@@ -10,6 +10,7 @@ import tomllib
 import pytest
 
 from workbench.__main__ import main
+from workbench.cli import doctor
 from workbench.cli.extras import PURPOSES
 from workbench.cli.parser import command_line, parsers
 
@@ -87,8 +88,6 @@ def test_a_mistake_is_a_document_too(capsys):
     ids=" ".join,
 )
 def test_what_lists_or_describes_tells_programs_the_same(arguments, capsys):
-    if arguments[0] == "completion":
-        pytest.importorskip("shtab")
     assert document(arguments, capsys)["result"]
     assert main(["--json", *arguments]) == 0
     json.loads(capsys.readouterr().out)
@@ -150,7 +149,6 @@ except SystemExit as end:
 
 def test_the_script_completes_commands_options_and_choices(root, tmp_path, capsys):
     """In bash itself: what it offers after each beginning of a line."""
-    pytest.importorskip("shtab")
     assert main(["completion", "bash"]) == 0
     script = tmp_path / "workbench.bash"
     script.write_text(capsys.readouterr().out)
@@ -192,8 +190,6 @@ def test_a_sound_installation_has_nothing_wrong(capsys):
 def test_a_changed_fmu_and_a_cache_out_of_reach_are_told_with_what_to_do(
     root, tmp_path, monkeypatch, capsys
 ):
-    from workbench.cli import doctor
-
     kept = tmp_path / "fmus"
     (kept / "fmi2").mkdir(parents=True)
     (kept / "manifest.json").write_bytes((root / "fmus" / "manifest.json").read_bytes())

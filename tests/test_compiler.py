@@ -5,6 +5,7 @@ import tempfile
 import zipfile
 from pathlib import Path
 
+import casadi
 import fmpy
 import numpy as np
 import pytest
@@ -12,15 +13,11 @@ from fmpy.validation import validate_fmu
 from numpy.testing import assert_allclose
 
 from workbench.errors import InputError
+from workbench.models import compiler
+from workbench.models.compiler.description import base_units
+from workbench.models.compiler.explicit import StateSpace, make_explicit
+from workbench.models.compiler.flat import flatten
 from workbench.models.fmu import FMU
-
-casadi = pytest.importorskip("casadi")
-pytest.importorskip("rumoca")
-
-from workbench.models import compiler  # noqa: E402  (needs the extra)
-from workbench.models.compiler.description import base_units  # noqa: E402
-from workbench.models.compiler.explicit import StateSpace, make_explicit  # noqa: E402
-from workbench.models.compiler.flat import flatten  # noqa: E402
 
 
 def library(folder: Path, text: str) -> Path:

@@ -21,6 +21,8 @@ from workbench.system.system import System
 from workbench.tuning import evaluate_gains, pose
 from workbench.tuning.settling import Settling
 
+from .built import build_here
+
 NAMES = ("disturbance_observer", "parameter_estimator")
 
 
@@ -68,10 +70,6 @@ def test_gains_act_on_the_states_they_were_tuned_for_in_whatever_order_a_compile
     root, system, tmp_path
 ):
     """OpenModelica sorts states by name; here the order is that of the declarations."""
-    pytest.importorskip("casadi")
-    pytest.importorskip("rumoca")
-    from .built import build_here
-
     library = tmp_path / "WheelsetRig"
     shutil.copytree(root / "modelica" / "WheelsetRig", library)
     source = library / "MinimalObserver.mo"

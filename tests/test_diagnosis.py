@@ -12,9 +12,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-pytest.importorskip("casadi")
-pytest.importorskip("rumoca")
-
 from workbench.diagnosis import Diagnosis, Outcome, catalogue, diagnose
 from workbench.diagnosis.data.motion import ModelSource
 from workbench.diagnosis.effects.extension import ExtendedModel, build

@@ -7,9 +7,6 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-pytest.importorskip("casadi")
-pytest.importorskip("rumoca")
-
 from workbench.arrays import Matrix, Vector
 from workbench.diagnosis import build_everything, choose, given_values, read_effects
 from workbench.diagnosis.data.cleaning import outliers, smooth, uneven_steps

@@ -26,7 +26,6 @@ from .schemas import check
 
 @pytest.fixture(scope="session")
 def results(root, stops, tmp_path_factory) -> Path:
-    pytest.importorskip("rumoca", reason="no Modelica compiler")
     return diagnose(root, stops, tmp_path_factory.mktemp("diagnosis"))
 
 

@@ -18,7 +18,6 @@ from .processes import ending
 @pytest.fixture(scope="session")
 def forceless(root, stops, tmp_path_factory) -> Any:
     """The page of the same stops without Fx, in which nothing is wrong then."""
-    pytest.importorskip("rumoca", reason="no Modelica compiler")
     folder = tmp_path_factory.mktemp("forceless")
     for name in STOPS:
         (folder / name).mkdir()
@@ -34,7 +33,6 @@ def forceless(root, stops, tmp_path_factory) -> Any:
 @pytest.mark.long
 def test_an_interrupted_search_keeps_what_it_found(root, stops, tmp_path):
     """Ctrl-C while a second cause is sought."""
-    pytest.importorskip("rumoca", reason="no Modelica compiler")
     arguments = ["diagnose", str(stops), "--effects", *EFFECTS, "--out", str(tmp_path)]
     command = [sys.executable, "-m", "workbench", *arguments]
     searches = 0

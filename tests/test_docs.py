@@ -8,9 +8,15 @@ import sys
 import tomllib
 from pathlib import Path
 
+import jsonschema
 import pytest
 
-pytest.importorskip("casadi", reason="needs the extra [compiler]")
+import workbench as wb
+from workbench.cli.parser import command_line, parsers
+from workbench.diagnosis.inference.thresholds import Thresholds
+from workbench.system.declaration import key_names
+from workbench.system.reference import tables
+from workbench.system.system import System
 
 from .pages import blocks, calls, check_calls, run_page
 
@@ -79,7 +85,6 @@ def test_a_wrong_example_is_found(tmp_path):
 @pytest.fixture(scope="module")
 def site(tmp_path_factory) -> Path:
     """Built as `make docs` does, where no network can be reached."""
-    pytest.importorskip("material", reason="needs the extra [docs]")
     out = tmp_path_factory.mktemp("site")
     nowhere = {f"{kind}_proxy": "http://127.0.0.1:9" for kind in ("http", "https")}
     command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(out)]
@@ -110,10 +115,6 @@ def test_the_picture_of_the_readme_is_in_the_site(site):
 
 
 def test_the_reference_has_every_command_name_effect_and_threshold(site):
-    import workbench as wb
-    from workbench.cli.parser import command_line, parsers
-    from workbench.diagnosis.inference.thresholds import Thresholds
-
     commands = (site / "commands.html").read_text()
     for parser in parsers(command_line(""))[1:]:
         if parser.description is not None:
@@ -131,10 +132,6 @@ def test_the_reference_has_every_command_name_effect_and_threshold(site):
 
 
 def test_the_page_of_the_system_file_has_every_key_that_is_read(site):
-    from workbench.system.declaration import key_names
-    from workbench.system.reference import tables
-    from workbench.system.system import System
-
     page = (site / "system-file.html").read_text()
     assert "keys of" not in page
     for table in tables(System).values():
@@ -143,7 +140,6 @@ def test_the_page_of_the_system_file_has_every_key_that_is_read(site):
 
 
 def test_the_schema_of_case_files_takes_those_that_are_there_and_no_others(site):
-    jsonschema = pytest.importorskip("jsonschema")
     schema = json.loads((site / "schemas" / "wheelset.case.json").read_text())
     jsonschema.Draft202012Validator.check_schema(schema)
     validator = jsonschema.Draft202012Validator(schema)

@@ -5,9 +5,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-pytest.importorskip("casadi")
-pytest.importorskip("rumoca")
-
 from workbench.__main__ import main
 from workbench.diagnosis import read_effects
 from workbench.diagnosis.effects.extension import ExtendedModel, build, variables

@@ -17,18 +17,14 @@ from fmpy.ssp.ssd import read_ssd, read_ssv
 from fmpy.validation import validate_fmu
 
 from workbench.__main__ import main
+from workbench.cli.parser import command_line
 from workbench.errors import InputError
+from workbench.models.compiler.archive import PLATFORMS
 from workbench.observers import Estimator, Gains, choose
+from workbench.observers.export import ObserverModel, build_observer, observer, write_package
 from workbench.observers.gains_file import format_gains
 from workbench.recordings.case import Case, read_cases
 from workbench.system.registry import load_system, open_model
-
-pytest.importorskip("casadi")
-pytest.importorskip("rumoca")
-
-from workbench.cli.parser import command_line
-from workbench.models.compiler.archive import PLATFORMS
-from workbench.observers.export import ObserverModel, build_observer, observer, write_package
 
 SYSTEM = load_system("wheelset")
 KINDS = choose(SYSTEM, list(SYSTEM.export.classes))

@@ -23,19 +23,15 @@ from fmpy.validation import validate_fmu
 from workbench.__main__ import main
 from workbench.errors import InputError
 from workbench.models import fmu_cache
+from workbench.models.compiler import native
 from workbench.models.fmu import FMU
 from workbench.observers import Estimator, choose
 from workbench.observers.estimators.kalman import ExtendedKalmanFilter
+from workbench.observers.export import EstimatorLaw, build_law
 from workbench.observers.gains_file import format_gains
 from workbench.recordings.case import Case, read_case
 from workbench.system.registry import load_system, open_model
 from workbench.system.system import System
-
-pytest.importorskip("casadi")
-pytest.importorskip("rumoca")
-
-from workbench.models.compiler import native
-from workbench.observers.export import EstimatorLaw, build_law
 
 from . import heater
 

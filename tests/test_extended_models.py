@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from workbench.diagnosis.effects.extension import build
 from workbench.models.fmu import FMU
+from workbench.models.modelica import read_library
 from workbench.observers import Estimator, Gains
 from workbench.observers.estimators.disturbance import DisturbanceObserver
 from workbench.observers.estimators.kalman import ExtendedKalmanFilter
@@ -17,12 +19,6 @@ from workbench.observers.run import Ending
 from workbench.observers.score import score
 from workbench.recordings.case import Case, read_case
 from workbench.system.registry import load_system
-
-pytest.importorskip("casadi")
-pytest.importorskip("rumoca")
-
-from workbench.diagnosis.effects.extension import build
-from workbench.models.modelica import read_library
 
 SYSTEM = load_system("wheelset")
 RR, JR, TRAIN_INERTIA = 0.70, 1500.0, 7840.0

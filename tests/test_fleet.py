@@ -56,7 +56,6 @@ def test_each_machine_is_watched_as_it_is_alone(fleet, local, tmp_path):
 
 
 def test_a_fleet_goes_on_from_its_states_and_reads_urls(fleet, local, tmp_path):
-    pytest.importorskip("fsspec")
     out, where = tmp_path / "out", tmp_path / "fleet"
     shutil.copytree(local, out)
     shutil.copytree(fleet, where)
@@ -73,7 +72,8 @@ def test_a_fleet_goes_on_from_its_states_and_reads_urls(fleet, local, tmp_path):
 
 
 def test_a_cluster_finds_the_same(fleet, local, tmp_path):
-    distributed = pytest.importorskip("distributed")
+    import distributed
+
     # In processes of their own: within this one, after hundreds of tests, a task may never end.
     options = {"n_workers": 1, "threads_per_worker": 1, "dashboard_address": ":0"}
     with distributed.LocalCluster(processes=True, **options) as cluster:

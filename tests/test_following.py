@@ -56,7 +56,6 @@ def test_a_rival_that_is_nearer_than_the_true_cause_is_predicted_as_such():
 
 
 def test_a_rig_that_makes_no_experiments_is_refused(tmp_path, capsys):
-    pytest.importorskip("rumoca", reason="no Modelica compiler")
     assert main(["power", "--follow", "--system", "train", "--out", str(tmp_path)]) == 2
     assert "one with the method 'following'" in capsys.readouterr().err
 
@@ -64,7 +63,6 @@ def test_a_rig_that_makes_no_experiments_is_refused(tmp_path, capsys):
 @pytest.mark.long
 def test_torque_and_force_part_where_the_drive_imitates_nothing(tmp_path):
     """With an inertia imitated, both are collinear in any stop, whatever the pressure."""
-    pytest.importorskip("rumoca", reason="no Modelica compiler")
     options = ["--follow", "--effects", "FxGain", "--sizes", "8", "--repeats", "1"]
     alike = ["--case", "24_alike_80_2.7", "--case", "25_alike_80_2.7"]
     assert main(["power", *options, *alike, "--out", str(tmp_path), "--workers", "1"]) == 0
@@ -92,7 +90,6 @@ def test_torque_and_force_part_where_the_drive_imitates_nothing(tmp_path):
     ],
 )
 def test_a_twin_is_parted_by_what_is_proposed_for_it(planted, twin, sensor, answer, tmp_path):
-    pytest.importorskip("rumoca", reason="no Modelica compiler")
     options = ["--follow", "--effects", planted, "--sizes", "8", "--repeats", "1"]
     alike = ["--case", "24_alike_80_2.7", "--case", "25_alike_80_2.7"]
     assert main(["power", *options, *alike, "--out", str(tmp_path), "--workers", "1"]) == 0

@@ -28,9 +28,6 @@ from workbench.recordings.case import Case, read_case
 from workbench.system.registry import open_model
 from workbench.system.system import System
 
-pytest.importorskip("casadi")
-pytest.importorskip("rumoca")
-
 from .built import declare
 
 LIBRARY = """

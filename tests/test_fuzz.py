@@ -6,8 +6,6 @@ from pathlib import Path
 
 import pytest
 
-pytest.importorskip("rumoca", reason="needs the extra [compiler]")
-
 from tests.fuzz import harness
 from tests.fuzz.apart import one_process
 from tests.fuzz.harness import Target, fuzz, generator, write

@@ -4,10 +4,6 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-pytest.importorskip("casadi", reason="needs the extra [compiler]")
-pytest.importorskip("rumoca", reason="needs the extra [compiler]")
-pytest.importorskip("ziglang", reason="needs the extra [compiler]")
-
 from workbench.arrays import Vector
 from workbench.diagnosis import given_values, read_effects
 from workbench.diagnosis.data.motion import ModelSource

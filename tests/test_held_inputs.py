@@ -20,9 +20,6 @@ from workbench.system.system import System
 
 from .built import declare
 
-pytest.importorskip("rumoca", reason="needs the extra [compiler]")
-pytest.importorskip("ziglang", reason="needs the extra [compiler]")
-
 VESSEL = """
 package Vessel "A vessel that a pump fills"
   model Observer "Its volume"

@@ -73,8 +73,6 @@ RATES, STEP, NOISE, WALK = (0.02, 0.05), 1.0, 0.2, np.array([0.01, 0.002])
 
 @pytest.fixture(scope="module")
 def vessel(tmp_path_factory) -> System:
-    pytest.importorskip("casadi")
-    pytest.importorskip("rumoca")
     folder = tmp_path_factory.mktemp("vessel")
     rng, warm, rows = np.random.default_rng(3), 10.0, []
     for k in range(300):

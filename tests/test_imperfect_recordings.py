@@ -12,9 +12,6 @@ import pytest
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
-pytest.importorskip("casadi")
-pytest.importorskip("rumoca")
-
 from workbench.diagnosis.data.cleaning import outliers
 from workbench.diagnosis.data.counting import BEYOND
 from workbench.diagnosis.inference.thresholds import SOUND

@@ -18,9 +18,6 @@ from workbench.system.registry import open_model
 from .built import declare
 from .schemas import check
 
-pytest.importorskip("rumoca", reason="needs the extra [compiler]")
-pytest.importorskip("ziglang", reason="needs the extra [compiler]")
-
 TRAM = """
 package Tram "A tram of which power and speed are measured"
   model Observer "Its speed"

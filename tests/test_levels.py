@@ -27,9 +27,6 @@ from workbench.system.system import System
 from .built import declare
 from .heater import LIBRARY, NOISE, SYSTEM, cases, diagnosed
 
-pytest.importorskip("casadi")
-pytest.importorskip("rumoca")
-
 G, SPREAD = 0.3, 0.015  # of both of the block's own conductances together [W/K]
 HALVES = "".join(f"{one} = {{ spread = {SPREAD / 2**0.5 / (0.5 * G)} }}\n" for one in ("Ga", "Gb"))
 

@@ -24,9 +24,6 @@ from workbench.observers.estimators.smoother import Smoother
 from workbench.system.registry import load_system, open_model
 from workbench.system.system import System
 
-pytest.importorskip("casadi")
-pytest.importorskip("rumoca")
-
 from .built import build_here
 
 LIBRARY = """

@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
+import casadi
 import fmpy
 import numpy as np
 import pytest
@@ -20,13 +21,9 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from workbench.errors import InputError
-
-casadi = pytest.importorskip("casadi")
-pytest.importorskip("rumoca")
-
-from workbench.models import compiler  # noqa: E402  (needs the extra)
-from workbench.models.compiler.explicit import StateSpace, make_explicit  # noqa: E402
-from workbench.models.compiler.flat import flatten  # noqa: E402
+from workbench.models import compiler
+from workbench.models.compiler.explicit import StateSpace, make_explicit
+from workbench.models.compiler.flat import flatten
 
 Series = NDArray[np.float64]
 TIMES = np.linspace(0.0, 1.0, 11)  # s

@@ -399,7 +399,6 @@ def test_the_machine_is_known_from_before_a_change_and_diagnosed_after_it(usual)
 @pytest.mark.long
 def test_the_cause_of_a_slow_loss_is_named_with_its_axle(tmp_path):
     """Of eight stops without those before, nothing was said: tolerances blur it."""
-    pytest.importorskip("rumoca")
     if not RECORDINGS.exists():
         pytest.skip("the recordings are not at hand")
     words = ["monitor", str(RECORDINGS / "history"), "--system", "train", "--diagnose"]

@@ -21,6 +21,8 @@ from workbench.recordings.case import Case, read_case
 from workbench.system.check import check_model
 from workbench.system.system import System
 
+from .built import build_here
+
 NAMES = {
     "omegaW": "speedWheelset",
     "omegaR": "speedRoller",
@@ -41,10 +43,6 @@ NAMES = {
 @pytest.fixture(scope="module")
 def renamed_path(root, tmp_path_factory) -> Path:
     """MinimalObserver with every variable that estimators use under another name."""
-    pytest.importorskip("rumoca")
-    pytest.importorskip("casadi")
-    from .built import build_here  # needs the extra
-
     folder = tmp_path_factory.mktemp("renamed")
     library = folder / "WheelsetRig"
     shutil.copytree(root / "modelica" / "WheelsetRig", library)

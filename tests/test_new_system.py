@@ -14,10 +14,6 @@ from workbench.recordings.case import read_cases
 from workbench.system.registry import load_system
 from workbench.system.template import SEEPAGE, write_system
 
-pytest.importorskip("casadi", reason="needs the extra [compiler]")
-pytest.importorskip("rumoca", reason="needs the extra [compiler]")
-pytest.importorskip("ziglang", reason="needs the extra [compiler]")
-
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory) -> Path:

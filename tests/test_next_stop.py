@@ -268,7 +268,6 @@ def heated(seed: int, power: np.ndarray, begin: float) -> pd.DataFrame:
 
 @pytest.fixture(scope="module")
 def block(tmp_path_factory) -> System:
-    pytest.importorskip("rumoca", reason="no Modelica compiler")
     folder = tmp_path_factory.mktemp("heater") / "block"
     heater(folder)
     file = folder / "system.toml"

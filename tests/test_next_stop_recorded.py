@@ -23,7 +23,6 @@ def test_a_faster_stop_is_proposed_and_parts_the_radii(system, tmp_path):
     """By the lightest stop alone, a wheel of 1.5 mm less and a roller of 2.3 mm more look alike."""
     if not RADIUS.is_dir():
         pytest.skip("needs the independent recordings, which have licences of their own")
-    pytest.importorskip("rumoca", reason="no Modelica compiler")
     effects, all_effects = library_effects(system), tmp_path / "AllEffects.fmu"
     build_everything(system, effects, all_effects)
     light = read_cases([RADIUS / "01_dry_80_1.5"], system)

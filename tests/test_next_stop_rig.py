@@ -53,7 +53,6 @@ def two_stops(system: System, effects: Effects, folder: Path) -> list[Case]:
 
 @pytest.fixture(scope="module")
 def alike(system, tmp_path_factory) -> list[Case]:
-    pytest.importorskip("rumoca", reason="no Modelica compiler")
     return two_stops(system, PLANTED, tmp_path_factory.mktemp("alike"))
 
 
@@ -123,7 +122,6 @@ def test_full_fits_end_within_half_a_deviation_of_where_more_rounds_lead(
 @pytest.mark.long
 def test_what_no_stop_parts_is_said_and_the_sensor_that_would(one_speed, tmp_path):
     """A load cell and a torque that read too much are told apart by neither pressure nor time."""
-    pytest.importorskip("rumoca", reason="no Modelica compiler")
     asked = one_speed.experiments
     assert asked is not None
     steps = tuple(
@@ -189,7 +187,6 @@ def test_rivals_that_bend_far_are_fitted_again_in_full(
 
     The decision is that of the diagnosis, which tells apart beyond 40 of chi-squared.
     """
-    pytest.importorskip("rumoca", reason="no Modelica compiler")
     cases, rivals, effects = of_two(system, planted, names, tmp_path)
     (one,) = predict_experiments(system, rivals, [other_surface(system, rail, imitated)], 1)
     true, other = ([model.effects for model in rivals.models].index((name,)) for name in names)
@@ -204,7 +201,6 @@ def test_rivals_that_bend_far_are_fitted_again_in_full(
 @pytest.mark.long
 def test_what_derivatives_alone_promise_is_not_proposed(system, tmp_path):
     """On wet rails, derivatives part stiffness from load by ten deviations; full fits do not."""
-    pytest.importorskip("rumoca", reason="no Modelica compiler")
     names = ["CreepStiffness", "WheelLoad"]
     _, rivals, _ = of_two(system, "creep_stiffness=0.16", names, tmp_path)
     proposed = next_stop(system, rivals, ALONE)
@@ -216,7 +212,6 @@ def test_what_derivatives_alone_promise_is_not_proposed(system, tmp_path):
 @pytest.mark.long
 def test_what_one_rival_alone_takes_beyond_the_claims_is_proposed_last(system, tmp_path):
     """On a light axle and a wet rail less load lets the wheel slide, a softer contact does not."""
-    pytest.importorskip("rumoca", reason="no Modelica compiler")
     asked = system.experiments
     assert asked is not None
     light = {**asked.conditions, "wheel_load": (Setting(60e3, "60 kN"),)}

@@ -142,8 +142,6 @@ def test_a_sensor_that_rectifies_is_scored_by_its_reading(tmp_path):
     The recording is the model's own, so that its free run errs by the noise alone. By the state,
     it would err by twice the temperature wherever the block is cold.
     """
-    pytest.importorskip("casadi")
-    pytest.importorskip("rumoca")
     folder = tmp_path / "block"
     folder.mkdir()
     output = '  output Real reading(unit="K") = abs(T) "As read";\n'

@@ -9,9 +9,6 @@ from pathlib import Path
 
 import pytest
 
-pytest.importorskip("casadi", reason="needs the extra [compiler]")
-pytest.importorskip("rumoca", reason="needs the extra [compiler]")
-
 from workbench.__main__ import main
 from workbench.errors import InputError
 from workbench.models.compiler.openmodelica import Message, build_with_omc, errors_in

@@ -17,9 +17,6 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-pytest.importorskip("casadi")
-pytest.importorskip("rumoca")
-
 from workbench.diagnosis import Outcome, catalogue, diagnose
 from workbench.diagnosis.problem import Problem
 from workbench.diagnosis.report import write_diagnosis

@@ -59,8 +59,6 @@ def refused(command: str, out: Path, capsys: pytest.CaptureFixture[str]) -> str:
 def test_a_place_that_takes_no_results_is_refused_before_the_work(
     root, tmp_path, monkeypatch, capsys, command
 ):
-    if command in ("diagnose", "export", "power"):
-        pytest.importorskip("casadi")
     monkeypatch.chdir(root)
     (tmp_path / "file").write_text("mine")
     for out, match in (

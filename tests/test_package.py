@@ -181,7 +181,6 @@ def test_messages_of_the_wheel_name_only_what_it_has(anywhere):
     missing = anywhere("simulate", "--fmu", "missing.fmu")
     assert missing.returncode == 2
     assert "To do: give the path of one with --fmu." in missing.stderr
-    pytest.importorskip("rumoca")
     refused = anywhere("fmu", "build", "--all")
     assert refused.returncode == 2
     assert "found a package that was installed from a wheel" in refused.stderr

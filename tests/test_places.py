@@ -4,9 +4,6 @@ from pathlib import Path
 
 import pytest
 
-pytest.importorskip("casadi", reason="needs the extra [compiler]")
-pytest.importorskip("rumoca", reason="needs the extra [compiler]")
-
 from workbench.diagnosis import choose, read_effects
 from workbench.diagnosis.effects.extension import ExtendedModel, parameter_of, variables
 from workbench.errors import InputError

@@ -26,9 +26,6 @@ from workbench.observers.score import corner
 from workbench.recordings.case import Case
 from workbench.tuning import Job, Plan, Search, evaluate_gains, recording, search
 
-pytest.importorskip("casadi")
-pytest.importorskip("rumoca")
-
 from .built import declare
 
 MODEL = """

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from workbench.errors import InputError
+from workbench.recordings.datasets import published
 from workbench.system.plugins import Plugin, find_plugin
 
 PROJECT = """
@@ -172,8 +173,6 @@ def test_a_package_that_declares_none_is_read_by_module_names_with_a_warning(tmp
 
 
 def test_a_companion_is_a_plugin_with_a_warning(root, tmp_path):
-    from workbench.recordings.datasets import published
-
     file = tmp_path / "system.toml"
     file.write_text('title = "Tanks"\ncompanion = "workbench.machines.published:CASCADED_TANKS"\n')
     with pytest.warns(FutureWarning, match=r"'companion' is called 'plugin' now"):

@@ -36,10 +36,6 @@ from workbench.system.template import AREA, OUTLET, write_system
 
 from .page_rules import check_page
 
-pytest.importorskip("casadi", reason="needs the extra [compiler]")
-pytest.importorskip("rumoca", reason="needs the extra [compiler]")
-pytest.importorskip("ziglang", reason="needs the extra [compiler]")
-
 THRESHOLD, RATE = 1.2, 3e-3  # [m], [m2/s] of a leak that begins at a level
 PERIOD = 1.885  # [m] of way
 

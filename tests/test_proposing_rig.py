@@ -31,7 +31,6 @@ def test_pads_that_bed_in_are_told_by_the_time_since_they_touch(system, tmp_path
     What the law makes of the friction is within 15 % of the range of what the cause does, on stops
     that neither was fitted to.
     """
-    pytest.importorskip("rumoca", reason="no Modelica compiler")
     cases = stops(system, 1, tmp_path / "stops")
     quiet = {"workers": 2, "report": lambda _: None}
     before = wb.diagnose(system, cases, effects=["WheelLoad"], out=tmp_path / "a", **quiet)

@@ -11,10 +11,6 @@ from workbench.recordings.case import Case, read_cases
 from workbench.recordings.datasets import write_cases
 from workbench.system.registry import load_system
 
-pytest.importorskip("casadi", reason="needs the extra [compiler]")
-pytest.importorskip("rumoca", reason="needs the extra [compiler]")
-pytest.importorskip("ziglang", reason="needs the extra [compiler]")
-
 
 @pytest.fixture(scope="module")
 def folder(published_cases) -> Path:

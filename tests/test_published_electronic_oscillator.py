@@ -1,7 +1,6 @@
 """A published oscillating circuit is read, and its stiffening spring is named."""
 
 import numpy as np
-import pytest
 from numpy.testing import assert_allclose
 
 from workbench.api import diagnose
@@ -36,8 +35,6 @@ def test_the_arrow_is_held_out_and_realisations_follow_it(tmp_path):
 
 def test_the_stiffening_spring_alone_is_named(published_cases, tmp_path):
     """Of 7.3 mV it leaves the 0.3 mV of cards and circuit."""
-    pytest.importorskip("casadi", reason="needs the extra [compiler]")
-    pytest.importorskip("rumoca", reason="needs the extra [compiler]")
     cases = published_cases("electronic_oscillator", "electronic_oscillator")
     system = load_system("electronic_oscillator")
     fitted = read_cases([cases / f"multisine_{number}" for number in (1, 2, 3)], system)

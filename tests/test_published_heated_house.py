@@ -62,8 +62,6 @@ def cases(published_cases) -> dict[str, Case]:
 
 @pytest.fixture(scope="module")
 def outcome(cases, tmp_path_factory) -> Outcome:
-    pytest.importorskip("casadi", reason="needs the extra [compiler]")
-    pytest.importorskip("rumoca", reason="needs the extra [compiler]")
     return diagnose(
         load_system("heated_house"),
         [cases["four_days"]],
@@ -115,8 +113,6 @@ def test_held_out_hours_are_foreseen_as_by_the_published_structure(cases, outcom
 
 def test_with_all_hours_fitted_it_errs_less_than_the_published_model(cases, tmp_path):
     """The protocol of its figure: parameters from all 141 h, theirs of one-step predictions."""
-    pytest.importorskip("casadi", reason="needs the extra [compiler]")
-    pytest.importorskip("rumoca", reason="needs the extra [compiler]")
     system = load_system("heated_house")
     found = diagnose(system, cases.values(), out=tmp_path, workers=1, report=lambda line: None)
     (cause,) = found.diagnosis.causes

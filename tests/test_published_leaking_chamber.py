@@ -90,7 +90,6 @@ def test_a_leak_is_found_however_far_it_leads_from_the_tight_chamber(tmp_path, t
 
     Linearised about a tight chamber the pressure falls evenly, which tells nothing of a decay.
     """
-    pytest.importorskip("rumoca", reason="needs the extra [compiler]")
     system = load_system("leaking_chamber")
     conductance, time = times * MATTERS, 0.1 * np.arange(600)
     for number, pressure in enumerate((5e5, 7e5)):
@@ -121,8 +120,6 @@ def cases(published_cases) -> Path:
 
 
 def diagnosed(cases: Path, name: str, out: Path) -> Outcome:
-    pytest.importorskip("casadi", reason="needs the extra [compiler]")
-    pytest.importorskip("rumoca", reason="needs the extra [compiler]")
     system = load_system("leaking_chamber")
     above = read_cases([cases / f"{name}_above"], system)
     return diagnose(system, above, out=out, workers=1, report=lambda line: None)
@@ -138,8 +135,6 @@ def test_a_chamber_that_leaks_does_so_laminarly(cases, tmp_path, name):
 
 def test_both_parts_of_a_chamber_that_empties_are_explained_by_its_leak(cases, tmp_path):
     """The nominal chamber is thousands of times the noise off, where derivatives tell nothing."""
-    pytest.importorskip("casadi", reason="needs the extra [compiler]")
-    pytest.importorskip("rumoca", reason="needs the extra [compiler]")
     system = load_system("leaking_chamber")
     both = read_cases([cases / f"Ultimaker_020_{part}" for part in ("above", "below")], system)
     outcome = diagnose(system, both, out=tmp_path, workers=1, report=lambda line: None)

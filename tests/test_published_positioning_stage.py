@@ -27,8 +27,6 @@ def test_the_record_with_pulses_is_held_out(tmp_path):
 
 def test_friction_and_its_slant_are_named(published_cases, tmp_path):
     """Published: 20.4 N and 203.5 N.s/m, or 166.7 one way and 240.4 the other."""
-    pytest.importorskip("casadi", reason="needs the extra [compiler]")
-    pytest.importorskip("rumoca", reason="needs the extra [compiler]")
     cases = published_cases("positioning_stage", "positioning_stage")
     system = load_system("positioning_stage")
     fitted = read_cases([cases / "motion"], system)

@@ -4,13 +4,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+import casadi as ca
 import numpy as np
 import pytest
-
-pytest.importorskip("casadi", reason="needs the extra [compiler]")
-pytest.importorskip("rumoca", reason="needs the extra [compiler]")
-
-import casadi as ca
 
 from workbench.errors import FMUError
 from workbench.models.compiler.explicit import StateSpace, make_explicit

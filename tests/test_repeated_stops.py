@@ -46,7 +46,6 @@ def test_what_is_said_of_the_discs_reaches_the_model(tmp_path):
 
 
 def test_fade_of_the_model_begins_there_too(tmp_path):
-    pytest.importorskip("rumoca", reason="no Modelica compiler")
     library = read_library(SYSTEM.library)
     (fade,) = (
         effect for effect in read_effects(library, "MinimalObserver") if effect.name == "BrakeFade"

@@ -10,9 +10,6 @@ import pandas as pd
 import pytest
 from scipy.integrate import solve_ivp
 
-pytest.importorskip("casadi")
-pytest.importorskip("rumoca")
-
 from .heater import NOISE, cases, diagnosed, system
 
 CONVECTION = """  model Convection "air that rises from the block"

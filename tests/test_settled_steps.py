@@ -3,14 +3,10 @@
 import numpy as np
 import pytest
 
+from workbench.diagnosis.data.motion import ModelSource
 from workbench.diagnosis.simulation.residual_model import ResidualModel
 from workbench.recordings.case import read_cases
 from workbench.system.registry import load_system
-
-pytest.importorskip("casadi")
-pytest.importorskip("rumoca")
-
-from workbench.diagnosis.data.motion import ModelSource
 
 from .built import build_here, write_case
 

@@ -6,9 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-pytest.importorskip("casadi")
-pytest.importorskip("rumoca")
-
 from workbench.arrays import Vector
 from workbench.diagnosis import Diagnosis, catalogue
 from workbench.diagnosis.data.motion import ModelSource, OpenModel, motion

@@ -27,10 +27,6 @@ from workbench.system.units import quantity
 
 from .built import build_here, write_case
 
-pytest.importorskip("casadi", reason="needs the extra [compiler]")
-pytest.importorskip("rumoca", reason="needs the extra [compiler]")
-pytest.importorskip("ziglang", reason="needs the extra [compiler]")
-
 BALANCE = """
 package Balance "A spring balance: force by deflection, without a motion of its own"
   partial model PartialPivot "Slot: friction of the pivot"

@@ -15,9 +15,6 @@ from workbench.system.registry import load_system
 
 from .built import declare
 
-pytest.importorskip("rumoca", reason="needs the extra [compiler]")
-pytest.importorskip("ziglang", reason="needs the extra [compiler]")
-
 KETTLE = """
 package Kettle "Water that a body heats"
   model Observer "Heat of a body and of the water about it"

@@ -11,10 +11,7 @@ from workbench.diagnosis.simulation.steps import step, steps
 from workbench.models.fmu import FMU
 from workbench.models.native import instance
 
-pytest.importorskip("casadi")
-pytest.importorskip("rumoca")
-
-from .built import build_text  # needs the extra
+from .built import build_text
 
 MODEL = """
 within ;

@@ -6,6 +6,8 @@ from pathlib import Path
 import pytest
 
 from workbench.errors import InputError
+from workbench.models.compiler import build, openmodelica
+from workbench.models.compiler.flat import flatten
 from workbench.models.modelica import check, read_library
 
 ROOT = Path(__file__).parent.parent
@@ -245,10 +247,6 @@ def test_every_class_that_comes_with_the_workbench_says_what_is_so(library):
 
 
 def test_either_compiler_refuses_it_before_its_front_end_is_asked(tmp_path, monkeypatch):
-    pytest.importorskip("rumoca")
-    pytest.importorskip("casadi")
-    from workbench.models.compiler import build, openmodelica  # needs the extra
-
     package = write(tmp_path, "model M Part part(slot(gain=2.0)); end M;")
     omc = tmp_path / "bin" / "omc"
     omc.parent.mkdir()
@@ -266,9 +264,6 @@ def test_either_compiler_refuses_it_before_its_front_end_is_asked(tmp_path, monk
 
 def test_what_the_front_end_would_drop_is_refused(tmp_path):
     """A component that the base inherits stays as it was, however right its redeclaration is."""
-    pytest.importorskip("rumoca")
-    from workbench.models.compiler.flat import flatten  # needs the extra
-
     text = "model N extends Part; end N; model M extends N(redeclare Named slot); end M;"
     message = r"redeclaration of 'slot', which Lib\.N inherits.*declare 'slot' in Lib\.N"
     with pytest.raises(InputError, match=message):
@@ -286,9 +281,6 @@ def test_what_the_front_end_would_drop_is_refused(tmp_path):
 )
 def test_a_value_that_the_front_end_would_lose_is_refused(text, tmp_path):
     """It would go on with the default: a model with another number, and no word of it."""
-    pytest.importorskip("rumoca")
-    from workbench.models.compiler.flat import flatten  # needs the extra
-
     law = "model A parameter Real k(max=1.0) = 0.5; output Real y = k; end A; "
     with pytest.raises(
         InputError, match=r"package\.mo:\d+: found a value of 'k' together with max"

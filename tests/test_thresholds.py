@@ -9,9 +9,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import binom, chi2, norm
 
-pytest.importorskip("casadi")
-pytest.importorskip("rumoca")
-
 from workbench.__main__ import main
 from workbench.diagnosis.inference.thresholds import thresholds
 from workbench.machines.wheelset.planting import SHEET_ERRORS, PlantedStops

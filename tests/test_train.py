@@ -158,7 +158,6 @@ LABELLED = {  # set: what is planted, as it is called here
 @pytest.mark.parametrize("name", LABELLED)
 def test_a_labelled_fault_is_named_with_its_place(name, train, tmp_path):
     """Pads by what they have beside the other axles': a tolerance of theirs is no other loss."""
-    pytest.importorskip("rumoca")
     cases, truth = cases_of(f"labelled/{name}", train, tmp_path / "cases")
     found = wb.diagnose(train, cases, out=tmp_path / "out", workers=2).diagnosis
     effect, size, planted = LABELLED[name]
@@ -175,7 +174,6 @@ def test_a_labelled_fault_is_named_with_its_place(name, train, tmp_path):
 @pytest.mark.long
 def test_a_wrong_radius_is_named_with_its_axle(train, tmp_path):
     """Among three causes on every axle, in two stops of the four."""
-    pytest.importorskip("rumoca")
     cases, truth = cases_of("labelled/radius_axle", train, tmp_path / "cases")
     (planted,) = truth["effects"].values()
     kinds = ("WheelRadius", "WeakPads", "DraggingBrake")

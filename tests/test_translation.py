@@ -10,8 +10,6 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-pytest.importorskip("casadi")
-
 from workbench.errors import InputError
 from workbench.models.native import compiled
 from workbench.observers.export.translation import Array, Data, Number, Program

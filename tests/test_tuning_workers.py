@@ -95,7 +95,8 @@ def pid(evaluator: Evaluator) -> int:
 
 
 def test_a_cluster_finds_the_same_gains(problem, pool, tmp_path):
-    distributed = pytest.importorskip("distributed")
+    import distributed
+
     from workbench.runtime.cluster import DaskPool
 
     job = problem.job
@@ -138,7 +139,6 @@ except ValueError:
 
 def test_a_worker_that_could_not_be_prepared_is_not_ended_for_it_later():
     """It may belong to somebody else's process, and may be of use to the next who asks."""
-    pytest.importorskip("distributed")
     command = [sys.executable, "-c", LATE]
     run = subprocess.run(command, capture_output=True, text=True, check=False)
     assert (run.returncode, run.stdout) == (0, "alive\n"), run.stderr
@@ -179,7 +179,6 @@ def worker(
 @pytest.fixture
 def scheduler(tmp_path) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
     """Address and process of a scheduler."""
-    pytest.importorskip("distributed")
     file = tmp_path / "scheduler.json"
     with dask("scheduler", "--scheduler-file", str(file), "--port", "0") as process:
         deadline = time.monotonic() + 60.0
@@ -197,7 +196,8 @@ def test_a_cluster_without_workers_is_refused_in_words(scheduler, problem):
 
 def test_only_workers_with_the_same_code_get_work(scheduler, problem, pool, tmp_path):
     """One lacks the project, one has a constant of its objective otherwise."""
-    distributed = pytest.importorskip("distributed")
+    import distributed
+
     from workbench.runtime.cluster import DaskPool
 
     address, _ = scheduler

@@ -15,10 +15,6 @@ import pytest
 
 import workbench as wb
 
-pytest.importorskip("casadi", reason="needs the extra [compiler]")
-pytest.importorskip("rumoca", reason="needs the extra [compiler]")
-pytest.importorskip("ziglang", reason="needs the extra [compiler]")
-
 DATA = {
     "cascaded_tanks": "cascaded_tanks",
     "servo_pendulum": "servo_pendulum",

@@ -6,9 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-pytest.importorskip("casadi")
-pytest.importorskip("rumoca")
-
 from workbench.diagnosis import read_effects
 from workbench.diagnosis.effects.extension import ExtendedModel, build
 from workbench.diagnosis.effects.slots import read_slots

@@ -163,7 +163,6 @@ def test_sets_of_the_independent_simulator_are_understood():
 
 
 def test_a_generated_train_of_two_vehicles_is_the_one_that_is_known(tmp_path):
-    pytest.importorskip("rumoca")
     generated, estimates = growth.build(2, tmp_path, pitching=False), []
     samples = growth.stop(generated)
     same = {quantity.name for quantity in generated.estimated}
@@ -225,8 +224,6 @@ def rms(ratios: list[Matrix]) -> float:
 
 @pytest.fixture(scope="module")
 def everything(tmp_path_factory) -> Path:
-    pytest.importorskip("casadi", reason="needs the extra [compiler]")
-    pytest.importorskip("rumoca", reason="needs the extra [compiler]")
     path = tmp_path_factory.mktemp("everything") / "everything.fmu"
     build_everything(SYSTEM, library_effects(SYSTEM), path)
     return path
