@@ -19,14 +19,12 @@ class Figure:
     summaries : files that the commands write, below the folder of results.
     table : of the summaries, in their order.
     long : whether they take many minutes, or hours.
-    page : beside this module, on which the table stands.
     """
 
     commands: tuple[str, ...]
     summaries: tuple[Path, ...]
     table: Callable[..., Table]
     long: bool = False
-    page: str = "accuracy.md"
 
     @property
     def recorded(self) -> bool:

@@ -138,7 +138,6 @@ TRAIN = {
         (_prepared("healthy"), _SAFETY),
         (Path("distance/healthy/distance.json"),),
         safety,
-        page="distance.md",
     ),
     "plain": Figure(
         (
@@ -148,7 +147,6 @@ TRAIN = {
         (Path("distance/plain/distance.json"),),
         plain,
         long=True,
-        page="distance.md",
     ),
     "predicted": Figure(
         (
@@ -162,7 +160,6 @@ TRAIN = {
         ),
         tuple(Path("distance", name, "distance.json") for name in PREDICTED),
         predicted,
-        page="distance.md",
     ),
     "monitor": Figure(
         (
@@ -177,7 +174,6 @@ TRAIN = {
         ),
         monitored,
         long=True,
-        page="monitor.md",
     ),
     "faults": Figure(
         (
@@ -187,7 +183,6 @@ TRAIN = {
         tuple(Path("train", name, "summary.json") for name in FAULTS),
         partial(labelled, FAULTS),
         long=True,
-        page="train.md",
     ),
     "named": Figure(
         (
@@ -197,6 +192,5 @@ TRAIN = {
         (Path("train/power/power.json"),),
         named,
         long=True,
-        page="train.md",
     ),
 }

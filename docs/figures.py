@@ -153,7 +153,6 @@ FIGURES = {
         (Path("power/left_out/left_out.json"),),
         tables.laws,
         long=True,
-        page="propose.md",
     ),
     "machines": Figure(
         (
@@ -196,12 +195,14 @@ def written(name: str, *summaries: Summary) -> str:
 def origin(commands: Sequence[str]) -> str:
     """What stands below a table: the commands that made it."""
     places = {"out": RESULTS.as_posix(), "recordings": "FOLDER"}
-    told = [f"workbench {command}".format_map(places) for command in commands]
-    if len(told) == 1:
-        return f"*Written by `make figures` from `{told[0]}`.*"
-    lines = "\n".join(told)
+    calls = [f"workbench {command}".format_map(places) for command in commands]
+    if len(calls) == 1:
+        return f"*Written by `make figures` from `{calls[0]}`.*"
+    lines = "\n".join(calls)
     return (
-        f"*Written by `make figures` from*\n\n<!-- parsed: takes minutes -->\n```sh\n{lines}\n```"
+        "*Written by `make figures`.*\n\n"
+        '<details markdown="1"><summary>Commands</summary>\n\n'
+        f"<!-- parsed: takes minutes -->\n```sh\n{lines}\n```\n\n</details>"
     )
 
 
@@ -212,12 +213,20 @@ def block(name: str) -> re.Pattern[str]:
     )
 
 
+def page_of(name: str) -> Path:
+    """Page with the marks of a table; SystemExit if none has them, or several."""
+    pages = [page for page in sorted(PAGES.glob("*.md")) if block(name).search(page.read_text())]
+    if len(pages) != 1:
+        raise SystemExit(f"{name}: found {len(pages)} pages with its marks, expected one")
+    return pages[0]
+
+
 def placed(page: str, name: str, *summaries: Summary) -> str:
     """The page with a table written anew."""
-    found, count = block(name).subn(lambda _: written(name, *summaries), page)
+    table, count = block(name).subn(lambda _: written(name, *summaries), page)
     if count != 1:
-        raise SystemExit(f"{FIGURES[name].page}: found {count} places for {name}, expected one")
-    return found
+        raise SystemExit(f"found {count} places for {name}, expected one")
+    return table
 
 
 def main() -> int:
@@ -254,7 +263,7 @@ def main() -> int:
             continue
         files = [ROOT / RESULTS / summary for summary in FIGURES[name].summaries]
         summaries = [json.loads(file.read_text()) for file in files]
-        page = PAGES / FIGURES[name].page
+        page = page_of(name)
         page.write_text(placed(page.read_text(), name, *summaries))
         print(f"{page.relative_to(ROOT)}: {name}")
     return 1 if failed else 0

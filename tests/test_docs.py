@@ -184,7 +184,7 @@ def test_the_readme_says_what_the_table_says():
 def test_the_readme_says_of_machines_what_the_page_says():
     page, readme = (
         re.findall(r"^\| (.*) \|$", (ROOT / name).read_text(), re.M)
-        for name in ("docs/accuracy.md", "README.md")
+        for name in ("docs/evidence-machines.md", "README.md")
     )
     rows = [row.split(" | ") for row in readme if row.count(" | ") == 4][1:]
     assert len(rows) == 8

@@ -31,19 +31,14 @@ FADE = {"fade": {"value": 4.28e-4, "low": 4.07e-4, "high": 4.5e-4, "unit": "1/K"
 SHARE = {"value": 95.0, "low": 75.1, "high": 99.87, "unit": "%", "better": "higher"}
 
 
-def page(name: str) -> Path:
-    """Of a table."""
-    return figures.PAGES / figures.FIGURES[name].page
-
-
 @pytest.mark.parametrize("name", figures.FIGURES)
 def test_each_table_has_one_place_on_the_page(name):
-    assert len(figures.block(name).findall(page(name).read_text())) == 1
+    assert len(figures.block(name).findall(figures.page_of(name).read_text())) == 1
 
 
 @pytest.mark.parametrize("name", figures.FIGURES)
 def test_what_is_said_to_be_written_is_of_its_command(name):
-    (text,) = figures.block(name).findall(page(name).read_text())
+    (text,) = figures.block(name).findall(figures.page_of(name).read_text())
     if "Written by" in text:
         assert text.endswith(f"\n\n{figures.origin(figures.FIGURES[name].commands)}")
 
@@ -165,15 +160,15 @@ def test_a_machine_is_told_by_what_was_held_out_in_the_unit_of_who_published_it(
 
 
 def test_without_their_recordings_tables_stay(monkeypatch, capsys):
-    before = page("singles").read_text()
+    before = figures.page_of("singles").read_text()
     monkeypatch.setattr("sys.argv", ["figures.py", "singles"])
     figures.main()
     assert "singles: stays as it is, for it needs --recordings" in capsys.readouterr().out
-    assert page("singles").read_text() == before
+    assert figures.page_of("singles").read_text() == before
 
 
 def test_a_command_that_fails_costs_its_own_table(monkeypatch, capfd, tmp_path):
-    before = page("machines").read_text()
+    before = figures.page_of("machines").read_text()
     command = ["figures.py", "machines", "--recordings", str(tmp_path / "none")]
     monkeypatch.setattr("sys.argv", command)
     monkeypatch.setitem(
@@ -184,7 +179,7 @@ def test_a_command_that_fails_costs_its_own_table(monkeypatch, capfd, tmp_path):
     assert figures.main() == 1
     out = capfd.readouterr().out
     assert "machines: stays as it is, for `workbench prepare cascaded_tanks" in out
-    assert page("machines").read_text() == before
+    assert figures.page_of("machines").read_text() == before
 
 
 def test_a_table_is_written_in_its_place_and_nothing_else_is_touched():
