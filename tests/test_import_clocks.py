@@ -47,7 +47,7 @@ def table(path: Path, stamps: Sequence[str], name: str = "Time") -> Path:
 
 
 def clock(path: Path, system: System, time: str = "") -> Clock:
-    columns = dict([parse_named(f"time={time}", "", system)]) if time else {}
+    columns = dict([parse_named(f"time={time}", "", system.signals)]) if time else {}
     (found,) = propose([read_recorded_file(path)], system, columns).clocks.values()
     return found
 

@@ -48,7 +48,7 @@ def write(
 
 
 def proposed(path: Path, system: System, *columns: str) -> ProposedMapping:
-    named = dict(parse_named(column, "", system) for column in columns)
+    named = dict(parse_named(column, "", system.signals) for column in columns)
     return propose([read_recorded_file(path)], system, named)
 
 

@@ -75,7 +75,7 @@ def read_cases(
     named = [f"{signal}={channel}" for signal, channel in (columns or {}).items()]
     options = RecordingOptions(
         conditions or {},
-        dict(parse_named(column, "columns", known) for column in named),
+        dict(parse_named(column, "columns", known.signals) for column in named),
         None if sample_rate is None else 1.0 / quantity(sample_rate, "Hz", "sample_rate"),
     )
     cases = recordings.case.read_cases([Path(path) for path in paths], known, options)

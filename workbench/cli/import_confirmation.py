@@ -54,9 +54,9 @@ def confirm(
     if yes or output.json:  # a program is asked nothing
         return _complete(files, proposed, proposed.doubts), conditions
     columns = dict(known.columns)
-    for answer in _answers(files, proposed):
+    for answer in answers(files, bool(proposed.problems)):
         if answer.partition("=")[0].strip() in (TIME, *system.signals):
-            signal, channel = parse_named(answer, "answer", system)
+            signal, channel = parse_named(answer, "answer", system.signals)
             columns[signal] = channel
         else:
             name, value = read_condition(answer, system)
@@ -65,9 +65,15 @@ def confirm(
     return _complete(files, proposed, []), conditions
 
 
-def _answers(files: Sequence[RecordedFile], proposed: ProposedRecordings) -> list[str]:
-    """Ask the user for corrections of the proposal."""
-    action = "name what is missing" if proposed.problems else "Enter takes this"
+def answers(files: Sequence[RecordedFile], missing: bool) -> list[str]:
+    """Ask the user for corrections of a proposal, from which something is missing or not.
+
+    Raises
+    ------
+    InputError
+        If it is refused, or nobody answers.
+    """
+    action = "name what is missing" if missing else "Enter takes this"
     print(f"{action}; correct with 'SIGNAL=CHANNEL [unit]; CONDITION=VALUE'; n refuses: ", end="")
     try:
         answer = input().strip()

@@ -25,19 +25,31 @@ def recording_options(options: argparse.Namespace, system: System) -> RecordingO
         If an entry cannot be read.
     """
     conditions = dict(read_condition(entry, system) for entry in options.condition)
-    columns = dict(parse_named(entry, "command line, --column", system) for entry in options.column)
-    step = None
-    if options.sample_rate is not None:
-        rate = quantity(options.sample_rate, "Hz", "command line, --sample-rate")
-        if not rate > 0.0:
-            raise InputError(
-                where="command line, --sample-rate",
-                found=options.sample_rate,
-                expected="samples per second, above 0",
-                remedy="write for instance --sample-rate '200 Hz'",
-            )
-        step = 1.0 / rate
-    return RecordingOptions(conditions, columns, step)
+    columns = dict(
+        parse_named(entry, "command line, --column", system.signals) for entry in options.column
+    )
+    return RecordingOptions(conditions, columns, step_of(options))
+
+
+def step_of(options: argparse.Namespace) -> float | None:
+    """Time between two samples of files without times, as --sample-rate says [s].
+
+    Raises
+    ------
+    InputError
+        If it is no rate.
+    """
+    if options.sample_rate is None:
+        return None
+    rate = quantity(options.sample_rate, "Hz", "command line, --sample-rate")
+    if not rate > 0.0:
+        raise InputError(
+            where="command line, --sample-rate",
+            found=options.sample_rate,
+            expected="samples per second, above 0",
+            remedy="write for instance --sample-rate '200 Hz'",
+        )
+    return 1.0 / rate
 
 
 def read_condition(text: str, system: System) -> tuple[str, Any]:

@@ -256,6 +256,11 @@ class Signal:
         return self.noise == 0.0 and self.relative_noise == 0.0 and self.resolution == 0.0
 
     @property
+    def names(self) -> tuple[str, ...]:
+        """What people and recorders call it."""
+        return self.name, self.label, *self.called
+
+    @property
     def noise_at_scale(self) -> float:
         """Standard deviation of a sample of typical size [unit]."""
         return self.noise + self.relative_noise * self.scale
@@ -394,6 +399,32 @@ class StateNoise:
 def unit_in_model(scope: Scope, name: str) -> str:
     """Unit of a variable of the model; 1 where it has none, or does not say it."""
     return (scope.units or {}).get(name, "1")
+
+
+@declared
+class FittedParameter:
+    """A parameter of the model, or a state whose start is, that a fit changes."""
+
+    name: str = table_name()
+    range: tuple[float, float] = key(
+        "in which it is sought",
+        unit=lambda scope, _: unit_in_model(scope, scope.own["name"]),
+        absent=_ALL,
+        otherwise="any value",
+        ordered=True,
+        expected=_LIMITS,
+    )
+    prior: tuple[float, float] | tuple[()] = key(
+        '`["2 Ohm", "0.1 Ohm"]`: what is known of it, and the standard deviation of that',
+        unit=lambda scope, _: unit_in_model(scope, scope.own["name"]),
+        absent=(),
+        otherwise="nothing",
+    )
+    by_recording: bool | None = key(
+        "whether each recording has a value of its own",
+        absent=None,
+        otherwise="a parameter is the same in all, the start of a state is not",
+    )
 
 
 @declared

@@ -24,6 +24,7 @@ from workbench.system.parts import (
     EstimatedQuantity,
     Export,
     FeedbackFading,
+    FittedParameter,
     FrictionPower,
     Model,
     Objective,
@@ -222,6 +223,12 @@ class System:
     )
     state_noise: tuple[StateNoise, ...] = key(
         "what is known of states of the model", name="states", absent=(), of_model=True
+    )
+    fitted: tuple[FittedParameter, ...] = key(
+        "parameters of the model, and states by their starts, that a fit may change",
+        name="fit",
+        absent=(),
+        of_model=True,
     )
     settles: float = key("time in which the model comes to rest", "s", 10.0, name="points.settles")
     design: OperatingPoint = key(

@@ -267,7 +267,7 @@ def _by_name(
     candidates: dict[int, list[tuple[Signal, Assignment]]] = {EXACT: [], WORDS: [], WITHIN: []}
     for signal in system.signals.values():
         for place in places:
-            likeness = alike(place.channel.name, place.channel.about, signal)
+            likeness = alike(place.channel.name, place.channel.about, signal.names)
             if likeness and is_asked(place.channel.name) and not signal.exact:
                 doubts[signal.name] = f"'{place.channel.name}' is asked for, not measured"
             elif likeness:
@@ -319,7 +319,7 @@ def _by_unit(
 
 
 # Units that recorders use and may leave out, by the SI unit of what they measure.
-_USUAL = {
+USUAL_UNITS = {
     "Pa": ("Pa", "kPa", "MPa", "mbar", "bar", "psi"),
     "rad/s": ("rad/s", "rpm", "rev/s", "deg/s"),
     "rad": ("rad", "deg", "rev"),
@@ -360,9 +360,11 @@ def conversion_to(unit: str, signal: Signal, system: System) -> tuple[Conversion
 
 def fitting_units(samples: Vector, signal: Signal, system: System) -> list[str]:
     """Usual units in which values without a unit have the signal's typical size."""
-    others = _USUAL.get(signal.recorded_as.unit, ()) if signal.recorded_as else ()
+    others = USUAL_UNITS.get(signal.recorded_as.unit, ()) if signal.recorded_as else ()
     fitting: list[str] = []
-    for unit in dict.fromkeys((signal.shown, *_USUAL.get(signal.unit, (signal.unit,)), *others)):
+    for unit in dict.fromkeys(
+        (signal.shown, *USUAL_UNITS.get(signal.unit, (signal.unit,)), *others)
+    ):
         way = conversion_to(unit, signal, system)
         if way is None:
             continue

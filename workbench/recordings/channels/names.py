@@ -2,7 +2,7 @@
 
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -10,7 +10,6 @@ from typing import Any
 from workbench.errors import InputError
 from workbench.recordings.formats import FileChannel, Group, RecordedFile
 from workbench.recordings.formats.spelling import named, spelled
-from workbench.system.parts import Signal
 from workbench.system.system import System
 from workbench.system.tables import Table, read_table
 
@@ -90,7 +89,7 @@ def _missing(table: Table) -> tuple[float, ...]:
     return tuple(map(float, values))
 
 
-def parse_named(text: str, where: str, system: System) -> tuple[str, NamedChannel]:
+def parse_named(text: str, where: str, signals: Collection[str]) -> tuple[str, NamedChannel]:
     """One entry as people type it: `SIGNAL=CHANNEL`, `SIGNAL=-CHANNEL [unit]`.
 
     Values that stand for no sample follow it: `SIGNAL=CHANNEL [unit] missing -9999, 7999`, or none.
@@ -101,12 +100,11 @@ def parse_named(text: str, where: str, system: System) -> tuple[str, NamedChanne
         If it is none.
     """
     signal, equals, channel = (part.strip() for part in text.partition("="))
-    if not equals or not channel.lstrip("-") or signal not in (TIME, *system.signals):
+    if not equals or not channel.lstrip("-") or signal not in (TIME, *signals):
         raise InputError(
             where=where,
             found=repr(text),
-            expected=f"SIGNAL=CHANNEL or SIGNAL=CHANNEL [unit], of {TIME}, "
-            f"{', '.join(system.signals)}",
+            expected=f"SIGNAL=CHANNEL or SIGNAL=CHANNEL [unit], of {TIME}, {', '.join(signals)}",
             remedy="write for instance 'time=Zeit [ms]'; a minus before the channel reverses it",
         )
     own, missing = channel, None
@@ -139,9 +137,8 @@ def is_asked(name: str) -> bool:
     return bool(_ASKED.intersection(own)) or any(map(_ASKED_WITHIN.search, own))
 
 
-def alike(channel: str, about: str, signal: Signal) -> int:
+def alike(channel: str, about: str, known: Sequence[str]) -> int:
     """How alike a channel's name is to those of a signal: EXACT, WORDS, WITHIN, or 0."""
-    known = [signal.name, signal.label, *signal.called]
     own = words(channel)
     best = 0
     for name in known:

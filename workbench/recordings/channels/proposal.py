@@ -140,7 +140,7 @@ def propose(
 def _text_of(signal: Signal, texts: Sequence[FileChannel]) -> str:
     """Why a signal has no channel: one of its name may hold texts."""
     for channel in texts:
-        if alike(channel.name, channel.about, signal):
+        if alike(channel.name, channel.about, signal.names):
             example = next(filter(None, channel.texts), "")
             return f"'{channel.name}' holds texts such as '{example}', no numbers"
     return "no channel whose name or unit tells"

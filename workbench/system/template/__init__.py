@@ -3,6 +3,7 @@
 The recordings are made by equations of their own, with a wall that seeps, which the model lacks.
 """
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -31,6 +32,22 @@ def write_system(folder: Path, seepage: float = SEEPAGE) -> list[Path]:
     """
     here = Path(__file__).parent
     paths = [folder / name for name in _FILES]
+    refuse_present(paths)
+    for path in paths:
+        write_whole(path, (here / path.name).read_bytes())
+    for number in range(1, _RECORDINGS + 1):
+        paths += _record(folder / "recordings" / f"{number:02}_steps", number, seepage)
+    return paths
+
+
+def refuse_present(paths: Sequence[Path]) -> None:
+    """Refuse to write over files of a system.
+
+    Raises
+    ------
+    InputError
+        If one is there already.
+    """
     for path in paths:
         if path.exists():
             raise InputError(
@@ -39,11 +56,6 @@ def write_system(folder: Path, seepage: float = SEEPAGE) -> list[Path]:
                 expected="a folder without a system",
                 remedy="choose another folder, or remove the file",
             )
-    for path in paths:
-        write_whole(path, (here / path.name).read_bytes())
-    for number in range(1, _RECORDINGS + 1):
-        paths += _record(folder / "recordings" / f"{number:02}_steps", number, seepage)
-    return paths
 
 
 def _record(folder: Path, number: int, seepage: float) -> list[Path]:

@@ -1,0 +1,142 @@
+"""An FMU and log files are enough: `workbench new` writes a system file that commands run on."""
+
+import builtins
+import json
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from workbench.__main__ import main
+from workbench.recordings.case import read_cases
+from workbench.system.registry import load_system
+
+pytest.importorskip("casadi", reason="needs the extra [compiler]")
+pytest.importorskip("rumoca", reason="needs the extra [compiler]")
+pytest.importorskip("ziglang", reason="needs the extra [compiler]")
+
+from .built import build_text
+
+OVEN = """
+model Oven "Block in a casing"
+  parameter Real C(unit="J/K", min=10.0, max=1000.0) = 80.0 "Heat capacity of the block";
+  parameter Real K(unit="W/K") = 2.0 "From block to casing";
+  parameter Real G(unit="W/K") = 0.5 "From casing to the surroundings";
+  parameter Real offset(unit="W") = 0.0;
+  input Real P(unit="W") "Heating power";
+  input Real draught(unit="W/K");
+  output Real T(unit="K", start=293.15, fixed=true, nominal=300.0, min=250.0, max=500.0) "Block";
+  output Real loss(unit="W") = (G + draught)*(Tc - 293.15);
+  Real Tc(unit="K", start=293.15, fixed=true, nominal=300.0) "Casing";
+equation
+  C*der(T) = P + offset - K*(T - Tc);
+  200.0*der(Tc) = K*(T - Tc) - loss;
+end Oven;
+"""
+NOISE = 0.05  # K
+
+
+@pytest.fixture(scope="module")
+def fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return build_text(tmp_path_factory.mktemp("oven"), OVEN)
+
+
+def write_log(
+    path: Path, seed: int, header: str = "Zeit [ms];Heating power [kW];T [°C];p [mbar]"
+) -> Path:
+    """A German log of an oven of another capacity, by SciPy."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(0.0, 600.0, 2.0)
+    power = np.repeat(rng.uniform(5.0, 60.0, 4), time.size // 4).round()
+    x, rows = np.array([295.0, 294.0]), []
+    for t, u in zip(time, power, strict=True):
+        measured = x[0] - 273.15 + NOISE * rng.standard_normal()
+        rows.append(f"{1e3 * t:.0f};{1e-3 * u:.3f};{measured:.3f};1013".replace(".", ","))
+
+        def rates(_: float, x: np.ndarray, u: float = u) -> list[float]:
+            flow = 2.6 * (x[0] - x[1])
+            return [(u - flow) / 100.0, (flow - 0.7 * (x[1] - 293.15)) / 200.0]
+
+        x = solve_ivp(rates, (0.0, 2.0), x, rtol=1e-9, atol=1e-9).y[:, -1]
+    path.write_text("\n".join([header, *rows]))
+    return path
+
+
+@pytest.fixture
+def answer(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], list[str]]:
+    """Answers each question with a text; returns the questions."""
+
+    def answers(text: str) -> list[str]:
+        asked: list[str] = []
+        monkeypatch.setattr(builtins, "input", lambda: asked.append(text) or text)
+        return asked
+
+    return answers
+
+
+def test_two_commands_lead_from_an_fmu_and_logs_to_an_open_loop(
+    tmp_path: Path, fmu: Path, answer: Callable[[str], list[str]]
+) -> None:
+    asked = answer("")
+    logs = [str(write_log(tmp_path / f"day{k}.csv", k)) for k in (1, 2)]
+    folder = tmp_path / "oven"
+    assert main(["new", str(folder), "--fmu", str(fmu), "--recordings", *logs]) == 0
+    assert not asked  # names and units tell all
+    content = tomllib.loads((folder / "system.toml").read_text())
+    assert content["sample_time"] == "2 s"
+    assert content["outputs"]["T"]["possible"] == ["250 K", "500 K"]
+    noise = float(content["outputs"]["T"]["noise"].removesuffix(" K"))
+    assert noise == pytest.approx(NOISE, rel=0.15)  # 600 samples tell it to 4 %; values are rounded
+    assert content["inputs"]["P"]["held"] is True
+    assert content["fit"]["C"]["range"] == ["10 J/K", "1000 J/K"]
+    assert content["fit"]["K"]["range"] == ["0.4 W/K", "10 W/K"]
+    assert "offset" not in content["fit"]  # zero, and no range: nobody knows its size
+    system = load_system(folder)
+    cases = read_cases([folder / "recordings"], system)
+    assert [case.name for case in cases] == ["day1", "day2"]
+    assert 294.0 < cases[0]["T"][0] < 296.0
+    out = str(tmp_path / "out")
+    command = ["simulate", "--system", str(folder), "--estimator", "open_loop", "--out", out]
+    assert main([*command, "--workers", "1"]) == 0
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert set(summary["cases"]) == {"day1", "day2"}
+
+
+def test_what_was_concluded_or_is_missing_is_said_in_the_file(tmp_path: Path, fmu: Path) -> None:
+    log = write_log(tmp_path / "log.csv", 3)
+    main(["new", str(tmp_path / "oven"), "--fmu", str(fmu), "--recordings", str(log), "--yes"])
+    text = (tmp_path / "oven" / "system.toml").read_text()
+    assert "# QUESTION: draught drives the model, and no channel has its name; it stays at" in text
+    assert "# [fit.offset] is 0, and the model states no range: add it with a range" in text
+    assert "0.5 W/K in the model; a fifth to five times its value" in text
+    assert "# channels that are not used: p [mbar]" in text
+    assert "Tc at 293.15 [K]" in text
+
+
+def test_a_channel_that_only_its_unit_speaks_for_is_asked_about_once(
+    tmp_path: Path, fmu: Path, answer: Callable[[str], list[str]]
+) -> None:
+    asked = answer("n")
+    log = write_log(tmp_path / "log.csv", 3, "Zeit [ms];Leistung [kW];Sonde 3 [°C];p [mbar]")
+    command = ["new", str(tmp_path / "oven"), "--fmu", str(fmu), "--recordings", str(log)]
+    assert main(command) == 2
+    assert not (tmp_path / "oven").exists()
+    assert asked == ["n"]
+    asked = answer("")
+    assert main(command) == 0
+    assert asked == [""]
+    (case,) = read_cases([tmp_path / "oven" / "recordings"], load_system(tmp_path / "oven"))
+    assert 294.0 < case["T"][0] < 296.0
+
+
+def test_an_output_that_no_channel_can_be_is_asked_for_by_name(
+    tmp_path: Path, fmu: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log = write_log(tmp_path / "log.csv", 3, "Zeit [ms];Leistung [kW];Sonde 3 [V];p [mbar]")
+    command = ["new", str(tmp_path / "oven"), "--fmu", str(fmu), "--recordings", str(log)]
+    assert main(command) == 2
+    assert "found no channel that is an output of the model" in capsys.readouterr().err
+    assert main([*command, "--column", "T=Sonde 3 [degC]", "--column", "P=Leistung", "--yes"]) == 0

@@ -1,0 +1,527 @@
+"""A system file for an FMU, from its model description and recordings.
+
+What two places agree on is written as it is; what was concluded has its reason as a comment beside
+it; what nobody but a user can know is a line with QUESTION.
+"""
+
+import json
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from workbench.arrays import Vector
+from workbench.diagnosis.data.cleaning import deviation_of
+from workbench.errors import InputError
+from workbench.models.description import MODEL_EXCHANGE, Description, Variable
+from workbench.recordings.channels import (
+    TIME,
+    MergedRecording,
+    NamedChannel,
+    RecordingOptions,
+    listed,
+    merge,
+    propose_recordings,
+)
+from workbench.recordings.channels.matching import USUAL_UNITS, PlacedChannel
+from workbench.recordings.channels.names import (
+    EXACT,
+    WITHIN,
+    WORDS,
+    alike,
+    is_asked,
+    is_time,
+    labelled,
+)
+from workbench.recordings.formats import FileChannel, RecordedFile
+from workbench.recordings.formats.spelling import conversion, spelled
+from workbench.system.reader import system_of
+from workbench.system.units import check_unit
+
+_TYPICAL = 10.0  # times its nominal value, or a tenth, is what a variable's largest sample may be
+_NOISELESS = 1e-4  # of its range: below the error of usual sensors; only a simulation is finer
+_LIVE = 30  # parameters that are proposed for a fit; more are listed in a comment
+_REACH = 5.0  # times a parameter, and a fifth, where the model states no range
+
+
+@dataclass(frozen=True, eq=False)
+class DraftSignal:
+    """A variable of the FMU that was recorded.
+
+    Attributes
+    ----------
+    name : in the system file; that of the variable where it is one word.
+    role : of the table in the system file.
+    unit : in which the model has it, 1 where the workbench does not know it.
+    channel : that holds it.
+    reason : why, for people.
+    doubt : what somebody must confirm, in words; empty: nothing.
+    """
+
+    name: str
+    variable: Variable
+    role: str
+    unit: str
+    channel: NamedChannel
+    reason: str
+    doubt: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Draft:
+    """What is known of a system before its file is written.
+
+    Attributes
+    ----------
+    recordings : of all files, in the units of the signals.
+    time : channel of the times, None where the file itself says them.
+    questions : what somebody must confirm, in words.
+    unmatched : variables of the FMU without a channel, and why, in words.
+    left : channels that nobody takes.
+    """
+
+    description: Description
+    signals: tuple[DraftSignal, ...]
+    recordings: tuple[MergedRecording, ...]
+    time: NamedChannel | None
+    questions: tuple[str, ...]
+    unmatched: Mapping[str, str]
+    left: tuple[str, ...]
+
+    @property
+    def columns(self) -> dict[str, NamedChannel]:
+        """Channels by signal, as `workbench import` takes them."""
+        columns = {signal.name: signal.channel for signal in self.signals}
+        return columns | ({TIME: self.time} if self.time else {})
+
+    def samples(self, signal: DraftSignal) -> list[Vector]:
+        """(n,) of each recording, in the unit of a signal."""
+        return [recording.signals[signal.name] for recording in self.recordings]
+
+
+def signal_names(description: Description) -> dict[str, str]:
+    """Names in a system file, one word each, of the variables that a recording may hold."""
+    names: dict[str, str] = {}
+    for variable in description.variables:
+        shown = re.sub(r"\W+", "_", variable.name).strip("_")
+        while shown in names.values() or not shown.isidentifier():
+            shown = f"{shown}_" if shown.isidentifier() else f"v{shown}"
+        names[variable.name] = shown
+    return names
+
+
+def draft_system(
+    description: Description, files: Sequence[RecordedFile], known: RecordingOptions
+) -> Draft:
+    """Match an FMU's variables with channels of files, by name, unit and plausible values.
+
+    Parameters
+    ----------
+    known : channels that the user names by signal, and the step of files without times.
+
+    Raises
+    ------
+    InputError
+        If no output of the FMU has a channel, or the times of a file cannot be read.
+    """
+    signals, unmatched, left = _match(description, files, known.columns)
+    where = ", ".join(str(file.path) for file in files)
+    if not any(signal.role == "outputs" for signal in signals):
+        outputs = description.names("output") or description.states
+        raise InputError(
+            where=where,
+            found=f"no channel that is an output of the model: {listed(left)}",
+            expected=f"one of {listed(list(outputs))}",
+            remedy="name it, --column 'VARIABLE=CHANNEL [unit]'",
+        )
+    system = system_of(_provisional(description, files, signals), Path(where))
+    columns = {signal.name: signal.channel for signal in signals}
+    columns |= {TIME: known.columns[TIME]} if TIME in known.columns else {}
+    recordings, questions, time = [], [s.doubt for s in signals if s.doubt], None
+    for file in files:
+        held = propose_recordings([file], system, {}, replace(known, columns=columns))
+        questions += [*held.problems, *held.doubts]
+        time = time or held.named.get(TIME)
+        recordings += [merge(part.files, part.proposal, system) for part in held.held]
+    asked = tuple(dict.fromkeys(questions))
+    return Draft(description, tuple(signals), tuple(recordings), time, asked, unmatched, left)
+
+
+def _match(
+    description: Description, files: Sequence[RecordedFile], named: Mapping[str, NamedChannel]
+) -> tuple[list[DraftSignal], dict[str, str], tuple[str, ...]]:
+    """Signals, why other inputs and outputs have no channel, and channels that nobody takes."""
+    names = signal_names(description)
+    places: dict[str, PlacedChannel] = {}
+    for placed in labelled(files[:1]):
+        place = PlacedChannel(*placed)
+        if not _is_time(place.channel):
+            places.setdefault(place.channel.name, place)
+    signals: dict[str, DraftSignal] = {}
+    pairs: list[tuple[int, str, DraftSignal]] = []  # likeness, variable, what it would be
+    reasons: dict[str, str] = {}
+    for variable in description.variables:
+        own = names[variable.name]
+        role = {"input": "inputs", "output": "outputs"}.get(variable.causality, "")
+        moves = variable.causality == "local" and variable.variability == "continuous"
+        role = role or "outputs" * (
+            moves and variable.real and variable.name not in description.rates
+        )
+        if not role or not variable.holds_number or variable.array:
+            continue
+        if channel := named.get(own):
+            unit = spelled(variable.unit or "") or channel.unit or "1"
+            unit = unit if _is_known(unit) else "1"
+            signals[own] = DraftSignal(own, variable, role, unit, channel, "named by you")
+            continue
+        called = [variable.name, own, variable.name.split(".")[-1], variable.text]
+        for place in places.values():
+            likeness = alike(place.channel.name, place.channel.about, [c for c in called if c])
+            # A variable that is no output is meant only where a channel has its name.
+            if likeness < EXACT and variable.causality == "local":
+                continue
+            if is_asked(place.channel.name) and role == "outputs" and likeness != EXACT:
+                continue
+            signal, why = _candidate(own, variable, role, place, likeness)
+            if signal:
+                pairs.append((likeness, own, signal))
+            elif likeness:
+                reasons[own] = why
+    for level in (EXACT, WORDS, WITHIN, 0):
+        taken = {signal.channel.channel for signal in signals.values()}
+        open_pairs = [
+            signal
+            for likeness, own, signal in pairs
+            if likeness == level and own not in signals and signal.channel.channel not in taken
+        ]
+        for signal in open_pairs:
+            rivals = [s.channel.channel for s in open_pairs if s.name == signal.name]
+            claims = [s.name for s in open_pairs if s.channel.channel == signal.channel.channel]
+            if len(rivals) == len(claims) == 1:
+                signals[signal.name] = signal
+            elif level:
+                choice = listed([repr(name) for name in (rivals if len(rivals) > 1 else claims)])
+                reasons[signal.name] = (
+                    f"it may be {choice}"
+                    if len(rivals) > 1
+                    else (f"'{signal.channel.channel}' may be {choice}")
+                )
+    needed = [v for v in description.variables if v.causality in ("input", "output")]
+    unmatched = {
+        variable.name: reasons.get(names[variable.name], "no channel has its name")
+        for variable in needed
+        if names[variable.name] not in signals and not variable.array
+    }
+    taken = {signal.channel.channel for signal in signals.values()}
+    left = tuple(
+        f"{name} [{place.channel.unit}]" if place.channel.unit else name
+        for name, place in places.items()
+        if name not in taken
+    )
+    return list(signals.values()), unmatched, left
+
+
+def _is_time(channel: FileChannel) -> bool:
+    """Whether a channel is one of times: `T [degC]` is not."""
+    timely = not channel.unit or conversion(channel.unit, "s") is not None
+    return channel.stamp or (is_time(channel.name) and timely)
+
+
+def _is_known(unit: str) -> bool:
+    try:
+        check_unit(unit, "")
+    except InputError:
+        return False
+    return True
+
+
+def _candidate(
+    name: str, variable: Variable, role: str, place: PlacedChannel, likeness: int
+) -> tuple[DraftSignal | None, str]:
+    """A channel as a variable, or None and why it cannot be."""
+    stated, own = place.channel.unit, spelled(variable.unit or "")
+    if not likeness and not (stated and own):
+        return None, ""
+    doubt = "" if likeness else f"{name}: nothing but its unit speaks for '{place.channel.name}'"
+    why = f"its name, '{place.channel.name}'" if likeness else "the only one of its unit"
+    unit, read_in = own or stated or "1", stated or own or "1"
+    if own and not _is_known(own):  # such as degC, which has a zero of its own
+        if stated not in ("", own):
+            return None, f"'{place.channel.name}' is in [{stated}], the model's variable in [{own}]"
+        why += f"; the workbench does not convert [{own}], values are taken as they are"
+        unit = read_in = "1"
+    elif own and stated and conversion(stated, own) is None:
+        return None, f"'{place.channel.name}' is in [{stated}], the model's variable in [{own}]"
+    elif own and not stated:
+        doubt = doubt or f"{name}: no unit in the file, [{own}] of the model is taken"
+    elif stated and not own:
+        unit, text, sure = _without_unit(variable, place.channel.values, stated)
+        why += f"; {text}"
+        doubt = doubt or ("" if sure else f"{name}: {text}")
+    way = conversion(read_in, unit)
+    if way is None:
+        unit, read_in, way = "1", "1", conversion("1", "1")
+    assert way is not None
+    values = way.factor * place.channel.values + way.zero
+    if not np.isfinite(values).any():
+        return None, f"'{place.channel.name}' holds no numbers"
+    low, high = (
+        -math.inf if variable.minimum is None else variable.minimum,
+        math.inf if variable.maximum is None else variable.maximum,
+    )
+    if np.nanmax(values) < low or np.nanmin(values) > high:
+        return None, f"no sample of '{place.channel.name}' is within {low:g} to {high:g}"
+    size, nominal = float(np.nanmax(np.abs(values))), abs(variable.nominal or 0.0)
+    if nominal and size and not 1 / 300.0 < size / nominal < 300.0:
+        doubt = doubt or (
+            f"{name}: its largest sample, {size:.4g}, is {size / nominal:.3g} times the model's "
+            f"nominal value {nominal:g} [{unit}]"
+        )
+    channel = NamedChannel(place.channel.name, read_in)
+    return DraftSignal(name, variable, role, unit, channel, why, doubt), ""
+
+
+def _without_unit(variable: Variable, values: Vector, stated: str) -> tuple[str, str, bool]:
+    """Unit that the model has where it says none, why, and whether anything tells it."""
+    base = next((si for si, others in USUAL_UNITS.items() if stated in others), stated)
+    if base == stated:
+        return stated, f"the model says no unit, [{stated}] of the file is taken", True
+    typical = abs(variable.nominal or float(variable.start or 0.0))
+    fitting = []
+    for unit, way in ((base, conversion(stated, base)), (stated, conversion(stated, stated))):
+        # A unit with a zero of its own, as degC, is that of a plain number.
+        size = values if way is None else way.factor * values + way.zero
+        largest = float(np.nanmax(np.abs(size), initial=0.0))
+        if typical and 1.0 / _TYPICAL <= largest / typical <= _TYPICAL:
+            fitting.append(unit)
+    unit = fitting[0] if len(fitting) == 1 else base
+    known = unit if _is_known(unit) else "1"
+    if len(fitting) == 1:
+        return known, f"the model says no unit; its value {typical:g} fits [{unit}]", True
+    return known, f"the model says no unit; [{unit}] is taken, and [{stated}] in the file", False
+
+
+def _provisional(
+    description: Description, files: Sequence[RecordedFile], signals: Sequence[DraftSignal]
+) -> dict[str, Any]:
+    """Content of a system file that recordings can be read with: sizes and noise are not known."""
+    steps = [group.step for group in files[0].groups if math.isfinite(group.step)]
+    steps += [
+        float(np.nanmedian(np.abs(np.diff(channel.values))))
+        for group in files[0].groups
+        for channel in group.channels
+        if _is_time(channel) and channel.values.size > 2 and not channel.stamp
+    ]
+    content: dict[str, Any] = {
+        "title": description.name or description.path.stem,
+        "sample_time": f"{next((s for s in steps if s > 0.0), 1.0):.6g} s",
+        "models": {"observer": {"fmu": str(description.path.resolve())}},
+    }
+    sizes = {
+        channel.name: float(np.nanmax(np.abs(channel.values), initial=0.0))
+        for group in files[0].groups
+        for channel in group.channels
+    }
+    for signal in signals:
+        way = conversion(signal.channel.unit or signal.unit, signal.unit)
+        size = (sizes.get(signal.channel.channel, 1.0) or 1.0) * (way.factor if way else 1.0)
+        content.setdefault(signal.role, {})[signal.name] = {
+            "variable": signal.variable.name,
+            "unit": signal.unit,
+            "noise": _quantity(1e-3 * size, signal.unit),
+            "scale": _quantity(size, signal.unit),
+        }
+    return content
+
+
+# --- the file ---
+
+
+def _quantity(value: float, unit: str) -> Any:
+    """A quantity as TOML has it: a text with its unit, a number without."""
+    return float(f"{value:.4g}") if unit == "1" else f"{value:.4g} {unit}"
+
+
+def _entry(key: str, value: Any, why: str = "") -> str:
+    text = json.dumps(value, ensure_ascii=False)
+    return f"{key} = {text}" + (f"  # {why}" if why else "")
+
+
+def _key(name: str) -> str:
+    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else json.dumps(name, ensure_ascii=False)
+
+
+def system_text(draft: Draft, fmu: str) -> str:
+    """The system file, with the reason of each value that was concluded.
+
+    Parameters
+    ----------
+    fmu : file of the FMU beside it.
+    """
+    model, times = draft.description, [recording.time for recording in draft.recordings]
+    step = float(np.median(np.concatenate([np.diff(time) for time in times])))
+    lines = [
+        f"# {model.name}: written from the model description of {fmu} and "
+        f"{len(times)} recordings. Values with a comment were",
+        "# concluded, for the reason that it gives: change what you know better.",
+    ]
+    lines += [f"# QUESTION: {question}" for question in draft.questions]
+    title = model.text or model.name or Path(fmu).stem
+    lines += ["", _entry("title", " ".join(title.split()))]
+    lines += [_entry("sample_time", f"{step:.6g} s", "median step of the recordings")]
+    lines += ['cases = "recordings"', *_reported(draft), "", "[models]"]
+    lines += [f"observer = {{ fmu = {json.dumps(fmu)} }}"]
+    if MODEL_EXCHANGE not in model.interfaces or model.event_indicators:
+        kind = "has events" if MODEL_EXCHANGE in model.interfaces else "is for Co-Simulation alone"
+        lines += [f"# The model {kind}: of the estimators, the open loop runs on it."]
+    for signal in sorted(draft.signals, key=lambda signal: signal.role):
+        lines += _signal_table(draft, signal)
+    lines += _missing(draft)
+    lines += _states(draft)
+    return "\n".join([*lines, *_candidates(model)]) + "\n"
+
+
+def _reported(draft: Draft) -> list[str]:
+    """Outputs of the FMU that nobody measured."""
+    model, taken = draft.description, {signal.variable.name for signal in draft.signals}
+    names = [
+        v.name
+        for v in model.variables
+        if v.causality == "output" and v.real and v.name not in taken and _is_known(v.unit or "1")
+    ]
+    plain = [name for name in names if name.isidentifier()]
+    return [_entry("reported", plain, "outputs of the model that were not measured")] * bool(plain)
+
+
+def _signal_table(draft: Draft, signal: DraftSignal) -> list[str]:
+    """The table of a measured signal."""
+    variable, unit = signal.variable, signal.unit
+    samples = draft.samples(signal)
+    largest = max(float(np.abs(values).max()) for values in samples)
+    low, high = min(v.min() for v in samples), max(v.max() for v in samples)
+    lines = ["", f"# {signal.reason}", f"[{signal.role}.{signal.name}]"]
+    lines += [_entry("variable", variable.name)] * (variable.name != signal.name)
+    ours = "as the file says" if not variable.unit else "of the model's variable"
+    if variable.unit and unit != variable.unit:
+        ours = f"the model says [{variable.unit}], which is not converted"
+    lines += [_entry("unit", unit, ours)]
+    lines += [_entry("label", " ".join(variable.text.split()))] * bool(variable.text.strip())
+    if signal.role == "inputs" and _steps(samples):
+        lines += [_entry("noise", _quantity(0.0, unit), "it stays for samples on end: a command")]
+        lines += ["held = true  # it stays as it is from sample to sample, and jumps"]
+    else:
+        lines += _noise(samples, unit, float(high - low), may_be_exact=signal.role == "inputs")
+    scale, why = largest or abs(float(variable.start or 0.0)) or 1.0, "largest sample"
+    if variable.nominal and 0.1 < largest / abs(variable.nominal) < 10.0:
+        scale, why = abs(variable.nominal), "nominal value of the model"
+    lines += [_entry("scale", _quantity(scale, unit), why)]
+    if variable.minimum is not None and variable.maximum is not None:
+        limits = [variable.minimum, variable.maximum]
+        if limits[0] <= low and high <= limits[1] and all(map(math.isfinite, limits)):
+            written = [_quantity(limit, unit) for limit in limits]
+            lines += [_entry("possible", written, "min and max of the model")]
+        else:
+            lines += [
+                f"# QUESTION: the model has it from {limits[0]:g} to {limits[1]:g}, and the "
+                f"recordings from {low:.4g} to {high:.4g}."
+            ]
+    return lines
+
+
+def _steps(samples: Sequence[Vector]) -> bool:
+    """Whether a signal is set and stays so: most samples are exactly the one before."""
+    moved = np.concatenate([np.diff(values) for values in samples])
+    return bool((moved == 0.0).mean() > 0.5)
+
+
+def _noise(samples: Sequence[Vector], unit: str, span: float, *, may_be_exact: bool) -> list[str]:
+    """Noise of a sensor, from differences of samples, and the step in which it is read."""
+    noise = float(np.median([deviation_of(values) for values in samples]))
+    why = "from differences of samples; what lasts longer than a sample is not in it"
+    lines = []
+    if noise < _NOISELESS * span and may_be_exact:
+        noise, why = 0.0, "its samples scatter by less than 1e-4 of its range: taken as exact"
+    elif not noise > _NOISELESS * span:
+        noise = _NOISELESS * span or 1e-4 * max(float(np.abs(samples[0]).max()), 1e-6)
+        why = "its samples scatter by less: 1e-4 of its range, so that no sensor is trusted blindly"
+    levels = np.unique(np.concatenate(samples))
+    if 1 < levels.size < 0.25 * sum(map(np.size, samples)):
+        resolution = float(np.diff(levels).min())
+        if resolution > _NOISELESS * span:
+            text = "least step between its samples, which repeat"
+            lines = [_entry("resolution", _quantity(resolution, unit), text)]
+    return [_entry("noise", _quantity(noise, unit), why), *lines]
+
+
+def _missing(draft: Draft) -> list[str]:
+    """Inputs that nothing drives, and channels that nobody takes."""
+    causality = {v.name: v for v in draft.description.variables}
+    lines = [
+        f"# QUESTION: {name} drives the model, and {why}; it stays at its start value "
+        f"{causality[name].start or 0}. Import a recording with it, and add [inputs.NAME]."
+        for name, why in draft.unmatched.items()
+        if causality[name].causality == "input"
+    ]
+    lines += [f"# channels that are not used: {listed(draft.left)}"] * bool(draft.left)
+    return ["", *lines] if lines else []
+
+
+def _states(draft: Draft) -> list[str]:
+    """Where states begin that no recording shows."""
+    variables = {v.name: v for v in draft.description.variables}
+    measured = {signal.variable.name for signal in draft.signals}
+    hidden = [name for name in draft.description.states if name not in measured]
+    if not hidden:
+        return []
+    begins = [
+        f"{name} at {variables[name].start or 'its start value'} [{variables[name].unit or '1'}]"
+        for name in hidden
+    ]
+    return [
+        "",
+        f"# States that no recording shows begin as the model says: {listed(begins)}.",
+        "# [states.NAME] spread says how far from there one may begin; else its nominal value.",
+    ]
+
+
+def _candidates(model: Description) -> list[str]:
+    """Parameters that a fit may change, with ranges."""
+    parameters = [
+        v
+        for v in model.variables
+        if v.causality == "parameter"
+        and v.real
+        and v.start is not None
+        and v.initial != "calculated"
+    ]
+    lines = []
+    for parameter in parameters[:_LIVE]:
+        unit, start = parameter.unit or "1", float(parameter.start or 0.0)
+        low, high, why = parameter.minimum, parameter.maximum, "min and max of the model"
+        if low is None or high is None or not np.isfinite([low, high]).all():
+            beyond = sorted((start / _REACH, start * _REACH))
+            low = beyond[0] if low is None or not low > beyond[0] else low
+            high = beyond[1] if high is None or not high < beyond[1] else high
+            why = "a fifth to five times its value: the model states no range"
+        table = f"fit.{_key(parameter.name)}"
+        about = f"{' '.join(parameter.text.split())}; " if parameter.text else ""
+        if not low < high:
+            lines += [f"# [{table}] is 0, and the model states no range: add it with a range"]
+            continue
+        written = [_quantity(limit, unit) for limit in (low, high)]
+        lines += [f"# {about}{start:.4g} {unit} in the model; {why}"]
+        lines += [f"[{table}]", _entry("range", written)]
+    if more := parameters[_LIVE:]:
+        lines += [f"# further parameters: {listed([v.name for v in more], 100)}"]
+    if not lines:
+        return []
+    return [
+        "",
+        "# --- candidates of a fit: remove the tables of what you know ---",
+        "",
+        *lines,
+    ]
