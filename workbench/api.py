@@ -17,10 +17,9 @@ from typing import Any
 import pandas as pd
 
 from workbench import diagnosis, observers, recordings, tuning
-from workbench.diagnosis import Effect, Outcome, Problem, laws
+from workbench.diagnosis import Outcome, Problem, laws
 from workbench.diagnosis.laws import Proposal
 from workbench.errors import InputError
-from workbench.models.modelica import Library, read_library
 from workbench.observers import Gains
 from workbench.observers.replay import observed
 from workbench.observers.run import Run
@@ -228,7 +227,7 @@ def diagnose(
     Parameters
     ----------
     held_out : recordings on which only the errors of both models are measured.
-    effects : names of those to consider; all of the library unless some are given.
+    effects : names of those to consider; all of the library, or of the FMU, unless some are given.
     out : folder of the extended model; a temporary one unless another is given.
     certainty : whether it is asked how sure the sizes are, by fits of their own.
     workers : processes, one per processor unless another number is given.
@@ -239,15 +238,17 @@ def diagnose(
     InputError
         If recordings or library cannot be used.
     """
-    library, chosen = _catalogue(system, effects)
-    problem = Problem(system, cases, library, chosen, held_out)
+    problem = _problem(system, cases, effects, held_out)
     engine = Engine(_number(workers), report, _folder(out, "diagnosis"))
     return diagnosis.diagnose(problem, engine, certainty=certainty)
 
 
-def _catalogue(system: System, effects: Sequence[str]) -> tuple[Library, Sequence[Effect]]:
-    library = read_library(system.library)
-    return library, diagnosis.choose(effects, diagnosis.catalogue(system, library))
+def _problem(
+    system: System, cases: Sequence[Case], effects: Sequence[str], held_out: Sequence[Case]
+) -> Problem:
+    library = diagnosis.library_of(system)
+    chosen = diagnosis.choose(effects, diagnosis.catalogue(system, library))
+    return Problem(system, cases, library, chosen, held_out)
 
 
 def _folder(out: str | Path | None, name: str) -> Path:
@@ -287,8 +288,7 @@ def propose(
             expected="'unexplained', several causes, or one beside which errors last",
             remedy="ask for no law: nothing is missing, or one effect explains it",
         )
-    library, chosen = _catalogue(found.system, effects)
-    problem = Problem(found.system, found.cases, library, chosen, held_out)
+    problem = _problem(found.system, found.cases, effects, held_out)
     return laws.propose(found, problem, Engine(_number(workers), report, _folder(out, "proposal")))
 
 

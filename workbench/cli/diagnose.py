@@ -108,7 +108,7 @@ def _split_held_out(
 def run(options: argparse.Namespace, output: Output) -> CommandResult:
     """Diagnose the recordings, or list the effects."""
     from workbench.cli.inputs import given_cases
-    from workbench.diagnosis import Problem, catalogue, choose
+    from workbench.diagnosis import Problem, catalogue, choose, library_of
     from workbench.models.modelica import read_library
     from workbench.system.reader import with_model
     from workbench.system.registry import load_system
@@ -119,14 +119,15 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
         system = replace(system, library=options.library)
     if options.fmu is not None:
         system = with_model(system, OBSERVER, options.fmu)
-    library = read_library(system.library)
+    library = library_of(system) if options.library is None else read_library(options.library)
     effects = choose(options.effects, catalogue(system, library))
     if options.list:
         output.result("\n".join(f"{effect.name:<29} {effect.text}" for effect in effects))
         return CommandResult(
             {"effects": [{"name": effect.name, "text": effect.text} for effect in effects]}
         )
-    require_compiler()
+    if library is not None:
+        require_compiler()
     cases, held_out = _split_held_out(given_cases(options, system), options.held_out)
     with locked_folder(options.out):
         return _run(options, output, Problem(system, cases, library, effects, held_out))

@@ -117,14 +117,13 @@ def _diagnose_change(
     provenance: dict[str, Any],
 ) -> dict[str, Any]:
     """Diagnose the recordings after the change; returns the summary of the diagnosis."""
-    from workbench.diagnosis import Problem, catalogue, diagnose
+    from workbench.diagnosis import Problem, catalogue, diagnose, library_of
     from workbench.diagnosis.report import write_diagnosis
-    from workbench.models.modelica import read_library
     from workbench.recordings.datasets import read_recorded
     from workbench.studies.monitoring.cause import known_from_before, recordings_after
 
     system, out = known_from_before(result), options.out / "cause"
-    library = read_library(system.library)
+    library = library_of(system)
     effects = catalogue(system, library)
     names = recordings_after(result)
     output.stage(f"cause of the change, from {', '.join(names)}")

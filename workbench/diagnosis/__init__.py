@@ -7,13 +7,12 @@ One FMU holds the observer model with every effect of the catalogue at size zero
 switched on by a parameter.
 """
 
-from workbench.diagnosis.data.clocks import catalogue
 from workbench.diagnosis.effects.catalogue import Effect, choose, read_effects
 from workbench.diagnosis.inference.residuals import Dependence, Residuals
 from workbench.diagnosis.inference.sample_errors import Errors
 from workbench.diagnosis.inference.verdict import Cause, Diagnosis, Gain, Interval
 from workbench.diagnosis.outcome import Extension, Outcome
-from workbench.diagnosis.problem import Problem
+from workbench.diagnosis.problem import Problem, catalogue, library_of
 from workbench.diagnosis.run import build_everything, diagnose, given_values
 
 __all__ = [
@@ -33,5 +32,6 @@ __all__ = [
     "choose",
     "diagnose",
     "given_values",
+    "library_of",
     "read_effects",
 ]

@@ -212,11 +212,19 @@ class Outcome:
             return []
         if self.diagnosis.late is not None:
             return []
-        steps = ["infer a law from these recordings: workbench diagnose ... --propose"]
-        if any("at its bound" in why for one in self.diagnosis.nearest for why in one.reasons):
-            steps.append("widen the bounds of a parameter at its bound, if physics allows it")
-        steps.append("add an effect for it to the library, and diagnose again")
-        return steps
+        bound = any("at its bound" in why for one in self.diagnosis.nearest for why in one.reasons)
+        widen = ["widen the bounds of a parameter at its bound, if physics allows it"] * bound
+        if not self.system.library.is_file():
+            return [
+                *widen,
+                "put the Modelica library of the model beside the system file: effects of its own, "
+                "and laws that --propose infers, act inside of its equations",
+            ]
+        return [
+            "infer a law from these recordings: workbench diagnose ... --propose",
+            *widen,
+            "add an effect for it to the library, and diagnose again",
+        ]
 
     def _unexplained(self) -> str:
         partial, late = self.diagnosis.partial, self.diagnosis.late

@@ -1,8 +1,8 @@
 """A diagnosis, from recordings to the extended model and what it gains."""
 
 import tempfile
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from workbench.diagnosis.data.clocks import case_in_time, late_signals
 from workbench.diagnosis.data.counting import refuse_too_few
 from workbench.diagnosis.data.motion import ModelSource
+from workbench.diagnosis.effects.candidates import with_starts
 from workbench.diagnosis.effects.catalogue import Effect
 from workbench.diagnosis.effects.extension import ExtendedModel, build, parameter_of
 from workbench.diagnosis.inference.certainty import assess
@@ -57,12 +58,10 @@ def diagnose(
         If there are too few recordings, or one has too little that counts; if the library cannot be
         compiled, or the model is none of this library.
     """
-    system, effects, report = problem.system, problem.effects, engine.report
-    refuse_too_few(problem.cases, system, len(problem.held_out))
+    refuse_too_few(problem.cases, problem.system, len(problem.held_out))
     with tempfile.TemporaryDirectory() as scratch:
-        everything = Path(scratch) / f"{EVERYTHING}.fmu"
-        report(f"compiling {len(effects)} effects")
-        build_everything(system, problem.library, effects, everything)
+        problem, everything = _with_model(problem, Path(scratch), engine.report)
+        system, effects, report = problem.system, problem.effects, engine.report
         source = ModelSource(everything, system, given_values(everything, system))
         with ResidualModel(source, problem.cases, engine) as simulations:
             fit = Fit(simulations, effects)
@@ -109,6 +108,20 @@ def diagnose(
             )
 
 
+def _with_model(
+    problem: Problem, scratch: Path, report: Callable[[str], None]
+) -> tuple[Problem, Path]:
+    """The problem, and an FMU with all that it considers, at zero."""
+    if problem.library is None:
+        # Nobody has said how states begin, which an FMU tells only by their nominal values.
+        with open_model(problem.system) as model:
+            return replace(problem, system=with_starts(problem.system, model)), model.path
+    everything = scratch / f"{EVERYTHING}.fmu"
+    report(f"compiling {len(problem.effects)} effects")
+    build_everything(problem.system, problem.library, problem.effects, everything)
+    return problem, everything
+
+
 def _differing(
     system: System, extension: Extension | None, starts: Mapping[str, Mapping[str, float]]
 ) -> dict[str, dict[str, float]]:
@@ -142,7 +155,7 @@ def given_values(everything: Path, system: System) -> dict[str, float]:
     InputError
         If the model is no observer model of this library.
     """
-    with FMU(everything) as extended, open_model(system) as diagnosed:
+    with FMU(everything, system.names) as extended, open_model(system) as diagnosed:
         compare = system.comparison
         asked = [*compare.tolerances, *compare.levels, *sorted(system.constants)]
         if missing := [name for name in asked if name not in diagnosed.defaults]:
@@ -171,13 +184,14 @@ class _Found:
 
     def extend(self, *, every_platform: bool) -> Extension | None:
         """Write the extended model, compile it, compare its predictions with those of the fit."""
-        if not self.diagnosis.causes:
+        library = self.problem.library
+        if not self.diagnosis.causes or library is None:
             return None
+        base = self.problem.base
         self.engine.report("compiling the extended model")
         simulations, best = self.simulations, self.diagnosis.best
-        library, base = self.problem.library, self.problem.base
         values = self._values()
-        present = [e for e in self.problem.effects if e.name in values and not e.late]
+        present = [e for e in self.problem.effects if e.name in values and e.of_library]
         own = {name: value for name, value in simulations.given.items() if "." not in name}
         own |= self._usual_levels()
         arrays = {name.partition("[")[0] for name in own if "[" in name}

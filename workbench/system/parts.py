@@ -298,6 +298,22 @@ class FrictionPower:
     label: str = key("what it wears, for people", absent="{name}")
 
 
+@declared
+class Candidates:
+    """What a diagnosis of an FMU without a library of effects considers; `*` is any letters."""
+
+    only: tuple[str, ...] = key(
+        'parameters of the FMU, `"motor.*"`, and errors of sensors, `"SensorGain[*]"`',
+        absent=(),
+        otherwise="all",
+    )
+    without: tuple[str, ...] = key("of those, what is not considered", absent=())
+    matters: float = key(
+        "least change worth reporting: over a parameter's value, of a gain, over a signal's scale",
+        absent=0.01,
+    )
+
+
 def _reach(scope: Scope) -> float:
     """Standard deviation of what is anywhere in the range."""
     low, high = scope.own["range"]

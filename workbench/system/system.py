@@ -19,6 +19,7 @@ from workbench.system.expression import Expression
 from workbench.system.parts import (
     AT_REST,
     ENDLESS,
+    Candidates,
     Condition,
     DerivedSignal,
     EstimatedQuantity,
@@ -279,6 +280,7 @@ class System:
         absent=(),
         otherwise="by signal",
     )
+    candidates: Candidates = key("what a diagnosis of an FMU alone considers")
     export: Export = key("estimators as FMUs")
     redundancies: tuple[Redundancy, ...] = key(
         "pairs of formulas that tell the same in a recording", absent=()

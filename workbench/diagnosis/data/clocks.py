@@ -14,26 +14,14 @@ from scipy.ndimage import uniform_filter1d
 
 from workbench.arrays import Matrix, Vector
 from workbench.diagnosis.data.samples import Samples
-from workbench.diagnosis.effects.catalogue import Effect, read_effects
+from workbench.diagnosis.effects.catalogue import Effect
 from workbench.diagnosis.effects.extension import variables
-from workbench.models.modelica import Library
 from workbench.recordings.case import Case
-from workbench.system.system import OBSERVER, System
+from workbench.system.system import System
 
 KIND, OWN, SKEW = "LoggerTimeSkew", "TimeSkew", "skew"
 # Of the least time that matters: a logger that scans five channels has neighbours as far apart.
 _MATTERS = 2.0
-
-
-def catalogue(system: System, library: Library) -> tuple[Effect, ...]:
-    """All that a diagnosis may find: effects of the library, then clocks of the system's loggers.
-
-    Raises
-    ------
-    InputError
-        See `read_effects`.
-    """
-    return (*read_effects(library, system.models[OBSERVER].name), *clocks(system))
 
 
 def clocks(system: System) -> tuple[Effect, ...]:

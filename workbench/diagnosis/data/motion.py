@@ -78,7 +78,7 @@ class OpenModel:
 @contextmanager
 def opened(source: ModelSource) -> Iterator[OpenModel]:
     """Open an FMU."""
-    with FMU(source.path, None, source.given) as fmu:
+    with FMU(source.path, source.system.names, source.given) as fmu:
         yield OpenModel(fmu, motion(fmu, source.system))
 
 

@@ -88,6 +88,8 @@ class Effect:
     restarted : why stops in which no state is restarted cannot show it; empty if they can.
     place, places : which of how many elements of `size`, from 1; 0 where it is no array.
     late : measured signals of the logger that is late; the effect is then none of a model.
+    sensor : measured signal whose sensor is wrong; the effect is then none of a model.
+    parameter : of the model itself, whose value is another one by the size.
     """
 
     name: str
@@ -106,6 +108,13 @@ class Effect:
     place: int = 0
     places: int = 0
     late: tuple[str, ...] = ()
+    sensor: str = ""
+    parameter: str = ""
+
+    @property
+    def of_library(self) -> bool:
+        """Whether a class of the library adds it to the model."""
+        return not (self.late or self.sensor or self.parameter)
 
     @property
     def kind(self) -> str:

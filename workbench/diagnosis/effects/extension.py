@@ -31,9 +31,11 @@ def component(name: str) -> str:
 def variables(effect: Effect, parameter: str) -> tuple[str, ...]:
     """Names in the FMU of one parameter of an effect, one for each of its slots.
 
-    Of a logger's clock, which no FMU has, its own name.
+    Of a clock or a sensor, which no FMU has, its own name.
     """
-    if effect.late:
+    if effect.parameter:
+        return (effect.parameter,)
+    if not effect.of_library:
         return (f"{effect.name}.{parameter}",)
     element = f"[{effect.place}]" if effect.place else ""
     return tuple(f"{slot}.{component(effect.kind)}.{parameter}{element}" for slot in effect.slots)
@@ -42,7 +44,7 @@ def variables(effect: Effect, parameter: str) -> tuple[str, ...]:
 def sizes_by_component(effects: Iterable[Effect]) -> dict[str, list[str]]:
     """Variables of the FMU that are the sizes of a component: without them it is nominal."""
     by_component: dict[str, list[str]] = {}
-    for effect in (effect for effect in effects if not effect.late):
+    for effect in (effect for effect in effects if effect.of_library):
         for name in (name for size in effect.sizes for name in variables(effect, size)):
             by_component.setdefault(name.rpartition(".")[0], []).append(name)
     return by_component

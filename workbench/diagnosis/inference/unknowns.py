@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from workbench.diagnosis.data.cleaning import ALONG
+from workbench.diagnosis.effects.candidates import own_bounds
 from workbench.diagnosis.effects.catalogue import Effect
 from workbench.diagnosis.effects.extension import variables
 from workbench.diagnosis.effects.presence import Presence
@@ -94,7 +95,10 @@ class Unknowns:
 
     def bounds(self, effect: Effect, parameter: str) -> tuple[float, float]:
         """Least and greatest value of a parameter, SI."""
-        declared = self._simulations.bounds[variables(effect, parameter)[0]]
+        variable = variables(effect, parameter)[0]
+        declared = self._simulations.bounds[variable]
+        if effect.parameter:
+            declared = own_bounds(self._simulations.nominal[variable], declared)
         low, high = self.opened.get((effect.name, parameter), declared)
         # An amplitude has no sign: its phase has.
         return (0.0, high) if parameter == "cosine" else (low, high)
@@ -157,9 +161,14 @@ class Unknowns:
                 parts = {parameter: size}
             for part, value in parts.items():
                 names = variables(effect, part)
-                start = self._simulations.given.get(names[0], 0.0) if part in effect.sizes else 0.0
+                start = self._present(effect, names[0]) if part in effect.sizes else 0.0
                 values |= dict.fromkeys(names, start + float(value))
         return values
+
+    def _present(self, effect: Effect, variable: str) -> float:
+        """Value of a size in the model that is diagnosed."""
+        nominal = self._simulations.nominal[variable] if effect.parameter else 0.0
+        return self._simulations.given.get(variable, nominal)
 
     def _middle(self, point: Point, name: str, k: int) -> float:
         """Value of what differs between recordings, without the deviation of this one."""

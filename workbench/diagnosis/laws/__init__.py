@@ -207,7 +207,7 @@ def _as_effects(
     problem: Problem, forms: Mapping[str, ClosedForm], folder: Path
 ) -> tuple[Library, list[Effect]]:
     """A library with closed forms, and these: the likelier law and the simpler form first."""
-    extended = extended_library(problem.library, [form.written for form in forms.values()], folder)
+    extended = extended_library(problem.modelica, [form.written for form in forms.values()], folder)
     order = list(forms)
     own = [effect for effect in read_effects(extended, problem.base) if effect.name in forms]
     return extended, sorted(own, key=lambda effect: order.index(effect.name))
@@ -222,6 +222,6 @@ def _diagnosed(problem: Problem, forms: Mapping[str, ClosedForm], engine: Engine
         effects = [*problem.effects, *own]
         outcome = diagnose(replace(problem, library=extended, effects=effects), engine)
     if outcome.extension is not None:
-        text = package(problem.library, [form.written for form in forms.values()])
+        text = package(problem.modelica, [form.written for form in forms.values()])
         write_whole(outcome.extension.modelica.with_name(f"{PACKAGE}.mo"), text)
     return outcome

@@ -151,7 +151,7 @@ def estimated(
         able = _compiled(problem, prospects, path, about.active)
         if not able:
             return []
-        effects = _effects(problem.library, able)
+        effects = _effects(problem.modelica, able)
         source = ModelSource(path, problem.system, given_values(path, problem.system))
         with ResidualModel(source, problem.cases, engine) as simulations:
             fit = Fit(simulations, [*about.active, *effects])
@@ -182,8 +182,8 @@ def _compiled(
     name, about = "FreeFunctions", "With free functions"
     with tempfile.TemporaryDirectory() as scratch:
         written = [_written(f"Free{k}", prospect) for k, prospect in enumerate(prospects)]
-        extended = extended_library(problem.library, written, Path(scratch))
-        effects = [*known, *_effects(problem.library, prospects)]
+        extended = extended_library(problem.modelica, written, Path(scratch))
+        effects = [*known, *_effects(problem.modelica, prospects)]
         text = ExtendedModel(extended, problem.base, name, effects, about).source()
         try:
             build(extended, name, text, path, every_platform=False)

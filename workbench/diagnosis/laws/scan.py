@@ -101,7 +101,7 @@ class Scan:
     """
 
     def __init__(self, problem: Problem, about: FittedModel, engine: Engine) -> None:
-        system, library, base = problem.system, problem.library, problem.base
+        system, library, base = problem.system, problem.modelica, problem.base
         self._lasting = system.comparison.lasting
         where = tuple(places(library, base, read_slots(library, base)))
         names = list(

@@ -17,6 +17,8 @@ from workbench.arrays import Matrix
 from workbench.diagnosis.data.clocks import greatest_skew, late_signals
 from workbench.diagnosis.data.motion import ModelSource, OpenModel, opened
 from workbench.diagnosis.data.samples import Samples, compared, prepare
+from workbench.diagnosis.data.sensors import sensor_errors
+from workbench.diagnosis.effects.candidates import GAIN
 from workbench.diagnosis.inference.thresholds import SOUND, Soundness
 from workbench.diagnosis.simulation.prediction import Variation
 from workbench.diagnosis.simulation.simulator import (
@@ -116,6 +118,10 @@ class ResidualModel:
         for name in late_signals(self.system):
             self.units[name] = "s"
             self.bounds[name] = (-greatest_skew(self.system), greatest_skew(self.system))
+        for name, (signal, size, typical) in sensor_errors(self.system).items():
+            self.units[name] = "1" if size == GAIN else self.system.signals[signal].unit
+            # A gain keeps the sign of its signal; a zero is off by the size of the signal at most.
+            self.bounds[name] = (-0.9, 9.0) if size == GAIN else (-typical, typical)
 
     def _simulator(self, given: SimulatorSetup) -> Simulator:
         """One in this process, with the FMU that is open."""

@@ -12,6 +12,15 @@ import numpy as np
 from workbench.arrays import Matrix, Vector
 from workbench.diagnosis.data.clocks import in_time, late_signals, lateness, mirrored, moved
 from workbench.diagnosis.data.samples import Samples
+from workbench.diagnosis.data.sensors import (
+    Reading,
+    corrected,
+    readings,
+    scaled,
+    sensor_errors,
+    shifted,
+    starts,
+)
 from workbench.diagnosis.inference.thresholds import Thresholds
 from workbench.diagnosis.simulation.prediction import Predictor, Variation
 from workbench.errors import FMUError
@@ -19,6 +28,7 @@ from workbench.models.fmu import FMU
 from workbench.system.system import System
 
 _DELAY_STEP = 1e-3  # of the difference, over the delay's spread; errors are linear in the delay
+_SENSOR_STEP = 1e-3  # of the difference, over a typical size of a sensor's error
 _FINEST = 32  # steps of a sample time
 
 
@@ -81,6 +91,7 @@ class Simulator:
         rest = given.system.comparison.rest
         self._rest = fmu.variables([rest.output]) if rest else None
         self._clocks = late_signals(given.system)
+        self._sensors = sensor_errors(given.system)
 
     def stepped(self, parts: int) -> "Simulator":
         """The same FMU in other steps, so many to a sample time."""
@@ -113,7 +124,7 @@ class Simulator:
         """
         recording = self._recordings[number]
         late = lateness(self._clocks, values)
-        freed = in_time(recording.free, late)
+        freed = corrected(in_time(recording.free, late), self._wrong(values))
         try:
             errors = self._predictor.errors(freed, self._known(values)) + (recording.y - freed.y)
         except FMUError:
@@ -167,10 +178,12 @@ class Simulator:
         """
         recording, fmu = self._in_time(number, values), self._fmu
         jacobian = np.zeros((len(recording.blocks) * len(recording.slopes) + 1, len(columns)))
-        clocks = [j for j, column in enumerate(columns) if column.variables[0] in self._clocks]
-        if clocks:
-            jacobian[:-1, clocks] = self._by_clocks(number, values, [columns[j] for j in clocks])
-        for part in _compatible(columns, clocks):
+        outside = {*self._clocks, *self._sensors}
+        beside = [j for j, column in enumerate(columns) if column.variables[0] in outside]
+        if beside:
+            names = [columns[j].variables[0] for j in beside]
+            jacobian[:-1, beside] = self._by_instruments(number, values, names)
+        for part in _compatible(columns, beside):
             varied = [columns[j] for j in part]
             shares = None if courses is None else courses[:, part]
             absent = self._absent(values, varied, sizes or {})
@@ -201,23 +214,31 @@ class Simulator:
             if not any(name in acting or values.get(name, self._fmu.defaults[name]) for name in own)
         ]
 
-    def _by_clocks(
-        self, number: int, values: Mapping[str, float], columns: Sequence[Variation]
+    def _by_instruments(
+        self, number: int, values: Mapping[str, float], names: Sequence[str]
     ) -> Matrix:
-        """Derivatives of the errors by the lateness of loggers, (b*c, p).
+        """Derivatives of the errors by the lateness of loggers and errors of sensors, (b*c, p).
 
-        By differences over a sample: within one, a signal that is moved is a straight line.
+        By differences. Of a clock over a sample: within one, a signal that is moved is a straight
+        line. Errors are nearly linear in the error of a sensor.
         """
-        step = float(np.median(np.diff(self._recordings[number].time)))
+        sample = float(np.median(np.diff(self._recordings[number].time)))
+        steps = [
+            _SENSOR_STEP * self._sensors[name][2] if name in self._sensors else sample
+            for name in names
+        ]
 
         def errors(values: Mapping[str, float]) -> Matrix:
             simulated, _ = self._simulated(number, values)
             return self._whitened(number, self._read(number, simulated, values)).ravel()
 
         now = errors(values)
-        names = [column.variables[0] for column in columns]
-        later = [errors({**values, name: values.get(name, 0.0) + step}) for name in names]
-        return np.column_stack([(point - now) / step for point in later])
+        return np.column_stack(
+            [
+                (errors({**values, name: values.get(name, 0.0) + step}) - now) / step
+                for name, step in zip(names, steps, strict=True)
+            ]
+        )
 
     def weighed(self, number: int, values: Mapping[str, float]) -> Samples:
         """A recording whose errors are weighed by how sharply they depend on what is not known.
@@ -273,23 +294,35 @@ class Simulator:
         return errors, (recording.rest - float(self._fmu.get(self._rest)[0])) / recording.rest_noise
 
     def _in_time(self, number: int, values: Mapping[str, float]) -> Samples:
-        """A recording as by one clock."""
-        return in_time(self._recordings[number], lateness(self._clocks, values))
+        """A recording as by one clock, and by right sensors."""
+        by_one_clock = in_time(self._recordings[number], lateness(self._clocks, values))
+        return corrected(by_one_clock, self._wrong(values))
+
+    def _wrong(self, values: Mapping[str, float]) -> dict[str, Reading]:
+        """What sensors read, of those with an error."""
+        return readings(self._sensors, values)
 
     def _known(self, values: Mapping[str, float]) -> dict[str, float]:
         """Values of the FMU's variables."""
-        others = {*(name for name, _ in self._delays.values()), *self._clocks}
-        return {name: value for name, value in values.items() if name not in others}
+        others = {
+            *(name for name, _ in self._delays.values()),
+            *self._clocks,
+            *self._sensors,
+        }
+        known = {name: value for name, value in values.items() if name not in others}
+        return starts(known, self._wrong(values))
 
     def _read(self, number: int, errors: Matrix, values: Mapping[str, float]) -> Matrix:
         """Errors of samples (n, c) with sensors behind structures, as late as `values` say."""
         recording, late = self._recordings[number], lateness(self._clocks, values)
-        read_ = recording.y - self._late(number, recording.y - errors, values)
+        seen = self._late(number, recording.y - errors, values)
+        read_ = recording.y - shifted(recording, seen, self._wrong(values))
         return mirrored(recording, read_, late) if late else read_
 
     def _late(self, number: int, signals: Matrix, values: Mapping[str, float]) -> Matrix:
-        """What sensors read of signals (n, c, ...), behind structures and late."""
+        """What sensors read of signals (n, c, ...), behind structures, late, by their factors."""
         recording, late = self._recordings[number], lateness(self._clocks, values)
+        signals = scaled(recording, signals, self._wrong(values))
         if self._delays or late:
             signals = signals.copy()
         for j, (name, _) in self._delays.items():
@@ -334,7 +367,7 @@ def _compatible(columns: Sequence[Variation], left: Collection[int]) -> list[lis
 @contextmanager
 def simulating(given: SimulatorSetup) -> Iterator[Simulator]:
     """Open an FMU and simulate with it."""
-    with FMU(given.path) as fmu:
+    with FMU(given.path, given.system.names) as fmu:
         yield Simulator(given, fmu)
 
 

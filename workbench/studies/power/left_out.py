@@ -210,7 +210,7 @@ def function_error(
         return None
     with tempfile.TemporaryDirectory() as folder:
         written = [proposal.forms[cause.effect.name].written for cause in proposal.laws]
-        extended = extended_library(problem.library, written, Path(folder))
+        extended = extended_library(problem.modelica, written, Path(folder))
         path = Path(folder) / "Both.fmu"
         about = "With the law and the true cause"
         text = ExtendedModel(extended, problem.base, "Both", effects, about).source()

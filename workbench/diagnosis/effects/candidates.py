@@ -1,0 +1,149 @@
+"""What a diagnosis may find in a model without a library of effects: an FMU and its sensors alone.
+
+Each parameter of the FMU may have another value, and each sensor another gain or zero. No source is
+needed: a parameter is set, and a reading is corrected beside the FMU.
+"""
+
+import re
+from collections.abc import Collection, Iterable, Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from workbench.diagnosis.effects.catalogue import Effect
+from workbench.errors import unknown_name
+from workbench.models.description import Variable
+from workbench.models.fmu import FMU
+from workbench.observers.operating import start_spreads
+from workbench.system.parts import Signal, StateNoise
+from workbench.system.system import System
+from workbench.system.units import with_unit
+
+CHANGE, GAIN, OFFSET = "change", "gain", "offset"
+_CHANGEABLE = ("fixed", "tunable")
+_FACTOR = 10.0  # by which a parameter is larger or smaller at most, if the FMU has no bounds
+
+
+def candidates(model: FMU, system: System) -> tuple[Effect, ...]:
+    """List what may be wrong in an FMU and in the sensors of its signals.
+
+    Parameters that the system fits in any case (levels, tolerances), or that only correct
+    estimates, are none. A parameter that is zero needs a nominal value or bounds in the FMU: else
+    nobody knows which change is small.
+
+    Returns
+    -------
+    effects : parameters in the order of the FMU, then gain and offset of each input and output.
+    """
+    chosen = system.candidates
+    effects = {e.name: e for e in (*_parameters(model, system), *_sensors(system))}
+    considered = _matching(chosen.only, effects, system) if chosen.only else set(effects)
+    considered -= _matching(chosen.without, effects, system)
+    return tuple(effect for name, effect in effects.items() if name in considered)
+
+
+def _matching(patterns: Iterable[str], names: Collection[str], system: System) -> set[str]:
+    """Names that patterns stand for; each must stand for one at least."""
+    matching: set[str] = set()
+    for pattern in patterns:
+        # Names have brackets, as `tank[1].level`: only * is special.
+        expression = re.compile(".*".join(map(re.escape, pattern.split("*"))))
+        fitting = {name for name in names if expression.fullmatch(name)}
+        if not fitting:
+            raise unknown_name(
+                pattern,
+                names,
+                where=f"{system.source}, [candidates]",
+                expected="a parameter of the FMU that may differ, or an error of a sensor",
+                remedy="correct the name; 'workbench diagnose --list' lists all",
+            )
+        matching |= fitting
+    return matching
+
+
+def own_bounds(nominal: float, declared: tuple[float, float]) -> tuple[float, float]:
+    """Least and greatest change of a parameter of the model.
+
+    Parameters
+    ----------
+    declared : least and greatest value by the FMU, infinite for none. Without them a parameter
+        keeps its sign, and is at most ten times as large or as small.
+    """
+    low, high = declared
+    if nominal:
+        ends = sorted((nominal / _FACTOR, nominal * _FACTOR))
+        low, high = (end if np.isinf(d) else d for end, d in zip(ends, (low, high), strict=True))
+    return low - nominal, high - nominal
+
+
+def with_starts(system: System, model: FMU) -> System:
+    """The system with an uncertain start of each state that no output shows."""
+    known = {state.name: state for state in system.state_noise}
+    spreads = dict(zip(model.states, start_spreads(model, system), strict=True))
+    for name, spread in spreads.items():
+        state = known.get(name, StateNoise(name, name, None, None))
+        if name not in system.signals and state.spread is None:
+            known[name] = replace(state, spread=float(spread))
+    return replace(system, state_noise=tuple(known.values()))
+
+
+def _parameters(model: FMU, system: System) -> Iterator[Effect]:
+    compare = system.comparison
+    fitted = {*compare.levels, *compare.tolerances, *system.corrections}
+    for variable in model.description.variables:
+        if (
+            variable.causality != "parameter"
+            or variable.variability not in _CHANGEABLE
+            or variable.initial == "calculated"
+            or variable.name in fitted
+            or variable.name not in model.defaults
+        ):
+            continue
+        value = model.defaults[variable.name]
+        size = _size(variable, value)
+        if size == 0.0:
+            continue
+        about = f" ({variable.text})" if variable.text else ""
+        nominal = with_unit(value, variable.unit) if variable.unit else f"{value:.3g}"
+        yield Effect(
+            name=variable.name,
+            model=variable.name,
+            slots=(),
+            size=CHANGE,
+            matters=system.candidates.matters * size,
+            text=f"another value of {variable.name}{about} than {nominal}",
+            separation=f"a measurement of {variable.name} by itself",
+            parameter=variable.name,
+        )
+
+
+def _size(variable: Variable, value: float) -> float:
+    """What a change of a parameter is compared with; 0 if nothing says it."""
+    if value:
+        return abs(value)
+    if variable.minimum is not None and variable.maximum is not None:
+        return variable.maximum - variable.minimum
+    return abs(variable.nominal or 0.0)
+
+
+def _sensors(system: System) -> Iterator[Effect]:
+    for signal in system.signals.values():
+        for size, least in ((GAIN, 1.0), (OFFSET, signal.scale)):
+            yield Effect(
+                name=sensor_error(signal, size),
+                model=sensor_error(signal, size),
+                slots=(),
+                size=size,
+                matters=system.candidates.matters * least,
+                text=f"a sensor of {signal.label} with another {_PLAIN[size]}",
+                separation=f"a second sensor of {signal.label}",
+                sensor=signal.name,
+            )
+
+
+_PLAIN = {GAIN: "gain", OFFSET: "zero"}
+
+
+def sensor_error(signal: Signal, size: str) -> str:
+    """Name of the wrong gain or zero of a sensor, such as 'SensorGain[u]'."""
+    return f"Sensor{size.capitalize()}[{signal.name}]"
