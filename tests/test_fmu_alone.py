@@ -157,6 +157,20 @@ def test_candidates_are_chosen_in_the_system_file(tank, tmp_path, capsys):
     assert message in capsys.readouterr().err
 
 
+def test_a_stated_range_bounds_the_change(tank, tmp_path):
+    """Of 10 % only 4 are allowed: the size is told to be at its bound."""
+    text = SYSTEM.replace("Tank.fmu", str(tank.source.parent / "Tank.fmu"))
+    (tmp_path / "system.toml").write_text(f'{text}[fit.A]\nrange = ["0.4 m2", "0.52 m2"]\n')
+    system = load_system(tmp_path)
+    cases = read_cases(record(tmp_path / "recordings", seed=2, area=0.55), system)
+    outcome = diagnose(
+        system, cases, effects=["A"], out=tmp_path, workers=1, report=lambda line: None
+    )
+    nearest = [candidate.text for candidate in outcome.diagnosis.nearest]
+    limited = [text for text in [*outcome.warnings, *nearest] if "0.02 m2" in text]
+    assert limited, outcome.summary()
+
+
 def test_what_needs_the_equations_says_so(tank, tmp_path):
     cases = read_cases(record(tmp_path / "recordings", seed=6, area=0.55), tank)
     effects = choose(["SensorOffset[level]"], catalogue(tank, None))

@@ -226,6 +226,9 @@ _SAID = {
 }
 
 
+_LEAST = {"m2": 0.01}  # of a unit that is said, 1 unless given: areas go by squares
+
+
 _STEPS = (1, 10, 100)  # of what a share is said per
 
 
@@ -243,6 +246,8 @@ def said(values: Sequence[float], unit: str) -> tuple[list[float], str]:
     (([7.07], '% per 100 K'), ([2.1, 2.0], 'mm'))
     >>> said([1.06], "1/s"), said([1.2], "1/K")
     (([1.06], '1/s'), ([1.2], '1/K'))
+    >>> said([0.05], "m2"), said([1e-3], "m2")
+    (([0.05], 'm2'), ([1000.0], 'mm2'))
     >>> said([150.0], "N"), said([12e3], "Pa"), said([4.05e-4], "m2/s")
     (([150.0], 'N'), ([120.0], 'mbar'), ([0.000405], 'm2/s'))
     """
@@ -254,7 +259,8 @@ def said(values: Sequence[float], unit: str) -> tuple[list[float], str]:
         per = divisor if step == 1 else f"{step} {divisor}"
         return [round(100.0 * step * value, 12) for value in values], f"% per {per}"
     choices = _SAID.get(unit, ((unit, 1.0),))
-    shown, factor = next((c for c in choices if size >= c[1] * (1.0 - 1e-9)), choices[-1])
+    least = _LEAST.get(unit, 1.0) * (1.0 - 1e-9)
+    shown, factor = next((c for c in choices if size >= least * c[1]), choices[-1])
     return [round(value / factor, 12) if factor != 1.0 else value for value in values], shown
 
 

@@ -115,6 +115,12 @@ class ResidualModel:
             )
             for v in fmu.description.variables
         }
+        for parameter in self.system.fitted:
+            low, high = self.bounds[parameter.name]
+            self.bounds[parameter.name] = (
+                max(low, parameter.range[0]),
+                min(high, parameter.range[1]),
+            )
         for name in late_signals(self.system):
             self.units[name] = "s"
             self.bounds[name] = (-greatest_skew(self.system), greatest_skew(self.system))
