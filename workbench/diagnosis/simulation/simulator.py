@@ -28,7 +28,7 @@ from workbench.models.fmu import FMU
 from workbench.system.system import System
 
 _DELAY_STEP = 1e-3  # of the difference, over the delay's spread; errors are linear in the delay
-_SENSOR_STEP = 1e-3  # of the difference, over a typical size of a sensor's error
+_DIFFERENCE = 1e-4  # step over a typical size: far above rounding, far below what bends
 _FINEST = 32  # steps of a sample time
 
 
@@ -92,6 +92,12 @@ class Simulator:
         self._rest = fmu.variables([rest.output]) if rest else None
         self._clocks = late_signals(given.system)
         self._sensors = sensor_errors(given.system)
+        self._typical = {name: size for name, (_, _, size) in self._sensors.items()}
+        if not given.system.library.is_file():
+            # An FMU of another tool need not take a parameter while it runs: each is set before.
+            self._typical |= {
+                name: abs(fmu.defaults.get(name, 0.0)) or 1.0 for name in fmu.parameters
+            }
 
     def stepped(self, parts: int) -> "Simulator":
         """The same FMU in other steps, so many to a sample time."""
@@ -178,11 +184,11 @@ class Simulator:
         """
         recording, fmu = self._in_time(number, values), self._fmu
         jacobian = np.zeros((len(recording.blocks) * len(recording.slopes) + 1, len(columns)))
-        outside = {*self._clocks, *self._sensors}
-        beside = [j for j, column in enumerate(columns) if column.variables[0] in outside]
+        differing = {*self._clocks, *self._typical}
+        beside = [j for j, column in enumerate(columns) if column.variables[0] in differing]
         if beside:
             names = [columns[j].variables[0] for j in beside]
-            jacobian[:-1, beside] = self._by_instruments(number, values, names)
+            jacobian[:-1, beside] = self._by_differences(number, values, names)
         for part in _compatible(columns, beside):
             varied = [columns[j] for j in part]
             shares = None if courses is None else courses[:, part]
@@ -214,18 +220,16 @@ class Simulator:
             if not any(name in acting or values.get(name, self._fmu.defaults[name]) for name in own)
         ]
 
-    def _by_instruments(
+    def _by_differences(
         self, number: int, values: Mapping[str, float], names: Sequence[str]
     ) -> Matrix:
-        """Derivatives of the errors by the lateness of loggers and errors of sensors, (b*c, p).
+        """Derivatives of the errors by clocks, sensors, and parameters of an FMU alone, (b*c, p).
 
-        By differences. Of a clock over a sample: within one, a signal that is moved is a straight
-        line. Errors are nearly linear in the error of a sensor.
+        Of a clock over a sample: within one, a signal that is moved is a straight line.
         """
         sample = float(np.median(np.diff(self._recordings[number].time)))
         steps = [
-            _SENSOR_STEP * self._sensors[name][2] if name in self._sensors else sample
-            for name in names
+            _DIFFERENCE * self._typical[name] if name in self._typical else sample for name in names
         ]
 
         def errors(values: Mapping[str, float]) -> Matrix:
@@ -235,10 +239,14 @@ class Simulator:
         now = errors(values)
         return np.column_stack(
             [
-                (errors({**values, name: values.get(name, 0.0) + step}) - now) / step
+                (errors({**values, name: self._at(name, values) + step}) - now) / step
                 for name, step in zip(names, steps, strict=True)
             ]
         )
+
+    def _at(self, name: str, values: Mapping[str, float]) -> float:
+        """Value of a parameter, or of the error of a clock or a sensor."""
+        return values.get(name, self._fmu.defaults.get(name, 0.0))
 
     def weighed(self, number: int, values: Mapping[str, float]) -> Samples:
         """A recording whose errors are weighed by how sharply they depend on what is not known.
