@@ -70,11 +70,8 @@ sample_time = "1 s"
 [models]
 observer = {{ class = "Observer" }}
 
-[inputs.P]
-unit = "W"
-noise = "0 W"
-scale = "40 W"
-held = true
+[inputs]
+P = {{ unit = "W", noise = "0 W", scale = "40 W", held = true }}
 
 [outputs.T]
 unit = "K"
@@ -82,14 +79,11 @@ noise = "0.05 K"
 scale = "20 K"
 {sensor}
 
-[states.Tc]
-spread = "30 K"
+[states]
+Tc = {{ spread = "30 K" }}
 
-[estimated.Gc]
-correction = "dGc"
-unit = "W/K"
-range = ["0.1 W/K", "2 W/K"]
-walk = "0.01 W/K"
+[estimated]
+Gc = {{ correction = "dGc", unit = "W/K", range = ["0.1 W/K", "2 W/K"], walk = "0.01 W/K" }}
 """
 NOISE = 0.05  # [K]
 

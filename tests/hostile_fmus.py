@@ -1,24 +1,18 @@
 """FMUs that harm whoever calls them: the project's own, with a few lines of C in one function."""
 
-import os
 import re
 import shutil
 import subprocess
-import sys
 import zipfile
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
+from subprocess import CompletedProcess
 
 import fmpy
-import pytest
 
-from .processes import ending
+from .processes import COMPILER, ROOT, python
 
 NAME = "MinimalObserver"
-COMPILER = shutil.which("cc") or shutil.which("gcc")
-needs_compiler = pytest.mark.skipif(COMPILER is None, reason="needs a C compiler")
-ROOT = Path(__file__).parents[1]
 
 
 def rewritten(original: Path, path: Path, change: Callable[[Path], None]) -> Path:
@@ -32,6 +26,15 @@ def rewritten(original: Path, path: Path, change: Callable[[Path], None]) -> Pat
             archive.write(file, file.relative_to(folder))
     shutil.rmtree(folder)
     return path
+
+
+def compile_library(folder: Path, name: str) -> None:
+    """Compile the sources of an unpacked FMU of FMI 2.0 into its library."""
+    library = folder / "binaries" / fmpy.platform / f"{name}{fmpy.sharedLibraryExtension}"
+    files = ("model", "integrator", "fmi2", "instance")
+    command = [COMPILER, "-std=gnu99", "-shared", "-fPIC", "-fvisibility=hidden", "-w"]
+    sources = [folder / "sources" / f"{file}.c" for file in files]
+    subprocess.run([*command, *sources, "-o", library, "-lm"], check=True)
 
 
 def hostile(path: Path) -> Path:
@@ -48,40 +51,17 @@ def hostile(path: Path) -> Path:
         )
         assert functions > 30
         file.write_text(attack + text)
-        library = folder / "binaries" / fmpy.platform / f"{NAME}{fmpy.sharedLibraryExtension}"
-        sources = [
-            file.with_name(f"{one}.c") for one in ("model", "integrator", "fmi2", "instance")
-        ]
-        command = [COMPILER, "-std=gnu99", "-shared", "-fPIC", "-fvisibility=hidden", "-w"]
-        subprocess.run([*command, *sources, "-o", library, "-lm"], check=True)
+        compile_library(folder, NAME)
 
     return rewritten(ROOT / "fmus" / "fmi2" / f"{NAME}.fmu", path, change)
 
 
-def workbench(
-    folder: Path, *arguments: str | Path, **environment: str
-) -> "subprocess.CompletedProcess[str]":
-    """Run the command line with temporary files in a folder, `tmp`."""
-    with running(folder, *arguments, **environment) as process:
-        out, errors = process.communicate(timeout=120)
-    return subprocess.CompletedProcess(process.args, process.returncode, out, errors)
-
-
-@contextmanager
-def running(
-    folder: Path, *arguments: str | Path, **environment: str
-) -> "Iterator[subprocess.Popen[str]]":
-    """Run the command line beside the block; see `workbench`."""
+def own_folder(folder: Path) -> dict[str, str]:
+    """Have Python work in a folder, and make its temporary files in `tmp` there."""
     (folder / "tmp").mkdir(exist_ok=True)
-    usual = {"TMPDIR": str(folder / "tmp"), "PYTHONPATH": str(ROOT)}
-    command = subprocess.Popen(
-        [sys.executable, "-m", "workbench", *map(str, arguments)],
-        cwd=folder,
-        env={**os.environ, **usual, **environment},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-    )
-    with ending(command):
-        yield command
+    return {"cwd": str(folder), "TMPDIR": str(folder / "tmp")}
+
+
+def workbench(folder: Path, *arguments: str | Path, **environment: str) -> CompletedProcess[str]:
+    """Run the command line with temporary files in a folder, `tmp`."""
+    return python("-m", "workbench", *arguments, **own_folder(folder), **environment)

@@ -9,16 +9,20 @@ import hashlib
 import os
 import shutil
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import platformdirs
 
 from workbench.machines.wheelset import rig
 from workbench.machines.wheelset.rig import Effects, Scenario, simulate, write_recording
 from workbench.models import fmu
 
-REFERENCE = Path(__file__).parent.parent / "fmus" / "fmi2" / "Reference.fmu"
+ROOT = Path(__file__).parents[1]
+REFERENCE = ROOT / "fmus" / "fmi2" / "Reference.fmu"
+TWO_STOPS = ("03_dry_120_3.6", "08_wet_120_3.6")
 RATE = 200  # [Hz]
 _MOST = 256  # of 0.5 MB; a run of all tests makes some 150
 _SOURCES = [
@@ -48,3 +52,13 @@ def record(scenario: Scenario, seed: int, effects: Effects, folder: Path, every:
         part.replace(kept)
         for old in sorted(shelf.iterdir(), key=lambda path: -path.stat().st_mtime)[_MOST:]:
             shutil.rmtree(old, ignore_errors=True)
+
+
+def write_beginnings(folder: Path, names: Sequence[str] = TWO_STOPS) -> Path:
+    """Write 6 s each of two standard stops, first pressure and what follows, under these names."""
+    for name, of in zip(names, TWO_STOPS, strict=True):
+        (folder / name).mkdir(parents=True)
+        shutil.copy(ROOT / "cases" / of / "case.toml", folder / name)
+        table = pd.read_csv(ROOT / "cases" / of / "measured.csv").iloc[700:1900]
+        table.to_csv(folder / name / "measured.csv", index=False)
+    return folder

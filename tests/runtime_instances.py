@@ -2,7 +2,6 @@
 
 import ctypes
 import re
-import shutil
 import subprocess
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -16,8 +15,7 @@ from fmpy.fmi2 import FMU2Model, FMU2Slave, fmi2CallbackFunctions, fmi2CallbackL
 from fmpy.fmi3 import FMU3Model, FMU3Slave
 from scipy.linalg import expm
 
-COMPILER = shutil.which("cc") or shutil.which("gcc")
-needs_compiler = pytest.mark.skipif(COMPILER is None, reason="needs a C compiler")
+from .processes import COMPILER
 
 MODELS = Path(__file__).parent / "runtime"
 RUNTIME = Path(__file__).parents[1] / "workbench" / "models" / "compiler" / "runtime"

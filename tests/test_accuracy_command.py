@@ -221,7 +221,6 @@ def test_bands_that_are_multiplied_by_what_they_need_hold_95_percent(scale):
         return found
 
     factor = needed(stops(1.0), "one", "Fx")
-    assert factor is not None
     # 1.96 standard deviations are the reach of a band, 2.776 that of Student's t with 4 degrees.
     assert factor == pytest.approx(scale * 2.776 / 1.96, rel=0.03)
     # Six stops of 3200 samples: a share of 95 % is known to 0.16 %.

@@ -43,23 +43,17 @@ sample_time = "1 s"
 [models]
 observer = { class = "Level", fmu = "Level.fmu" }
 
-[inputs.filling]
-unit = "m/s"
-noise = "0 m/s"
-scale = "1 m/s"
+[inputs]
+filling = { unit = "m/s", noise = "0 m/s", scale = "1 m/s" }
 
-[outputs.coarse]
-unit = "m"
-noise = "0.2 m"
-scale = "1 m"
+[outputs]
+coarse = { unit = "m", noise = "0.2 m", scale = "1 m" }
 
-[aids.fine]
-unit = "m"
-noise = "0.05 m"
-scale = "1 m"
+[aids]
+fine = { unit = "m", noise = "0.05 m", scale = "1 m" }
 
-[states.coarse]
-walk = "0 m"
+[states]
+coarse = { walk = "0 m" }
 """
 TRAIN = load_system("train")
 

@@ -22,7 +22,7 @@ from workbench.observers.replay import replay
 from workbench.recordings.case import read_case
 from workbench.system.registry import load_system, open_model
 
-from .hostile_fmus import COMPILER, needs_compiler
+from .processes import COMPILER, needs_compiler
 
 pytestmark = needs_compiler
 

@@ -1,8 +1,5 @@
 """The workbench in a script or notebook: each step is a value, and nothing guards the script."""
 
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +9,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import workbench as wb
 from workbench.system.template import write_system
+
+from .processes import python
 
 SCRIPT = """
 import workbench as wb
@@ -51,14 +50,7 @@ def test_a_script_needs_no_guard_from_file_to_diagnosis(root, folder):
     """Workers import neither the script nor start it again: it prints each line once."""
     script = folder / "script.py"
     script.write_text(SCRIPT)
-    run = subprocess.run(
-        [sys.executable, "-W", "error", str(script)],
-        cwd=folder,
-        env={**os.environ, "PYTHONPATH": str(root), "MPLBACKEND": "agg"},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    run = python("-W", "error", script, cwd=folder, MPLBACKEND="agg")
     assert run.returncode == 0, run.stderr
     assert run.stdout.count("[1/2] z ") == 1
     said = "The model lacks a wall that seeps in proportion to the level: Seepage, k 0.0004"
@@ -95,7 +87,6 @@ def test_tuned_gains_are_what_an_estimator_then_runs_with(system, case):
         workers=1,
         report=lines.append,
     )
-    assert tuned is not None
     assert len([line for line in lines if " z " in line]) == 2
     usual = wb.observe(system, case, "disturbance_observer")
     better = wb.observe(system, case, "disturbance_observer", tuned.gains)

@@ -16,7 +16,8 @@ from workbench.errors import FMUError, InputError
 from workbench.models.archive import unpack
 from workbench.models.fmu import FMU
 
-from .hostile_fmus import ROOT, rewritten
+from .hostile_fmus import rewritten
+from .processes import ROOT
 
 OWN = ROOT / "fmus" / "fmi2" / "MinimalObserver.fmu"
 XML = "modelDescription.xml"

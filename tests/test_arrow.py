@@ -60,10 +60,8 @@ noise = "0 m3/s"
 scale = "1e-3 m3/s"
 
 {outputs}
-[outputs.level]
-unit = "V"
-noise = "0.01 V"
-scale = "3 V"
+[outputs]
+level = {{ unit = "V", noise = "0.01 V", scale = "3 V" }}
 
 [states.header]
 walk = "2e-3 m"

@@ -201,15 +201,11 @@ sample_time = "{step} s"
 [models]
 observer = {{ class = "Observer" }}
 
-[inputs.f]
-unit = "m/s2"
-noise = "0 m/s2"
-scale = "1 m/s2"
+[inputs]
+f = {{ unit = "m/s2", noise = "0 m/s2", scale = "1 m/s2" }}
 
-[outputs.s]
-unit = "m"
-noise = "1e-3 m"
-scale = "0.5 m"
+[outputs]
+s = {{ unit = "m", noise = "1e-3 m", scale = "0.5 m" }}
 
 [estimated.b]
 correction = "db"

@@ -72,13 +72,13 @@ def test_arrays_of_one_call_are_not_those_of_the_next():
 
 
 def _named(fields: list[tuple[str, Any]]) -> Callable[..., Any]:
-    kind: Any = NamedTuple("Pair", fields)  # type: ignore[misc]
-    return kind  # type: ignore[no-any-return]
+    kind: Any = NamedTuple("Pair", fields)
+    return kind
 
 
 @compiled
 def difference(pair: Any) -> float:
-    return pair.first - pair.second  # type: ignore[no-any-return]
+    return pair.first - pair.second
 
 
 def test_classes_of_one_name_may_have_their_fields_in_another_order():

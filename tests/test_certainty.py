@@ -70,15 +70,11 @@ sample_time = "10 ms"
 [models]
 observer = { class = "Observer" }
 
-[inputs.u]
-unit = "m"
-noise = "0 m"
-scale = "2 m"
+[inputs]
+u = { unit = "m", noise = "0 m", scale = "2 m" }
 
-[outputs.y]
-unit = "N"
-noise = "0.1 N"
-scale = "5 N"
+[outputs]
+y = { unit = "N", noise = "0.1 N", scale = "5 N" }
 
 [estimated.c]
 correction = "dc"
@@ -88,11 +84,11 @@ acts_on = "y"
 walk = "0.1 N/m"
 spread = "0.1 N/m"
 
-[points.design]
-inputs = { u = "1 m" }
+[points]
+design = { inputs = { u = "1 m" } }
 
-[diagnosis.levels]
-c = {}
+[diagnosis]
+levels = { c = {} }
 """
 SCALE, BEND, TEETH, NOISE = 2.1, 0.3, 3.0, 0.1
 
@@ -147,8 +143,6 @@ def test_at_the_ends_by_noise_alone_the_least_chi_squared_has_risen_by_3_84(fits
     best = begun(fit, "Bend", BEND)
     found = assess(fit, best, lambda _: None)
     ((key, (low, high)),) = found.ends.items()
-    assert low is not None
-    assert high is not None
     bottom = least(fit, best, best.point.sizes[key])
     rises = [least(fit, best, end) - bottom for end in (low, high)]
     # Ends are found along a parabola through one point of each side: 5 % is its third order.

@@ -6,13 +6,14 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
+from contextlib import AbstractContextManager
 from pathlib import Path
 
 import pytest
 
 from workbench.models import jit
 
-ROOT = Path(__file__).parents[1]
+from .processes import LONGEST, ROOT, python, running
 
 PROGRAM = """
 import numpy as np
@@ -44,24 +45,15 @@ def home() -> Iterator[Path]:
 
 def started(
     home: str | Path | None, program: str = PROGRAM, **more: str
-) -> "subprocess.Popen[str]":
+) -> AbstractContextManager[subprocess.Popen[str]]:
     """A program that solves by compiled code."""
-    environment = {k: v for k, v in os.environ.items() if k not in ("HOME", "XDG_CACHE_HOME")}
-    if home is not None:
-        environment["HOME"] = str(home)
-    return subprocess.Popen(
-        [sys.executable, "-c", program],
-        env={**environment, "PYTHONPATH": str(ROOT), **more},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        cwd="/",
-    )
+    at = {"HOME": None if home is None else str(home), "XDG_CACHE_HOME": None}
+    return running("-c", program, cwd="/", **{**at, **more})
 
 
 def solved(home: str | Path | None, program: str = PROGRAM, **more: str) -> str:
     with started(home, program, **more) as process:
-        out, errors = process.communicate(timeout=100)
+        out, errors = process.communicate(timeout=LONGEST)
     assert (process.returncode, errors) == (0, "")
     return out.strip()
 
@@ -100,11 +92,8 @@ def test_code_is_made_again_when_what_makes_it_changes(name, tmp_path, monkeypat
 
 
 def test_what_two_processes_need_at_once_is_compiled_by_one(home):
-    both = [started(home) for _ in range(2)]
-    told = []
-    for process in both:
-        with process:
-            told.append(process.communicate(timeout=120))
+    with started(home) as one, started(home) as other:
+        told = [process.communicate(timeout=LONGEST) for process in (one, other)]
     assert sorted(told) == [("0 kept\n", ""), ("1 kept\n", "")]
     names = {file.name for file in home.rglob("*") if file.is_file()}
     assert {Path(name).suffix for name in names - {"turns"}} == {".code"}
@@ -113,13 +102,12 @@ def test_what_two_processes_need_at_once_is_compiled_by_one(home):
 @pytest.mark.skipif(os.name != "posix", reason="there each process compiles for itself")
 def test_who_dies_while_it_compiles_leaves_the_turn_to_the_next(home):
     with started(home, program=DYING) as first:
-        assert first.stdout is not None
         assert first.stdout.readline() == "compiling\n"
         with started(home) as second:
             with pytest.raises(subprocess.TimeoutExpired):
                 second.wait(timeout=5)
             first.kill()
-            assert second.communicate(timeout=120) == ("0 kept\n", "")
+            assert second.communicate(timeout=LONGEST) == ("0 kept\n", "")
 
 
 @pytest.mark.parametrize("home", ["/dev/null", "/proc", "", None])
@@ -137,15 +125,7 @@ def test_a_user_without_a_home_keeps_nothing():
         "cache = workbench.models.fmu_cache\n"
         "print(cache.is_known('name'), cache.cache_folder().is_dir())"
     )
-    environment = {k: v for k, v in os.environ.items() if k not in ("HOME", "XDG_CACHE_HOME")}
-    run = subprocess.run(
-        [sys.executable, "-c", program],
-        env={**environment, "PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-        check=False,
-        cwd="/",
-    )
+    run = python("-c", program, cwd="/", HOME=None, XDG_CACHE_HOME=None)
     assert (run.stdout, run.stderr) == ("False False\n", "")
 
 

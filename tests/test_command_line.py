@@ -14,6 +14,8 @@ from workbench.cli import doctor
 from workbench.cli.extras import PURPOSES
 from workbench.cli.parser import command_line, parsers
 
+from .processes import python
+
 HEAVY = ("numba", "numpy", "scipy", "matplotlib", "pandas", "fmpy", "pint")
 PARSERS = [parser for parser in parsers(command_line("")) if " " in parser.prog]
 
@@ -133,14 +135,7 @@ try:
 except SystemExit as end:
     print(end.code, sorted(set(sys.modules) & set({HEAVY})), file=sys.stderr)
 """
-    run = subprocess.run(
-        [sys.executable, "-c", script],
-        cwd=root,
-        capture_output=True,
-        text=True,
-        check=True,
-        timeout=60,
-    )
+    run = python("-c", script)
     assert run.stderr == "0 []\n"
 
 

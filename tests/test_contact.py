@@ -54,7 +54,7 @@ def test_stiffness_grows_with_load_to_the_power_two_thirds(minimal):
 )
 def test_force_is_odd_in_slip_and_bounded_by_friction(minimal_path, w, v, mu0):
     contact = DRY_55 | {"muWR": mu0}
-    with FMU(minimal_path) as fmu:  # type: ignore[arg-type]
+    with FMU(minimal_path) as fmu:
         plus, minus = creep_force(fmu, contact, v, np.array([w, -w]))
     friction = mu0 * (0.6 * np.exp(-0.6 * w) + 0.4)
     # Speeds near 40 m/s are known to 1e-14, the force per slip is at most 2*K*0.7/0.1 N/(m/s).

@@ -19,7 +19,8 @@ from workbench.models.description import Description, read_description
 from workbench.models.fmu import FMU, CoSimulation
 from workbench.models.trial import ContainedError, Limits, NoAnswerError
 
-from .hostile_fmus import needs_compiler, rewritten
+from .hostile_fmus import rewritten
+from .processes import needs_compiler
 
 pytestmark = needs_compiler
 

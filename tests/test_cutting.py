@@ -201,7 +201,6 @@ def test_each_stop_of_a_day_is_a_recording(system):
     parts = cut(time, signals, system)
     kept = [(time[part.first], time[part.end - 1]) for part in parts if not part.reason]
     rule = system.cutting
-    assert rule is not None
     # A stop begins with its pressure and ends at standstill, by the speed over the rate.
     begins = [10.0, 59.0, 127.0]
     lasts = [(20.0 - 0.1) / 1.0, (20.0 - 0.1) / 2.0, (20.0 - 0.1) / 1.0]

@@ -133,7 +133,6 @@ def slow_parameter_estimator(fmu: FMU, system: System) -> tuple[Estimator, Gains
 def test_settling_predicts_how_much_of_a_friction_step_is_left(system, models, make, name):
     """Reference: the observer itself along a model whose friction steps at the operating point."""
     fmu, asked = models[name], system.following
-    assert asked is not None
     assert asked.within == 0.5
     step, rate = 0.01, 1000
     settling = Settling(fmu, system, estimators_of(system)[name])  # leaves the model in equilibrium

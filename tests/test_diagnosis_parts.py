@@ -494,13 +494,9 @@ def test_sizes_have_bounds_units_and_a_zero_default(everything):
                     one = described[name]
                     assert fmu.defaults[name] == 0.0
                     assert one.unit
-                    assert one.minimum is not None
-                    assert one.maximum is not None
                     assert one.minimum <= 0.0 < effect.matters < one.maximum
             for shape, values in effect.shapes:
                 one = described[variables(effect, shape)[0]]
-                assert one.minimum is not None
-                assert one.maximum is not None
                 assert one.minimum <= min(values) <= max(values) <= one.maximum
 
 

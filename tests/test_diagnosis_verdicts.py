@@ -2,8 +2,6 @@
 
 import json
 import signal
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +10,7 @@ import pandas as pd
 import pytest
 
 from .diagnosis_pages import EFFECTS, STOPS, TWINS, diagnose, section, text
-from .processes import ending
+from .processes import running
 
 
 @pytest.fixture(scope="session")
@@ -34,11 +32,8 @@ def forceless(root, stops, tmp_path_factory) -> Any:
 def test_an_interrupted_search_keeps_what_it_found(root, stops, tmp_path):
     """Ctrl-C while a second cause is sought."""
     arguments = ["diagnose", str(stops), "--effects", *EFFECTS, "--out", str(tmp_path)]
-    command = [sys.executable, "-m", "workbench", *arguments]
     searches = 0
-    search = subprocess.Popen(command, cwd=root, stderr=subprocess.PIPE, text=True)
-    with ending(search) as run:
-        assert run.stderr is not None
+    with running("-m", "workbench", *arguments) as run:
         for line in run.stderr:
             searches += "signatures" in line
             if searches == 2 and "signatures" in line:

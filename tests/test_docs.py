@@ -1,10 +1,7 @@
 """The documentation is true: its examples run, its site builds without network, its schemas fit."""
 
 import json
-import os
 import re
-import subprocess
-import sys
 import tomllib
 from pathlib import Path
 
@@ -19,6 +16,7 @@ from workbench.system.reference import tables
 from workbench.system.system import System
 
 from .pages import blocks, calls, check_calls, run_page
+from .processes import python
 
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -87,16 +85,8 @@ def site(tmp_path_factory) -> Path:
     """Built as `make docs` does, where no network can be reached."""
     out = tmp_path_factory.mktemp("site")
     nowhere = {f"{kind}_proxy": "http://127.0.0.1:9" for kind in ("http", "https")}
-    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(out)]
-    run = subprocess.run(
-        command,
-        cwd=ROOT,
-        env={**os.environ, "PYTHONPATH": str(ROOT), "NO_MKDOCS_2_WARNING": "1", **nowhere},
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=300,
-    )
+    command = ("-m", "mkdocs", "build", "--strict", "--site-dir", str(out))
+    run = python(*command, NO_MKDOCS_2_WARNING="1", **nowhere)
     assert run.returncode == 0, run.stderr
     return out
 

@@ -34,11 +34,11 @@ from workbench.system.registry import load_system, open_model
 from workbench.system.system import System
 
 from . import heater
+from .processes import COMPILER
 
 ROOT = Path(__file__).parent.parent
 SYSTEM = load_system("wheelset")
 NAMES = ("ekf", "ukf", "mhe", "imm")
-COMPILER = shutil.which("cc") or shutil.which("gcc")
 # Of the largest value of an output. Found here: equal to the bit, as the order of operations is the
 # same; elementary functions of another library may differ in their last bit.
 AGREEMENT = 1e-6
@@ -428,8 +428,6 @@ class Shared(ExtendedKalmanFilter):
 def test_what_does_not_become_c_is_refused_in_words(tmp_path, minimal, name, match):
     (tmp_path / "own.py").write_text(OWN)
     found = importlib.util.spec_from_file_location("own", tmp_path / "own.py")
-    assert found is not None
-    assert found.loader is not None
     module = importlib.util.module_from_spec(found)
     found.loader.exec_module(module)
     kind = getattr(module, name)

@@ -98,9 +98,7 @@ def force_error(case: Case, estimator: Estimator) -> float:
     """Error of Fx, rms over mean while braking."""
     run = replay(case, estimator)
     assert run.ending is Ending.OK
-    error = score(case, run, SYSTEM).nrmse
-    assert error is not None
-    return error
+    return score(case, run, SYSTEM).nrmse
 
 
 def test_a_model_that_knows_the_fade_of_its_pads_lowers_the_error_of_the_force(

@@ -2,14 +2,10 @@
 
 import json
 import re
-import shutil
-import subprocess
 import tempfile
-import zipfile
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from pathlib import Path
 
-import fmpy
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
@@ -20,8 +16,9 @@ from workbench.models.checks import CheckResult, check, is_fit
 from workbench.models.fmu import FMU, CoSimulation
 from workbench.models.trial import Limits
 
-COMPILER = shutil.which("cc") or shutil.which("gcc")
-needs_compiler = pytest.mark.skipif(COMPILER is None, reason="needs a C compiler")
+from .hostile_fmus import compile_library, rewritten
+from .processes import needs_compiler
+
 NAME = "MinimalObserver"
 
 # Enough for a fault that comes with the 40th instance.
@@ -102,18 +99,6 @@ LEAKS = (
 )
 
 
-def variant(original: Path, path: Path, change: Callable[[Path], None]) -> Path:
-    """Copy of an FMU, changed in its unpacked folder."""
-    folder = path.with_suffix("")
-    with zipfile.ZipFile(original) as archive:
-        archive.extractall(folder)
-    change(folder)
-    with zipfile.ZipFile(path, "w") as archive:
-        for file in folder.rglob("*"):
-            archive.write(file, file.relative_to(folder))
-    return path
-
-
 def faulty(original: Path, path: Path, old: str, new: str) -> Path:
     """Copy of an FMU with a fault in its runtime."""
 
@@ -123,12 +108,9 @@ def faulty(original: Path, path: Path, old: str, new: str) -> Path:
         # The adjoint begins as the directional derivative does, but comes after it.
         assert old in text
         source.write_text("#include <unistd.h>\n" + text.replace(old, new, 1))
-        library = folder / "binaries" / fmpy.platform / f"{NAME}{fmpy.sharedLibraryExtension}"
-        files = [folder / "sources" / name for name in ("model.c", "integrator.c", "fmi2.c")]
-        command = [COMPILER, "-std=gnu99", "-shared", "-fPIC", "-fvisibility=hidden", "-w"]
-        subprocess.run([*command, source, *files, "-o", library, "-lm"], check=True)
+        compile_library(folder, NAME)
 
-    return variant(original, path, change)
+    return rewritten(original, path, change)
 
 
 def failed(findings: Iterable[CheckResult]) -> list[str]:
@@ -184,7 +166,6 @@ def test_wrong_derivative_is_named_with_both_values(minimal_path, tmp_path):
     name, old, new = FAULTS["directional derivative has the wrong sign"]
     reason = by_name(check(faulty(minimal_path, tmp_path / "faulty.fmu", old, new), 1), name).reason
     found = re.search(r"is (\S+) by the FMU, (\S+) by differences", reason)
-    assert found is not None
     # Six digits are printed.
     assert float(found[1]) == pytest.approx(-float(found[2]), rel=1e-4)
 
@@ -215,7 +196,7 @@ def test_what_an_fmu_does_not_offer_is_not_applicable(minimal_path, tmp_path):
             text = text.replace(f'{flag}="true"', "")
         file.write_text(text)
 
-    findings = check(variant(minimal_path, tmp_path / "bare.fmu", restrict), FEW)
+    findings = check(rewritten(minimal_path, tmp_path / "bare.fmu", restrict), FEW)
     reasons = {f.name: f.reason for f in findings if f.passed is None}
     assert is_fit(findings)
     assert reasons == {
@@ -236,7 +217,7 @@ def co_simulation_only(minimal_path, tmp_path) -> Path:
         text = file.read_text()
         file.write_text(re.sub(r"<ModelExchange.*</ModelExchange>", "", text, flags=re.DOTALL))
 
-    return variant(minimal_path, tmp_path / "slave.fmu", restrict)
+    return rewritten(minimal_path, tmp_path / "slave.fmu", restrict)
 
 
 def test_fmu_without_model_exchange_is_refused(co_simulation_only):

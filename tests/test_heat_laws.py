@@ -25,7 +25,6 @@ LONGEST = 40.0  # [s]
 
 @pytest.fixture(scope="module")
 def library(system) -> Library:
-    assert system.library is not None
     return read_library(system.library)
 
 
@@ -62,7 +61,6 @@ def test_friction_may_depend_on_the_heat_it_makes_kept_or_lost(pads):
     # From heat that a stop keeps to heat of which most is gone at its end.
     assert set(found) == {0.0, 10.0 * LONGEST, 3.0 * LONGEST, LONGEST}
     for one in found.values():
-        assert one.law.influence is not None
         assert [part.name for part in one.law.influence.factors] == ["Fperp", "v", "mu"]
 
 
@@ -90,7 +88,6 @@ def test_the_class_of_a_law_holds_the_heat_that_was_looked_at(
         (recording,) = simulations.recordings
     moving = slice(0, int(np.flatnonzero(recording.told)[-1]))
     *seen, held = table[moving].T
-    assert law.law.influence is not None
     course = dict(zip(names, seen, strict=True))
     heat = law.law.influence.course(pads, course, recording.time[moving])
     assert heat.max() > 1e6  # of a stop from 120 km/h; [J]

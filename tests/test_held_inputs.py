@@ -40,21 +40,12 @@ sample_time = "1 s"
 [models]
 observer = { class = "Observer" }
 
-[inputs.q]
-unit = "m3/s"
-noise = "0 m3/s"
-scale = "1e-3 m3/s"
-held = true
+[inputs]
+q = { unit = "m3/s", noise = "0 m3/s", scale = "1e-3 m3/s", held = true }
 
-[outputs.V]
-unit = "m3"
-noise = "1e-5 m3"
-scale = "0.01 m3"
-
-[outputs.through]
-unit = "m3/s"
-noise = "1e-6 m3/s"
-scale = "1e-3 m3/s"
+[outputs]
+V = { unit = "m3", noise = "1e-5 m3", scale = "0.01 m3" }
+through = { unit = "m3/s", noise = "1e-6 m3/s", scale = "1e-3 m3/s" }
 
 [estimated.leak]
 correction = "dl"

@@ -63,10 +63,7 @@ design.inputs = { heater = "0.3 K/s" }
 [conditions.cover]
 choices = ["on", "off"]
 lasts = "100 s"
-
-[conditions.cover.parameters]
-on = { rate = 0.02 }
-off = { rate = 0.05 }
+parameters = { on = { rate = 0.02 }, off = { rate = 0.05 } }
 """
 RATES, STEP, NOISE, WALK = (0.02, 0.05), 1.0, 0.2, np.array([0.01, 0.002])
 

@@ -294,7 +294,6 @@ def test_a_channel_that_judges_is_named_and_not_dropped_in_silence(tmp_path, sys
 )
 def test_units_of_workshops_are_known(unit, si, factor):
     found = conversion(spelled(f"[{unit}]"), si)
-    assert found is not None
     assert found.factor == pytest.approx(factor, rel=1e-15)
     assert found.zero == 0.0
 

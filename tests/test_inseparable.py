@@ -41,15 +41,11 @@ sample_time = "1 s"
 [models]
 observer = { class = "Observer" }
 
-[inputs.P]
-unit = "W"
-noise = "500 W"
-scale = "2e5 W"
+[inputs]
+P = { unit = "W", noise = "500 W", scale = "2e5 W" }
 
-[outputs.v]
-unit = "m/s"
-noise = "0.05 m/s"
-scale = "10 m/s"
+[outputs]
+v = { unit = "m/s", noise = "0.05 m/s", scale = "10 m/s" }
 """
 QUANTITIES = {
     "m": 'correction = "dm"\nunit = "kg"\nrange = ["20000 kg", "70000 kg"]\n'

@@ -70,26 +70,23 @@ def said(skews: Mapping[str, float], monkeypatch: pytest.MonkeyPatch) -> LateSig
     monkeypatch.setattr(timing, "fitted", lambda fit, start, active: model(0.0, active))
     monkeypatch.setattr(timing, "replace", lambda point, **changes: point)
     nominal = model(1e6)
-    return by_themselves(fit, nominal, nominal, clean=False)  # type: ignore[arg-type]
+    return by_themselves(fit, nominal, nominal, clean=False)
 
 
 def test_one_late_signal_is_named_with_its_time(monkeypatch):
     """Six microseconds are a hundredth of a sample, however sure they are."""
     found = said({"u": -6e-6, "w": 8e-3}, monkeypatch)
-    assert found is not None
     assert found.signals == ("w",)
     assert found.skew == pytest.approx(8e-3)
 
 
 def test_what_all_others_are_early_against_is_late(monkeypatch):
     found = said({"u": -8e-3, "w": -8e-3}, monkeypatch)
-    assert found is not None
     assert (found.signals, found.skew) == (("i",), pytest.approx(8e-3))
 
 
 def test_signals_that_are_late_by_different_times_are_listed(monkeypatch):
     found = said({"u": 3e-3, "v": -2e-3, "w": 8e-3, "x": 5e-3}, monkeypatch)
-    assert found is not None
     assert found.skews == {"u": 3e-3, "v": -2e-3, "w": 8e-3, "x": 5e-3}
     assert found.signals == ("u", "v", "w", "x")
 
@@ -239,7 +236,6 @@ def test_one_late_signal_is_named_and_its_advice_leads_to_the_cause(signal, ms, 
         (tmp_path / name).mkdir()
     outcome = diagnosis({signal: ms}, tmp_path / "as it was")
     late = outcome.diagnosis.late
-    assert late is not None
     assert outcome.to_dict()["late"]["signals"] == (signal,)
     assert late.skew == pytest.approx(1e-3 * ms, abs=1e-4)  # a tenth of a sample
     assert f'add own = ["{signal}"] to [loggers]' in outcome.sentence

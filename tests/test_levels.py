@@ -152,7 +152,7 @@ def test_a_free_run_is_free_whatever_noise_an_input_declares(tmp_path):
     for name, noise in (("exact", "0 W"), ("noisy", "5 W")):
         folder = tmp_path / name
         file = SYSTEM.format(sensor="").replace('noise = "0 W"', f'noise = "{noise}"')
-        file = file.replace('[states.Tc]\nspread = "30 K"\n', "")
+        file = file.replace('[states]\nTc = { spread = "30 K" }\n', "")
         of = declare(folder, LIBRARY, file)
         outcome = diagnosed(of, cases(of, frames[:1]), folder, cases(of, frames)[1:])
         free.append([error.free_run[0] for error in outcome.errors])

@@ -313,11 +313,9 @@ def test_the_first_proposal_parts_what_the_recordings_before_did_not(
 
 def test_what_is_beside_the_best_of_a_fraction_is_tried_too(block, undecided, monkeypatch):
     monkeypatch.setattr(candidates, "_GRID", 1)
-    assert block.experiments is not None
     knob = FurtherSetting("knob", "a knob", "1", (Setting(0.0, "0"), Setting(1.0, "1")))
     asked = replace(block.experiments, further=(*block.experiments.further, knob))
     assert len(settings_fraction(asked)) == 1
-    assert undecided.rivals is not None
     found = next_stop(replace(block, experiments=asked), undecided.rivals, ALONE)
     turned = {one.prediction.candidate.settings["knob"].value for one in found.tried}
     assert turned == {0.0, 1.0}
@@ -347,7 +345,6 @@ def test_the_separation_is_what_recordings_then_show(block, mild, proposed):
 def test_a_rival_cannot_use_what_its_recordings_so_far_hold(block, undecided, proposed):
     """States at the start of recordings that are made: free, as sure as they were, and known."""
     rivals = undecided.rivals
-    assert rivals is not None
     apart = []
     for furthest in (np.inf, rivals.models[0].recordings[0].furthest[0], 0.0):
         models = [
@@ -370,7 +367,6 @@ def test_a_rival_cannot_use_what_its_recordings_so_far_hold(block, undecided, pr
 
 def test_each_experiment_is_drawn_as_often(block):
     """Seven profiles in 7000 draws: chi-squared of six degrees of freedom, one in a thousand."""
-    assert block.experiments is not None
     rng = np.random.default_rng(8)
     (first,) = all_settings(block.experiments)
     every = [first, *other_profiles(block.experiments, first)]
@@ -389,7 +385,6 @@ def test_the_cost_is_what_the_file_says(proposed):
 def test_of_a_single_cause_the_deviation_of_its_size_falls_as_predicted(
     block, mild, undecided, tmp_path
 ):
-    assert undecided.rivals is not None
     alone = replace(undecided.rivals, models=undecided.rivals.models[:1])
     found = next_stop(block, alone, ALONE)
     deviations = [one.prediction.precision[1] for one in found.tried]
@@ -397,14 +392,12 @@ def test_of_a_single_cause_the_deviation_of_its_size_falls_as_predicted(
     assert "times as sure" in found.sentence
     both = [*mild, *named_anew(made(block, found.tried[0]))]
     rivals = diagnosed(block, both, tmp_path).rivals
-    assert rivals is not None
     shown = rivals.models[0].information[0, 0] ** -0.5
     # Of information that adds up, the draw of noise moves the derivatives by little.
     assert shown == pytest.approx(deviations[0], rel=0.2)
 
 
 def test_tolerances_of_recordings_so_far_are_where_they_do_best(undecided):
-    assert undecided.rivals is not None
     for model in undecided.rivals.models:
         still = np.zeros(len(model.sizes) + len(model.levels))
         for recording in model.recordings:
@@ -412,7 +405,6 @@ def test_tolerances_of_recordings_so_far_are_where_they_do_best(undecided):
 
 
 def test_rivals_are_read_as_they_were_written(undecided):
-    assert undecided.rivals is not None
     said = json.loads(json.dumps(undecided.rivals.to_dict()))
     assert read_rivals(said).to_dict() == undecided.rivals.to_dict()
 
@@ -454,7 +446,6 @@ def test_what_is_no_undecided_diagnosis_is_refused(summary, said, tmp_path, caps
 
 
 def test_a_system_that_does_not_say_what_may_be_varied_is_refused(block, undecided):
-    assert undecided.rivals is not None
     silent = replace(block, experiments=None)
     with pytest.raises(InputError, match=r"no table \[next\]"):
         next_stop(silent, undecided.rivals, ALONE)

@@ -27,7 +27,6 @@ def test_a_faster_stop_is_proposed_and_parts_the_radii(system, tmp_path):
     build_everything(system, effects, all_effects)
     light = read_cases([RADIUS / "01_dry_80_1.5"], system)
     _, rivals = rivals_of_set(system, effects, all_effects, light)
-    assert rivals is not None
     assert {model.effects for model in rivals.models} == {("WheelRadius",), ("RollerRadius",)}
     asked = next_stop(system, rivals, ALONE)
     assert "initial speed 160 km/h" in asked.tried[0].text

@@ -37,7 +37,6 @@ PLANTED = plant(CONSTANT_PADS, ["pressure_exponent=0.04"])
 @pytest.fixture(scope="module")
 def one_speed(system) -> System:
     """The rig where only the pressure may be varied."""
-    assert system.experiments is not None
     asked = system.experiments
     first = {name: values[:1] for name, values in asked.conditions.items()}
     further = tuple(replace(setting, values=setting.values[:1]) for setting in asked.further)
@@ -104,7 +103,6 @@ def test_full_fits_end_within_half_a_deviation_of_where_more_rounds_lead(
 ):
     """Of some stops: what is left moves by half of what noise moves it by, at most."""
     rivals = undecided.rivals
-    assert rivals is not None
     plan = [one.prediction.candidate for one in proposed.tried[1::2]]
     ended = predict_experiments(one_speed, rivals, plan, workers=1)
     least = Fit.least
@@ -123,7 +121,6 @@ def test_full_fits_end_within_half_a_deviation_of_where_more_rounds_lead(
 def test_what_no_stop_parts_is_said_and_the_sensor_that_would(one_speed, tmp_path):
     """A load cell and a torque that read too much are told apart by neither pressure nor time."""
     asked = one_speed.experiments
-    assert asked is not None
     steps = tuple(
         replace(given, profiles=("step",)) if given in asked.varied else given
         for given in asked.inputs
@@ -146,7 +143,6 @@ def test_what_no_stop_parts_is_said_and_the_sensor_that_would(one_speed, tmp_pat
 
 def other_surface(system: System, rail: str, imitated: float) -> Experiment:
     """A stop from 160 km/h with a staircase, on a rail, with an inertia that the drive imitates."""
-    assert system.experiments is not None
     fixed: dict[str, object] = {"initial_speed": 160.0 / 3.6, "direction": 1}
     fixed |= {"wheel_rail": rail, "wheel_load": 80e3, "imitated": imitated}
     fixed |= {"disc_temperature": 333.15}
@@ -165,7 +161,6 @@ def of_two(
     effects = plant(CONSTANT_PADS, [planted])
     cases = two_stops(system, effects, folder / "stops")
     found = wb.diagnose(system, cases, effects=names, out=folder, workers=1, report=lambda _: None)
-    assert found.rivals is not None
     assert [model.effects for model in found.rivals.models] in (
         [(a,), (b,)] for a, b in permutations(names)
     )
@@ -213,7 +208,6 @@ def test_what_derivatives_alone_promise_is_not_proposed(system, tmp_path):
 def test_what_one_rival_alone_takes_beyond_the_claims_is_proposed_last(system, tmp_path):
     """On a light axle and a wet rail less load lets the wheel slide, a softer contact does not."""
     asked = system.experiments
-    assert asked is not None
     light = {**asked.conditions, "wheel_load": (Setting(60e3, "60 kN"),)}
     rig = replace(system, experiments=replace(asked, conditions=light))
     names = ["CreepStiffness", "WheelLoad"]

@@ -157,7 +157,6 @@ def test_a_wrong_radius_does_not_lead_the_smoother_astray(made, dry_case, radius
     errors = {}
     for name in ("ekf", "smoother"):
         judged = score(wrong, replay(wrong, made[name]), WHEELSET)
-        assert judged.nrmse is not None
         errors[name] = judged.nrmse
     assert errors["smoother"] < 1.1 * errors["ekf"]
     assert errors["smoother"] < 0.0025  # no more than twice that of the right radius
@@ -175,7 +174,6 @@ def test_every_observer_recovers_friction_and_force(stop, made, name):
     error = low_pass(case.time, run.signal("muDC") - truth, 5.0)[settled]
     assert np.abs(error).max() < 0.01
     judged = score(case, run, WHEELSET)
-    assert judged.nrmse is not None
     assert judged.nrmse < 0.02
 
 
@@ -252,7 +250,6 @@ def test_observers_run_on_the_full_model_too(fmu, stop, root, name):
         kind = estimators_of(WHEELSET)[name]
         estimator = kind(full, WHEELSET, kind.default_gains(full, WHEELSET))
         judged = score(case, replay(case, estimator), WHEELSET)
-        assert judged.nrmse is not None
         assert judged.nrmse < 0.02
 
 

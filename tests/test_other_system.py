@@ -55,24 +55,12 @@ sample_time = "0.5 s"
 [models]
 observer = { class = "Vessel", fmu = "Vessel.fmu" }
 
-[inputs.P]
-unit = "W"
-shown = "kW"
-label = "heating power"
-noise = "1 W"
-scale = "1 kW"
+[inputs]
+P = { unit = "W", shown = "kW", label = "heating power", noise = "1 W", scale = "1 kW" }
 
-[outputs.TSkin]
-unit = "K"
-label = "temperature of the skin"
-noise = "0.02 K"
-scale = "50 K"
-
-[outputs.T]
-unit = "K"
-label = "temperature of the water"
-noise = "0.02 K"
-scale = "50 K"
+[outputs]
+TSkin = { unit = "K", label = "temperature of the skin", noise = "0.02 K", scale = "50 K" }
+T = { unit = "K", label = "temperature of the water", noise = "0.02 K", scale = "50 K" }
 
 [estimated.G]
 correction = "dG"
@@ -84,9 +72,7 @@ acts_on = "T"
 
 [points]
 settles = "2000 s"
-
-[points.design]
-inputs = { P = "500 W" }
+design = { inputs = { P = "500 W" } }
 
 [objective]
 judged = "T"

@@ -1,7 +1,6 @@
 """A machine comes as a plugin of a distribution of its own: system, command, estimator, gains."""
 
 import json
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -11,6 +10,8 @@ import pytest
 from workbench.errors import InputError
 from workbench.recordings.datasets import published
 from workbench.system.plugins import Plugin, find_plugin
+
+from .processes import python
 
 PROJECT = """
 [build-system]
@@ -24,8 +25,8 @@ version = "1.0"
 [project.entry-points."workbench.machines"]
 spinning = "spinning:PLUGIN"
 
-[tool.hatch.build.targets.wheel]
-only-include = ["spinning"]
+[tool.hatch.build.targets]
+wheel = { only-include = ["spinning"] }
 """
 SYSTEM = """
 name = "spinning"
@@ -34,22 +35,14 @@ plugin = "spinning"
 sample_time = "5 ms"
 [models]
 observer = {{ class = "MinimalObserver", fmu = "{fmu}" }}
-[inputs.pB]
-unit = "Pa"
-noise = "5 mbar"
-scale = "4 bar"
-[inputs.tauR]
-unit = "N.m"
-noise = "40 N.m"
-scale = "10 kN.m"
-[outputs.omegaW]
-unit = "rad/s"
-noise = "0.002 rad/s"
-scale = "60 rad/s"
-[outputs.omegaR]
-unit = "rad/s"
-noise = "0.003 rad/s"
-scale = "60 rad/s"
+[inputs]
+pB = {{ unit = "Pa", noise = "5 mbar", scale = "4 bar" }}
+tauR = {{ unit = "N.m", noise = "40 N.m", scale = "10 kN.m" }}
+
+[outputs]
+omegaW = {{ unit = "rad/s", noise = "0.002 rad/s", scale = "60 rad/s" }}
+omegaR = {{ unit = "rad/s", noise = "0.003 rad/s", scale = "60 rad/s" }}
+
 [objective]
 weights = {{ omegaW = 1.0 }}
 """
@@ -107,14 +100,8 @@ def installed(root, tmp_path_factory) -> Path:
 
 def said(*command: str, beside: Path) -> str:
     """What Python prints, with a folder of distributions beside those that are installed."""
-    run = subprocess.run(
-        [sys.executable, *command],
-        env={**os.environ, "PYTHONPATH": str(beside)},
-        capture_output=True,
-        text=True,
-        check=True,
-        timeout=120,
-    )
+    run = python(*command, PYTHONPATH=str(beside))
+    assert run.returncode == 0, run.stderr
     return run.stdout + run.stderr
 
 

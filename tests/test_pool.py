@@ -8,7 +8,7 @@ import sys
 import time
 from collections.abc import Iterator
 from concurrent.futures import Future, wait
-from contextlib import contextmanager, nullcontext
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
 
 import numpy as np
@@ -18,9 +18,7 @@ from threadpoolctl import threadpool_info
 from workbench.errors import InputError, WorkerError
 from workbench.runtime.pool import Pool
 
-from .processes import comes_true, ending, living
-
-ROOT = Path(__file__).parents[1]
+from .processes import LONGEST, comes_true, living, python, running
 
 
 def pid(state: object) -> int:
@@ -92,7 +90,7 @@ def test_a_failed_preparation_is_raised_by_every_task():
     with Pool(2, open, "/nowhere/at/all") as pool:
         for _ in range(3):
             with pytest.raises(FileNotFoundError, match="nowhere"):
-                pool.submit(pid).result(timeout=60.0)
+                pool.submit(pid).result(timeout=LONGEST)
 
 
 def test_a_task_whose_worker_dies_is_tried_again(tmp_path):
@@ -149,16 +147,7 @@ def test_leaving_a_pool_ends_what_is_under_way_and_drops_what_waits():
     with pytest.raises(WorkerError, match="closed"):
         tasks[0].result()
     assert all(task.cancelled() for task in tasks[1:])
-    with pytest.raises(ProcessLookupError):
-        _until_gone(worker)
-
-
-def _until_gone(process: int) -> None:
-    """Raise ProcessLookupError as soon as a process is gone."""
-    end = time.monotonic() + 30.0
-    while time.monotonic() < end:
-        os.kill(process, 0)
-        time.sleep(0.01)
+    assert comes_true(lambda: not Path(f"/proc/{worker}").exists())
 
 
 def test_finishing_keeps_what_is_under_way_and_drops_what_waits():
@@ -220,23 +209,14 @@ with Pool(2, nullcontext, 600.0) as pool:
 """
 
 
-def _started(program: str, folder: Path) -> "subprocess.Popen[str]":
-    path = folder / "program.py"
-    path.write_text(program)
-    return subprocess.Popen(
-        [sys.executable, str(path)],
-        cwd=folder,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-    )
+def started(program: str, folder: Path) -> "AbstractContextManager[subprocess.Popen[str]]":
+    (folder / "program.py").write_text(program)
+    return running("program.py", cwd=folder)
 
 
 def test_a_script_needs_no_guard(tmp_path):
-    with ending(_started(PLAIN, tmp_path)) as program:
-        out, errors = program.communicate(timeout=120)
+    with started(PLAIN, tmp_path) as program:
+        out, errors = program.communicate(timeout=LONGEST)
     assert out == "program\n[3.0, 9.0]\n"
     assert errors == ""
     assert program.returncode == 0
@@ -245,32 +225,22 @@ def test_a_script_needs_no_guard(tmp_path):
 def test_a_program_from_the_prompt_needs_no_guard(tmp_path):
     """As in a notebook, where the program is no file."""
     program = PLAIN.replace('Path(__file__).exists() and __name__ == "__main__"', "True")
-    run = subprocess.run(
-        [sys.executable, "-c", program],
-        cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=True,
-    )
+    run = python("-c", program, cwd=tmp_path)
     assert (run.stdout, run.stderr) == ("program\n[3.0, 9.0]\n", "")
 
 
 @pytest.mark.usefixtures("ctrl_c")
 def test_ctrl_c_is_the_programs_alone_and_ends_the_pool(tmp_path):
-    with ending(_started(WAITING, tmp_path)) as program:
-        assert program.stdout is not None
+    with started(WAITING, tmp_path) as program:
         assert program.stdout.readline() == "under way\n"
         os.killpg(program.pid, signal.SIGINT)  # as a terminal does: to all processes of the group
-        out, errors = program.communicate(timeout=60)
+        out, errors = program.communicate(timeout=LONGEST)
     assert (out, errors, program.returncode) == ("interrupted\n", "", 0)
     assert comes_true(lambda: not living(program.pid))
 
 
 def test_workers_end_with_a_program_that_is_killed(tmp_path):
-    with ending(_started(WAITING, tmp_path)) as program:
-        assert program.stdout is not None
+    with started(WAITING, tmp_path) as program:
         assert program.stdout.readline() == "under way\n"
         assert len(living(program.pid)) > 2
         program.kill()

@@ -2,9 +2,6 @@
 
 import dataclasses
 import json
-import os
-import subprocess
-import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -50,10 +47,9 @@ from workbench.studies.power.statistics import intervals_cover, named_all, named
 from workbench.system.registry import load_system
 
 from .page_rules import check_page
-from .processes import comes_true, living
+from .processes import ROOT, comes_true, living, running
 from .schemas import check
 
-ROOT = Path(__file__).parents[1]
 REFERENCE = ROOT / "fmus" / "fmi2" / "Reference.fmu"
 SYSTEM = load_system("wheelset")
 REPERTOIRE = Repertoire(PLANTABLE, library_effects(SYSTEM))
@@ -357,16 +353,10 @@ def run(out: Path, report: Callable[[str], None]) -> tuple[list[SetVerdict], boo
 def test_killed_run_leaves_no_process_and_goes_on_where_it_was(tmp_path):
     """Two short stops: a load cell's gain of 1.6 % is plain, one of 0.05 % is not worth a word."""
     script = (
-        "import sys; from pathlib import Path; sys.path.insert(0, sys.argv[1]); "
-        "from tests import test_power; "
-        "test_power.run(Path(sys.argv[2]), lambda line: print(line, flush=True))"
+        "import sys; from pathlib import Path; from tests import test_power; "
+        "test_power.run(Path(sys.argv[1]), lambda line: print(line, flush=True))"
     )
-    command = [sys.executable, "-c", script, str(ROOT), str(tmp_path)]
-    environment = {**os.environ, "TMPDIR": str(tmp_path)}
-    with subprocess.Popen(
-        command, stdout=subprocess.PIPE, text=True, start_new_session=True, env=environment
-    ) as process:
-        assert process.stdout is not None
+    with running("-c", script, tmp_path, TMPDIR=str(tmp_path)) as process:
         assert "clean" in process.stdout.readline()
         # The next set is under way in a worker.
         assert comes_true(lambda: len(living(process.pid)) > 1)

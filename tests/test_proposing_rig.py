@@ -38,7 +38,6 @@ def test_pads_that_bed_in_are_told_by_the_time_since_they_touch(system, tmp_path
     found = wb.propose(before, out=tmp_path / "b", **quiet)
     (law,) = found.laws
     form = found.forms[law.effect.name]
-    assert form.law.influence is not None
     assert (form.law.influence.kind, form.form.name) == ("since", "Saturation")
     slots = {form.law.place.slot.name for form in found.forms.values()}
     assert "padFriction" in slots
@@ -55,7 +54,6 @@ def test_pads_that_bed_in_are_told_by_the_time_since_they_touch(system, tmp_path
     problem = Problem(system, fresh, library, effects)
     error = function_error(problem, known, found, bedding)
     if form.law.place.slot.name == "padFriction":
-        assert error is not None
         assert error < 0.15
     else:
         assert error is None

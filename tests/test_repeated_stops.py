@@ -68,7 +68,6 @@ def test_fade_of_the_model_begins_there_too(tmp_path):
 @pytest.fixture(scope="module")
 def coasting() -> Experiment:
     """From 120 km/h with the drive off: braked for five seconds, and released."""
-    assert SYSTEM.experiments is not None
     fixed = {"initial_speed": 120.0 / 3.6, "direction": 1, "wheel_rail": "dry", "imitated": 0.0}
     one = next(
         one
@@ -107,7 +106,6 @@ def test_the_rig_coasts_down_by_its_losses_alone(coasting):
 
 
 def test_a_coast_down_counts_from_its_brake_on(coasting):
-    assert SYSTEM.experiments is not None
     with CoSimulation(model_path(SYSTEM, "observer")) as model:
         case = predict_recording(model, SYSTEM, coasting, {}, ("Fx",), 1)
     assert case.time[-1] == pytest.approx(SYSTEM.experiments.lasts)

@@ -21,6 +21,7 @@ from workbench.observers.gains import matrix_names
 from workbench.observers.report import standings, usual_error
 
 from .page_rules import check_page
+from .processes import LONGEST, python
 
 CASES = ("02_dry_100_2.7", "07_wet_80_1.5", "09_wet_160_4.2_wsp")
 FILES = (".csv", ".png", ".svg")
@@ -406,11 +407,8 @@ def test_legend_hides_an_estimator_everywhere(browser):
 
 
 def test_live_without_a_display_gives_status_2_and_a_message(root, tmp_path):
-    headless = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
-    command = [sys.executable, "-m", "workbench", "simulate", f"cases/{CASES[0]}", "--live"]
-    run = subprocess.run(
-        [*command, "--out", str(tmp_path)], cwd=root, env=headless, capture_output=True, text=True
-    )
+    command = ("-m", "workbench", "simulate", f"cases/{CASES[0]}", "--live", "--out", tmp_path)
+    run = python(*command, DISPLAY=None, WAYLAND_DISPLAY=None)
     assert run.returncode == 2
     assert "--live: found no window" in run.stderr
     assert "run without --live" in run.stderr
@@ -452,7 +450,7 @@ def test_live_window_draws_whole_runs_and_may_be_closed(root):
         env=environment,
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=LONGEST,
     )
     assert run.returncode == 0, run.stderr
     expected = [("measured", True), ("open loop", True), ("direct inversion", True)]

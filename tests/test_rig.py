@@ -5,7 +5,6 @@ import os
 import platform
 import re
 import signal
-import subprocess
 import sys
 from functools import cache
 from pathlib import Path
@@ -34,9 +33,8 @@ from workbench.recordings.case import read_case, read_cases
 from workbench.studies.design import with_sensor
 from workbench.system.registry import load_system
 
-from .processes import ending
+from .processes import LONGEST, ROOT, running
 
-ROOT = Path(__file__).parents[1]
 REFERENCE = ROOT / "fmus" / "fmi2" / "Reference.fmu"
 CASES = ROOT / "cases"  # of the rig with this seed, which is asked below and in `test_rig_cases`
 SEED = 1
@@ -227,7 +225,6 @@ def test_a_stop_that_is_proposed_follows_its_profile(tmp_path):
 
 
 def test_a_stop_that_is_proposed_has_the_load_and_the_sensors_that_it_asks_for():
-    assert SYSTEM.experiments is not None
     asked = PROPOSED | {"conditions": {**PROPOSED["conditions"], "wheel_load": 60e3}}
     (surface,) = (sensor for sensor in SYSTEM.experiments.sensors if sensor.name == "surface")
     usual, light = stop_of(PROPOSED, SYSTEM), stop_of(asked, with_sensor(SYSTEM, surface))
@@ -410,20 +407,11 @@ def test_a_measured_recording_is_never_overwritten(tmp_path):
 
 @pytest.mark.usefixtures("ctrl_c")
 def test_interrupt_keeps_finished_cases(tmp_path):
-    command = [sys.executable, "-m", "workbench", "rig", "--workers", "1", "--out", str(tmp_path)]
-    process = subprocess.Popen(
-        command,
-        cwd=ROOT,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-    )
-    with ending(process):
-        assert process.stderr is not None
+    command = ("-m", "workbench", "rig", "--workers", "1", "--out", tmp_path)
+    with running(*command) as process:
         first = process.stderr.readline()
         os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to all processes of the group
-        rest, errors = process.communicate(timeout=30)
+        rest, errors = process.communicate(timeout=LONGEST)
     assert first.startswith("[  1/14]")
     assert process.returncode == 130
     assert "Traceback" not in errors

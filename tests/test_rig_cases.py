@@ -36,7 +36,6 @@ def test_cases_are_the_standard_stops_of_the_rig():
 def test_makefile_and_this_file_make_the_same_cases():
     """`make cases` needs the command that is tried below."""
     recipe = re.search(r"^cases:.*\n\t(.+)$", (ROOT / "Makefile").read_text(), re.MULTILINE)
-    assert recipe is not None
     assert recipe[1] == "$(RUN) -m workbench rig --seed 1 --truth-every 4 --out cases"
 
 

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from .processes import needs_compiler
 from .runtime_instances import (
     DX1,
     DX2,
@@ -28,7 +29,6 @@ from .runtime_instances import (
     Fmu,
     K,
     U,
-    needs_compiler,
     oscillate,
 )
 

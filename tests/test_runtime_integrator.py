@@ -11,6 +11,7 @@ from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
+from .processes import needs_compiler
 from .runtime_instances import (
     TIME,
     VERSIONS,
@@ -19,7 +20,6 @@ from .runtime_instances import (
     Fmu,
     U,
     compile_model,
-    needs_compiler,
     oscillate,
 )
 

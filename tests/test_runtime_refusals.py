@@ -9,6 +9,7 @@ import pytest
 from fmpy.fmi1 import FMICallException
 from numpy.testing import assert_allclose
 
+from .processes import needs_compiler
 from .runtime_instances import (
     DISCARD,
     DX1,
@@ -22,7 +23,6 @@ from .runtime_instances import (
     Fmu,
     K,
     U,
-    needs_compiler,
 )
 
 pytestmark = needs_compiler

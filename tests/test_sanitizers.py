@@ -1,15 +1,15 @@
 """The C inside the FMUs under the address and undefined-behaviour sanitizers."""
 
-import shutil
 import subprocess
 import zipfile
 from pathlib import Path
 
 import pytest
 
+from .processes import COMPILER
+
 ROOT = Path(__file__).parent.parent
 PROGRAMS = Path(__file__).parent / "runtime"
-COMPILER = shutil.which("cc") or shutil.which("gcc")
 SANITIZE = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 
 

@@ -55,6 +55,5 @@ def test_a_law_that_stands_for_two_gives_way_to_them(tmp_path):
     assert set(sizes) == {"Draught", "Radiation"}
     assert sizes["Draught"]["G"].low <= G <= sizes["Draught"]["G"].high
     assert sizes["Radiation"]["s"].low <= S <= sizes["Radiation"]["s"].high
-    assert found.gain is not None
     # Block means of noise keep their size; of some sixty a recording, four sigma are a third.
     assert found.gain.after == pytest.approx(1.0, abs=0.33)

@@ -38,15 +38,11 @@ reported = ["body", "water"]
 [models]
 observer = {{ class = "Observer" }}
 
-[inputs.P]
-unit = "W"
-noise = "1 W"
-scale = "1000 W"
+[inputs]
+P = {{ unit = "W", noise = "1 W", scale = "1000 W" }}
 
-[outputs.reading]
-unit = "K"
-noise = "0.1 K"
-scale = "50 K"
+[outputs]
+reading = {{ unit = "K", noise = "0.1 K", scale = "50 K" }}
 
 [estimated.loss]
 correction = "dloss"

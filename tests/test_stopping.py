@@ -55,7 +55,6 @@ def train() -> System:
 
 @pytest.fixture(scope="module")
 def stopping(train) -> Stopping:
-    assert train.stopping is not None
     return train.stopping
 
 
@@ -123,7 +122,6 @@ def test_a_stop_is_that_of_the_models_own_integrator(train, stopping, forecaster
     stop = asked_stop({"speed": "100 km/h", "gradient": -0.005}, train, stopping)
     found = forecaster.stop(stop, {})
     path, h = train.model(OBSERVER).path, 0.02
-    assert path is not None
     with CoSimulation(path) as model:
         speed = stop.asked["speed"]
         start = {f"omega{axle}": speed / 0.46 for axle in range(1, 9)}

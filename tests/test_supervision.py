@@ -4,13 +4,13 @@ import fcntl
 import json
 import os
 import signal
-import subprocess
 import sys
 import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import closing, contextmanager, suppress
 from pathlib import Path
+from subprocess import Popen
 
 import pytest
 
@@ -18,8 +18,8 @@ from workbench.models.fmu import FMU
 from workbench.runtime import files
 from workbench.runtime.files import TemporaryFolder
 
-from .hostile_fmus import ROOT, needs_compiler, running, workbench
-from .processes import comes_true, living
+from .hostile_fmus import own_folder, workbench
+from .processes import LONGEST, ROOT, comes_true, living, needs_compiler, python, running
 
 CASE = ROOT / "cases" / "01_dry_80_1.5"
 linux_only = pytest.mark.skipif(sys.platform != "linux", reason="Landlock and seccomp are Linux's")
@@ -104,15 +104,7 @@ sys.exit(supervised(work))
 def test_who_asks_for_an_end_while_a_module_is_imported_sees_no_traceback(request_, status, home):
     """Python makes another error of what comes while a class names its members."""
     (home / "work.py").write_text(IN_A_CLASS.format(request=request_))
-    command = [sys.executable, "work.py"]
-    run = subprocess.run(
-        command,
-        cwd=home,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    run = python("work.py", cwd=home)
     assert (run.returncode, run.stderr) == (status, "")
 
 
@@ -138,18 +130,16 @@ sys.exit(supervised(lambda: 0))
 @pytest.mark.parametrize("which", ["_held", "_remove"])
 def test_who_asks_for_an_end_while_temporary_files_are_made_or_removed_leaves_none(which, home):
     (home / "work.py").write_text(BESIDE_FILES.format(which=which))
-    (home / "tmp").mkdir()
-    environment = {**os.environ, "PYTHONPATH": str(ROOT), "TMPDIR": str(home / "tmp")}
-    subprocess.run([sys.executable, "work.py"], cwd=home, env=environment, check=False)
+    python("work.py", **own_folder(home))
     assert left(home) == []
 
 
 @contextmanager
-def waiting(folder: Path, hostile_path: Path) -> "Iterator[subprocess.Popen[str]]":
+def waiting(folder: Path, hostile_path: Path) -> "Iterator[Popen[str]]":
     """A check that waits for a model, in the middle of its work."""
     plan = {"HOSTILE": "wait fmi2Instantiate 10", "WORKBENCH_TRIAL": "answer=300"}
-    with running(folder, "fmu", "check", hostile_path, **plan) as command:
-        assert command.stdout is not None
+    check = ("-m", "workbench", "fmu", "check", hostile_path)
+    with running(*check, **own_folder(folder), **plan) as command:
         while "serialised" not in (line := command.stdout.readline()):
             assert line, command.communicate()
         assert comes_true(lambda: len(left(folder)) > 0)
@@ -164,7 +154,7 @@ def waiting(folder: Path, hostile_path: Path) -> "Iterator[subprocess.Popen[str]
 def test_a_command_that_is_asked_to_end_leaves_nothing(number, status, hostile_path, home):
     with waiting(home, hostile_path) as command:
         command.send_signal(number)
-        command.communicate(timeout=60)
+        command.communicate(timeout=LONGEST)
     assert command.returncode == status
     assert left(home) == []
     assert comes_true(lambda: not living(command.pid))
@@ -200,15 +190,15 @@ def served(session: int) -> list[int]:
 @pytest.mark.parametrize("victim", [pytest.param("server", marks=pytest.mark.long), "worker"])
 def test_a_command_goes_on_without_a_process_of_its_pool_and_leaves_nothing(victim, home):
     cases = (CASE, ROOT / "cases" / "02_dry_100_2.7")
-    command = ("simulate", *cases, "--estimator", "open_loop", "--out", "out", "--workers", "2")
-    with running(home, *command) as process:
+    command = ("-m", "workbench", "simulate", *cases, "--estimator", "open_loop", "--workers", "2")
+    with running(*command, "--out", "out", **own_folder(home)) as process:
         number = ["server", "worker"].index(victim)
         assert comes_true(lambda: len(served(process.pid)) > number)
         killed = served(process.pid)[number]
         os.kill(killed, signal.SIGSTOP)
         time.sleep(5.0)  # in which it is asked for something, and does not answer
         os.kill(killed, signal.SIGKILL)
-        _, said = process.communicate(timeout=120)
+        _, said = process.communicate(timeout=LONGEST)
     assert process.returncode == 0, said
     assert "Traceback" not in said
     assert left(home) == []
@@ -305,14 +295,6 @@ def test_a_program_that_asks_for_isolation_stays_free_itself(home):
         "open('mine', 'w').close()\n"
         "raise SystemExit(status)"
     )
-    run = subprocess.run(
-        [sys.executable, "-c", program],
-        cwd=home,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-    )
+    run = python("-c", program, cwd=home)
     assert run.returncode == 0, run.stderr
     assert (home / "mine").exists()

@@ -2,7 +2,6 @@
 
 import ctypes
 import math
-import shutil
 import subprocess
 from pathlib import Path
 from typing import NamedTuple
@@ -16,7 +15,8 @@ from workbench.observers.export.translation import Array, Data, Number, Program
 from workbench.observers.export.translation.data import contents
 from workbench.observers.export.translation.values import DOUBLE
 
-COMPILER = shutil.which("cc") or shutil.which("gcc")
+from .processes import COMPILER
+
 HELPERS = Path(__file__).parent.parent / "workbench" / "observers" / "export" / "law.c"
 LENGTH, ROWS, COLUMNS = 5, 3, 4
 _SHARE = 0.25
@@ -28,7 +28,7 @@ MATRIX = Array(DOUBLE, (ROWS, COLUMNS), (COLUMNS, 1), constant=False)
 
 
 @compiled
-def from_the_end(a, m, x):  # type: ignore[no-untyped-def]
+def from_the_end(a, m, x):
     last = -1
     a[last] += m[-1, -2]
     for i in range(-3, 0):
@@ -37,7 +37,7 @@ def from_the_end(a, m, x):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _total(values):  # type: ignore[no-untyped-def]
+def _total(values):
     total = 0.0
     for i in range(values.size):
         total += values[i] * (i + 1)
@@ -45,14 +45,14 @@ def _total(values):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def pieces(a, m, x):  # type: ignore[no-untyped-def]
+def pieces(a, m, x):
     n = int(abs(x))
     found = _total(a[n:]) + 2.0 * _total(a[:n]) + 3.0 * _total(a[-n:]) + 5.0 * _total(a[1:-1])
     return found + 7.0 * _total(m[:, 1]) + 11.0 * _total(m[2, 1:]) + 13.0 * _total(m[:n, 0])
 
 
 @compiled
-def _rank(a, i, j):  # type: ignore[no-untyped-def]
+def _rank(a, i, j):
     """The larger of two elements, where it stands, and how far they are apart."""
     if a[i] > a[j]:
         return i, a[i] - a[j]
@@ -60,7 +60,7 @@ def _rank(a, i, j):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def swaps(a, m, x):  # type: ignore[no-untyped-def]
+def swaps(a, m, x):
     a[0], a[1], a[2] = a[1], a[2], a[0]
     first, second = 1.0, x
     first, second = second, first
@@ -71,7 +71,7 @@ def swaps(a, m, x):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def extremes(a, m, x):  # type: ignore[no-untyped-def]
+def extremes(a, m, x):
     a[0] = min(max(a[0], -_SHARE), _SHARE)
     a[1] = max(np.nan, a[1]) if x > 0.0 else max(a[1], np.nan)
     a[2] = min(np.nan, a[2]) if x > 0.0 else min(a[2], np.nan)
@@ -80,14 +80,14 @@ def extremes(a, m, x):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _note(a, value):  # type: ignore[no-untyped-def]
+def _note(a, value):
     """Write what was asked for behind what was asked for before."""
     a[4] = 10.0 * a[4] + value
     return value
 
 
 @compiled
-def first_that_decides(a, m, x):  # type: ignore[no-untyped-def]
+def first_that_decides(a, m, x):
     a[4] = 0.0
     status = _note(a, 0) or _note(a, 2) or _note(a, 3)
     status = status or _note(a, 4)
@@ -99,7 +99,7 @@ def first_that_decides(a, m, x):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def order_of_calls(a, m, x):  # type: ignore[no-untyped-def]
+def order_of_calls(a, m, x):
     a[4] = 1.0
     found = a[4] + _note(a, 2.0) * a[4] - _note(a, 3.0) / a[4]
     a[0] += _note(a, 4.0)
@@ -109,7 +109,7 @@ def order_of_calls(a, m, x):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def kinds(a, m, x):  # type: ignore[no-untyped-def]
+def kinds(a, m, x):
     total, count, seen = 0, 3, False
     for i in range(LENGTH):
         seen = seen or a[i] > 0.0
@@ -120,7 +120,7 @@ def kinds(a, m, x):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def loops(a, m, x):  # type: ignore[no-untyped-def]
+def loops(a, m, x):
     end, found = 4, 0.0
     for i in range(end):
         end = 1
@@ -141,7 +141,7 @@ def loops(a, m, x):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def choices(a, m, x):  # type: ignore[no-untyped-def]
+def choices(a, m, x):
     sign = -1 if x < 0.0 else 1 if x > 0.0 else 0
     if -1.0 < x <= 1.0:
         part = x
@@ -156,7 +156,7 @@ def choices(a, m, x):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def functions(a, m, x):  # type: ignore[no-untyped-def]
+def functions(a, m, x):
     found = np.sqrt(abs(x)) + np.exp(-x * x) + np.log(1.0 + abs(x)) + math.sin(x) * np.tanh(x)
     gone = np.isnan(x) or not np.isfinite(a[0])
     return np.inf if gone else found + np.arctan2(x, 2.0) + np.floor(x) + np.hypot(x, 1.0)
@@ -215,20 +215,20 @@ def test_c_gives_the_bits_that_compiled_python_gives(library, law, x):
 
 
 @compiled
-def goes_over_an_array(a, m, x):  # type: ignore[no-untyped-def]
+def goes_over_an_array(a, m, x):
     for value in a:
         x += value
     return x
 
 
 @compiled
-def assigns_a_piece(a, m, x):  # type: ignore[no-untyped-def]
+def assigns_a_piece(a, m, x):
     a[1:] = x
     return x
 
 
 @compiled
-def names_an_array_twice(a, m, x):  # type: ignore[no-untyped-def]
+def names_an_array_twice(a, m, x):
     row = m[0]
     if x > 0.0:
         row = m[1]
@@ -236,29 +236,29 @@ def names_an_array_twice(a, m, x):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def uses_a_counter_later(a, m, x):  # type: ignore[no-untyped-def]
+def uses_a_counter_later(a, m, x):
     for i in range(3):
         x += a[i]
     return x + i
 
 
 @compiled
-def has_a_remainder(a, m, x):  # type: ignore[no-untyped-def]
+def has_a_remainder(a, m, x):
     return x % 2.0
 
 
 @compiled
-def adds_arrays(a, m, x):  # type: ignore[no-untyped-def]
+def adds_arrays(a, m, x):
     return (a + a)[0]
 
 
 @compiled
-def calls_numpy(a, m, x):  # type: ignore[no-untyped-def]
+def calls_numpy(a, m, x):
     return np.sum(a)
 
 
 @compiled
-def calls_itself(a, m, x):  # type: ignore[no-untyped-def]
+def calls_itself(a, m, x):
     return x if x < 1.0 else calls_itself(a, m, x - 1.0)
 
 

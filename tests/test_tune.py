@@ -1,14 +1,10 @@
 """`tune` as a user runs it: what it writes, what it reads back, and what it survives."""
 
 import json
-import subprocess
-import sys
-import time
 import tomllib
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
 from numpy.testing import assert_array_equal
 
@@ -22,9 +18,8 @@ from workbench.system.registry import open_model
 from workbench.system.system import System
 from workbench.tuning import tunable
 
-CASES = ("03_dry_120_3.6", "08_wet_120_3.6")
-SAMPLES = slice(700, 1900)  # 6 s: first pressure and the beginning of the stop
-
+from .processes import comes_true, living, running
+from .recordings import write_beginnings
 
 # --- gains.toml ---
 
@@ -90,14 +85,7 @@ def test_a_wrong_file_of_gains_is_refused(system, tmp_path, text, match):
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory, root) -> Path:
     """Two short recordings."""
-    cases = tmp_path_factory.mktemp("cases")
-    for name in CASES:
-        (cases / name).mkdir()
-        source = root / "cases" / name
-        (cases / name / "case.toml").write_text((source / "case.toml").read_text())
-        table = pd.read_csv(source / "measured.csv").iloc[SAMPLES]
-        table.to_csv(cases / name / "measured.csv", index=False)
-    return cases
+    return write_beginnings(tmp_path_factory.mktemp("cases"))
 
 
 def command(folder: Path, out: Path, *options: str) -> list[str]:
@@ -110,20 +98,11 @@ def test_a_run_that_is_killed_resumes_to_the_result_of_one_that_is_not(
 ):
     killed, whole = tmp_path / "killed", tmp_path / "whole"
     checkpoint = killed / "checkpoint.json"
-    arguments = [sys.executable, "-m", "workbench", *command(folder, killed)]
-    with subprocess.Popen(arguments, cwd=root, stdout=subprocess.DEVNULL) as master:
-        deadline = time.monotonic() + 60.0
-        while not checkpoint.exists() and time.monotonic() < deadline:
-            time.sleep(0.005)
-        workers = children(master.pid)
+    with running("-m", "workbench", *command(folder, killed)) as master:
+        assert comes_true(checkpoint.exists)
+        assert len(living(master.pid)) > 1
         master.kill()
-    assert checkpoint.exists()
-    assert workers
-    # A worker notices the death of its master at once; 10 s are for a busy machine.
-    deadline = time.monotonic() + 10.0
-    while any(alive(pid) for pid in workers) and time.monotonic() < deadline:
-        time.sleep(0.05)
-    assert not [pid for pid in workers if alive(pid)]
+    assert comes_true(lambda: not living(master.pid))
     # As if it had been killed inside a checkpoint, which is written beside and then renamed.
     half = checkpoint.read_bytes()[:1000]
     checkpoint.with_name("checkpoint.json.part").write_bytes(half)
@@ -132,27 +111,6 @@ def test_a_run_that_is_killed_resumes_to_the_result_of_one_that_is_not(
     assert main(command(folder, killed, "--resume")) == 0
     assert main(command(folder, whole)) == 0
     assert (killed / "gains.toml").read_bytes() == (whole / "gains.toml").read_bytes()
-
-
-def children(pid: int) -> list[int]:
-    """Processes that a process started, from /proc."""
-    found = []
-    for status in Path("/proc").glob("[0-9]*/stat"):
-        try:
-            fields = status.read_text().rpartition(")")[2].split()
-        except OSError:
-            continue
-        if int(fields[1]) == pid:
-            found.append(int(status.parent.name))
-    return found
-
-
-def alive(pid: int) -> bool:
-    """Whether a process runs; one that has ended and waits for its parent does not."""
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    except OSError:
-        return False
 
 
 def test_results_keep_their_contract(root, system, folder, tmp_path, monkeypatch, capsys):

@@ -54,7 +54,6 @@ def test_planted_gains_are_found(system, prepare, stop_beginnings, inline, tmp_p
     pool = inline(job)
     plan = Plan(80, 5, seed=2)
     found = search(pool, job, problem.space, everything, plan, tmp_path / "checkpoint.json")
-    assert found is not None
     z_reasoned = evaluate_gains(pool, job, [reasoned.values]).max()
     assert found.z < 0.02 * z_reasoned
     # Columns that decide about the force; a tenth is what is left of z over its slope.
@@ -174,7 +173,6 @@ def test_a_gain_without_effect_does_not_matter(problem, pool, tmp_path):
     job, space = problem.job, problem.space
     plan = Plan(generations=1, population=1, seed=3)
     found = search(pool, job, space, range(len(job.recordings)), plan, tmp_path / "c.json")
-    assert found is not None
     matters = {e.gain: e.matters for e in sensitivities(pool, job, space, found)}
     assert matters["L42"]
     assert not matters["T_muWR"]
@@ -186,7 +184,6 @@ def test_gains_are_as_good_as_the_last_candidates_that_lose_one_percent_at_most(
     job, space = problem.job, problem.space
     plan = Plan(generations=0, population=1, seed=3)
     found = search(pool, job, space, range(len(job.recordings)), plan, tmp_path / "c.json")
-    assert found is not None
     assert not found.converged
     members = np.tile(found.coordinates, (3, 1))
     members[:, 0] = 0.55, 0.65, 0.95

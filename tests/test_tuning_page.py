@@ -4,9 +4,6 @@ import copy
 import json
 import re
 import signal
-import subprocess
-import sys
-import time
 from pathlib import Path
 from typing import Any
 
@@ -22,25 +19,18 @@ from workbench.system.system import System
 from workbench.tuning.report import write_tuning_page
 
 from .page_rules import check_page
-from .processes import ending
+from .processes import LONGEST, comes_true, python, running
+from .recordings import write_beginnings
 from .schemas import check
 
 HOSTILE = '08_wet "<img src=x onerror=alert(1)>" & co'  # a folder may have this name
-CASES = {"03_dry_120_3.6": "03_dry_120_3.6", HOSTILE: "08_wet_120_3.6"}  # and where it is from
-SAMPLES = slice(700, 1900)  # 6 s: first pressure and the beginning of the stop
+CASES = ("03_dry_120_3.6", HOSTILE)
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory, root) -> Path:
     """Two short recordings."""
-    cases = tmp_path_factory.mktemp("cases")
-    for name, source in CASES.items():
-        (cases / name).mkdir()
-        text = (root / "cases" / source / "case.toml").read_text()
-        (cases / name / "case.toml").write_text(text)
-        table = pd.read_csv(root / "cases" / source / "measured.csv").iloc[SAMPLES]
-        table.to_csv(cases / name / "measured.csv", index=False)
-    return cases
+    return write_beginnings(tmp_path_factory.mktemp("cases"), CASES)
 
 
 def command(folder: Path, out: Path, *options: str) -> list[str]:
@@ -54,13 +44,8 @@ def results(root, folder, tmp_path_factory) -> Path:
     """Through the command line, its last line beside the results."""
     out = tmp_path_factory.mktemp("tuned")
     arguments = command(folder, out, "--budget", "2", "--folds", "2")
-    run = subprocess.run(
-        [sys.executable, "-m", "workbench", *arguments],
-        cwd=root,
-        capture_output=True,
-        text=True,
-        check=True,
-    )
+    run = python("-m", "workbench", *arguments)
+    assert run.returncode == 0, run.stderr
     (out / "printed").write_text(run.stdout)
     return out
 
@@ -303,7 +288,7 @@ def test_dots_of_cases_lie_on_one_axis_from_zero(page, summary):
     cases = [summary["cases"][name] for name in names]
     circles = [float(x) for x in drawing.xpath("./circle/@cx")]
     diamonds = [
-        float(re.match(r"M([\d.]+)", d)[1])  # type: ignore[index]
+        float(re.match(r"M([\d.]+)", d)[1])
         for d in drawing.xpath("./path[contains(@class, 'diamond')]/@d")
     ]
     (zero,) = (
@@ -395,14 +380,12 @@ def test_a_search_that_converged_says_so(changed, tmp_path):
 
 @pytest.mark.usefixtures("ctrl_c")
 def test_an_interrupted_run_says_so_and_claims_no_sensitivity(root, folder, tmp_path):
-    arguments = [sys.executable, "-m", "workbench", *command(folder, tmp_path, "--budget", "9999")]
-    search = subprocess.Popen(arguments, cwd=root, stdout=subprocess.DEVNULL, text=True)
-    with ending(search) as run:
-        deadline = time.monotonic() + 60.0
-        while not (tmp_path / "checkpoint.json").exists() and time.monotonic() < deadline:
-            time.sleep(0.005)
+    search = command(folder, tmp_path, "--budget", "9999")
+    with running("-m", "workbench", *search) as run:
+        assert comes_true((tmp_path / "checkpoint.json").exists)
         run.send_signal(signal.SIGINT)
-        assert run.wait(60) == 130
+        run.communicate(timeout=LONGEST)
+    assert run.returncode == 130
     page = lxml.html.fromstring((tmp_path / "index.html").read_bytes())
     generations = json.loads((tmp_path / "summary.json").read_text())["work"]["generations"]
     assert headline(page).startswith(f"Interrupted after generation {generations}: ")

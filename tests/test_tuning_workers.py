@@ -39,14 +39,14 @@ from workbench.tuning import (
 from workbench.tuning.checkpoint import Checkpoint, Generation, Population, load, save
 from workbench.tuning.search import identity
 
+from .processes import python
+
 SMALL = Plan(generations=4, population=1, seed=3)
 
 
 def run(pool: Workers, problem: Problem, path: Path, plan: Plan, **options) -> Search:
     job, space = problem.job, problem.space
-    found = search(pool, job, space, range(len(job.recordings)), plan, path, **options)
-    assert found is not None
-    return found
+    return search(pool, job, space, range(len(job.recordings)), plan, path, **options)
 
 
 def test_economy_changes_nothing_but_the_work(problem, pool, tmp_path):
@@ -55,8 +55,6 @@ def test_economy_changes_nothing_but_the_work(problem, pool, tmp_path):
     full = run(pool, problem, tmp_path / "b.json", replace(plan, economy=False))
     mark = identity(problem.job, problem.space, range(3), plan)
     a, b = (load(tmp_path / name, mark) for name in ("a.json", "b.json"))
-    assert a is not None
-    assert b is not None
     for name in ("members", "z", "z_k"):
         assert_array_equal(getattr(a.population, name), getattr(b.population, name))
     assert_array_equal(thrifty.best, full.best)
@@ -139,8 +137,7 @@ except ValueError:
 
 def test_a_worker_that_could_not_be_prepared_is_not_ended_for_it_later():
     """It may belong to somebody else's process, and may be of use to the next who asks."""
-    command = [sys.executable, "-c", LATE]
-    run = subprocess.run(command, capture_output=True, text=True, check=False)
+    run = python("-c", LATE)
     assert (run.returncode, run.stdout) == (0, "alive\n"), run.stderr
 
 
@@ -438,7 +435,6 @@ def test_no_damage_of_a_checkpoint_goes_unseen(saved):
         except InputError:
             refused += 1
         else:
-            assert found is not None
             assert found.history == checkpoint.history
             for name in ("members", "z", "z_k"):
                 assert_array_equal(

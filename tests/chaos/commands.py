@@ -4,17 +4,13 @@ import json
 from pathlib import Path
 from typing import Any
 
-import pandas as pd
-
 from tests.chaos.harness import ROOT, Command
-
-CASES = ("03_dry_120_3.6", "08_wet_120_3.6")
-SAMPLES = slice(700, 1900)  # 6 s: first pressure and the beginning of the stop
+from tests.recordings import write_beginnings
 
 
 def commands(folder: Path) -> tuple[Command, ...]:
     """All of them; their recordings are written into a folder first."""
-    _write_cases(folder)
+    write_beginnings(folder)
     search = ("--cases", str(folder), "--budget", "15", "--population", "4", "--workers", "2")
     return (
         Command(
@@ -37,15 +33,6 @@ def commands(folder: Path) -> tuple[Command, ...]:
             _tables,
         ),
     )
-
-
-def _write_cases(folder: Path) -> None:
-    for name in CASES:
-        (folder / name).mkdir(parents=True)
-        source = ROOT / "cases" / name
-        (folder / name / "case.toml").write_text((source / "case.toml").read_text())
-        table = pd.read_csv(source / "measured.csv").iloc[SAMPLES]
-        table.to_csv(folder / name / "measured.csv", index=False)
 
 
 def _tables(out: Path) -> dict[str, bytes]:

@@ -17,10 +17,8 @@ from pathlib import Path
 from random import Random
 from typing import Any
 
-from tests.processes import comes_true, living
+from tests.processes import LONGEST, ROOT, comes_true, living
 
-ROOT = Path(__file__).parents[2]
-LONGEST = 60.0  # s from a signal to the end; a machine may have other work to do
 BEGUN = 0.2  # s from which on a command answers for itself, and no longer Python for it
 ROOM = 64 * 2**20  # bytes, more than any of the commands writes
 KINDS = ("kill", "interrupt", "terminate", "full disk")
