@@ -148,7 +148,8 @@ def mat_73_array(path: Path, stops: Stops) -> None:
     path.write_bytes(content)
 
 
-FORMATS = {  # with what recordings are called in them, of stops called "Stop 1" and "Stop 2"
+# With what recordings are called in them, of stops called "Stop 1" and "Stop 2".
+FORMATS_OF_STOPS = {
     "sheets.xlsx": (workbook, ("Stop 1", "Stop 2")),
     "stamps.xlsx": (workbook_of_stamps, ("Stop 1", "Stop 2")),
     "logger.mf4": (mdf_4, ("Stop 1", "Stop 2")),

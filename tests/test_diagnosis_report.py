@@ -3,6 +3,7 @@
 import dataclasses
 import json
 import re
+import signal
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
@@ -14,13 +15,14 @@ import pytest
 from numpy.testing import assert_allclose
 
 from workbench.diagnosis.inference.residuals import Balance
-from workbench.diagnosis.outcome import lasting_blocks, recording_figure
+from workbench.diagnosis.outcome import FAST, lasting, lasting_blocks, recording_figure
 from workbench.diagnosis.report import write_diagnosis_page
 from workbench.pages.figures import CaseFigure
 from workbench.system.system import System
 
-from .diagnosis_pages import STOPS, TWINS, diagnose, residuals, section, text
+from .diagnosis_pages import EFFECTS, STOPS, TWINS, diagnose, residuals, section, text
 from .page_rules import check_page
+from .processes import running
 from .schemas import check
 
 
@@ -455,3 +457,100 @@ def test_heat_follows_the_share(browser):
         for colour in browser["heat"]
     ]
     assert_allclose(alpha, 0.45 * np.array(browser["shares"]), atol=0.01)
+
+
+LASTING = 10  # blocks of 50 ms
+
+
+def test_half_a_lasting_time_is_ten_blocks(system):
+    assert lasting_blocks(system) == LASTING
+
+
+def test_noise_alone_leaves_one_and_a_lasting_error_stands_out():
+    before, after = lasting(residuals(gap=False), LASTING).noises()
+    # 80 independent means: one standard deviation of their rms is 8 %.
+    assert_allclose(after, 1.0, atol=0.3)
+    # Ten sigma of a block, in means over ten blocks, for 70 % of the time.
+    assert_allclose(before, 10.0 * np.sqrt(10.0 * 0.7), rtol=0.05)
+
+
+def test_an_error_that_turns_with_the_wheel_is_shown_where_means_would_hide_it(dry_case, system):
+    one = residuals(gap=False)
+    turning = one.after + 5.0 * (-1.0) ** np.arange(len(one.after))[:, None]
+    one = dataclasses.replace(one, before=turning)
+    assert (lasting(one, LASTING).noises()[0] < 1.5).all()
+    assert (lasting(one, FAST).noises()[0] > 4.5).all()
+    figure = recording_figure(one, dry_case, system, "with X", FAST)
+    assert "means over 50 ms" in figure.finding
+
+
+def test_no_mean_and_no_line_bridges_what_was_set_aside(dry_case, system):
+    one = residuals(gap=True)
+    quiet, loud = one.block_time < 10.0, one.block_time > 15.0
+    assert abs(lasting(one, LASTING).before[quiet]).max() < 3.0
+    assert lasting(one, LASTING).before[loud].min() > 7.0
+    figure = recording_figure(one, dry_case, system, "with X", LASTING)
+    inside = (figure.time > 10.0) & (figure.time < 15.0)
+    for panel in figure.panels:
+        for curve in panel.curves:
+            assert np.isnan(curve.values[inside]).all()
+            assert np.isfinite(curve.values[~inside]).all()
+
+
+@pytest.fixture(scope="session")
+def forceless(root, stops, tmp_path_factory) -> Any:
+    """The page of the same stops without Fx, in which nothing is wrong then."""
+    folder = tmp_path_factory.mktemp("forceless")
+    for name in STOPS:
+        (folder / name).mkdir()
+        (folder / name / "case.toml").write_text((stops / name / "case.toml").read_text())
+        table = pd.read_csv(stops / name / "measured.csv")
+        forces = [column for column in table if column.startswith("Fx")]
+        table.drop(columns=forces).to_csv(folder / name / "measured.csv", index=False)
+    out = diagnose(root, folder, tmp_path_factory.mktemp("forceless_out"))
+    return lxml.html.fromstring((out / "index.html").read_bytes())
+
+
+@pytest.mark.usefixtures("ctrl_c")
+@pytest.mark.long
+def test_an_interrupted_search_keeps_what_it_found(root, stops, tmp_path):
+    """Ctrl-C while a second cause is sought."""
+    arguments = ["diagnose", str(stops), "--effects", *EFFECTS, "--out", str(tmp_path)]
+    searches = 0
+    with running("-m", "workbench", *arguments) as run:
+        for line in run.stderr:
+            searches += "signatures" in line
+            if searches == 2 and "signatures" in line:
+                run.send_signal(signal.SIGINT)
+    assert run.returncode == 130
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    (cause,) = summary["causes"]
+    assert cause["effect"] in TWINS
+    assert summary["gain"]["after"] < summary["gain"]["before"]
+    assert Path(summary["model"]["fmu"]).is_file()
+    page = lxml.html.fromstring((tmp_path / "index.html").read_bytes())
+    assert "interrupted" in text(page.find_class("warning")[0])
+    assert "more may be missing" in text(page.get_element_by_id("answer"))
+
+
+def test_without_force_the_verdict_says_what_that_costs(forceless):
+    headline = text(forceless.find_class("headline")[0])
+    assert headline.startswith("Nothing.")
+    assert "Without a measured creep force, fewer effects" in headline
+    assert any(
+        "Creep force Fx was not measured" in text(one) for one in forceless.find_class("warning")
+    )
+    titles = [text(title) for title in forceless.xpath("//article//text[@class='title']")]
+    assert not [title for title in titles if "force" in title or "balance" in title]
+    # What it was is estimated nevertheless.
+    estimated = section(forceless, "estimate").xpath(".//text[@class='title']")
+    assert any(text(title).startswith("Creep force") for title in estimated)
+
+
+def test_where_nothing_is_missing_nothing_is_claimed(forceless):
+    assert not forceless.find_class("dots")
+    assert not forceless.xpath("//section[@aria-labelledby='model']")
+    assert not forceless.xpath("//a[@href='#model']")
+    assert "Nothing was extended" in text(section(forceless, "gain"))
+    assert not forceless.xpath("//path[contains(@class, 'style-2')]")
+    assert text(section(forceless, "causes")).startswith("Causes, strongest first None.")

@@ -1,11 +1,14 @@
-"""Where results go: a place that takes none is told before the work, and files are whole."""
+"""Where results go and how far work is: a place that takes none is told before, files are whole."""
 
+import json
 import os
+import re
 import resource
 import signal
 import subprocess
 import sys
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -16,10 +19,13 @@ from workbench.errors import InputError
 from workbench.runtime import files
 from workbench.runtime.files import (
     locked_folder,
+    replacing,
     require_writable,
     warning_if_unwritable,
+    write_json,
     write_whole,
 )
+from workbench.runtime.progress import ProgressReporter, StepReporter
 
 COMMANDS = {
     "simulate": ["simulate", "cases/01_dry_80_1.5"],
@@ -164,3 +170,91 @@ def test_what_fills_the_disk_leaves_no_half_of_a_file(tmp_path):
         with pytest.raises(InputError, match="File too large"):
             write_whole(tmp_path / "page.html", "x" * 2000)
     assert os.listdir(tmp_path) == []
+
+
+def test_text_bytes_and_json_are_written_in_folders_made_as_needed(tmp_path):
+    folder = tmp_path / "a" / "b"
+    write_whole(folder / "text", "µ\n")
+    write_whole(folder / "bytes", b"\x00\n")
+    write_json(folder / "json", {"µ": [1.5, None]})
+    assert (folder / "text").read_bytes() == "µ\n".encode()
+    assert (folder / "bytes").read_bytes() == b"\x00\n"
+    assert json.loads((folder / "json").read_text()) == {"µ": [1.5, None]}
+    assert sorted(file.name for file in folder.iterdir()) == ["bytes", "json", "text"]
+
+
+def test_what_fails_half_way_leaves_the_file_as_it_was(tmp_path):
+    path = tmp_path / "result"
+    write_whole(path, "before")
+
+    def half() -> None:
+        with replacing(path) as stream:
+            stream.write(b"aft")
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        half()
+    assert path.read_text() == "before"
+    assert [file.name for file in tmp_path.iterdir()] == ["result"]
+
+
+def test_a_full_disk_is_told_and_keeps_the_file_before(tmp_path, monkeypatch):
+    path = tmp_path / "result"
+    write_whole(path, "before")
+
+    def refuse(number: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", refuse)
+    with pytest.raises(InputError, match=r"result: found .*No space left on device"):
+        write_whole(path, "after")
+    assert path.read_text() == "before"
+    assert [file.name for file in tmp_path.iterdir()] == ["result"]
+
+
+def test_a_place_that_is_no_folder_is_refused(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="cannot be written"):
+        write_whole(tmp_path / "file" / "result", "content")
+
+
+def test_a_part_that_takes_long_says_how_much_is_left_of_it():
+    lines: list[str] = []
+    done = ProgressReporter(lines.append, "simulations", every=0.0).part(4)
+    for one in range(4):
+        done(one)
+    assert [line.partition(",")[0] for line in lines] == [f"{n} simulations" for n in (1, 2, 3, 4)]
+    assert re.fullmatch(r"1 simulations, about \d+ s left of these 4", lines[0])
+    assert lines[-1] == "4 simulations"  # nothing is left
+
+
+def test_parts_add_up_from_any_thread():
+    lines: list[str] = []
+    pace = ProgressReporter(lines.append, "simulations", every=0.0)
+
+    def part(size: int) -> None:
+        done = pace.part(size)
+        for one in range(size):
+            done(one)
+
+    with ThreadPoolExecutor(4) as threads:
+        list(threads.map(part, [25, 50, 75, 100]))
+    counts = sorted(int(line.split()[0]) for line in lines)
+    assert counts == list(range(1, 251))
+
+
+def test_what_is_soon_done_says_nothing():
+    lines: list[str] = []
+    done = ProgressReporter(lines.append, "simulations", every=3600.0).part(100)
+    for one in range(100):
+        done(one)
+    assert lines == []
+
+
+def test_each_of_a_known_number_of_steps_says_what_came_of_it_and_what_is_left():
+    lines: list[str] = []
+    progress = StepReporter(lines.append, 12)
+    for name in ("first", "second"):
+        progress.step(name)
+    assert re.fullmatch(r"\[ 1/12\] first, about \d+ s left", lines[0])
+    assert re.fullmatch(r"\[ 2/12\] second, about \d+ s left", lines[1])

@@ -41,6 +41,7 @@ def scenario(name: str, speed: float, direction: int = 1) -> Scenario:
 
 
 @cache
+@cache
 def make(
     *planted: str, name: str = "03_dry_120_3.6", speed: float = 40.0, direction: int = 1
 ) -> StopTruth:

@@ -1,10 +1,16 @@
-"""Built FMUs are kept between runs."""
+"""Built FMUs are kept between runs, and those of the repository are what its sources give."""
 
+import hashlib
+import json
 from pathlib import Path
 
 import pytest
 
+from workbench.__main__ import main
 from workbench.models import fmu_cache
+from workbench.models.compiler import source_hash
+from workbench.runtime.resources import fmus
+from workbench.system.installed import built_models
 
 
 @pytest.fixture
@@ -79,3 +85,20 @@ def test_a_build_that_fails_keeps_nothing(cache, tmp_path):
     with pytest.raises(ValueError, match="no such class"):
         fmu_cache.fetch("name", tmp_path / "one.fmu", fail)
     assert not cache.exists()
+
+
+def test_fmus_are_those_of_their_manifest_and_it_is_of_these_sources():
+    """Libraries and the compiler, whose code is among the sources; nothing is built."""
+    manifest = json.loads((fmus() / "manifest.json").read_text(encoding="utf-8"))
+    assert manifest["source_sha256"] == source_hash(*built_models())
+    held = {
+        path.relative_to(fmus()).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in fmus().rglob("*.fmu")
+    }
+    assert held == {name: one["sha256"] for name, one in manifest["fmus"].items()}
+
+
+@pytest.mark.long
+def test_fmus_match_their_sources():
+    """Builds all of them for all platforms, unless this machine has built these sources before."""
+    assert main(["fmu", "build", "--all", "--check"]) == 0
