@@ -84,9 +84,9 @@ bench: $(VENV)/dev.stamp
 test: $(VENV)/dev.stamp
 	$(VENV)/bin/ruff format --check .
 	$(VENV)/bin/ruff check .
-	$(VENV)/bin/mypy
 	$(VENV)/bin/lint-imports
-	$(PYTEST) -m "not long"
+	# Types are checked beside the tests, which leave processors free where they wait for programs.
+	$(VENV)/bin/mypy & types=$$!; $(PYTEST) -m "not long"; tests=$$?; wait $$types && exit $$tests
 
 test-long: $(VENV)/dev.stamp
 	$(PYTEST) -m long

@@ -32,6 +32,7 @@ pytest.register_assert_rewrite(
 
 from .diagnosis_pages import PLANTED, STOPS  # noqa: E402
 from .hostile_fmus import hostile  # noqa: E402
+from .processes import LONGEST  # noqa: E402
 from .recordings import record  # noqa: E402
 from .runtime_instances import Fmu, compile_model  # noqa: E402
 
@@ -247,7 +248,7 @@ def probe(tmp_path_factory) -> Callable[..., dict[str, Any]]:
             ],
             capture_output=True,
             text=True,
-            timeout=120,
+            timeout=LONGEST,
             check=True,
         )
         assert not [line for line in run.stderr.splitlines() if "CONSOLE" in line]

@@ -45,9 +45,9 @@ out = pathlib.Path(sys.argv[1])
 again = out.exists()
 out.mkdir(exist_ok=True)
 {begins}
-(out / "r").write_text(f"{{{wrote}}}")
 try:
-    time.sleep(1.0)
+    (out / "r").write_text(f"{{{wrote}}}")
+    time.sleep(0.1 if again else 60.0)
 except KeyboardInterrupt:
     {ends}
 """

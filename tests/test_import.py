@@ -43,9 +43,9 @@ UNITS = {"pB": 1e5, "tauR": 1e3, "omegaW": 1 / 3.6 / 0.4, "omegaR": 1 / 3.6 / 0.
 
 @pytest.fixture(scope="module")
 def stop(root, system) -> Case:
-    """A stop, every fourth sample of it."""
+    """24 s of a stop, every fourth sample of it."""
     (case,) = wb.read_cases(root / "cases" / "01_dry_80_1.5", system)
-    return case.part(slice(None, None, 4))
+    return case.part(slice(None, 4800, 4))
 
 
 @pytest.fixture(autouse=True)
@@ -444,10 +444,10 @@ SIGNALS = "pB", "tauR", "omegaW", "omegaR", "Fx"
 
 @pytest.fixture(scope="module")
 def cases(root, system) -> list[Case]:
-    """Two stops, every fourth sample of them."""
+    """24 s of two stops, every fourth sample of them."""
     names = "01_dry_80_1.5", "02_dry_100_2.7"
     read = wb.read_cases([root / "cases" / name for name in names], system)
-    return [one.part(slice(None, None, 4)) for one in read]
+    return [one.part(slice(None, 4800, 4)) for one in read]
 
 
 @pytest.fixture(scope="module")

@@ -133,7 +133,7 @@ def test_a_task_beyond_the_limit_is_ended_and_the_next_is_done():
         with pytest.raises(WorkerError, match=r"longer than 0\.2 s"):
             pool.submit(time.sleep).result()
         assert pool.submit(math.sqrt).result() == math.sqrt(600.0)
-        assert time.monotonic() - begin < 60.0  # of 600; what it takes depends on the machine
+        assert time.monotonic() - begin < LONGEST  # of 600 s
 
 
 def test_leaving_a_pool_ends_what_is_under_way_and_drops_what_waits():
@@ -143,7 +143,7 @@ def test_leaving_a_pool_ends_what_is_under_way_and_drops_what_waits():
         tasks = [pool.submit(time.sleep) for _ in range(3)]
         while not tasks[0].running():
             wait(tasks[:1], timeout=0.01)
-    assert time.monotonic() - begin < 60.0
+    assert time.monotonic() - begin < LONGEST
     with pytest.raises(WorkerError, match="closed"):
         tasks[0].result()
     assert all(task.cancelled() for task in tasks[1:])

@@ -250,10 +250,12 @@ def test_slots_that_are_proposed_rightly_are_counted():
 # --- laws that turn, and that begin ---
 
 
-def swinging(rng: np.random.Generator, size: float) -> tuple[list[Matrix], list[Vector]]:
+def swinging(
+    rng: np.random.Generator, size: float, counts: tuple[int, int] = (500, 800)
+) -> tuple[list[Matrix], list[Vector]]:
     """White errors of two channels, one of which swings with the way of what slows down."""
     errors, clocks = [], []
-    for speed, count in ((30.0, 500), (44.0, 800)):
+    for speed, count in zip((30.0, 44.0), counts, strict=True):
         time = 0.05 * np.arange(count)
         way = speed * time - 0.5 * speed / time[-1] * time**2
         noise = rng.standard_normal((count, 2))
@@ -274,7 +276,7 @@ def test_white_noise_has_no_period_that_a_search_would_not_find_by_chance():
     """The largest of M sums of 8 squares: by Boole, one in a hundred is beyond this quantile."""
     rng, beyond = np.random.default_rng(6), 0
     for _ in range(40):
-        errors, clocks = swinging(rng, 0.0)
+        errors, clocks = swinging(rng, 0.0, (150, 240))
         found = strongest_period(errors, clocks, 20)
         fast = [error - uniform_filter1d(error, 20, axis=0, mode="nearest") for error in errors]
         power = 0.0
