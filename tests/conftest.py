@@ -16,8 +16,10 @@ import fmpy
 import lxml.html
 import pytest
 
+from workbench.diagnosis import build_everything, read_effects
 from workbench.machines.wheelset.rig import CONSTANT_PADS, SCENARIOS, plant
 from workbench.models.fmu import FMU
+from workbench.models.modelica import read_library
 from workbench.recordings.case import Case, read_case
 from workbench.recordings.datasets import write_cases
 from workbench.runtime.pool import Pool
@@ -185,6 +187,15 @@ def open_fmu(tmp_path_factory) -> Callable[..., Fmu]:
 
 
 # --- diagnosis ---
+
+
+@pytest.fixture(scope="session")
+def everything(system, tmp_path_factory) -> Path:
+    """The observer model of the wheelset with every effect at zero."""
+    path = tmp_path_factory.mktemp("everything") / "AllEffects.fmu"
+    library = read_library(system.library)
+    build_everything(system, library, read_effects(library, "MinimalObserver"), path)
+    return path
 
 
 @pytest.fixture(scope="session")

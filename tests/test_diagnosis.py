@@ -14,7 +14,6 @@ import pytest
 
 from workbench.diagnosis import Diagnosis, Outcome, catalogue, diagnose
 from workbench.diagnosis.data.motion import ModelSource
-from workbench.diagnosis.effects.extension import ExtendedModel, build
 from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.selection import anew
 from workbench.diagnosis.inference.verdict import conclude
@@ -78,17 +77,6 @@ def mostly_long(names: Iterable[str], short: Collection[str]) -> list[Any]:
     """Parameters of a test, marked `long` but for the short ones."""
     marks = {name: () if name in short else (pytest.mark.long,) for name in names}
     return [pytest.param(name, marks=marked) for name, marked in marks.items()]
-
-
-@pytest.fixture(scope="session")
-def everything(tmp_path_factory) -> Path:
-    """The observer model with every effect at zero."""
-    path = tmp_path_factory.mktemp("library") / "AllEffects.fmu"
-    text = ExtendedModel(
-        LIBRARY, "MinimalObserver", "AllEffects", EFFECTS, "Every effect at zero"
-    ).source()
-    build(LIBRARY, "AllEffects", text, path, every_platform=False)
-    return path
 
 
 @pytest.fixture

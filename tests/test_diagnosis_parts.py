@@ -66,16 +66,6 @@ DRY = {
 INPUTS, OUTPUTS = ("pB", "tauR"), ("omegaW", "omegaR")
 
 
-@pytest.fixture(scope="module")
-def everything(tmp_path_factory) -> Path:
-    path = tmp_path_factory.mktemp("library") / "AllEffects.fmu"
-    text = ExtendedModel(
-        LIBRARY, "MinimalObserver", "AllEffects", EFFECTS, "Every effect at zero"
-    ).source()
-    build(LIBRARY, "AllEffects", text, path, every_platform=False)
-    return path
-
-
 def simulated(fmu: Path, parameters: dict[str, float]) -> Case:
     """A stop without noise, by the FMU's own integrator (RODAS, implicit, with error control)."""
     h, n = 0.005, 3200

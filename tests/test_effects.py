@@ -162,19 +162,16 @@ def test_outputs_continue_inputs_where_they_are_of_the_same_kind():
     }
 
 
-def test_an_output_that_is_an_input_is_handed_on_by_effects_that_say_nothing_of_it(tmp_path):
+def test_an_output_that_is_an_input_is_handed_on_by_effects_that_say_nothing_of_it(everything):
     """Water on one of three discs, before and behind laws that hold for all of them."""
     slots = {slot.name: slot for slot in read_slots(WHEELSET, "MinimalObserver")}
     assert slots["padFriction"].outputs == ("mu",)
     assert slots["padFriction"].handed == {"lack": "lackBefore"}
     assert not any(slot.handed for name, slot in slots.items() if name != "padFriction")
-    fmu = tmp_path / "AllEffects.fmu"
-    text = ExtendedModel(WHEELSET, "MinimalObserver", "AllEffects", EFFECTS, "All effects").source()
-    build(WHEELSET, "AllEffects", text, fmu, every_platform=False)
 
     def force(size: str, film: float) -> float:
         """Of the disc that brakes least [N], at 50 rad/s and 2.7 bar."""
-        with FMU(fmu) as model:
+        with FMU(everything) as model:
             model.start({"omegaW": 50.0, "omegaR": 50.0 * 0.46 / 0.70}, {size: film})
             model.set(model.variables(["pB"]), np.array([2.7e5]))
             (found,) = model.get(model.variables(["FDisc"]))

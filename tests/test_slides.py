@@ -10,7 +10,6 @@ from workbench.arrays import Vector
 from workbench.diagnosis import Diagnosis, catalogue
 from workbench.diagnosis.data.motion import ModelSource, OpenModel, motion
 from workbench.diagnosis.data.samples import Samples, compared, prepare
-from workbench.diagnosis.effects.extension import ExtendedModel, build
 from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.verdict import conclude
 from workbench.diagnosis.simulation.prediction import Predictor
@@ -130,16 +129,6 @@ def test_errors_of_slides_are_as_large_as_their_weights_say():
     with simulating(SimulatorSetup(MINIMAL, system, (samples,))) as simulator:
         unweighed = simulator.at(0, WET).errors
     assert np.square(unweighed[spans])[:, 0].mean() > 3.0
-
-
-@pytest.fixture(scope="module")
-def everything(tmp_path_factory) -> Path:
-    path = tmp_path_factory.mktemp("library") / "AllEffects.fmu"
-    text = ExtendedModel(
-        LIBRARY, "MinimalObserver", "AllEffects", EFFECTS, "Every effect at zero"
-    ).source()
-    build(LIBRARY, "AllEffects", text, path, every_platform=False)
-    return path
 
 
 def diagnosed(
