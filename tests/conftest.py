@@ -17,7 +17,6 @@ import lxml.html
 import pytest
 
 from workbench.diagnosis import build_everything, read_effects
-from workbench.machines.wheelset.rig import CONSTANT_PADS, SCENARIOS, plant
 from workbench.models.fmu import FMU
 from workbench.models.modelica import read_library
 from workbench.recordings.case import Case, read_case
@@ -28,14 +27,10 @@ from workbench.system.system import System
 from workbench.tuning import Evaluator, Job, Problem, pose, tunable
 
 # Before they are imported, for asserts in them to tell values as those of the tests do.
-pytest.register_assert_rewrite(
-    "tests.case_folders", "tests.diagnosis_pages", "tests.runtime_instances"
-)
+pytest.register_assert_rewrite("tests.case_folders", "tests.page_rules", "tests.runtime_instances")
 
-from .diagnosis_pages import PLANTED, STOPS  # noqa: E402
 from .hostile_fmus import hostile  # noqa: E402
 from .processes import LONGEST  # noqa: E402
-from .recordings import record  # noqa: E402
 from .runtime_instances import Fmu, compile_model  # noqa: E402
 
 ROOT = Path(__file__).parent.parent
@@ -196,19 +191,6 @@ def everything(system, tmp_path_factory) -> Path:
     library = read_library(system.library)
     build_everything(system, library, read_effects(library, "MinimalObserver"), path)
     return path
-
-
-@pytest.fixture(scope="session")
-def stops(tmp_path_factory) -> Path:
-    """Three stops of the virtual rig, whose load cells have a wrong zero."""
-    folder = tmp_path_factory.mktemp("stops")
-    effects = plant(CONSTANT_PADS, [f"fx_offset={PLANTED}"])
-    for seed, (name, speed) in enumerate(STOPS.items()):
-        usual = SCENARIOS[name]
-        conditions = replace(usual.conditions, initial_speed=speed / 3.6)
-        short = replace(usual, conditions=conditions)
-        record(short, seed, effects, folder / name)
-    return folder
 
 
 # --- pages ---

@@ -7,6 +7,7 @@ from urllib.parse import unquote
 
 import lxml.html
 import numpy as np
+import pandas as pd
 
 _MOST = 3e6  # [byte] of a page
 
@@ -54,3 +55,24 @@ def check_page(path: Path, summary: dict[str, Any]) -> Any:
     assert policy.startswith("default-src 'none'")
     assert not re.search(r"http|\*|self", policy)
     return page
+
+
+def text(element: Any) -> str:
+    return " ".join(element.text_content().split())
+
+
+def section(page: Any, name: str) -> Any:
+    return page.xpath(f"//section[@aria-labelledby='{name}']")[0]
+
+
+def data(page: Any, table: str) -> pd.DataFrame:
+    """Numbers of a table as the page sorts them, texts as they are shown, by its headings."""
+    table = page.get_element_by_id(table)
+    titles = [text(cell) for cell in table.xpath("thead/tr/th")][1:]
+    rows = {
+        text(row[0]): [
+            float(value) if (value := cell.get("data-value")) else text(cell) for cell in row[1:]
+        ]
+        for row in table.find("tbody")
+    }
+    return pd.DataFrame.from_dict(rows, orient="index", columns=titles)

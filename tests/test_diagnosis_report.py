@@ -1,9 +1,9 @@
 """The page of `diagnose`: the verdict and its evidence, for an engineer without the tool."""
 
-import dataclasses
 import json
 import re
 import signal
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
@@ -14,24 +14,77 @@ import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
 
+from workbench.__main__ import main
+from workbench.diagnosis import Residuals
 from workbench.diagnosis.inference.residuals import Balance
 from workbench.diagnosis.outcome import FAST, lasting, lasting_blocks, recording_figure
 from workbench.diagnosis.report import write_diagnosis_page
+from workbench.machines.wheelset.rig import CONSTANT_PADS, SCENARIOS, plant
 from workbench.pages.figures import CaseFigure
+from workbench.system.registry import load_system
 from workbench.system.system import System
 
-from .diagnosis_pages import EFFECTS, STOPS, TWINS, diagnose, residuals, section, text
-from .page_rules import check_page
+from .page_rules import check_page, data, section, text
 from .processes import running
+from .recordings import record
 from .schemas import check
 
+STOPS = {"01_dry_80_1.5": 45.0, "03_dry_120_3.6": 70.0, "05_dry_120_2.7_rev": 60.0}  # from [km/h]
+PLANTED = 150.0  # [N] of the load cells, some ten times the noise of half a second
+TWINS = {"FxOffset", "ApexOffset"}  # of which either may be named first
+EFFECTS = ["BrakeFade", "BeddingIn", "WheelRadius", *sorted(TWINS)]
 
-@pytest.fixture(scope="session")
+
+def diagnose(root: Path, stops: Path, out: Path) -> Path:
+    """Through the command line, with few effects to be quick."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(root)
+        assert (
+            main(["diagnose", str(stops), "--certainty", "--effects", *EFFECTS, "--out", str(out)])
+            == 0
+        )
+    return out
+
+
+def residuals(gap: bool) -> Residuals:
+    """A stop of 40 s with white noise, an error in its second half, and perhaps a slide."""
+    rng = np.random.default_rng(1)
+    time = np.arange(800) * 0.05
+    kept = (time < 10.0) | (time > 15.0) if gap else time >= 0.0
+    after = rng.normal(size=(kept.sum(), 3))
+    step = np.where(time[kept] > 12.0, 10.0, 0.0)
+    slip = np.where(kept, 1e-3, np.nan)
+    return Residuals(
+        name="stop",
+        time=time,
+        balances=(Balance("slip", "Slip, as measured", "m/s", "mm/s", slip),),
+        channels=load_system("wheelset").comparison.channels,
+        block_time=time[kept],
+        before=after + step[:, None],
+        after=after,
+        sigma=np.ones_like(after),
+    )
+
+
+@pytest.fixture(scope="module")
+def stops(tmp_path_factory) -> Path:
+    """Three stops of the virtual rig, whose load cells have a wrong zero."""
+    folder = tmp_path_factory.mktemp("stops")
+    effects = plant(CONSTANT_PADS, [f"fx_offset={PLANTED}"])
+    for seed, (name, speed) in enumerate(STOPS.items()):
+        usual = SCENARIOS[name]
+        conditions = replace(usual.conditions, initial_speed=speed / 3.6)
+        short = replace(usual, conditions=conditions)
+        record(short, seed, effects, folder / name)
+    return folder
+
+
+@pytest.fixture(scope="module")
 def results(root, stops, tmp_path_factory) -> Path:
     return diagnose(root, stops, tmp_path_factory.mktemp("diagnosis"))
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def summary(results) -> dict[str, Any]:
     return json.loads((results / "summary.json").read_text())
 
@@ -41,18 +94,9 @@ def test_summary_and_page_are_as_all_are(results, summary):
     check_page(results / "index.html", summary)
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def page(results) -> Any:
     return lxml.html.fromstring((results / "index.html").read_bytes())
-
-
-def data(table: Any) -> pd.DataFrame:
-    """Numbers of a table as the page sorts them, by its headings."""
-    titles = [text(cell) for cell in table.xpath("thead/tr/th")][1:]
-    rows = {
-        text(row[0]): [cell.get("data-value") for cell in row[1:]] for row in table.find("tbody")
-    }
-    return pd.DataFrame.from_dict(rows, orient="index", columns=titles)
 
 
 def steps(path: str) -> np.ndarray:
@@ -133,7 +177,7 @@ def test_the_noise_band_holds_what_the_extended_model_leaves_and_not_the_effect(
 
 
 def test_dependences_are_those_of_the_summary_before_and_after(page, summary):
-    table = data(page.get_element_by_id("dependence-table"))
+    table = data(page, "dependence-table")
     for dependence in summary["dependences"]:
         assert (
             float(table.at[dependence["influence"], f"{dependence['channel']}, nominal"])
@@ -184,8 +228,8 @@ def test_a_size_is_told_with_what_noise_alone_allows_and_what_its_error_goes_wit
 
 
 def test_each_candidate_has_one_row_the_best_first(page, summary):
-    table = data(page.get_element_by_id("candidate-table"))
-    falls = table["fall, cross-validated"].astype(float)
+    table = data(page, "candidate-table")
+    falls = table["fall, cross-validated"]
     assert sorted(table.index) == sorted(
         {candidate["effect"] for candidate in summary["candidates"]}
     )
@@ -249,7 +293,7 @@ def test_levels_and_samples_set_aside_are_reported(page, summary):
     entries = section(page, "baseline").xpath(".//dt")
     shown = {text(entry): text(entry.getnext()).split()[0] for entry in entries}
     assert shown == {name: f"{level['value']:.4g}" for name, level in summary["levels"].items()}
-    aside = data(page.get_element_by_id("aside-table"))
+    aside = data(page, "aside-table")
     for name, counts in summary["set_aside"].items():
         assert {reason: int(aside.at[name, reason]) for reason in counts} == counts
 
@@ -371,10 +415,10 @@ def test_pages_of_six_and_fourteen_long_stops_stay_small(system, summary, dry_ca
         Balance(name, name, "N.m", "N.m", rng.normal(size=one.time.size))
         for name in ("wheelset", "roller", "slip")
     )
-    long = dataclasses.replace(one, balances=balances)
+    long = replace(one, balances=balances)
     for count, most in ((6, 3e6), (14, 3e6)):
         figures = [
-            dataclasses.replace(
+            replace(
                 recording_figure(long, dry_case, system, "with X", lasting_blocks(system)),
                 name=f"stop_{k}",
             )
@@ -413,7 +457,7 @@ told.overflow = document.documentElement.scrollWidth - document.documentElement.
 """
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def browser(results, probe) -> dict[str, Any]:
     """What a script that uses the page finds."""
     return probe(results / "index.html", PROBE)
@@ -477,7 +521,7 @@ def test_noise_alone_leaves_one_and_a_lasting_error_stands_out():
 def test_an_error_that_turns_with_the_wheel_is_shown_where_means_would_hide_it(dry_case, system):
     one = residuals(gap=False)
     turning = one.after + 5.0 * (-1.0) ** np.arange(len(one.after))[:, None]
-    one = dataclasses.replace(one, before=turning)
+    one = replace(one, before=turning)
     assert (lasting(one, LASTING).noises()[0] < 1.5).all()
     assert (lasting(one, FAST).noises()[0] > 4.5).all()
     figure = recording_figure(one, dry_case, system, "with X", FAST)
@@ -497,7 +541,7 @@ def test_no_mean_and_no_line_bridges_what_was_set_aside(dry_case, system):
             assert np.isfinite(curve.values[~inside]).all()
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def forceless(root, stops, tmp_path_factory) -> Any:
     """The page of the same stops without Fx, in which nothing is wrong then."""
     folder = tmp_path_factory.mktemp("forceless")

@@ -9,7 +9,6 @@ from typing import Any
 
 import lxml.html
 import numpy as np
-import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
 
@@ -18,7 +17,7 @@ from workbench.system.registry import load_system, open_model
 from workbench.system.system import System
 from workbench.tuning.report import write_tuning_page
 
-from .page_rules import check_page
+from .page_rules import check_page, data, text
 from .processes import LONGEST, comes_true, python, running
 from .recordings import write_beginnings
 from .schemas import check
@@ -63,24 +62,6 @@ def test_summary_and_page_are_as_all_are(results, summary):
 @pytest.fixture(scope="module")
 def page(results) -> Any:
     return lxml.html.fromstring((results / "index.html").read_bytes())
-
-
-def text(element: Any) -> str:
-    return " ".join(element.text_content().split())
-
-
-def data(page: Any, table: str) -> pd.DataFrame:
-    """Numbers of a table as the page sorts them, texts as they are shown, by its headings."""
-    table = page.get_element_by_id(table)
-    titles = [text(cell) for cell in table.xpath("thead/tr/th")][1:]
-    rows = {
-        text(row[0]): [
-            text(cell) if cell.get("data-value") is None else float(cell.get("data-value"))
-            for cell in row[1:]
-        ]
-        for row in table.find("tbody")
-    }
-    return pd.DataFrame.from_dict(rows, orient="index", columns=titles)
 
 
 def news(page: Any) -> str:
