@@ -274,12 +274,12 @@ def narrow(probe) -> Callable[[Path], None]:
     """Asks that a screen of 320 px shows all of a page, in letters of the usual size."""
 
     def asked(page: Path) -> None:
-        found = probe(page, _NARROW, width=400)
-        assert found["errors"] == []
-        assert found["sideways"] == []
-        assert found["cut"] == []
-        assert found["drawn"]
-        for units, pixels in found["drawn"]:
+        shown = probe(page, _NARROW, width=400)
+        assert shown["errors"] == []
+        assert shown["sideways"] == []
+        assert shown["cut"] == []
+        assert shown["drawn"]
+        for units, pixels in shown["drawn"]:
             assert pixels <= 296
             assert pixels >= 0.98 * units  # one unit is one pixel
 

@@ -56,7 +56,7 @@ def model_of(vehicles: int, *, pitching: bool) -> str:
         [
             f'within TrainRig;\nmodel Longer "Train of {vehicles} vehicles"',
             f"  extends Train(final vehicles={vehicles}{start});",
-            *(f"  input Real {one};" for one in inputs),
+            *(f"  input Real {variable};" for variable in inputs),
             *(f"  output Real {one};" for one in (*states, *outputs)),
             "equation",
             "  mu = ordinary;\n  acting = fill(units, n);\n  drag = zeros(n);\n  mu0 = muWR;",
@@ -88,7 +88,7 @@ def build(vehicles: int, folder: Path, *, pitching: bool = True) -> System:
     fmu = folder / "Longer.fmu"
     build_here(library / "package.mo", "TrainRig.Longer", fmu)
     axles, every = range(1, 4 * vehicles + 1), range(1, vehicles + 1)
-    given = {one.name: one for one in system.inputs}
+    given = {variable.name: variable for variable in system.inputs}
     pressures = [replace(given["pB1"], name=f"pB{j}") for j in range(1, 2 * vehicles + 1)]
     vehicle = [
         replace(given[f"{one}1"], name=f"{one}{k}") for one in ("mass", "slope") for k in every
@@ -123,7 +123,7 @@ def stop(system: System) -> tuple[Vector, Matrix, Matrix]:
     v = 33.0 - _SLOWING * np.maximum(t - _BEGIN, 0.0)
     levels = {"pB": 2.2e5 * (t >= _BEGIN), "mass": 48e3 + 0.0 * t, "slope": 0.0 * t}
     levels |= {"omega": v / 0.46, "a": np.gradient(v, step), "curve": 0.0 * t}
-    u = [levels[one.name.rstrip("0123456789")] for one in system.inputs]
+    u = [levels[variable.name.rstrip("0123456789")] for variable in system.inputs]
     y = [levels[output.name.rstrip("0123456789")] for output in system.outputs]
     noise = [output.noise * random.standard_normal(t.size) for output in system.outputs]
     inputs: Matrix = np.column_stack(u)

@@ -28,7 +28,9 @@ def check_page(path: Path, summary: dict[str, Any]) -> Any:
     first = page.xpath("//body//*[self::a or self::button or @tabindex]")[0]
     assert page.get_element_by_id(first.get("href")[1:]).tag == "main"
     # What shows the answer is open, the rest is folded.
-    assert [one.get("open") is not None for one in page.xpath("//section/details")].count(True) == 1
+    assert [element.get("open") is not None for element in page.xpath("//section/details")].count(
+        True
+    ) == 1
     assert page.xpath("//section/details")[0].get("open") is not None
     ids = page.xpath("//@id")
     assert len(ids) == len(set(ids))

@@ -363,17 +363,17 @@ def test_a_force_that_is_too_large_by_a_constant():
 
 def test_a_force_that_is_late():
     late = np.interp(TIME - 0.1, TIME, FORCE)
-    found = accuracy(estimated(late, TRUTH.muDC), "one")
-    assert found.rise_delay == pytest.approx(0.1)
-    assert found.fall_delay == pytest.approx(0.1)
+    errors = accuracy(estimated(late, TRUTH.muDC), "one")
+    assert errors.rise_delay == pytest.approx(0.1)
+    assert errors.fall_delay == pytest.approx(0.1)
     never = estimated(0.5 * FORCE, TRUTH.muDC)
     assert rise_delay(never, "one") == math.inf
 
 
 def test_a_force_that_oscillates_at_the_first_contact():
     swing = np.where(TIME < 6.0, 500.0 * np.sin(2 * np.pi * TIME), 0.0)
-    found = accuracy(estimated(FORCE + swing, TRUTH.muDC), "one")
-    assert found.oscillation == pytest.approx(500.0 / 20e3, rel=0.01)
+    errors = accuracy(estimated(FORCE + swing, TRUTH.muDC), "one")
+    assert errors.oscillation == pytest.approx(500.0 / 20e3, rel=0.01)
 
 
 def test_friction_is_judged_from_a_second_after_the_first_contact():
@@ -399,10 +399,10 @@ def test_only_the_first_slide_counts_and_creep_is_none():
     later = replace(TRUTH, slip=np.where(TIME > 15.0, -0.05 * SPEED, TRUTH.slip))
     assert np.array_equal(replace(stop, truth=later).slide, SLIDING)
     rolling = replace(stop, truth=replace(TRUTH, slip=-0.015 * SPEED))
-    found = stop_accuracy(rolling)
-    assert not found.slides
-    assert found.wet  # one disc of three
-    assert found.estimators["one"].force_in_slide is None
+    accuracies = stop_accuracy(rolling)
+    assert not accuracies.slides
+    assert accuracies.wet  # one disc of three
+    assert accuracies.estimators["one"].force_in_slide is None
 
 
 # --- the worst ---

@@ -69,8 +69,8 @@ MUDC = list(WHEELSET.columns).index("muDC")
 @pytest.mark.parametrize("noise", [0.3, 1.0, 3.0])
 def test_noise_of_sensors_is_learnt(fmu, kind, noise):
     """After ten times the time for it, innovations are as large as the filter says."""
-    found = estimate(fmu, kind, WHEELSET, *stop(fmu, np.full(5000, 0.30), noise))
-    nis = np.asarray(found.nis)[4000:]
+    estimates = estimate(fmu, kind, WHEELSET, *stop(fmu, np.full(5000, 0.30), noise))
+    nis = np.asarray(estimates.nis)[4000:]
     # Mean of 1000 samples of two outputs: chance makes 2 +- 0.06, levels know 4 % of a deviation.
     assert nis.mean() == pytest.approx(2.0, abs=0.3)
 
@@ -89,10 +89,10 @@ def test_a_friction_that_stays_is_known_the_better_the_longer(fmu, kind):
 def test_a_friction_that_moves_again_is_followed(fmu, kind):
     """Still for 15 s, then 0.1 in 5 s, as on a drying disc: the band opens, and holds it."""
     moving = np.concatenate([np.full(3000, 0.20), np.linspace(0.20, 0.30, 1000)])
-    found = estimate(fmu, kind, WHEELSET, *stop(fmu, moving))
-    error = np.abs(found.values[:, MUDC] - moving)[3200:]
+    estimates = estimate(fmu, kind, WHEELSET, *stop(fmu, moving))
+    error = np.abs(estimates.values[:, MUDC] - moving)[3200:]
     assert error.max() < 0.01
-    assert np.mean(error < 2.0 * found.sigma[3200:, MUDC]) > 0.8
+    assert np.mean(error < 2.0 * estimates.sigma[3200:, MUDC]) > 0.8
 
 
 @pytest.mark.parametrize("kind", KINDS[:2])  # the window gives it less weight instead
@@ -116,8 +116,8 @@ def test_a_jump_of_a_friction_is_followed_at_once(fmu, kind, within, limit):
     The window first takes some of its samples for outliers, and is ready for more jumps after one.
     """
     jumping = np.concatenate([np.full(3000, 0.40), np.full(400, 0.20)])
-    found = estimate(fmu, kind, WHEELSET, *stop(fmu, jumping, 0.3))
-    error = np.abs(found.values[:, MUDC] - jumping)
+    estimates = estimate(fmu, kind, WHEELSET, *stop(fmu, jumping, 0.3))
+    error = np.abs(estimates.values[:, MUDC] - jumping)
     assert error[3000 + round(within / STEP) :].max() < limit
 
 

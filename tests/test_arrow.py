@@ -238,7 +238,7 @@ def dense_step(estimator: BlockKalmanFilter, u: Vector, y: Vector) -> tuple[Vect
     fmu, settings, h = estimator.fmu, estimator._settings.filter, estimator.system.sample_time
     fade = faded(estimator, y)
     n, z, P = len(fmu.states), estimator._state.z.copy(), estimator._joint()
-    inputs = fmu.variables([one.name for one in estimator.system.inputs])
+    inputs = fmu.variables([variable.name for variable in estimator.system.inputs])
     corrections = fmu.variables(estimator.system.corrections)
     fmu.set_states(z[:n])
     fmu.set(inputs, u)
@@ -320,7 +320,7 @@ def stops(
     """
     bogies = np.ones(4) if share is None else share
     h, axles, samples = system.sample_time, 8, 240
-    inputs = fmu.variables([one.name for one in system.inputs])
+    inputs = fmu.variables([variable.name for variable in system.inputs])
     corrections = fmu.variables(system.corrections)
     outputs = [fmu.states.index(output.name) for output in system.outputs]
     speed = fmu.states.index("vTrain")

@@ -57,11 +57,11 @@ def test_load_cells_feed_no_estimate(outcome, estimates):
     case = outcome.cases[0]
     signals = {name: values for name, values in case.signals.items() if name != "Fx"}
     blind = replace(outcome, cases=(replace(case, signals=signals),))
-    found = best_estimate(blind, case.name)
+    best = best_estimate(blind, case.name)
     for model, run in estimates[case.name].runs.items():
-        assert_array_equal(run.estimate, found.runs[model].estimate)
-        assert_array_equal(run.sigma, found.runs[model].sigma)
-        assert bands(found)[model]["Fx"]["inside"] is None
+        assert_array_equal(run.estimate, best.runs[model].estimate)
+        assert_array_equal(run.sigma, best.runs[model].sigma)
+        assert bands(best)[model]["Fx"]["inside"] is None
 
 
 def test_where_errors_have_no_explanation_there_is_no_best_estimate(outcome):
@@ -70,5 +70,5 @@ def test_where_errors_have_no_explanation_there_is_no_best_estimate(outcome):
     assert best_estimate(replace(outcome, diagnosis=unexplained), name) is None
     # Of a model that lacks nothing there is one, without an extended model.
     nothing = replace(outcome, diagnosis=replace(outcome.diagnosis, verdict="nothing"))
-    found = best_estimate(replace(nothing, extension=None), name)
-    assert list(found.runs) == ["nominal_model"]
+    best = best_estimate(replace(nothing, extension=None), name)
+    assert list(best.runs) == ["nominal_model"]

@@ -115,8 +115,8 @@ def fits(tmp_path_factory) -> Iterator[dict[str, Fit]]:
         opened.append(ResidualModel(ModelSource(path, system, {}), cases))
         fits[name] = Fit(opened[-1], effects)
     yield fits
-    for one in opened:
-        one.__exit__(None, None, None)
+    for model in opened:
+        model.__exit__(None, None, None)
 
 
 def begun(fit: Fit, name: str, size: float) -> FittedModel:
@@ -141,8 +141,8 @@ def least(fit: Fit, best: FittedModel, size: float) -> float:
 def test_at_the_ends_by_noise_alone_the_least_chi_squared_has_risen_by_3_84(fits):
     fit = fits["Bend"]
     best = begun(fit, "Bend", BEND)
-    found = assess(fit, best, lambda _: None)
-    ((key, (low, high)),) = found.ends.items()
+    certainty = assess(fit, best, lambda _: None)
+    ((key, (low, high)),) = certainty.ends.items()
     bottom = least(fit, best, best.point.sizes[key])
     rises = [least(fit, best, end) - bottom for end in (low, high)]
     # Ends are found along a parabola through one point of each side: 5 % is its third order.
@@ -154,34 +154,34 @@ def test_at_the_ends_by_noise_alone_the_least_chi_squared_has_risen_by_3_84(fits
 def test_errors_go_together_as_the_inverse_of_all_products_of_derivatives_says(fits):
     """Closed form: the bend has the derivative u exp(b u), the scale u, in means of blocks."""
     fit = fits["Bend"]
-    found = assess(fit, begun(fit, "Bend", BEND), lambda _: None)
+    certainty = assess(fit, begun(fit, "Bend", BEND), lambda _: None)
     u = np.concatenate([1.0 - np.cos(2.0 * np.pi / p * 0.01 * np.arange(1500)) for p in (4.0, 5.0)])
     J = np.column_stack([u * np.exp(BEND * u), u])
     inverse = np.linalg.inv(J.T @ J)
     expected = inverse[0, 1] / np.sqrt(inverse[0, 0] * inverse[1, 1])
-    assert found.unknowns == (("Bend", "b"), ("c", "all"))
-    assert_allclose(found.correlations, [[1.0, expected], [expected, 1.0]], atol=2e-3)
+    assert certainty.unknowns == (("Bend", "b"), ("c", "all"))
+    assert_allclose(certainty.correlations, [[1.0, expected], [expected, 1.0]], atol=2e-3)
 
 
 def test_a_law_with_one_minimum_is_found_from_everywhere(fits):
     fit = fits["Bend"]
-    found = assess(fit, begun(fit, "Bend", BEND), lambda _: None)
-    assert found.same == len(found.behind) == 4
-    assert found.lower == 0.0
+    certainty = assess(fit, begun(fit, "Bend", BEND), lambda _: None)
+    assert certainty.same == len(certainty.behind) == 4
+    assert certainty.lower == 0.0
 
 
 def test_of_a_law_with_many_minima_some_starts_end_elsewhere_and_none_lower(fits):
     fit = fits["Ripple"]
-    found = assess(fit, begun(fit, "Ripple", TEETH), lambda _: None)
-    assert 0 < found.same < 4
-    assert found.lower == 0.0
-    assert "none lower" in found.sentence
+    certainty = assess(fit, begun(fit, "Ripple", TEETH), lambda _: None)
+    assert 0 < certainty.same < 4
+    assert certainty.lower == 0.0
+    assert "none lower" in certainty.sentence
 
 
 def test_a_fit_that_sits_in_a_wrong_minimum_is_told(fits):
     fit = fits["Ripple"]
     wrong = begun(fit, "Ripple", 0.5 * TEETH)
     assert abs(wrong.point.sizes["Ripple", "k"] - TEETH) > 1.0
-    found = assess(fit, wrong, lambda _: None)
-    assert found.lower > 100.0
-    assert "sizes may be others" in found.sentence
+    certainty = assess(fit, wrong, lambda _: None)
+    assert certainty.lower > 100.0
+    assert "sizes may be others" in certainty.sentence

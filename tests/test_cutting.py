@@ -84,7 +84,7 @@ def test_no_sample_is_invented_in_a_gap(system):
 
 
 def test_an_input_that_is_held_stays_until_its_next_sample(system):
-    inputs = tuple(replace(one, held=one.name == "pB") for one in system.inputs)
+    inputs = tuple(replace(variable, held=variable.name == "pB") for variable in system.inputs)
     changed = replace(system, inputs=inputs)
     fast, slow = np.arange(0.0, 5.0, 0.01), np.arange(0.0, 5.0, 0.05)
     held = file(

@@ -141,12 +141,12 @@ def test_a_planted_effect_is_named_with_its_size(planted, tmp_path, diagnosed):
     name, parameter, small = PLANTED[planted]
     seed = 500 + list(PLANTED).index(planted)
     size = small * np.random.default_rng(seed).uniform(1.0, 2.0)
-    found = diagnosed(recorded(tmp_path, Effects(**{planted: size}), seed))
-    assert found.verdict == "found"
-    first = found.causes[0]
+    diagnosis = diagnosed(recorded(tmp_path, Effects(**{planted: size}), seed))
+    assert diagnosis.verdict == "found"
+    first = diagnosis.causes[0]
     assert name in (first.effect.name, *first.confusable_with)
-    assert len(found.causes) == 1
-    assert found.gain.after < found.gain.before
+    assert len(diagnosis.causes) == 1
+    assert diagnosis.gain.after < diagnosis.gain.before
     if first.effect.name == name:
         # Bounds of 95 %, and a tenth of the size for what the multibody model has besides.
         one = first.parameters[parameter]
@@ -171,25 +171,25 @@ def test_nothing_is_missing_in_the_model_that_a_diagnosis_extended(tmp_path):
 @pytest.mark.parametrize("planted", sorted(HIDDEN))
 def test_an_effect_that_the_stops_do_not_show_is_not_invented(planted, tmp_path, diagnosed):
     sizes = {"caliper_hysteresis": 0.03, "adhesion_recovery": 0.3, "wheel_inertia": 0.2}
-    found = diagnosed(recorded(tmp_path, Effects(**{planted: sizes[planted]}), 77))
-    assert found.verdict == "nothing"
+    diagnosis = diagnosed(recorded(tmp_path, Effects(**{planted: sizes[planted]}), 77))
+    assert diagnosis.verdict == "nothing"
     # Of adhesion that recovers they could show more.
-    assert set(found.not_visible) == {"CaliperHysteresis", "FallingFriction", "WheelInertia"}
+    assert set(diagnosis.not_visible) == {"CaliperHysteresis", "FallingFriction", "WheelInertia"}
 
 
 @pytest.mark.long
 def test_hysteresis_of_the_calipers_shows_where_pressure_falls(tmp_path, diagnosed):
     stairs = ("staircase_160", "staircase_120_rev", "dry_120_3.6")
-    found = diagnosed(recorded(tmp_path, Effects(caliper_hysteresis=0.05), 78, stairs))
-    assert [cause.effect.name for cause in found.causes] == ["CaliperHysteresis"]
-    share = found.causes[0].parameters["share"]
+    diagnosis = diagnosed(recorded(tmp_path, Effects(caliper_hysteresis=0.05), 78, stairs))
+    assert [cause.effect.name for cause in diagnosis.causes] == ["CaliperHysteresis"]
+    share = diagnosis.causes[0].parameters["share"]
     assert share.low <= 0.05 <= share.high
-    assert set(found.not_visible) == {"FallingFriction", "WheelInertia"}
+    assert set(diagnosis.not_visible) == {"FallingFriction", "WheelInertia"}
 
 
 def test_nothing_is_found_where_nothing_is_missing(clean, diagnosed):
-    found = diagnosed(clean)
-    assert (found.verdict, found.causes, found.gain) == ("nothing", (), None)
+    diagnosis = diagnosed(clean)
+    assert (diagnosis.verdict, diagnosis.causes, diagnosis.gain) == ("nothing", (), None)
 
 
 def test_nothing_is_found_without_a_measured_force(clean, diagnosed):
@@ -199,7 +199,7 @@ def test_nothing_is_found_without_a_measured_force(clean, diagnosed):
 @pytest.mark.long
 def test_stops_by_one_clock_show_none_that_is_late(clean, everything, tmp_path):
     """Three sets: chance has no side, and a bias that one set hides shows in their mean."""
-    clock = next(one for one in catalogue(SYSTEM, LIBRARY) if "omegaW" in one.late)
+    clock = next(effect for effect in catalogue(SYSTEM, LIBRARY) if "omegaW" in effect.late)
     ratios = []
     for cases in (clean, *(recorded(tmp_path / str(seed), Effects(), seed) for seed in (32, 33))):
         with ResidualModel(ModelSource(everything, SYSTEM, {}), cases) as simulations:
@@ -215,8 +215,8 @@ def test_stops_by_one_clock_show_none_that_is_late(clean, everything, tmp_path):
 @pytest.mark.long
 def test_fade_is_found_without_a_measured_force(tmp_path, diagnosed):
     cases = recorded(tmp_path, Effects(fade=5e-4), 12)
-    found = diagnosed([case.without(["Fx"]) for case in cases])
-    assert [cause.effect.name for cause in found.causes] == ["BrakeFade"]
+    diagnosis = diagnosed([case.without(["Fx"]) for case in cases])
+    assert [cause.effect.name for cause in diagnosis.causes] == ["BrakeFade"]
 
 
 # Signals that the rig's loggers may have late, by the name that the rig gives that.
@@ -227,9 +227,9 @@ LATE = {"pB": "late_pB", "tauR": "late_tauR", "omegaR": "late_omegaR", "Fx": "la
 @pytest.mark.parametrize("signals", [("pB", "Fx"), ("pB",)], ids="-".join)
 def test_a_late_logger_is_named_whatever_it_records(signals, tmp_path, diagnosed):
     cases = recorded(tmp_path, Effects(**{LATE[name]: 0.025 for name in signals}), 700)
-    found = diagnosed(cases, replace(SYSTEM, loggers={"second": signals}))
-    assert [cause.effect.name for cause in found.causes] == ["LoggerTimeSkew[second]"]
-    skew = found.causes[0].parameters["skew"]
+    diagnosis = diagnosed(cases, replace(SYSTEM, loggers={"second": signals}))
+    assert [cause.effect.name for cause in diagnosis.causes] == ["LoggerTimeSkew[second]"]
+    skew = diagnosis.causes[0].parameters["skew"]
     assert skew.low <= 0.025 <= skew.high
 
 
@@ -238,17 +238,17 @@ def test_a_late_logger_is_named_whatever_it_records(signals, tmp_path, diagnosed
 def test_a_late_logger_that_nobody_declared_is_no_other_cause(signals, tmp_path, diagnosed):
     """The clock of the speeds that the system file has would be 49 ms early, and explains less."""
     cases = recorded(tmp_path, Effects(**{LATE[name]: 0.012 for name in signals}), 700)
-    found = diagnosed(cases)
-    assert (found.verdict, found.causes) == ("unexplained", ())
-    assert found.late.signals == signals
+    diagnosis = diagnosed(cases)
+    assert (diagnosis.verdict, diagnosis.causes) == ("unexplained", ())
+    assert diagnosis.late.signals == signals
     # What the multibody model has besides is as large as a half of what matters, 1 ms.
-    assert abs(found.late.skew - 0.012) < 1.96 * found.late.sigma + 5e-4
+    assert abs(diagnosis.late.skew - 0.012) < 1.96 * diagnosis.late.sigma + 5e-4
 
 
 @pytest.mark.parametrize("outside", mostly_long(OUTSIDE, {"drive_beat"}))
 def test_a_cause_outside_the_catalogue_is_not_given_a_name(outside, tmp_path, diagnosed):
-    found = diagnosed(recorded(tmp_path, Effects(**{outside: OUTSIDE[outside]}), 55))
-    assert (found.verdict, found.causes, found.gain) == ("unexplained", (), None)
+    diagnosis = diagnosed(recorded(tmp_path, Effects(**{outside: OUTSIDE[outside]}), 55))
+    assert (diagnosis.verdict, diagnosis.causes, diagnosis.gain) == ("unexplained", (), None)
 
 
 @pytest.mark.long
@@ -263,8 +263,8 @@ def test_a_cause_outside_the_catalogue_is_not_given_a_name(outside, tmp_path, di
 )
 def test_two_effects_are_found_one_after_the_other(one, other, tmp_path, diagnosed):
     effects = Effects(**{name: 1.5 * PLANTED[name][2] for name in (one, other)})
-    found = diagnosed(recorded(tmp_path, effects, 91))
-    groups = [{cause.effect.name, *cause.confusable_with} for cause in found.causes]
+    diagnosis = diagnosed(recorded(tmp_path, effects, 91))
+    groups = [{cause.effect.name, *cause.confusable_with} for cause in diagnosis.causes]
     assert len(groups) == 2
     for planted in (one, other):
         assert any(PLANTED[planted][0] in group for group in groups)
@@ -276,8 +276,8 @@ def test_two_effects_that_hide_each_other_are_found_in_six_stops(tmp_path, diagn
     six = ("01_", "02_", "03_", "04_", "05_", "06_")
     names = [name for name in SCENARIOS if name.startswith(six)]
     effects = Effects(torque_gain=1.5 * 0.015, apex_offset=1.5e-3)
-    found = diagnosed(recorded(tmp_path, effects, 91, names))
-    groups = [{cause.effect.name, *cause.confusable_with} for cause in found.causes]
+    diagnosis = diagnosed(recorded(tmp_path, effects, 91, names))
+    groups = [{cause.effect.name, *cause.confusable_with} for cause in diagnosis.causes]
     assert len(groups) == 2
     for planted in ("DriveTorqueGain", "ApexOffset"):
         assert any(planted in group for group in groups)
@@ -285,8 +285,8 @@ def test_two_effects_that_hide_each_other_are_found_in_six_stops(tmp_path, diagn
 
 def test_wrong_samples_are_set_aside_and_never_fitted(tmp_path, diagnosed):
     cases = recorded(tmp_path, Effects(spikes=0.2, dropouts=0.2), 64)
-    found = diagnosed(cases)
-    assert found.verdict == "nothing"
+    diagnosis = diagnosed(cases)
+    assert diagnosis.verdict == "nothing"
 
 
 # What the independent simulator planted, by the folder of its recordings.
@@ -303,12 +303,12 @@ SEEN = {
 @pytest.mark.parametrize("folder", mostly_long(SEEN, {"speed_friction"}))
 def test_an_independent_simulator_is_seen_through(folder, diagnosed):
     name, parameter, size = SEEN[folder]
-    found = diagnosed(read_cases([LABELLED / folder], SYSTEM))
-    assert [cause.effect.name for cause in found.causes] == [name]
-    one = found.causes[0].parameters[parameter]
+    diagnosis = diagnosed(read_cases([LABELLED / folder], SYSTEM))
+    assert [cause.effect.name for cause in diagnosis.causes] == [name]
+    one = diagnosis.causes[0].parameters[parameter]
     # Its discs cool and its cylinders lag by formulas of its own: 2 % beside the interval.
     assert one.low - 0.02 * abs(size) <= size <= one.high + 0.02 * abs(size)
-    assert found.gain.after < 0.25 * found.gain.before
+    assert diagnosis.gain.after < 0.25 * diagnosis.gain.before
 
 
 def two_stops(folder: str) -> list[Case]:
@@ -391,9 +391,9 @@ WRONG_SENSORS: dict[str, tuple[Callable[[Case], Case], str, str, float]] = {
 @pytest.mark.parametrize("sensor", mostly_long(WRONG_SENSORS, {"late wheel speed"}))
 def test_a_wrong_sensor_on_an_independent_simulator_is_named(sensor, diagnosed):
     wrong, name, parameter, size = WRONG_SENSORS[sensor]
-    found = diagnosed([wrong(case) for case in read_cases([LABELLED / "clean"], SYSTEM)])
-    assert found.verdict == "found"
-    (cause,) = found.causes
+    diagnosis = diagnosed([wrong(case) for case in read_cases([LABELLED / "clean"], SYSTEM)])
+    assert diagnosis.verdict == "found"
+    (cause,) = diagnosis.causes
     assert name in (cause.effect.name, *cause.confusable_with)
     if cause.effect.name == name:
         assert cause.parameters[parameter].low <= size <= cause.parameters[parameter].high
@@ -414,18 +414,18 @@ def test_load_cells_that_drift_on_an_independent_simulator_are_unexplained(diagn
 @pytest.mark.skipif(not LABELLED.exists(), reason="no recordings of the independent simulator")
 def test_a_wrong_sensor_beside_wrong_physics_is_found_too(diagnosed):
     wrong, _, _, _ = WRONG_SENSORS["wheel radius"]
-    found = diagnosed([wrong(case) for case in read_cases([LABELLED / "fade"], SYSTEM)])
-    assert {cause.effect.name for cause in found.causes} == {"BrakeFade", "WheelRadius"}
+    diagnosis = diagnosed([wrong(case) for case in read_cases([LABELLED / "fade"], SYSTEM)])
+    assert {cause.effect.name for cause in diagnosis.causes} == {"BrakeFade", "WheelRadius"}
 
 
 @pytest.mark.long
 @pytest.mark.skipif(not LABELLED.exists(), reason="no recordings of the independent simulator")
 def test_two_wrong_sensors_are_found_though_either_hides_the_other(diagnosed):
     cases = read_cases([LABELLED / "clean"], SYSTEM)
-    found = diagnosed(
+    diagnosis = diagnosed(
         [c.with_signals({"tauR": 1.015 * c["tauR"], "Fx": c["Fx"] - 100.0}) for c in cases]
     )
-    groups = [{cause.effect.name, *cause.confusable_with} for cause in found.causes]
+    groups = [{cause.effect.name, *cause.confusable_with} for cause in diagnosis.causes]
     assert len(groups) == 2
     for name in ("DriveTorqueGain", "FxOffset"):
         assert any(name in group for group in groups)
@@ -441,10 +441,10 @@ def test_an_effect_that_turns_is_found_beside_one_that_dwarfs_it(diagnosed):
         angle = np.cumsum(omegaW * np.diff(case.time, prepend=case.time[0]))
         return case.with_signals({"omegaW": omegaW * (1.0 + 1e-3 * np.cos(angle))})
 
-    found = diagnosed(
+    diagnosis = diagnosed(
         [eccentric(case) for case in read_cases([LABELLED / "speed_friction"], SYSTEM)]
     )
-    law, ring = found.causes
+    law, ring = diagnosis.causes
     assert law.effect.name == "SpeedDependentPadFriction"
     assert law.parameters["slope"].low <= 0.22 <= law.parameters["slope"].high
     assert ring.effect.name == "PoleRingEccentricity"

@@ -372,7 +372,7 @@ def test_a_fit_from_elsewhere_that_ended_lower_is_a_warning(system, summary, fig
     }
     changed = {**summary, "certainty": {**summary["certainty"], "starts": starts}}
     causes = section(written(system, changed, [figure], tmp_path), "causes")
-    (told,) = [one for one in causes.find_class("warning") if "lower" in text(one)]
+    (told,) = [element for element in causes.find_class("warning") if "lower" in text(element)]
     assert "0.0, -40.0, no end" in text(told)
 
 
@@ -582,7 +582,8 @@ def test_without_force_the_verdict_says_what_that_costs(forceless):
     assert headline.startswith("Nothing.")
     assert "Without a measured creep force, fewer effects" in headline
     assert any(
-        "Creep force Fx was not measured" in text(one) for one in forceless.find_class("warning")
+        "Creep force Fx was not measured" in text(element)
+        for element in forceless.find_class("warning")
     )
     titles = [text(title) for title in forceless.xpath("//article//text[@class='title']")]
     assert not [title for title in titles if "force" in title or "balance" in title]

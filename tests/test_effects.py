@@ -121,13 +121,13 @@ def tank(folder: Path, *changes: tuple[str, str]) -> Library:
 def test_every_effect_has_a_claim_that_gives_it_a_size(effect):
     """A class with an annotation is an effect, and is found here without being listed."""
     claims = [
-        one.name
-        for one in WHEELSET.classes.values()
-        if one.name.startswith("WheelsetRig.Tests.")
-        for declared in one.components
+        definition.name
+        for definition in WHEELSET.classes.values()
+        if definition.name.startswith("WheelsetRig.Tests.")
+        for declared in definition.components
         for component in [declared, *(m.redeclared for m in declared.modifier.inner.values())]
         if component is not None
-        and WHEELSET.resolve(component.type, one.name) == effect.model
+        and WHEELSET.resolve(component.type, definition.name) == effect.model
         and not component.modifier.inner.keys().isdisjoint(effect.sizes)
     ]
     assert claims
@@ -609,7 +609,11 @@ def test_laws_of_turning_motion_have_its_units(law, units):
     )
     library = read_library(file)
     inherited = library.components(name).values()
-    read = {one.name: library.unit(one) for one in inherited if "parameter" in one.prefixes}
+    read = {
+        component.name: library.unit(component)
+        for component in inherited
+        if "parameter" in component.prefixes
+    }
     compiled = {parameter.name: parameter.unit for parameter in flatten(file, name).parameters}
     assert read == compiled == units
 

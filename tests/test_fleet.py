@@ -60,9 +60,9 @@ def test_a_fleet_goes_on_from_its_states_and_reads_urls(fleet, local, tmp_path):
     shutil.copytree(local, out)
     shutil.copytree(fleet, where)
     write_stop(where / "one" / "03", 3, {})
-    found = watched(f"file://{where}", out, "--workers", "1")
-    assert found["one"]["recordings"] == 3
-    assert found["two"]["recordings"] == 2
+    watch = watched(f"file://{where}", out, "--workers", "1")
+    assert watch["one"]["recordings"] == 3
+    assert watch["two"]["recordings"] == 2
     # What was known is as it was, to the last digit: it was not estimated again.
     before = estimates(local / "one")
     after = estimates(out / "one")

@@ -35,8 +35,8 @@ def test_what_was_followed_is_counted():
         row | {"proposed": made(True, False, 2.0, -0.1), "drawn": []},
         row | {"group": ["A"], "proposed": None, "drawn": []},  # named alone by the stops before
     ]
-    found = summarise_following(rows)
-    counted = {name: (one["hits"], one["of"]) for name, one in found.items()}
+    summary = summarise_following(rows)
+    counted = {name: (one["hits"], one["of"]) for name, one in summary.items()}
     assert counted == {
         **{"proposed": (2, 4), "drawn": (1, 2), "foreseen": (1, 2), "never": (1, 2)},
         **{"sensed": (1, 1), "answered": (3, 4)},

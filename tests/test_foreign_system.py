@@ -102,8 +102,8 @@ def simulated(seed: int) -> pd.DataFrame:
         rows.append(v)
         given = (AFTER if t >= OPENS else BEFORE, pump(t))
         # An observer takes an input for that of the step to its sample.
-        found = solve_ivp(volumes, (t, t + STEP), v, args=given, rtol=1e-9, atol=1e-12)
-        v = found.y[:, -1]
+        solution = solve_ivp(volumes, (t, t + STEP), v, args=given, rtol=1e-9, atol=1e-12)
+        v = solution.y[:, -1]
     level = np.array(rows)[:, 1] / AREA
     rng = np.random.default_rng(seed)
     before = np.append(0.0, time[:-1])

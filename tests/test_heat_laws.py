@@ -40,7 +40,7 @@ def braking(pads: Place) -> tuple[Vector, dict[str, Vector]]:
     """Times and what is watched at the pads, in a stop."""
     time = np.linspace(0.0, LONGEST, 401)
     courses = {"Fperp": 3e4 * (1.0 - np.exp(-time)), "v": 20.0 - 0.5 * time}
-    inputs = {one.name: courses.get(one.name, 0.0 * time) for one in pads.inputs}
+    inputs = {variable.name: courses.get(variable.name, 0.0 * time) for variable in pads.inputs}
     watched = {**inputs, "mu": 0.35 + 0.0 * time}
     return time, {f"padFriction.{name}": course for name, course in watched.items()}
 

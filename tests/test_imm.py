@@ -183,11 +183,11 @@ def test_a_time_that_is_none_is_refused(vessel, tmp_path):
 @pytest.fixture(scope="module")
 def rails() -> dict[str, Run]:
     """Wet and dry stops of the rig."""
-    found = read_cases([ROOT / "cases"], WHEELSET)
+    cases = read_cases([ROOT / "cases"], WHEELSET)
     with open_model(WHEELSET) as opened:
         gains = InteractingMultipleModel.default_gains(opened, WHEELSET)
         own = InteractingMultipleModel(opened, WHEELSET, gains)
-        return {one.name: replay(one, own) for one in found}
+        return {one.name: replay(one, own) for one in cases}
 
 
 def test_with_one_hypothesis_it_is_the_extended_filter():

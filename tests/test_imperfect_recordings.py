@@ -37,9 +37,9 @@ def simulated(seed: int, loss: float, casing: float) -> pd.DataFrame:
     A = np.array([[-2.0 - loss, 2.0], [2.0, -2.5]]) / np.array([[100.0], [200.0]])
     whole = expm(np.block([[A, np.array([[0.01], [0.0]])], [np.zeros((1, 3))]]))
     x, found = np.array([5.0, casing]), []
-    for one in power:
+    for watts in power:
         found.append(x[0])
-        x = whole[:2, :2] @ x + whole[:2, 2] * one
+        x = whole[:2, :2] @ x + whole[:2, 2] * watts
     measured = np.array(found) + NOISE * rng.standard_normal(SECONDS)
     return pd.DataFrame(
         {"time [s]": np.arange(SECONDS, dtype=float), "P [W]": power, "T [K]": measured}
@@ -164,7 +164,7 @@ def test_samples_at_the_limit_of_a_sensor_do_not_count(tmp_path):
     (cause,) = outcome.diagnosis.causes
     assert cause.effect.name == "Draught"
     assert cause.parameters["G"].low <= LOSS <= cause.parameters["G"].high
-    assert [one[BEYOND] for one in outcome.set_aside.values()] == beyond
+    assert [counts[BEYOND] for counts in outcome.set_aside.values()] == beyond
 
 
 @pytest.mark.parametrize(

@@ -447,7 +447,7 @@ def cases(root, system) -> list[Case]:
     """24 s of two stops, every fourth sample of them."""
     names = "01_dry_80_1.5", "02_dry_100_2.7"
     read = wb.read_cases([root / "cases" / name for name in names], system)
-    return [one.part(slice(None, 4800, 4)) for one in read]
+    return [recording.part(slice(None, 4800, 4)) for recording in read]
 
 
 @pytest.fixture(scope="module")
@@ -484,7 +484,7 @@ def test_each_recording_of_a_file_is_a_case_without_a_wrong_number(
     write(tmp_path / name, stops)
     assert take(name) == 0
     told = record(tmp_path)
-    assert [one["recording"] for one in told] == list(called)
+    assert [entry["recording"] for entry in told] == list(called)
     for one, truth in zip(told, cases, strict=True):
         (folder,) = one["cases"]
         (got,) = wb.read_cases(tmp_path / "out" / folder, system)
@@ -532,7 +532,7 @@ def test_sheets_may_differ_in_order_rate_and_stated_units(tmp_path, take, cases,
     for name, truth in (("a_Stop_1", cases[0]), ("a_Stop_2", cases[1].part(slice(None, None, 2)))):
         (got,) = wb.read_cases(tmp_path / "out" / name, system)
         assert_same(got, truth)
-    assert [one["channels"]["pB"]["unit"] for one in record(tmp_path)] == ["bar", "kPa"]
+    assert [entry["channels"]["pB"]["unit"] for entry in record(tmp_path)] == ["bar", "kPa"]
 
 
 def test_a_unit_that_one_sheet_alone_states_is_not_taken_for_the_others(
@@ -544,7 +544,7 @@ def test_a_unit_that_one_sheet_alone_states_is_not_taken_for_the_others(
     assert take("a.xlsx") == 2
     error = capsys.readouterr().err
     assert "'third': found pB: 'Bremsdruck' [bar], in 'Stop 1' 'Bremsdruck'" in error
-    assert [one["recording"] for one in record(tmp_path)] == list(NAMES)
+    assert [entry["recording"] for entry in record(tmp_path)] == list(NAMES)
 
 
 def test_a_sheet_that_lacks_a_channel_is_refused_and_leaves_the_others(
@@ -576,7 +576,7 @@ def test_what_else_a_workbook_holds_is_written_down(tmp_path, take, stops, capsy
         notes = " ".join(one["files"][0]["notes"])
         for note in ("'Sheet' was left out", "'Stop 2' is hidden", "'climate' holds other"):
             assert note in notes
-    assert [one["recording"] for one in record(tmp_path)] == list(NAMES)
+    assert [entry["recording"] for entry in record(tmp_path)] == list(NAMES)
 
 
 def test_names_of_sheets_become_names_that_differ(tmp_path, take, stops, system, cases):
@@ -705,7 +705,7 @@ def test_a_unit_named_for_all_sheets_is_not_taken_for_one_that_states_another(
     error = capsys.readouterr().err
     assert "'third': found" in error
     assert "taken in [bar], as named, and the file states [kPa]" in error
-    assert [one["recording"] for one in record(tmp_path)] == list(NAMES)
+    assert [entry["recording"] for entry in record(tmp_path)] == list(NAMES)
 
 
 def test_files_together_are_one_recording_whatever_their_sheets(tmp_path, take, stops, capsys):
@@ -758,9 +758,9 @@ def test_vectors_without_a_time_of_their_own_are_no_recordings(tmp_path, stops, 
                 for name, (unit, values) in held.items()
             ]
             file.write_segment(channels)
-    found = propose_recordings(
+    proposal = propose_recordings(
         [read_recorded_file(tmp_path / "a.tdms")], system, {}, RecordingOptions()
     )
-    (one,) = found.held
+    (one,) = proposal.held
     assert one.name == ""
-    assert "pB: it may be 'Stop 1/Bremsdruck' or 'Stop 2/Bremsdruck'" in found.problems
+    assert "pB: it may be 'Stop 1/Bremsdruck' or 'Stop 2/Bremsdruck'" in proposal.problems

@@ -102,10 +102,10 @@ def test_an_hour_without_samples_on_another_day_stays_a_gap(tmp_path, tank):
 def test_a_zone_that_is_said_tells_the_hours_of_a_changing_clock(tmp_path, tank):
     begin = datetime(2024, 10, 26, 22, tzinfo=BERLIN)
     path = table(tmp_path / "a.csv", local(begin, 100, "%d.%m.%Y %H:%M"))
-    found = clock(path, tank, "Time [DMY Europe/Berlin]")
-    assert_allclose(found.times, QUARTER * np.arange(100))
-    assert iso(found.start) == "2024-10-26T20:00:00.000000"
-    assert found.zoned
+    read_clock = clock(path, tank, "Time [DMY Europe/Berlin]")
+    assert_allclose(read_clock.times, QUARTER * np.arange(100))
+    assert iso(read_clock.start) == "2024-10-26T20:00:00.000000"
+    assert read_clock.zoned
 
 
 @pytest.mark.parametrize(
@@ -141,9 +141,9 @@ def test_a_zone_that_is_said_tells_the_hours_of_a_changing_clock(tmp_path, tank)
 )
 def test_dates_of_any_order_are_read_as_times_go_on(tmp_path, tank, form, start):
     path = table(tmp_path / "a.csv", local(datetime(2024, 3, 1, tzinfo=UTC), 300, form))
-    found = clock(path, tank)
-    assert_allclose(found.times, QUARTER * np.arange(300))
-    assert iso(found.start).startswith(start)
+    read_clock = clock(path, tank)
+    assert_allclose(read_clock.times, QUARTER * np.arange(300))
+    assert iso(read_clock.start).startswith(start)
 
 
 @pytest.mark.parametrize(
@@ -158,9 +158,9 @@ def test_dates_of_any_order_are_read_as_times_go_on(tmp_path, tank, form, start)
 )
 def test_dates_and_times_stand_in_columns_of_their_own(tmp_path, tank, names, form):
     stamps = local(datetime(2024, 3, 1, tzinfo=UTC), 300, form)
-    found = clock(table(tmp_path / "a.csv", stamps, names), tank)
-    assert_allclose(found.times, QUARTER * np.arange(300))
-    assert iso(found.start).startswith("2024-03-01")
+    read_clock = clock(table(tmp_path / "a.csv", stamps, names), tank)
+    assert_allclose(read_clock.times, QUARTER * np.arange(300))
+    assert iso(read_clock.start).startswith("2024-03-01")
 
 
 @pytest.mark.parametrize(
@@ -177,11 +177,11 @@ def test_two_figures_are_minutes_and_seconds_if_that_is_nearer_to_usual_steps(tm
     tank = load_system(tmp_path / "tank")  # a sample each 0.5 s
     stamps = [f"{k // 12 % 60:02d}:{5 * (k % 12):02d}" for k in range(1000)]
     path = table(tmp_path / "a.csv", stamps)
-    found = clock(path, tank)
-    assert_allclose(found.times, 5.0 * np.arange(1000))
-    assert not found.certain
+    read_clock = clock(path, tank)
+    assert_allclose(read_clock.times, 5.0 * np.arange(1000))
+    assert not read_clock.certain
     said = clock(path, tank, "Time [min:s]")
-    assert_allclose(said.times, found.times)
+    assert_allclose(said.times, read_clock.times)
     assert (said.certain, said.stated) == (True, "min:s")
 
 
@@ -189,9 +189,9 @@ def test_hours_to_12_go_on_from_12_to_1(tmp_path, tank):
     """As times of day they are told; beside dates half days are not known, and asked for."""
     begin = datetime(2024, 3, 5, tzinfo=UTC)
     path = table(tmp_path / "a.csv", local(begin, 200, "%I:%M:%S"))
-    found = clock(path, tank)
-    assert_allclose(found.times, QUARTER * np.arange(200))
-    assert "hours count to 12" in found.reason
+    read_clock = clock(path, tank)
+    assert_allclose(read_clock.times, QUARTER * np.arange(200))
+    assert "hours count to 12" in read_clock.reason
     dated = table(tmp_path / "b.csv", local(begin, 200, "%Y-%m-%d %I:%M:%S"))
     with pytest.raises(InputError, match=r"found .* after"):
         clock(dated, tank)
@@ -212,9 +212,9 @@ def test_an_hour_that_may_be_missing_is_told(tmp_path, tank):
 def test_a_zone_of_the_header_is_that_of_its_times(tmp_path, tank):
     begin = datetime(2024, 10, 26, 22, tzinfo=BERLIN)
     stamps = local(begin, 100, "%d.%m.%Y %H:%M")
-    found = clock(table(tmp_path / "a.csv", stamps, "Time [Europe/Berlin]"), tank)
-    assert_allclose(found.times, QUARTER * np.arange(100))
-    assert iso(found.start) == "2024-10-26T20:00:00.000000"
+    read_clock = clock(table(tmp_path / "a.csv", stamps, "Time [Europe/Berlin]"), tank)
+    assert_allclose(read_clock.times, QUARTER * np.arange(100))
+    assert iso(read_clock.start) == "2024-10-26T20:00:00.000000"
 
 
 def test_days_that_follow_are_not_those_of_several_years(tmp_path, tank):
@@ -246,8 +246,8 @@ def test_a_format_that_is_said_reads_what_is_no_date_elsewhere(tmp_path, tank):
     path = table(tmp_path / "a.csv", stamps)
     with pytest.raises(InputError, match=r"texts such as 'day 061 of 2024, 00h00'.*say how they"):
         clock(path, tank)
-    found = clock(path, tank, "Time [day %j of %Y, %Hh%M]")
-    assert_allclose(found.times, QUARTER * np.arange(100))
+    read_clock = clock(path, tank, "Time [day %j of %Y, %Hh%M]")
+    assert_allclose(read_clock.times, QUARTER * np.arange(100))
 
 
 @pytest.mark.parametrize(
@@ -285,11 +285,11 @@ def test_a_format_that_is_said_reads_what_is_no_date_elsewhere(tmp_path, tank):
     ],
 )
 def test_counts_are_seconds_from_their_first(tmp_path, tank, name, values, start):
-    found = clock(table(tmp_path / "a.csv", values, name), tank)
-    assert_allclose(found.times - found.times[0], QUARTER * np.arange(300), atol=1e-3)
-    assert found.certain
-    assert iso(found.start).startswith(start)
-    assert bool(start) == bool(iso(found.start))
+    read_clock = clock(table(tmp_path / "a.csv", values, name), tank)
+    assert_allclose(read_clock.times - read_clock.times[0], QUARTER * np.arange(300), atol=1e-3)
+    assert read_clock.certain
+    assert iso(read_clock.start).startswith(start)
+    assert bool(start) == bool(iso(read_clock.start))
 
 
 def test_clocks_that_contradict_each_other_are_refused_with_both(tmp_path, tank):
@@ -394,8 +394,8 @@ def test_a_recording_has_the_date_of_its_first_sample(tmp_path, tank, form, date
     recorded = read_recorded_file(path)
     proposal = propose([recorded], tank, {})
     assert merge([recorded], proposal, tank).date(0) == date
-    found = import_recording("a", ProposedRecording("", (recorded,), proposal), tank, {})
-    write(found, tmp_path / "cases", tank)
+    imported = import_recording("a", ProposedRecording("", (recorded,), proposal), tank, {})
+    write(imported, tmp_path / "cases", tank)
     (case,) = read_cases([tmp_path / "cases"], tank)
     assert case.date.startswith(date[:19] if not date.endswith("T00:00:00.000000") else date[:10])
     assert bool(case.date) == bool(date)

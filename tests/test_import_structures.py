@@ -51,12 +51,12 @@ def group(path: Path, content: Mapping[str, Any], form: Literal["4", "5"] = "5")
     ids=["t, u, y", "u, y, Ts", "MAT 4", "Simulink", "without names", "without time"],
 )
 def test_all_signals_of_a_structure_are_channels(tmp_path, content, names, form):
-    found = group(tmp_path / "a.mat", content, form)
-    assert [channel.name for channel in found.channels] == names
-    u, y = found.channels[-2:]
+    recorded = group(tmp_path / "a.mat", content, form)
+    assert [channel.name for channel in recorded.channels] == names
+    u, y = recorded.channels[-2:]
     assert_allclose(u.values, FLOW)
     assert_allclose(y.values, LEVEL)
-    assert np.isfinite(found.step) == ("est" in content)
+    assert np.isfinite(recorded.step) == ("est" in content)
 
 
 def struct(**fields: Any) -> Mapping[str, Any]:
@@ -81,9 +81,9 @@ def array(*entries: Mapping[str, Any]) -> np.ndarray:
     ],
 )
 def test_data_of_system_identification_has_its_names_units_and_steps(tmp_path, content):
-    found = group(tmp_path / "a.mat", {"data": content})
-    assert [(c.name, c.unit) for c in found.channels] == [("inflow", "l/s"), ("h", "mm")]
-    assert found.step == 0.5
+    recorded = group(tmp_path / "a.mat", {"data": content})
+    assert [(c.name, c.unit) for c in recorded.channels] == [("inflow", "l/s"), ("h", "mm")]
+    assert recorded.step == 0.5
 
 
 @pytest.mark.parametrize(
@@ -123,22 +123,22 @@ def test_signals_over_common_times_are_those_of_a_test_stand(tmp_path):
     signals = array(
         struct(Name="inflow", Data=FLOW, Unit="l/s"), struct(Name="h", Data=LEVEL, Unit="mm")
     )
-    found = group(tmp_path / "a.mat", {"exp": {"X": struct(Data=TIME, Unit="s"), "Y": signals}})
-    assert [(c.name, c.unit) for c in found.channels] == [
+    recorded = group(tmp_path / "a.mat", {"exp": {"X": struct(Data=TIME, Unit="s"), "Y": signals}})
+    assert [(c.name, c.unit) for c in recorded.channels] == [
         *(("time", "s"), ("inflow", "l/s"), ("h", "mm"))
     ]
 
 
 def test_a_table_of_inputs_beside_an_output_is_not_lost(tmp_path):
     inputs = np.column_stack([FLOW, 2.0 * FLOW])
-    found = group(tmp_path / "a.mat", {"z": {"u": inputs, "y": column(LEVEL), "Ts": 0.5}})
-    assert [channel.name for channel in found.channels] == ["u(1)", "u(2)", "y"]
+    recorded = group(tmp_path / "a.mat", {"z": {"u": inputs, "y": column(LEVEL), "Ts": 0.5}})
+    assert [channel.name for channel in recorded.channels] == ["u(1)", "u(2)", "y"]
 
 
 def test_times_may_be_texts(tmp_path):
     stamps = np.array([f"2024-03-05 10:00:{t:06.3f}" for t in TIME], dtype=object)
-    found = group(tmp_path / "a.mat", {"t": stamps, "h": column(LEVEL)})
-    assert_allclose(found.channels[0].values, TIME)
+    recorded = group(tmp_path / "a.mat", {"t": stamps, "h": column(LEVEL)})
+    assert_allclose(recorded.channels[0].values, TIME)
 
 
 def test_arrays_of_another_length_than_times_say_so(tmp_path):

@@ -75,20 +75,20 @@ def said(skews: Mapping[str, float], monkeypatch: pytest.MonkeyPatch) -> LateSig
 
 def test_one_late_signal_is_named_with_its_time(monkeypatch):
     """Six microseconds are a hundredth of a sample, however sure they are."""
-    found = said({"u": -6e-6, "w": 8e-3}, monkeypatch)
-    assert found.signals == ("w",)
-    assert found.skew == pytest.approx(8e-3)
+    printed = said({"u": -6e-6, "w": 8e-3}, monkeypatch)
+    assert printed.signals == ("w",)
+    assert printed.skew == pytest.approx(8e-3)
 
 
 def test_what_all_others_are_early_against_is_late(monkeypatch):
-    found = said({"u": -8e-3, "w": -8e-3}, monkeypatch)
-    assert (found.signals, found.skew) == (("i",), pytest.approx(8e-3))
+    printed = said({"u": -8e-3, "w": -8e-3}, monkeypatch)
+    assert (printed.signals, printed.skew) == (("i",), pytest.approx(8e-3))
 
 
 def test_signals_that_are_late_by_different_times_are_listed(monkeypatch):
-    found = said({"u": 3e-3, "v": -2e-3, "w": 8e-3, "x": 5e-3}, monkeypatch)
-    assert found.skews == {"u": 3e-3, "v": -2e-3, "w": 8e-3, "x": 5e-3}
-    assert found.signals == ("u", "v", "w", "x")
+    printed = said({"u": 3e-3, "v": -2e-3, "w": 8e-3, "x": 5e-3}, monkeypatch)
+    assert printed.skews == {"u": 3e-3, "v": -2e-3, "w": 8e-3, "x": 5e-3}
+    assert printed.signals == ("u", "v", "w", "x")
 
 
 def test_clocks_that_are_right_are_no_cause(monkeypatch):

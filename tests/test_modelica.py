@@ -26,13 +26,18 @@ def wheelset() -> Library:
 
 
 def test_classes_within_a_class_are_read_in_their_order(tmp_path):
-    found = library(
+    read = library(
         tmp_path,
         'package P "Two" model A model B end B; end A; partial model C "Third" end C; end P;',
     )
-    assert list(found.classes) == ["P", "P.A", "P.A.B", "P.C"]
-    assert [one.partial for one in found.classes.values()] == [False, False, False, True]
-    assert found.find("C").description == found.find("P.C").description == "Third"
+    assert list(read.classes) == ["P", "P.A", "P.A.B", "P.C"]
+    assert [definition.partial for definition in read.classes.values()] == [
+        False,
+        False,
+        False,
+        True,
+    ]
+    assert read.find("C").description == read.find("P.C").description == "Third"
 
 
 def test_every_file_of_the_library_is_read_in_the_order_of_its_packages(wheelset):
@@ -45,7 +50,7 @@ def test_every_file_of_the_library_is_read_in_the_order_of_its_packages(wheelset
 
 
 def test_comments_are_none_of_the_code_and_strings_none_of_the_comments(tmp_path):
-    found = library(
+    read = library(
         tmp_path,
         """package P "No // comment, no /* comment */, a \\"quote\\" and a \\\\"
   // model Hidden end Hidden;
@@ -60,14 +65,14 @@ def test_comments_are_none_of_the_code_and_strings_none_of_the_comments(tmp_path
 end P;
 """.replace('First, ""', 'First, " + "joined"'),
     )
-    assert list(found.classes) == ["P", "P.A"]
-    assert found.find("P").description == 'No // comment, no /* comment */, a "quote" and a \\'
-    x = found.components("P.A")["x"]
-    assert (x.modifier.value, found.unit(x), x.description) == ("1.0", "a;b", "First, joined")
+    assert list(read.classes) == ["P", "P.A"]
+    assert read.find("P").description == 'No // comment, no /* comment */, a "quote" and a \\'
+    x = read.components("P.A")["x"]
+    assert (x.modifier.value, read.unit(x), x.description) == ("1.0", "a;b", "First, joined")
 
 
 def test_a_component_has_its_prefixes_type_values_and_constraint(tmp_path):
-    found = library(
+    read = library(
         tmp_path,
         """package P
   partial model Slot end Slot;
@@ -87,7 +92,7 @@ def test_a_component_has_its_prefixes_type_values_and_constraint(tmp_path):
 end P;
 """,
     )
-    n, M, a, b, u, s, y, slot = found.components("P.A").values()
+    n, M, a, b, u, s, y, slot = read.components("P.A").values()
     assert n.prefixes == {"final", "parameter"}
     assert M.modifier.value == "[1, 2; 3, 4]"
     assert n.modifier.value == "if 1 > 0 then 3 else 4"
@@ -101,11 +106,11 @@ end P;
     assert y.description == "Sometimes"
     assert (slot.type, slot.constraint, slot.description) == ("Null", "Slot", "Place")
     assert slot.modifier.inner["x"].value == "u"
-    assert found.find("A").equations == {"y"}
+    assert read.find("A").equations == {"y"}
 
 
 def test_names_are_looked_up_from_the_inside_out_through_extends_and_imports(tmp_path):
-    found = library(
+    read = library(
         tmp_path,
         """package P
   import Far.Units;
@@ -127,14 +132,14 @@ def test_names_are_looked_up_from_the_inside_out_through_extends_and_imports(tmp
 end P;
 """,
     )
-    assert {name[-1]: found.bases(f"P.Q.{name}")[0] for name in "BCDEF"} == {
+    assert {name[-1]: read.bases(f"P.Q.{name}")[0] for name in "BCDEF"} == {
         "B": "P.Q.A",
         "C": "P.A",
         "D": "P.R.InR",
         "E": "Far.Units.Torque",
         "F": "Other.A",
     }
-    assert found.ancestors("P.S.G") == ("P.Q.B", "P.Q.A")
+    assert read.ancestors("P.S.G") == ("P.Q.B", "P.Q.A")
 
 
 def test_what_a_class_inherits_has_the_values_it_gives(wheelset):
@@ -149,7 +154,7 @@ def test_what_a_class_inherits_has_the_values_it_gives(wheelset):
 
 
 def test_a_vendor_annotation_is_numbers_texts_arrays_and_parts(tmp_path):
-    found = library(
+    read = library(
         tmp_path,
         """package P
   model A
@@ -161,11 +166,11 @@ def test_a_vendor_annotation_is_numbers_texts_arrays_and_parts(tmp_path):
 end P;
 """,
     )
-    assert found.find("A").vendor == {
+    assert read.find("A").vendor == {
         "a": {"size": "bc", "step": -1.5e-3, "on": True, "values": (1e5, 1.0), "in_": ("x", "y")},
         "empty": 'a "b"',
     }
-    assert found.find("B").vendor == {}  # annotations are not inherited
+    assert read.find("B").vendor == {}  # annotations are not inherited
 
 
 # --- what is refused ---
@@ -207,14 +212,14 @@ def test_what_cannot_be_read_is_refused_with_its_line(text, line, message, tmp_p
 
 
 def test_a_class_inherited_on_two_ways_has_what_either_says(tmp_path):
-    found = library(
+    read = library(
         tmp_path,
         "package P partial model A input Real u; input Real w; end A; "
         'partial model B extends A(u(unit="m")); end B; '
         "model L extends A(u(min=1)); parameter Real p(max=3) = 0; end L; "
         "model K extends L; end K; model C extends B; extends K(p(min=2)); end C; end P;",
     )
-    parts = found.components("P.C")
+    parts = read.components("P.C")
     assert list(parts) == ["u", "w", "p"]
     assert {key: modification.value for key, modification in parts["u"].modifier.inner.items()} == {
         "unit": '"m"',
@@ -247,9 +252,9 @@ def test_a_file_must_stand_where_its_class_belongs(tmp_path):
     ],
 )
 def test_what_a_class_extends_must_lead_somewhere(text, message, tmp_path):
-    found = library(tmp_path, f"package P {text} end P;")
+    read = library(tmp_path, f"package P {text} end P;")
     with pytest.raises(InputError, match=message):
-        found.components("P.A")
+        read.components("P.A")
 
 
 def test_an_unknown_class_is_refused_with_the_closest(wheelset):

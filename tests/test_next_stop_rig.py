@@ -134,10 +134,10 @@ def test_what_no_stop_parts_is_said_and_the_sensor_that_would(one_speed, tmp_pat
     rig = replace(one_speed, experiments=replace(asked, inputs=steps))
     cases = two_stops(rig, plant(CONSTANT_PADS, ["fx_gain=0.02"]), tmp_path / "stops")
     names = ["FxGain", "DriveTorqueGain"]
-    found = wb.diagnose(rig, cases, effects=names, out=tmp_path, workers=1, report=lambda _: None)
-    (cause,) = found.diagnosis.causes
+    outcome = wb.diagnose(rig, cases, effects=names, out=tmp_path, workers=1, report=lambda _: None)
+    (cause,) = outcome.diagnosis.causes
     assert {cause.effect.name, *cause.confusable_with} == set(names)
-    proposed = wb.next_stop(found, workers=1, report=lambda _: None)
+    proposed = wb.next_stop(outcome, workers=1, report=lambda _: None)
     assert not proposed.parts
     assert proposed.sentence.startswith(
         "No experiment here likely parts FxGain and DriveTorqueGain"
@@ -166,11 +166,13 @@ def of_two(
     """Two stops alike with something planted, what they leave undecided, and what was planted."""
     effects = plant(CONSTANT_PADS, [planted])
     cases = two_stops(system, effects, folder / "stops")
-    found = wb.diagnose(system, cases, effects=names, out=folder, workers=1, report=lambda _: None)
-    assert [model.effects for model in found.rivals.models] in (
+    outcome = wb.diagnose(
+        system, cases, effects=names, out=folder, workers=1, report=lambda _: None
+    )
+    assert [model.effects for model in outcome.rivals.models] in (
         [(a,), (b,)] for a, b in permutations(names)
     )
-    return cases, found.rivals, effects
+    return cases, outcome.rivals, effects
 
 
 @pytest.mark.long
@@ -207,7 +209,7 @@ def test_what_derivatives_alone_promise_is_not_proposed(system, tmp_path):
     proposed = next_stop(system, rivals, ALONE)
     assert not proposed.parts
     assert proposed.tried[0].prediction.separation < 4.0
-    assert max(one.prediction.separation for one in proposed.tried) < 6.4
+    assert max(experiment.prediction.separation for experiment in proposed.tried) < 6.4
 
 
 @pytest.mark.long

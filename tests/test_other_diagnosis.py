@@ -264,8 +264,8 @@ def test_a_logger_of_the_system_file_that_is_late_is_named(fan, tmp_path):
     system = declare(tmp_path, LIBRARY, f'{SYSTEM}\n[loggers]\nsupply = ["u"]\n')
     late = 3  # samples
     cases = [
-        one.with_signals({"u": np.concatenate([np.full(late, one["u"][0]), one["u"][:-late]])})
-        for one in recorded(tmp_path / "recordings", fan, nothing)
+        case.with_signals({"u": np.concatenate([np.full(late, case["u"][0]), case["u"][:-late]])})
+        for case in recorded(tmp_path / "recordings", fan, nothing)
     ]
     outcome = diagnosis(system, cases, tmp_path / "results")
     (cause,) = outcome.diagnosis.causes
@@ -309,7 +309,7 @@ def test_a_cause_beyond_its_bound_is_told_with_it(bounded):
     page = write_diagnosis(outcome, {"run": run_of("diagnose", outcome.system, {})}, out, 1)
     doubt, *others = json.loads((out / "summary.json").read_text())["warnings"]
     warnings = lxml.html.fromstring(page.read_bytes()).find_class("warning")
-    assert doubt in [" ".join(one.text_content().split()) for one in warnings]
+    assert doubt in [" ".join(warning.text_content().split()) for warning in warnings]
     assert f"doubt: {doubt}" in outcome.summary()
     assert "at its limit of 0.03 N.m" in doubt
     assert any("widens the intervals" in other for other in others)

@@ -153,8 +153,8 @@ def test_a_package_that_declares_none_is_read_by_module_names_with_a_warning(tmp
     (package / "planting.py").touch()
     monkeypatch.syspath_prepend(str(tmp_path))
     with pytest.warns(FutureWarning, match=r"old_companion declares no workbench\.Plugin"):
-        found = find_plugin("old_companion")
-    assert found == Plugin(
+        plugin = find_plugin("old_companion")
+    assert plugin == Plugin(
         virtual_rig="old_companion.planting:virtual_rig", gains=package / "gains"
     )
 

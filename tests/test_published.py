@@ -130,9 +130,9 @@ def test_the_arrow_is_held_out_and_realisations_follow_it(tmp_path):
     rows = [f"{u:.6f},{y:.6f}," for u, y in 0.1 * rng.standard_normal((70000, 2))]
     (tmp_path / "SNLS80mV.csv").write_text("\n".join(['"V1","V2",', *rows]) + "\n")
     read = electronic_oscillator.PUBLISHED.layouts[0].read(tmp_path)
-    assert [one.name for one in read if one.held_out] == ["arrow"]
+    assert [recording.name for recording in read if recording.held_out] == ["arrow"]
     whole = [(40420, 49119), (49120, 57819), (57820, 66519), (0, 40399)]
-    assert [one.rows for one in read] == whole
+    assert [recording.rows for recording in read] == whole
 
 
 def test_the_stiffening_spring_alone_is_named(published_cases, tmp_path):
@@ -287,7 +287,10 @@ def test_both_layouts_of_chambers_give_the_same_recordings(tmp_path):
 def test_a_chamber_is_cut_where_it_is_closed_and_at_2_bar(tmp_path):
     time = np.round(0.1 * np.arange(300), 3)
     folders(tmp_path, time)
-    read = {one.name: one for one in leaking_chamber.PUBLISHED.layouts[1].read(tmp_path)}
+    read = {
+        recording.name: recording
+        for recording in leaking_chamber.PUBLISHED.layouts[1].read(tmp_path)
+    }
     held_out = [name for name, one in read.items() if one.held_out]
     assert held_out == ["Ultimaker_015_below", "Ultimaker_020_below"]
     assert read["Aluminium_above"].rows == (0, 299)
@@ -400,9 +403,9 @@ def test_rate_has_a_tenth_of_the_noise_of_differences():
     """Closed form: of n samples h apart, s/h*sqrt(12/(n^3 - n)), as of any line."""
     time = 0.01 * np.arange(5000)
     noise = 0.01 * np.random.default_rng(2).standard_normal(time.size)
-    found = np.std(seal_friction.rate(time, noise)[5:-5])
-    assert found == pytest.approx(0.01 / 0.01 * np.sqrt(12.0 / (11**3 - 11)), rel=0.05)
-    assert found < 0.15 * np.std(np.diff(noise) / 0.01)
+    deviation = np.std(seal_friction.rate(time, noise)[5:-5])
+    assert deviation == pytest.approx(0.01 / 0.01 * np.sqrt(12.0 / (11**3 - 11)), rel=0.05)
+    assert deviation < 0.15 * np.std(np.diff(noise) / 0.01)
 
 
 def test_both_layouts_of_seals_give_the_same_recordings(tmp_path):

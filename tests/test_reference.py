@@ -216,9 +216,9 @@ def test_rigid_rig_on_its_longitudinal_cylinders_is_one_mass_on_one_spring(refer
     roller = INERTIA_ROLLER / RADIUS_ROLLER**2
     mass = 6530.0 + wheel * roller / (wheel + roller)
     expected = np.sqrt(2.0 * 78e6 / mass) / (2.0 * np.pi)
-    found = frequency_of(reference, "frameMotion.v[1]", stiff)
+    frequency = frequency_of(reference, "frameMotion.v[1]", stiff)
     # The units' calliper modes at 40 and 48 Hz couple in through pitch; 1 % is slack.
-    assert found == pytest.approx(expected, rel=0.01)
+    assert frequency == pytest.approx(expected, rel=0.01)
 
 
 @pytest.mark.parametrize(

@@ -70,9 +70,9 @@ def coasting() -> Experiment:
     """From 120 km/h with the drive off: braked for five seconds, and released."""
     fixed = {"initial_speed": 120.0 / 3.6, "direction": 1, "wheel_rail": "dry", "imitated": 0.0}
     one = next(
-        one
-        for one in all_settings(SYSTEM.experiments)
-        if all(one.settings[name].value == value for name, value in fixed.items())
+        experiment
+        for experiment in all_settings(SYSTEM.experiments)
+        if all(experiment.settings[name].value == value for name, value in fixed.items())
     )
     profiles = other_profiles(SYSTEM.experiments, one)
     return next(profile for profile in profiles if profile.profiles[0].shape == RELEASE)
@@ -109,5 +109,5 @@ def test_a_coast_down_counts_from_its_brake_on(coasting):
     with CoSimulation(model_path(SYSTEM, "observer")) as model:
         case = predict_recording(model, SYSTEM, coasting, {}, ("Fx",), 1)
     assert case.time[-1] == pytest.approx(SYSTEM.experiments.lasts)
-    found = count(case, SYSTEM, tuple(case.signals), SOUND, restarting=False)
-    assert len(found.blocks) * SYSTEM.comparison.block > 80.0
+    counted = count(case, SYSTEM, tuple(case.signals), SOUND, restarting=False)
+    assert len(counted.blocks) * SYSTEM.comparison.block > 80.0

@@ -183,11 +183,11 @@ def test_a_recording_without_the_cells_shows_the_smoother_as_reference(
         assert ("band style-raw" in [band.get("class") for band in bands]) == told
         assert case["reference"] == ("smoother" if told else None)
     # What the cells said, which it did not see: in means over 50 ms, whose noise is 80 N / 10^0.5.
-    found = pd.read_csv(results / f"{UNJUDGED}.csv")
-    cells = pd.read_csv(root / "cases" / CASES[0] / "measured.csv")["Fx [N]"][: len(found)]
-    block = np.arange(len(found)) // 10
-    error = (found["smoother.Fx [N]"] - cells).groupby(block).mean()
-    sigma = found["smoother.sigma_Fx [N]"].groupby(block).mean()
+    table = pd.read_csv(results / f"{UNJUDGED}.csv")
+    cells = pd.read_csv(root / "cases" / CASES[0] / "measured.csv")["Fx [N]"][: len(table)]
+    block = np.arange(len(table)) // 10
+    error = (table["smoother.Fx [N]"] - cells).groupby(block).mean()
+    sigma = table["smoother.sigma_Fx [N]"].groupby(block).mean()
     inside = error.abs() < 1.96 * np.hypot(sigma, 80.0 / np.sqrt(10.0))
     assert inside.mean() >= 0.93
     assert not [c for c in pd.read_csv(results / f"{CASES[0]}.csv") if c.startswith("smoother")]

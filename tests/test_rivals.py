@@ -38,8 +38,8 @@ def brute(r: Vector, P: Matrix, begun: Vector, prior: Vector, bounds: Vector) ->
     """Least of |r + P l|^2 + prior (begun + l)^2 within bounds of begun + l, by SciPy."""
     matrix = np.vstack([P, np.diag(np.sqrt(prior))])
     right = np.concatenate([r, np.sqrt(prior) * begun])
-    found = lsq_linear(matrix, -right, (-bounds - begun, bounds - begun), tol=1e-13)
-    return 2.0 * float(found.cost)
+    solution = lsq_linear(matrix, -right, (-bounds - begun, bounds - begun), tol=1e-13)
+    return 2.0 * float(solution.cost)
 
 
 @pytest.mark.parametrize("furthest", [0.25, 0.6, 9.0])

@@ -168,8 +168,8 @@ def test_directional_derivative_is_the_jacobian(open_fmu, version):
     fmu.set([X1, X2], [2.0, 3.0])
     J = oscillator_jacobian(2.0, 3.0)
     for seed in np.eye(5):
-        found = fmu.fmi.getDirectionalDerivative(UNKNOWNS, KNOWNS, list(seed))
-        assert found == list(J @ seed)  # products and sums of small integers: exact
+        column = fmu.fmi.getDirectionalDerivative(UNKNOWNS, KNOWNS, list(seed))
+        assert column == list(J @ seed)  # products and sums of small integers: exact
     assert fmu.fmi.getDirectionalDerivative([DX2], [U, K], [3.0, 2.0]) == [3.0 - 4.0]
 
 

@@ -159,14 +159,14 @@ def test_what_slip_makes_of_friction_is_named_from_three_slides(
     assert [cause.effect.name for cause in found.causes] == [name]
     gain = found.causes[0].parameters["gain"]
     assert gain.low <= size <= gain.high
-    assert not any(one["slide"] for one in aside)
+    assert not any(samples["slide"] for samples in aside)
 
 
 def test_nothing_is_found_in_slides_where_nothing_is_missing(everything, tmp_path):
     scenarios = [SCENARIOS[slide] for slide in SLIDES]
     found, aside = diagnosed(everything, tmp_path, scenarios, 802, Effects())
     assert found.verdict == "nothing"
-    assert not any(one["slide"] for one in aside)
+    assert not any(samples["slide"] for samples in aside)
 
 
 @pytest.mark.long
@@ -176,4 +176,4 @@ def test_a_patch_that_no_law_explains_is_left_out(everything, tmp_path):
     others = [SCENARIOS[one] for one in ("03_dry_120_3.6", "05_dry_120_2.7_rev")]
     found, aside = diagnosed(everything, tmp_path, [patched, *others], 803, Effects())
     assert found.verdict == "nothing"
-    assert [one["slide"] > 0 for one in aside] == [False, True, False]
+    assert [samples["slide"] > 0 for samples in aside] == [False, True, False]

@@ -269,9 +269,9 @@ def test_noise_of_an_input_that_the_output_shows_at_once_counts(balance):
     """Closed form: a deviation of 0.1 mm is one of 10 mN, by a stiffness of 100 N/m."""
     system = loaded(balance)
     with open_model(system) as fmu:
-        found = motion(fmu, system)
-    lead = led_by(found, np.array([1e-4, 1e-4]), np.array([0.01]), 0.01)
-    assert found.states == ()
+        linearised = motion(fmu, system)
+    lead = led_by(linearised, np.array([1e-4, 1e-4]), np.array([0.01]), 0.01)
+    assert linearised.states == ()
     assert lead.gain.shape == (0, 1)
     assert_allclose(lead.ahead, [[1e-4]])
 

@@ -78,9 +78,9 @@ def test_stick_and_slip_agree_with_an_error_controlled_integrator(amplitude, blo
         v = state[1]
         return [v, (force(t) - 3.0 * float(np.tanh(v / 1e-5))) / 2.0]
 
-    found = moved(block, force, 0.0, 2.0)
+    result = moved(block, force, 0.0, 2.0)
     reference = solve_ivp(
-        rates, (0.0, 2.0), [0.0, 0.0], "Radau", np.arange(len(found)) * H, rtol=1e-7, atol=1e-10
+        rates, (0.0, 2.0), [0.0, 0.0], "Radau", np.arange(len(result)) * H, rtol=1e-7, atol=1e-10
     ).y.T
     # Which way a step that meets a kink goes there, is known to some thousandths of the motion.
-    assert np.abs(found - reference)[:, 0].max() < 5e-3 * np.abs(reference[:, 0]).max()
+    assert np.abs(result - reference)[:, 0].max() < 5e-3 * np.abs(reference[:, 0]).max()

@@ -120,7 +120,7 @@ def test_a_correction_undoes_what_gradient_and_mass_do():
 def test_a_stop_is_that_of_the_models_own_integrator(train, stopping, forecaster):
     """Independent: the FMU's Co-Simulation, whose inputs are set every 20 ms."""
     stop = asked_stop({"speed": "100 km/h", "gradient": -0.005}, train, stopping)
-    found = forecaster.stop(stop, {})
+    forecast = forecaster.stop(stop, {})
     path, h = train.model(OBSERVER).path, 0.02
     with CoSimulation(path) as model:
         speed = stop.asked["speed"]
@@ -139,8 +139,8 @@ def test_a_stop_is_that_of_the_models_own_integrator(train, stopping, forecaster
             before, speed = speed, float(model.get(seen)[0])
             way, t = way + 0.5 * h * (before + speed), t + h
     # Steps of 0.1 s that meet ramps in their middle: a few centimetres in three hundred metres.
-    assert_allclose(found.distance, way, rtol=3e-4)
-    assert_allclose(found.time, t, atol=0.15)
+    assert_allclose(forecast.distance, way, rtol=3e-4)
+    assert_allclose(forecast.time, t, atol=0.15)
 
 
 def test_more_asked_of_a_stop_makes_it_longer_and_more_force_shorter(train, stopping, forecaster):
@@ -278,15 +278,15 @@ def made(train: System, *, rest: bool = True) -> Case:
 
 @pytest.mark.filterwarnings("ignore::UserWarning")  # no noise, which a recorder has
 def test_a_recording_tells_its_command_its_distance_and_what_was_asked(train, stopping):
-    found = read_stop(made(train), train, stopping)
+    read = read_stop(made(train), train, stopping)
     # Half the rise is met between two samples in a line, which is 3 ms off a bent curve.
-    assert_allclose(found.command, 20.02, atol=0.01)
-    assert_allclose(found.distance, 30.0 * 0.65 + 450.0, rtol=1e-3)
-    assert_allclose(found.stop.asked["speed"], 30.0, rtol=1e-6)
+    assert_allclose(read.command, 20.02, atol=0.01)
+    assert_allclose(read.distance, 30.0 * 0.65 + 450.0, rtol=1e-3)
+    assert_allclose(read.stop.asked["speed"], 30.0, rtol=1e-6)
     # A quarter of a percent has not risen yet when the reading begins; less in the median.
-    assert_allclose(found.stop.asked["pressure"], 2.7e5, rtol=1e-3)
-    assert_allclose(found.resistance, 0.004, rtol=1e-6)
-    assert found.outside == ()
+    assert_allclose(read.stop.asked["pressure"], 2.7e5, rtol=1e-3)
+    assert_allclose(read.resistance, 0.004, rtol=1e-6)
+    assert read.outside == ()
 
 
 @pytest.mark.filterwarnings("ignore::UserWarning")
@@ -406,10 +406,10 @@ def test_bands_hold_forty_stops_of_months(train, tmp_path):
     )
     truth = json.loads((RECORDINGS / "history" / "truth.json").read_text())["cases"]
     held = []
-    for one in found.valid:
-        low, high = one.forecast.band
-        held.append(low < truth[one.recorded.stop.name]["stop_distance"] < high)
-        assert one.forecast.width < 1.3
+    for stop in found.valid:
+        low, high = stop.forecast.band
+        held.append(low < truth[stop.recorded.stop.name]["stop_distance"] < high)
+        assert stop.forecast.width < 1.3
     assert len(held) == 40
     assert np.mean(held) >= 0.93
 

@@ -57,28 +57,28 @@ def derivatives(tank: FMU, columns: list[tuple[str, ...]], inflow: float, count:
 
 def test_derivatives_are_those_of_the_closed_form(tank):
     inflow, k, c, count = 0.3, 0.8, 1.5, 200
-    found = derivatives(tank, [("k",), ("c",), ("T",), ("h", "s")], inflow, count)
+    slopes = derivatives(tank, [("k",), ("c",), ("T",), ("h", "s")], inflow, count)
     t = np.linspace(0.0, END, count + 1)
     level = inflow / k + (2.0 - inflow / k) * np.exp(-k * t)
     by_k = -inflow / k**2 * (1.0 - np.exp(-k * t)) - (2.0 - inflow / k) * t * np.exp(-k * t)
     # The sensor lags by T = 1e-4 s, in which a level changes by less than 2e-4 m. Steps of order
     # two: (k h)^2 = 6e-5 of each, times the duration.
-    np.testing.assert_allclose(found[:, 0], c * by_k, atol=5e-4)
-    np.testing.assert_allclose(found[1:, 1], level[1:], atol=5e-4)
+    np.testing.assert_allclose(slopes[:, 0], c * by_k, atol=5e-4)
+    np.testing.assert_allclose(slopes[1:, 1], level[1:], atol=5e-4)
     # A sensor that is later shows what was before.
-    np.testing.assert_allclose(found[5:, 2], -c * (inflow - k * level)[5:], atol=2e-2)
-    np.testing.assert_allclose(found[:, 3], c * np.exp(-k * t), atol=5e-4)
+    np.testing.assert_allclose(slopes[5:, 2], -c * (inflow - k * level)[5:], atol=2e-2)
+    np.testing.assert_allclose(slopes[:, 3], c * np.exp(-k * t), atol=5e-4)
 
 
 def test_halving_the_step_quarters_the_error(tank):
     errors = []
     k, c, T = 0.8, 1.5, 1e-4
     for count in (20, 40):
-        found = derivatives(tank, [("k",), ("c",)], 0.0, count)
+        slopes = derivatives(tank, [("k",), ("c",)], 0.0, count)
         t = np.linspace(0.0, END, count + 1)
         # The tank drains as h0 exp(-k t), of which the sensor shows 1/(1 - k T).
         exact = 2.0 * c * np.exp(-k * t) * (T / (1.0 - k * T) ** 2 - t / (1.0 - k * T))
-        errors.append(np.abs(found[2:, 0] - exact[2:]).max())
+        errors.append(np.abs(slopes[2:, 0] - exact[2:]).max())
     # A fourth, and a little of the next order.
     assert 0.2 < errors[1] / errors[0] < 0.3
 

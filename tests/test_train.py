@@ -242,5 +242,5 @@ def test_masses_of_a_sound_train_stay_as_weighed_where_no_axle_slides(train, tmp
     for case in rolled:
         told, run = truth["cases"][case.name], wb.observe(train, case, "ekf")
         at = int(np.searchsorted(case.time, told["standstill"] - 4.0))
-        found = np.array([run.signal(f"mass[{k}]")[at] * case[f"mass{k}"][0] for k in (1, 2)])
-        assert_allclose(found, 1e3 * np.array(told["mass"]), rtol=0.05)
+        values = np.array([run.signal(f"mass[{k}]")[at] * case[f"mass{k}"][0] for k in (1, 2)])
+        assert_allclose(values, 1e3 * np.array(told["mass"]), rtol=0.05)

@@ -65,7 +65,7 @@ def page(results) -> Any:
 
 
 def news(page: Any) -> str:
-    return " ".join(text(one) for one in page.xpath("//header//p[@class='warning']"))
+    return " ".join(text(element) for element in page.xpath("//header//p[@class='warning']"))
 
 
 def headline(page: Any) -> str:
@@ -127,18 +127,18 @@ then = () => {
 
 def test_page_opens_without_errors_and_draws_its_curve(results, probe):
     curve = "document.querySelector('.dots .curve')"
-    found = probe(
+    shown = probe(
         results / "index.html",
         f"told.length = {curve}.getTotalLength(); told.fill = getComputedStyle({curve}).fill;"
         f"{NARROW}",
     )
-    assert found["errors"] == []
-    assert found["length"] > 100  # [px]
-    assert found["fill"] == "none"
+    assert shown["errors"] == []
+    assert shown["length"] > 100  # [px]
+    assert shown["fill"] == "none"
     # On a narrow screen all dots are in sight, and names stand above them.
-    assert found["drawn"] == found["room"] <= 376
-    assert 0 <= min(found["dots"]) < max(found["dots"]) <= found["room"]
-    assert set(found["names"]) == {0}
+    assert shown["drawn"] == shown["room"] <= 376
+    assert 0 <= min(shown["dots"]) < max(shown["dots"]) <= shown["room"]
+    assert set(shown["names"]) == {0}
 
 
 def test_the_convergence_and_all_else_fit_a_narrow_screen(results, narrow):

@@ -51,16 +51,18 @@ def held_out(found: wb.Outcome, measure: str = "rms") -> tuple[float, float]:
     """Error of all samples that were not fitted, before and after."""
     told = [error for error in found.errors if error.held_out]
     power = 2.0 if measure == "rms" else 1.0
-    each = np.array([getattr(one, measure) for one in told]) ** power
-    before, after = np.average(each, axis=0, weights=[one.samples for one in told]) ** (1.0 / power)
+    each = np.array([getattr(entry, measure) for entry in told]) ** power
+    before, after = np.average(each, axis=0, weights=[entry.samples for entry in told]) ** (
+        1.0 / power
+    )
     return float(before), float(after)
 
 
 def fitted(found: wb.Outcome) -> tuple[float, float]:
     """Root of the mean square of all samples that were fitted, before and after."""
     told = [error for error in found.errors if not error.held_out]
-    squares = np.array([one.rms for one in told]) ** 2
-    before, after = np.sqrt(np.average(squares, axis=0, weights=[one.samples for one in told]))
+    squares = np.array([entry.rms for entry in told]) ** 2
+    before, after = np.sqrt(np.average(squares, axis=0, weights=[entry.samples for entry in told]))
     return float(before), float(after)
 
 

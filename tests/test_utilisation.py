@@ -54,9 +54,9 @@ def estimates(
 def test_utilisation_is_that_of_polachs_law(peak_force, muWR, used):
     """Reference: peaks of the law found apart from the FMU, 40 m/s, 4, 8 and 12.5 kN a wheel."""
     force = [4e3, 8e3, 12.5e3][: len(used)]
-    found = peak_force.utilisation(estimates([muWR] * len(used), force))
+    utilised = peak_force.utilisation(estimates([muWR] * len(used), force))
     # Half of the last digit of the reference, as much again for interpolation.
-    np.testing.assert_allclose(found, used, atol=0.01)
+    np.testing.assert_allclose(utilised, used, atol=0.01)
 
 
 def test_peak_agrees_with_a_fine_scan_of_the_written_law(peak_force):
@@ -70,9 +70,9 @@ def test_peak_agrees_with_a_fine_scan_of_the_written_law(peak_force):
             peak = (
                 2 * Q * mu / np.pi * (kA * eps / (1 + (kA * eps) ** 2) + np.arctan(kS * eps))
             ).max()
-            found = peak_force.utilisation(estimates([mu0], [peak / 2], speed=speed))
+            utilised = peak_force.utilisation(estimates([mu0], [peak / 2], speed=speed))
             # Linear interpolation between 14 speeds and 10 frictions.
-            assert found == pytest.approx(0.5, rel=0.02)
+            assert utilised == pytest.approx(0.5, rel=0.02)
 
 
 def test_a_sliding_wheel_uses_all_adhesion_though_its_force_has_fallen(peak_force):

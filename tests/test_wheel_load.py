@@ -94,11 +94,11 @@ def test_samples_are_excluded_by_the_load_that_was_said(light, unsaid):
     much = replace(much, smoothed=0.0, within=0.0, only_while=None, restarted=())
     system = replace(SYSTEM, comparison=replace(SYSTEM.comparison, exclusions=(much,)))
     for case, load in ((light, 60e3), (unsaid, 80e3)):
-        found = count(case, system, tuple(case.signals), SOUND, restarting=False)
-        beyond = np.abs(found.clean["Fx"]) > 0.04 * 2.0 * load
+        counted = count(case, system, tuple(case.signals), SOUND, restarting=False)
+        beyond = np.abs(counted.clean["Fx"]) > 0.04 * 2.0 * load
         assert 0.01 < beyond.mean() < 0.99
         # But for the first samples and the last one, of which no mean is formed.
-        assert np.array_equal(found.excluded["much adhesion"][5:-5], beyond[5:-5])
+        assert np.array_equal(counted.excluded["much adhesion"][5:-5], beyond[5:-5])
 
 
 def test_a_model_without_that_parameter_runs_as_it_is(light, unsaid):

@@ -43,7 +43,7 @@ def write_stop(
     with open_model(system) as model:
         speeds = dict.fromkeys(outputs[:-1], _SPEED / 0.46)
         model.start({**speeds, "vTrain": _SPEED}, friction)
-        inputs = model.variables([one.name for one in system.inputs])
+        inputs = model.variables([variable.name for variable in system.inputs])
         states = [model.states.index(name) for name in outputs]
         u = np.array([0.0, 0.0, 0.0, 0.0, _MASS, _MASS, 0.0, 0.0, 0.0])
         for k in range(round((_COAST + 15.0) / _STEP)):
