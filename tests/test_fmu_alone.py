@@ -91,7 +91,7 @@ def record(folder: Path, seed: int, area=0.5, outlet=1e-3, gain=0.0, zero=0.0) -
 
 
 @pytest.fixture(scope="module")
-def tank(tmp_path_factory: pytest.TempPathFactory) -> System:
+def tank(tmp_path_factory) -> System:
     folder = tmp_path_factory.mktemp("tank")
     build_text(folder, MODEL)
     (folder / "system.toml").write_text(SYSTEM)

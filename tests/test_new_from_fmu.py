@@ -40,7 +40,7 @@ NOISE = 0.05  # K
 
 
 @pytest.fixture(scope="module")
-def fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def fmu(tmp_path_factory) -> Path:
     return build_text(tmp_path_factory.mktemp("oven"), OVEN)
 
 
@@ -66,7 +66,7 @@ def write_log(
 
 
 @pytest.fixture
-def answer(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], list[str]]:
+def answer(monkeypatch) -> Callable[[str], list[str]]:
     """Answers each question with a text; returns the questions."""
 
     def answers(text: str) -> list[str]:
@@ -77,9 +77,7 @@ def answer(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], list[str]]:
     return answers
 
 
-def test_two_commands_lead_from_an_fmu_and_logs_to_an_open_loop(
-    tmp_path: Path, fmu: Path, answer: Callable[[str], list[str]]
-) -> None:
+def test_two_commands_lead_from_an_fmu_and_logs_to_an_open_loop(tmp_path, fmu, answer):
     asked = answer("")
     logs = [str(write_log(tmp_path / f"day{k}.csv", k)) for k in (1, 2)]
     folder = tmp_path / "oven"
@@ -105,7 +103,7 @@ def test_two_commands_lead_from_an_fmu_and_logs_to_an_open_loop(
     assert set(summary["cases"]) == {"day1", "day2"}
 
 
-def test_what_was_concluded_or_is_missing_is_said_in_the_file(tmp_path: Path, fmu: Path) -> None:
+def test_what_was_concluded_or_is_missing_is_said_in_the_file(tmp_path, fmu):
     log = write_log(tmp_path / "log.csv", 3)
     main(["new", str(tmp_path / "oven"), "--fmu", str(fmu), "--recordings", str(log), "--yes"])
     text = (tmp_path / "oven" / "system.toml").read_text()
@@ -116,9 +114,7 @@ def test_what_was_concluded_or_is_missing_is_said_in_the_file(tmp_path: Path, fm
     assert "Tc at 293.15 [K]" in text
 
 
-def test_a_channel_that_only_its_unit_speaks_for_is_asked_about_once(
-    tmp_path: Path, fmu: Path, answer: Callable[[str], list[str]]
-) -> None:
+def test_a_channel_that_only_its_unit_speaks_for_is_asked_about_once(tmp_path, fmu, answer):
     asked = answer("n")
     log = write_log(tmp_path / "log.csv", 3, "Zeit [ms];Leistung [kW];Sonde 3 [°C];p [mbar]")
     command = ["new", str(tmp_path / "oven"), "--fmu", str(fmu), "--recordings", str(log)]
@@ -132,9 +128,7 @@ def test_a_channel_that_only_its_unit_speaks_for_is_asked_about_once(
     assert 294.0 < case["T"][0] < 296.0
 
 
-def test_an_output_that_no_channel_can_be_is_asked_for_by_name(
-    tmp_path: Path, fmu: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_an_output_that_no_channel_can_be_is_asked_for_by_name(tmp_path, fmu, capsys):
     log = write_log(tmp_path / "log.csv", 3, "Zeit [ms];Leistung [kW];Sonde 3 [V];p [mbar]")
     command = ["new", str(tmp_path / "oven"), "--fmu", str(fmu), "--recordings", str(log)]
     assert main(command) == 2
