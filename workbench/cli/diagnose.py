@@ -109,6 +109,7 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
     """Diagnose the recordings, or list the effects."""
     from workbench.cli.inputs import given_cases
     from workbench.diagnosis import Problem, catalogue, choose, library_of
+    from workbench.diagnosis.effects.candidates import COEFFICIENT
     from workbench.models.modelica import read_library
     from workbench.system.reader import with_model
     from workbench.system.registry import load_system
@@ -126,7 +127,7 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
         return CommandResult(
             {"effects": [{"name": effect.name, "text": effect.text} for effect in effects]}
         )
-    if library is not None:
+    if library is not None or any(effect.size == COEFFICIENT for effect in effects):
         require_compiler()
     cases, held_out = _split_held_out(given_cases(options, system), options.held_out)
     with locked_folder(options.out):

@@ -47,10 +47,11 @@ class Extension:
 
     Attributes
     ----------
+    modelica : None of an FMU alone, around which another FMU is built.
     difference : largest, in standard deviations of the noise of a sample mean.
     """
 
-    modelica: Path
+    modelica: Path | None
     fmu: Path
     difference: float
 
@@ -258,7 +259,8 @@ class Outcome:
         lines += ["", *self._sample_errors()]
         if self.extension is not None:
             part = " (a part of what is missing)" * (self.diagnosis.verdict == "partly explained")
-            lines += ["", f"extended model{part}: {self.extension.modelica}, {self.extension.fmu}"]
+            files = [str(f) for f in (self.extension.modelica, self.extension.fmu) if f is not None]
+            lines += ["", f"extended model{part}: {', '.join(files)}"]
         aside = sum(counts[FAULTY] + counts[MISSING] for counts in self.set_aside.values())
         if aside:
             lines.append(f"{aside} samples were missing or wrong, and set aside")
@@ -506,7 +508,7 @@ def _cause(cause: Cause) -> dict[str, Any]:
 def _model(extension: Extension | None, *, partial: bool) -> dict[str, Any]:
     return {
         "partial": partial,
-        "modelica": None if extension is None else str(extension.modelica),
+        "modelica": str(extension.modelica) if extension and extension.modelica else None,
         "fmu": None if extension is None else str(extension.fmu),
         "difference_from_fit": None if extension is None else extension.difference,
     }

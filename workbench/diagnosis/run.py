@@ -1,7 +1,7 @@
 """A diagnosis, from recordings to the extended model and what it gains."""
 
 import tempfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -10,7 +10,8 @@ import numpy as np
 from workbench.diagnosis.data.clocks import case_in_time, late_signals
 from workbench.diagnosis.data.counting import refuse_too_few
 from workbench.diagnosis.data.motion import ModelSource
-from workbench.diagnosis.effects.candidates import with_starts
+from workbench.diagnosis.data.sensors import case_by_sensors, sensor_errors
+from workbench.diagnosis.effects.candidates import rate_terms, with_starts
 from workbench.diagnosis.effects.catalogue import Effect
 from workbench.diagnosis.effects.extension import ExtendedModel, build, parameter_of
 from workbench.diagnosis.inference.certainty import assess
@@ -24,6 +25,8 @@ from workbench.diagnosis.problem import Problem
 from workbench.diagnosis.simulation.residual_model import ResidualModel
 from workbench.diagnosis.simulation.simulator import delay, simulating
 from workbench.errors import InputError
+from workbench.models.added import write_extended
+from workbench.models.description import MODEL_EXCHANGE
 from workbench.models.fmu import FMU
 from workbench.models.modelica import Library
 from workbench.observers.estimators.disturbance import DisturbanceObserver
@@ -112,11 +115,17 @@ def _with_model(
     problem: Problem, scratch: Path, report: Callable[[str], None]
 ) -> tuple[Problem, Path]:
     """The problem, and an FMU with all that it considers, at zero."""
+    everything = scratch / f"{EVERYTHING}.fmu"
     if problem.library is None:
         # Nobody has said how states begin, which an FMU tells only by their nominal values.
         with open_model(problem.system) as model:
-            return replace(problem, system=with_starts(problem.system, model)), model.path
-    everything = scratch / f"{EVERYTHING}.fmu"
+            problem = replace(problem, system=with_starts(problem.system, model))
+            asked = {effect.parameter for effect in problem.effects}
+            terms = [term for term in rate_terms(model) if term.name in asked]
+        if terms:
+            report(f"building an FMU around {model.path.name} with {len(terms)} terms")
+            write_extended(model.path, everything, terms, {}, {})
+        return problem, everything if terms else model.path
     report(f"compiling {len(problem.effects)} effects")
     build_everything(problem.system, problem.library, problem.effects, everything)
     return problem, everything
@@ -184,12 +193,13 @@ class _Found:
 
     def extend(self, *, every_platform: bool) -> Extension | None:
         """Write the extended model, compile it, compare its predictions with those of the fit."""
-        library = self.problem.library
-        if not self.diagnosis.causes or library is None:
+        if not self.diagnosis.causes:
             return None
+        if (library := self.problem.library) is None:
+            return self._extend_alone()
         base = self.problem.base
         self.engine.report("compiling the extended model")
-        simulations, best = self.simulations, self.diagnosis.best
+        simulations = self.simulations
         values = self._values()
         present = [e for e in self.problem.effects if e.name in values and e.of_library]
         own = {name: value for name, value in simulations.given.items() if "." not in name}
@@ -206,19 +216,61 @@ class _Found:
         modelica, path = folder / f"{EXTENDED}.mo", folder / f"{EXTENDED}.fmu"
         write_whole(modelica, text)
         build(library, EXTENDED, text, path, every_platform=every_platform)
+        return Extension(modelica, path, self._difference(path, frozenset()))
+
+    def _extend_alone(self) -> Extension | None:
+        """Write an FMU around the one that is diagnosed, if a parameter or a rate is wrong."""
+        with open_model(self.problem.system) as model:
+            terms = {term.name: term for term in rate_terms(model)}
+            defaults, names, path = dict(model.defaults), model.names, model.path
+            fit = MODEL_EXCHANGE in model.description.interfaces and model.version == "2.0"
+        sizes = {
+            effect.parameter: self.diagnosis.best.point.sizes[effect.name, effect.size]
+            for effect in self.diagnosis.best.active
+            if effect.parameter
+        }
+        if not sizes or not fit:
+            return None
+        self.engine.report("building the extended model")
+        added = {name: float(size) for name, size in sizes.items() if name in terms}
+        changed = {
+            names.get(name, name): defaults[name] + float(size)
+            for name, size in sizes.items()
+            if name not in terms
+        }
+        given = self.problem.system.given
+        changed = {**{names.get(n, n): v for n, v in given.items()}, **changed}
+        folder = self.engine.out / "model"
+        folder.mkdir(parents=True, exist_ok=True)
+        extended = folder / f"{EXTENDED}.fmu"
+        write_extended(path, extended, [terms[name] for name in added], added, changed)
+        return Extension(None, extended, self._difference(extended, frozenset(sizes)))
+
+    def _difference(self, path: Path, own: Collection[str]) -> float:
+        """How far an extended FMU's predictions are from those of the fit, at most.
+
+        Parameters
+        ----------
+        own : variables that it has other values of, which are not set, of an FMU around another.
+        """
+        simulations, best = self.simulations, self.diagnosis.best
         difference, system = 0.0, self.problem.system
-        read = {*(delay(name) for name in system.signals), *late_signals(system)}
+        read = {
+            *(delay(name) for name in system.signals),
+            *late_signals(system),
+            *sensor_errors(system),
+        }
         points = self.fit.unknowns.values(best.point)
         with simulating(simulations.simulated._replace(path=path, system=system)) as extended:
             for k, residuals in enumerate(best.linearised.residuals):
                 known = {
                     name: value
                     for name, value in points[k].items()
-                    if name in extended.parameters or name in read
+                    if name not in own and (own or name in extended.parameters or name in read)
                 }
                 errors = extended.at(k, known).errors
                 difference = max(difference, float(np.abs(errors - residuals.errors).max()))
-        return Extension(modelica, path, difference)
+        return difference
 
     def _values(self) -> dict[str, dict[str, float]]:
         """Parameters of the effects that the extended model has, by effect."""
@@ -264,10 +316,11 @@ class _Found:
                     report(f"no {estimator.label}: {refused.found}")
         errors: dict[str, dict[str, list[float]]] = {}
         counted = ProgressReporter(report, "runs of observers").part(2 * len(gains) * len(cases))
-        after = (
-            with_model(system, OBSERVER, extension.fmu),
-            [case_in_time(case, system, best.point.sizes) for case in cases],
-        )
+        extended, sizes = with_model(system, OBSERVER, extension.fmu), best.point.sizes
+        if self.problem.library is None:
+            extended = replace(extended, given={})  # of which the FMU has all
+        in_time = [case_in_time(case, system, sizes) for case in cases]
+        after = extended, [case_by_sensors(case, system, sizes) for case in in_time]
         for used, recorded in ((system, cases), after):
             with open_model(used) as fmu:
                 for estimator, gain in gains.items():

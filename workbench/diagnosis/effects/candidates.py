@@ -1,17 +1,21 @@
-"""What a diagnosis may find in a model without a library of effects: an FMU and its sensors alone.
+"""What a diagnosis may find without a library of effects: in an FMU and its sensors alone.
 
-Each parameter of the FMU may have another value, and each sensor another gain or zero. No source is
-needed: a parameter is set, and a reading is corrected beside the FMU.
+Each parameter of the FMU may have another value, each sensor another gain or zero, each rate may
+lack a term. No source is needed: a parameter is set, a reading is corrected beside the FMU, and a
+term is added to the rates around it.
 """
 
 import re
+import sys
 from collections.abc import Collection, Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
 
+from workbench.arrays import Vector
 from workbench.diagnosis.effects.catalogue import Effect
 from workbench.errors import unknown_name
+from workbench.models.added import CONSTANT, DRY, QUADRATIC, VISCOUS, RateTerm
 from workbench.models.description import Variable
 from workbench.models.fmu import FMU
 from workbench.observers.operating import start_spreads
@@ -19,7 +23,14 @@ from workbench.system.parts import Signal, StateNoise
 from workbench.system.system import System
 from workbench.system.units import with_unit
 
-CHANGE, GAIN, OFFSET = "change", "gain", "offset"
+CHANGE, GAIN, OFFSET, COEFFICIENT = "change", "gain", "offset", "coefficient"
+_FORMS = {
+    DRY: "a dry term, as of friction, in the rate of {state}",
+    VISCOUS: "a term in proportion to {state} in its rate, as of viscous friction or a leak",
+    QUADRATIC: "a quadratic term, as of drag, in the rate of {state}",
+    CONSTANT: "a constant term in the rate of {state}",
+}
+_SMOOTH = 1e-3  # of a state's size, within which a dry term is smooth
 _CHANGEABLE = ("fixed", "tunable")
 _FACTOR = 10.0  # by which a parameter is larger or smaller at most, if the FMU has no bounds
 
@@ -33,10 +44,12 @@ def candidates(model: FMU, system: System) -> tuple[Effect, ...]:
 
     Returns
     -------
-    effects : parameters in the order of the FMU, then gain and offset of each input and output.
+    effects : parameters in the order of the FMU, gain and offset of each input and output, then
+        terms beside the rates, by state.
     """
     chosen = system.candidates
-    effects = {e.name: e for e in (*_parameters(model, system), *_sensors(system))}
+    own = (*_parameters(model, system), *_sensors(system), *_terms(model, system))
+    effects = {effect.name: effect for effect in own}
     considered = _matching(chosen.only, effects, system) if chosen.only else set(effects)
     considered -= _matching(chosen.without, effects, system)
     return tuple(effect for name, effect in effects.items() if name in considered)
@@ -74,6 +87,56 @@ def own_bounds(nominal: float, declared: tuple[float, float]) -> tuple[float, fl
         ends = sorted((nominal / _FACTOR, nominal * _FACTOR))
         low, high = (end if np.isinf(d) else d for end, d in zip(ends, (low, high), strict=True))
     return low - nominal, high - nominal
+
+
+def rate_terms(model: FMU) -> tuple[RateTerm, ...]:
+    """Terms that may be missing beside the rates of an FMU's states.
+
+    A state that another state is the rate of, as a position is of a speed, has none: what moves it
+    acts on the speed. None for an FMU around which no other can be built.
+    """
+    if model.version != "2.0" or sys.platform == "win32":
+        return ()
+    model.start({})
+    x, scale = model.get_states(), _scales(model)
+    # The start, and each state moved by its scale to either side, (2s + 1, s); rates there.
+    points = np.vstack([x, x + np.diag(scale), x - np.diag(scale)])
+    rates = np.array([_rates(model, point) for point in points])
+    terms = []
+    for i, state in enumerate(model.states):
+        if any(np.array_equal(rates[:, i], other) for other in points.T):
+            continue
+        typical = float(np.abs(rates[:, i]).max()) or float(scale[i])
+        own = model.units.get(state, "")
+        rate = model.units.get(model.description.rates[i]) or (f"{own}/s" if own else "")
+        for form, text in _FORMS.items():
+            power = {VISCOUS: 1, QUADRATIC: 2}.get(form, 0)
+            terms.append(
+                RateTerm(
+                    name=f"added.{form}.{state}",
+                    state=i,
+                    form=form,
+                    typical=typical / float(scale[i]) ** power,
+                    unit=("1/s" if power == 1 else f"({rate})/({own})2" if power else rate)
+                    if own
+                    else "",
+                    width=_SMOOTH * float(scale[i]),
+                    text=text.format(state=state),
+                )
+            )
+    return tuple(terms)
+
+
+def _scales(model: FMU) -> Vector:
+    """Typical size of each state, (s,): its nominal value, or where it begins, or 1."""
+    nominal = {v.name: v.nominal for v in model.description.variables}
+    starts = zip(model.states, np.abs(model.get_states()), strict=True)
+    return np.array([nominal.get(name) or start or 1.0 for name, start in starts])
+
+
+def _rates(model: FMU, states: Vector) -> Vector:
+    model.set_states(states)
+    return model.derivatives().copy()
 
 
 def with_starts(system: System, model: FMU) -> System:
@@ -114,6 +177,21 @@ def _parameters(model: FMU, system: System) -> Iterator[Effect]:
             text=f"another value of {variable.name}{about} than {nominal}",
             separation=f"a measurement of {variable.name} by itself",
             parameter=variable.name,
+        )
+
+
+def _terms(model: FMU, system: System) -> Iterator[Effect]:
+    for term in rate_terms(model):
+        state = model.states[term.state]
+        yield Effect(
+            name=f"{term.form.capitalize()}Term[{state}]",
+            model=term.name,
+            slots=(),
+            size=COEFFICIENT,
+            matters=system.candidates.matters * term.typical,
+            text=term.text,
+            separation=f"recordings in which {state} moves otherwise",
+            parameter=term.name,
         )
 
 

@@ -221,7 +221,7 @@ def _diagnosed(problem: Problem, forms: Mapping[str, ClosedForm], engine: Engine
         extended, own = _as_effects(problem, first, Path(scratch))
         effects = [*problem.effects, *own]
         outcome = diagnose(replace(problem, library=extended, effects=effects), engine)
-    if outcome.extension is not None:
+    if outcome.extension is not None and outcome.extension.modelica is not None:
         text = package(problem.modelica, [form.written for form in forms.values()])
         write_whole(outcome.extension.modelica.with_name(f"{PACKAGE}.mo"), text)
     return outcome

@@ -96,7 +96,9 @@ class Simulator:
         if not given.system.library.is_file():
             # An FMU of another tool need not take a parameter while it runs: each is set before.
             self._typical |= {
-                name: abs(fmu.defaults.get(name, 0.0)) or 1.0 for name in fmu.parameters
+                v.name: abs(fmu.defaults.get(v.name, 0.0)) or v.nominal or 1.0
+                for v in fmu.description.variables
+                if v.causality == "parameter"
             }
 
     def stepped(self, parts: int) -> "Simulator":

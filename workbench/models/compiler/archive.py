@@ -77,7 +77,19 @@ def write_sources(folder: Path, fmi: int, generated: dict[str, str], headers: Pa
 
 
 def compile_library(sources: Path, library: Path, fmi: int, target: str) -> None:
-    """Compile the sources to a shared library for `target`.
+    """Compile the sources of an FMU to a shared library for `target`; see `compile_files`."""
+    libraries = () if "windows" in target else ("-lm",)
+    compile_files(sources, library, library_sources(fmi), target, libraries)
+
+
+def compile_files(
+    sources: Path, library: Path, files: Sequence[str], target: str, libraries: Sequence[str]
+) -> None:
+    """Compile C files of a folder to a shared library for `target`.
+
+    Parameters
+    ----------
+    libraries : options of the linker, such as "-lm".
 
     Raises
     ------
@@ -87,8 +99,8 @@ def compile_library(sources: Path, library: Path, fmi: int, target: str) -> None
     library.parent.mkdir(parents=True, exist_ok=True)
     command = [
         *(sys.executable, "-m", "ziglang", "cc", "-target", target, *FLAGS, "-shared", "-s", "-I."),
-        *library_sources(fmi),
-        *(() if "windows" in target else ("-lm",)),
+        *files,
+        *libraries,
         *((f"-Wl,-install_name,@rpath/{library.name}",) if "macos" in target else ()),
         *("-o", os.path.relpath(library, sources)),
     ]

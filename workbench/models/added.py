@@ -1,0 +1,230 @@
+"""An FMU around another one: terms beside the rates of its states, and parameters of other values.
+
+The inner FMU is kept whole below the resources; all calls are handed on to it by `added.c`. Model
+Exchange of FMI 2.0, on this machine.
+"""
+
+import shutil
+import tempfile
+import zipfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from xml.etree import ElementTree
+
+import fmpy
+
+from workbench.errors import InputError
+from workbench.models import fmu_cache
+from workbench.models.archive import DESCRIPTION
+from workbench.models.description import MODEL_EXCHANGE, Description, read_description
+
+DRY, VISCOUS, QUADRATIC, CONSTANT = "dry", "viscous", "quadratic", "constant"
+_IDENTIFIER, _INNER = "Extended", "inner"
+_HEADERS = Path(fmpy.__file__).parent / "c-code"
+_MOST_KNOWNS = 4096  # of one directional derivative
+
+
+@dataclass(frozen=True)
+class RateTerm:
+    """A term beside the rate of a state.
+
+    The rate gains -tanh(x/width), -x, -x*abs(x) or 1, times a coefficient.
+
+    Attributes
+    ----------
+    name : of its coefficient, a parameter of the FMU.
+    state : place in the FMU's continuous states.
+    form : DRY, VISCOUS, QUADRATIC or CONSTANT.
+    typical : size of the coefficient, in its unit; bounds are 1000 times that.
+    unit : of the coefficient, empty for none.
+    width : of the state within which a dry term is smooth.
+    text : what it is, for people.
+    """
+
+    name: str
+    state: int
+    form: str
+    typical: float
+    unit: str
+    width: float
+    text: str
+
+
+def write_extended(
+    inner: Path,
+    out: Path,
+    terms: Sequence[RateTerm],
+    coefficients: Mapping[str, float],
+    parameters: Mapping[str, float],
+) -> None:
+    """Write an FMU with terms beside the rates of another one.
+
+    Parameters
+    ----------
+    coefficients : start values of terms by name; others are 0.
+    parameters : values of the inner FMU's own, by its names.
+
+    Raises
+    ------
+    InputError
+        If the FMU is none of FMI 2.0 with Model Exchange for this machine.
+    """
+    # An extra: what extended FMUs are compiled with; running them needs none.
+    from workbench.models.compiler.archive import (
+        PLATFORMS,
+        compile_files,
+        digest,
+        digest_file,
+        native,
+        pack,
+    )
+
+    description = read_description(inner)
+    refuse_unfit(description)
+    library = description.library(MODEL_EXCHANGE)
+    with tempfile.TemporaryDirectory() as scratch:
+        folder, sources = Path(scratch) / _IDENTIFIER, Path(scratch) / "c"
+        resources = folder / "resources" / _INNER
+        with zipfile.ZipFile(inner) as archive:
+            kept = [
+                name
+                for name in archive.namelist()
+                if name in (DESCRIPTION, library) or name.startswith("resources/")
+            ]
+            archive.extractall(resources, kept)
+        text = (resources / DESCRIPTION).read_text(encoding="utf-8")
+        sources.mkdir()
+        header = _header(description, library, terms, coefficients, parameters)
+        code = Path(__file__).with_suffix(".c").read_text()
+        # The token changes with all that changes behaviour, and is in the code.
+        token = f"{{{digest([header, code, description.sha256])[:32]}}}"
+        (sources / "added.h").write_text(f'#define GUID "{token}"\n{header}')
+        (sources / "added.c").write_text(code)
+        for file in _HEADERS.glob("fmi2*.h"):
+            shutil.copyfile(file, sources / file.name)
+        fmi2_name, _, target, suffix = PLATFORMS[native()]
+        binary = folder / "binaries" / fmi2_name / f"{_IDENTIFIER}{suffix}"
+        compile_files(sources, binary, ["added.c"], target, ["-ldl"])
+        described = _described(text, token, description, terms, coefficients, parameters)
+        (folder / DESCRIPTION).write_bytes(described)
+        pack(folder, out)
+    fmu_cache.remember(digest_file(out))
+
+
+def refuse_unfit(description: Description) -> None:
+    """Refuse an FMU around which there can be none.
+
+    Raises
+    ------
+    InputError
+        If it is none of FMI 2.0 with Model Exchange.
+    """
+    if description.version != "2.0" or MODEL_EXCHANGE not in description.interfaces:
+        raise InputError(
+            where=str(description.path),
+            found=f"FMI {description.version}, {' and '.join(description.interfaces)}",
+            expected="Model Exchange of FMI 2.0, whose rates can be added to",
+            remedy="export the model so, or leave terms beside rates out",
+        )
+
+
+def _header(
+    description: Description,
+    library: str,
+    terms: Sequence[RateTerm],
+    coefficients: Mapping[str, float],
+    parameters: Mapping[str, float],
+) -> str:
+    """What `added.c` must know."""
+    references = {v.name: v.reference for v in description.variables}
+    first = max(references.values()) + 1
+    forms = {DRY: "DRY", VISCOUS: "VISCOUS", QUADRATIC: "QUADRATIC", CONSTANT: "CONSTANT"}
+    rows = [
+        f"{{{t.state}, {forms[t.form]}, {coefficients.get(t.name, 0.0)!r}, {t.width!r}}}"
+        for t in terms
+    ]
+    values = [repr(float(value)) for value in parameters.values()]
+    # C knows no empty arrays: one more entry than is used.
+    return f"""\
+#define INNER_GUID "{description.token}"
+#define INNER_LIBRARY "{_INNER}/{library}"
+#define INNER_RESOURCES "{_INNER}/resources"
+#define FIRST {first}u
+#define TERMS {len(terms)}u
+#define STATES {len(description.states)}u
+#define CHANGED {len(parameters)}u
+#define KNOWNS {_MOST_KNOWNS}
+enum {{ DRY, VISCOUS, QUADRATIC, CONSTANT }};
+typedef struct {{ size_t state; int form; double start, width; }} Term;
+static const Term terms[] = {{{", ".join([*rows, "{0, CONSTANT, 0.0, 1.0}"])}}};
+static const fmi2ValueReference states[] = {_array(references, description.states)};
+static const fmi2ValueReference rates[] = {_array(references, description.rates)};
+static const fmi2ValueReference changed[] = {_array(references, parameters)};
+static const fmi2Real values[] = {{{", ".join([*values, "0.0"])}}};
+"""
+
+
+def _array(references: Mapping[str, int], names: Sequence[str] | Mapping[str, float]) -> str:
+    return "{" + ", ".join([*(f"{references[name]}u" for name in names), "0u"]) + "}"
+
+
+def _described(
+    text: str,
+    token: str,
+    inner: Description,
+    terms: Sequence[RateTerm],
+    coefficients: Mapping[str, float],
+    parameters: Mapping[str, float],
+) -> bytes:
+    """The model description of the inner FMU with coefficients of terms."""
+    root = ElementTree.fromstring(text)
+    root.set("guid", token)
+    root.set("description", f"{root.get('description', root.get('modelName'))}, extended")
+    for alone in root.findall("CoSimulation"):
+        root.remove(alone)
+    exchange = root.find("ModelExchange")
+    variables, structure = root.find("ModelVariables"), root.find("ModelStructure")
+    assert exchange is not None
+    assert variables is not None
+    for part in list(exchange):
+        exchange.remove(part)
+    exchange.set("modelIdentifier", _IDENTIFIER)
+    exchange.set("canSerializeFMUstate", "false")
+    if (units := root.find("UnitDefinitions")) is None:
+        units = ElementTree.Element("UnitDefinitions")
+        root.insert(list(root).index(exchange) + 1, units)
+    known = {unit.get("name") for unit in units}
+    for unit in dict.fromkeys(term.unit for term in terms if term.unit not in {*known, ""}):
+        ElementTree.SubElement(units, "Unit", name=unit)
+    for variable in variables:
+        if (value := parameters.get(variable.get("name", ""))) is not None:
+            next(iter(variable.iterfind("Real"))).set("start", repr(float(value)))
+    first = max(v.reference for v in inner.variables) + 1
+    for k, term in enumerate(terms):
+        entry = ElementTree.SubElement(
+            variables,
+            "ScalarVariable",
+            name=term.name,
+            valueReference=str(first + k),
+            description=term.text,
+            causality="parameter",
+            variability="tunable",
+        )
+        least = -1e3 * term.typical if term.form == CONSTANT else 0.0
+        real = ElementTree.SubElement(
+            entry,
+            "Real",
+            start=repr(coefficients.get(term.name, 0.0)),
+            nominal=repr(term.typical),
+            min=repr(least),
+            max=repr(1e3 * term.typical),
+        )
+        if term.unit:
+            real.set("unit", term.unit)
+    # A rate depends on its own state now, which the inner FMU need not say.
+    for unknown in structure.iterfind("Derivatives/Unknown") if structure is not None else ():
+        for key in ("dependencies", "dependenciesKind"):
+            unknown.attrib.pop(key, None)
+    described: bytes = ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)
+    return described
