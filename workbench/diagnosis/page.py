@@ -151,8 +151,10 @@ def _balanced(figures: Sequence[CaseFigure]) -> bool:
     return figures[0].panels[-1].curves[0].style == "measured"
 
 
-def _inputs(system: System) -> str:
-    return " and ".join(signal.label for signal in system.inputs)
+def _driven(system: System) -> str:
+    """What a simulation runs from; a machine that is only released has no inputs."""
+    inputs = " and ".join(signal.label for signal in system.inputs)
+    return f"the measured {inputs}" if inputs else "its start"
 
 
 def _shown(
@@ -166,7 +168,7 @@ def _shown(
     compared = _compared(summary)
     ran = f", {compared}; errors of free runs are in a table below" if compared else ""
     text = (
-        f"The model ran from the measured {_inputs(system)}{ran}. Where a curve stays outside the "
+        f"The model ran from {_driven(system)}{ran}. Where a curve stays outside the "
         "grey band, the simulation is wrong by more than noise explains"
     )
     if summary["causes"]:
@@ -717,7 +719,7 @@ def _terms(
     )
     terms = {
         "Prediction error": f"Measured minus predicted, in means over {block}. The model is "
-        f"simulated from the measured {_inputs(system)}{along if led else ''}. Shown are running "
+        f"simulated from {_driven(system)}{along if led else ''}. Shown are running "
         f"means over {duration(lasting_blocks(system) * compare.block)}, or over {block} where a "
         "cause turns with a shaft; the band is two standard deviations of what noise alone leaves "
         "in them.",
