@@ -8,7 +8,7 @@ import subprocess
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -16,11 +16,13 @@ import fmpy
 import lxml.html
 import pytest
 
+from workbench import __main__ as program
 from workbench.diagnosis import build_everything, read_effects
 from workbench.models.fmu import FMU
 from workbench.models.modelica import read_library
 from workbench.recordings.case import Case, read_case
 from workbench.recordings.datasets import write_cases
+from workbench.runtime import pool as pools
 from workbench.runtime.pool import Pool
 from workbench.system.registry import load_system, open_model
 from workbench.system.system import System
@@ -38,6 +40,20 @@ ROOT = Path(__file__).parent.parent
 # Its sockets stay where the first of them was, which may be no folder of one test: that has a long
 # name, and goes.
 multiprocessing.util.get_temp_dir()
+
+
+# What workers of pools import most. Else the first pool of a session, which may need nothing,
+# would decide that all later ones import everything anew: 1.7 s of a processor for each worker.
+MOST = ("workbench.observers.report", "workbench.observers.simulation", "workbench.diagnosis.laws")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def workers_begin_with_most() -> Iterator[None]:
+    preload = partial(pools.preload, *MOST)
+    with pytest.MonkeyPatch.context() as patch:
+        for module in (program, pools):
+            patch.setattr(module, "preload", preload)
+        yield
 
 
 @pytest.fixture(scope="session")
