@@ -45,6 +45,7 @@ from workbench.studies.power.report import campaign_check, draw_chances, format_
 from workbench.studies.power.run import PowerStudy
 from workbench.studies.power.statistics import intervals_cover, named_all, named_right
 from workbench.system.registry import load_system
+from workbench.system.template import write_system
 
 from .page_rules import check_page
 from .processes import ROOT, comes_true, living, running
@@ -408,6 +409,20 @@ def test_what_is_clear_is_found_in_19_of_20(unknowns):
     drawn[:, 0] += clear(unknowns, decides)
     found = (np.square(drawn).sum(axis=1) > decides.fall_of(unknowns)).mean()
     assert found == pytest.approx(SURE, abs=3.0 * np.sqrt(SURE * (1.0 - SURE) / 4000))
+
+
+def test_a_system_without_a_plugin_is_planted_in_its_own_model(tmp_path):
+    """Its own four recordings drive it; seepage of 2 l/s per metre is far above noise."""
+    pytest.importorskip("casadi", reason="needs the extra [compiler]")
+    pytest.importorskip("rumoca", reason="needs the extra [compiler]")
+    write_system(tmp_path / "tank")
+    sets = ["--clean", "2", "--sizes", "200", "--repeats", "2", "--pairs", "0", "--workers", "1"]
+    options = ["--system", str(tmp_path / "tank"), "--out", str(tmp_path / "out")]
+    assert main(["power", *options, *sets]) == 0
+    power = json.loads((tmp_path / "out" / "power.json").read_text())
+    assert "own model" in power["provenance"]["machine"]
+    assert (power["false_alarms"]["hits"], power["false_alarms"]["of"]) == (0, 2)
+    assert (power["right_first"]["hits"], power["right_first"]["of"]) == (2, 2)
 
 
 def test_one_effect_at_one_size_is_one_set():

@@ -19,10 +19,10 @@ from workbench.diagnosis.data.motion import ModelSource
 from workbench.diagnosis.effects.extension import variables
 from workbench.diagnosis.effects.slots import read_slots
 from workbench.diagnosis.inference.fit import Fit
-from workbench.diagnosis.laws.forms import SIGNED
+from workbench.diagnosis.laws.forms import SIGNED, ClosedForm, candidates
 from workbench.diagnosis.laws.outcome import _falls, worse_everywhere
 from workbench.diagnosis.laws.periods import strongest_period
-from workbench.diagnosis.laws.places import LawInfluence, places, turning
+from workbench.diagnosis.laws.places import Carrier, Law, LawInfluence, places, turning
 from workbench.diagnosis.laws.splines import COEFFICIENTS, Knots, kernel, smoothest
 from workbench.diagnosis.simulation.prediction import Variation
 from workbench.diagnosis.simulation.residual_model import ResidualModel
@@ -392,6 +392,42 @@ def test_slots_tell_where_a_law_may_act(folder):
     (outlet,) = places(library, base, read_slots(library, base))
     assert (outlet.name, outlet.output.unit) == ("OutletActual", "m3/s")
     assert [(one.name, one.unit) for one in outlet.inputs] == [("nominal", "m3/s"), ("h", "m")]
+
+
+def test_bounds_of_a_size_follow_from_its_function_and_are_widened(folder):
+    """What pulses by more than the outlet lets out at its largest, 3 l/s by 2 l/s."""
+    system = load_system(folder)
+    library = read_library(system.library)
+    base = system.models[OBSERVER].name
+    (outlet,) = places(library, base, read_slots(library, base))
+    law = Law(outlet, Carrier("1.0", "m3/s", "adds to flow"), LawInfluence("turn", (), 40.0))
+    (form,) = candidates(law, None, 2e-3, 3e-3)
+
+    def greatest(form: ClosedForm) -> float:
+        size = form.written.declarations[0]
+        return float(size.partition("max=")[2].partition(")")[0])
+
+    assert greatest(form) > 3e-3
+    assert greatest(form.widened) == pytest.approx(10.0 * greatest(form))
+    # What multiplies the flow keeps its sign, however much room there is.
+    share = Law(outlet, Carrier(outlet.nominal, "1", "multiplies flow"), law.influence)
+    (form,) = candidates(share, None, 2e-3, 3.0)
+    assert greatest(form.widened) < 1.0
+
+
+@pytest.mark.long
+def test_a_form_whose_bounds_bind_is_fitted_with_wider_ones(tmp_path):
+    """A leak with the ninth power of the level; exponents are sought up to six at first."""
+    folder = recorded(
+        tmp_path / "tank",
+        lambda time, level: outlet(level) + 3e-3 * (level / 2.0) ** 9,
+    )
+    options = ["--system", str(folder), "--out", str(tmp_path / "out"), "--workers", "1"]
+    assert main(["diagnose", str(folder / "recordings"), *options, "--propose"]) == 0
+    told = json.loads((tmp_path / "out" / "proposed" / "proposal.json").read_text())
+    sizes = {name: size for law in told["laws"] for name, size in law["parameters"].items()}
+    assert sizes
+    assert not any(size["limit"] for size in sizes.values())
 
 
 def test_an_input_without_a_unit_has_that_of_what_it_is_bound_to(tmp_path):

@@ -59,3 +59,18 @@ def test_pads_that_bed_in_are_told_by_the_time_since_they_touch(system, tmp_path
         assert error < 0.15
     else:
         assert error is None
+
+
+@pytest.mark.long
+def test_friction_that_falls_with_deceleration_is_no_sum_of_known_causes(
+    system: System, tmp_path: Path
+) -> None:
+    """No catalogue has it; bedding in, a return spring and a film bend to it down to 1.26."""
+    planted = plant(CONSTANT_PADS, ["friction_deceleration=-0.04"])
+    for name in list(SCENARIOS)[:6]:
+        record(SCENARIOS[name], 1, planted, tmp_path / "stops" / name)
+    cases = [read_case(path, system) for path in sorted((tmp_path / "stops").iterdir())]
+    quiet = {"workers": 2, "report": lambda _: None}
+    found = wb.diagnose(system, cases, out=tmp_path / "out", **quiet)
+    assert found.diagnosis.verdict == "unexplained"
+    assert any("may be zero" in why for near in found.diagnosis.nearest for why in near.reasons)

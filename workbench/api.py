@@ -240,7 +240,8 @@ def diagnose(
     """
     problem = _problem(system, cases, effects, held_out)
     engine = Engine(_number(workers), report, _folder(out, "diagnosis"))
-    return diagnosis.diagnose(problem, engine, certainty=certainty)
+    outcome = diagnosis.diagnose(problem, engine, certainty=certainty)
+    return laws.compared_with_one_law(outcome, problem, engine)
 
 
 def _problem(

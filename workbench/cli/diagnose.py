@@ -157,18 +157,22 @@ def _propose(
 
 def _run(options: argparse.Namespace, output: Output, problem: Problem) -> CommandResult:
     from workbench.diagnosis import diagnose
+    from workbench.diagnosis.laws import compared_with_one_law
     from workbench.diagnosis.report import write_diagnosis
     from workbench.pages.provenance import run_of, sources
     from workbench.system.registry import open_model
 
     system, cases, held_out = problem.system, problem.cases, problem.held_out
     output.stage(f"{len(cases)} recordings" + f", {len(held_out)} held out" * bool(held_out))
+    engine = Engine(options.workers, output.stage, options.out)
     outcome = diagnose(
         problem,
-        Engine(options.workers, output.stage, options.out),
+        engine,
         every_platform=options.platforms == "all",
         certainty=options.certainty,
     )
+    if not options.propose:
+        outcome = compared_with_one_law(outcome, problem, engine)
     with open_model(system) as model:
         provenance = {
             "run": run_of("diagnose", system, sources([*cases, *held_out])),

@@ -29,9 +29,11 @@ from workbench.runtime.engine import Engine
 from workbench.runtime.files import locked_folder
 
 if TYPE_CHECKING:
+    from workbench.diagnosis import Effect
     from workbench.studies.power import Plantable, PowerStudy, VirtualRig
     from workbench.studies.power.planting import Group
     from workbench.studies.power.report import Check
+    from workbench.system.system import System
 
 WORKERS_NEED = ("workbench.studies.power", "workbench.studies.power.report")
 
@@ -41,8 +43,9 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
     parser = commands.add_parser(
         "power",
         help=text,
-        description="Plant effects in the virtual rig, diagnose the recordings without telling, "
-        "and count: false alarms on clean sets, right names against the size of the effect, pairs, "
+        description="Plant effects in the virtual rig of the system's plugin, or else in the "
+        "system's own model, diagnose the recordings without telling, and count: "
+        "false alarms on clean sets, right names against the size of the effect, pairs, "
         "causes that are not in the catalogue, coverage of the intervals. Writes power.json, "
         "figures (PNG, SVG) and the verdict on each set (sets.jsonl). Takes hours; Ctrl-C keeps "
         "what there is and reports it, --resume goes on. Needs the extra [compiler].",
@@ -109,7 +112,8 @@ def _add_sets(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="NAME",
-        help="recording of a set, may be repeated (default: those that are usual for the system)",
+        help="recording of a set, may be repeated (default: those that are usual for the system); "
+        "without a plugin a folder of recordings of the machine, whose inputs drive its own model",
     )
 
 
@@ -170,10 +174,18 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
             output.progress(f"{len(sets.recordings)} recorded sets")
             return _usual(options, output, PowerStudy(system, sets, effects), sets.groups)
     known = model_path(system, REFERENCE) if REFERENCE in system.models else None
-    rig = open_virtual_rig(system, options.case, options.reference or known)
-    study = PowerStudy(system, rig, effects)
     with locked_folder(options.out):
+        output.progress(f"{len(effects)} effects in the library")
+        rig = open_virtual_rig(
+            system,
+            options.case,
+            options.reference or known,
+            lambda: _own_model(options, system, effects),
+        )
+        study = PowerStudy(system, rig, effects)
         output.progress(f"sets of {len(rig.recordings)} recordings")
+        if about := study.rig.identity.get("machine"):
+            output.result(f"Recordings are made by {about}.")
         if options.check is None:
             return _usual(options, output, study, _plan_sets(options, study))
         engine = Engine(options.workers, output.stage)
@@ -183,6 +195,20 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
         output.result(check.text)
         output.result(f"data: {path.parent}")
         return _result(path, interrupted)
+
+
+def _own_model(
+    options: argparse.Namespace, system: System, effects: Sequence[Effect]
+) -> VirtualRig:
+    """The system's own model as a machine, where no plugin has equations of one."""
+    from workbench.studies.power.diagnosing import build_everything
+    from workbench.studies.power.own_model import own_model, template_cases
+
+    templates = template_cases(system, options.case)
+    path = options.out / "machine" / "AllEffects.fmu"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    build_everything(system, effects, path)
+    return own_model(system, effects, path, templates)
 
 
 def _select(names: Sequence[str], rig: VirtualRig) -> tuple[Plantable, ...]:
@@ -211,6 +237,7 @@ def _provenance(
         "workbench": version("wheelset-workbench"),
         "seed": options.seed,
         "stops": list(study.rig.recordings),
+        "machine": study.rig.identity.get("machine", "a plugin's virtual rig"),
         "interrupted": interrupted,
     }
 

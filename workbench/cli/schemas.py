@@ -220,7 +220,15 @@ def power_summaries() -> dict[str, Schema]:
 
 
 _SETS = closed(
-    {"run": RUN, "workbench": TEXT, "seed": WHOLE, "stops": listed(TEXT), "interrupted": FLAG}
+    {
+        "run": RUN,
+        "workbench": TEXT,
+        "seed": WHOLE,
+        "stops": listed(TEXT),
+        "machine": TEXT,
+        "interrupted": FLAG,
+    },
+    optional="machine",
 )
 
 

@@ -77,6 +77,8 @@ class Outcome:
         unless a cause was found.
     certainty : how sure the sizes are, by fits of their own; None if that was not asked, no
         cause was found, or the search was interrupted.
+    one_law : what a single law is that explains as much as several causes with less; empty if none
+        does, or there are not several.
     """
 
     system: System
@@ -93,6 +95,7 @@ class Outcome:
     starts: Mapping[str, Mapping[str, float]]
     rivals: Rivals | None
     certainty: Certainty | None
+    one_law: str = ""
 
     @property
     def channels(self) -> tuple[Channel, ...]:
@@ -184,6 +187,13 @@ class Outcome:
             for name, size in cause.parameters.items()
             if size.limit
         ]
+        if self.one_law:
+            names = " and ".join(cause.effect.name for cause in found.causes)
+            limits.insert(
+                0,
+                f"One law explains as much as {names} with less: {self.one_law}. Ask for its form "
+                "with --propose before you trust several causes.",
+            )
         shifted = [level.text for level in found.shifted]
         if found.noise_alone or found.gain is None:
             return [*limits, *shifted]

@@ -43,16 +43,14 @@ class CrossValidation:
             ]
         )
 
-    def chance(self, fitted: FittedModel, *, fast: bool) -> tuple[Vector, float]:
-        """Mean squares that noise exceeds as seldom as it raises an alarm, (K,), and of all.
+    def chance(self, fitted: FittedModel, *, fast: bool) -> Vector:
+        """Mean square of each recording that noise exceeds as seldom as it raises an alarm, (K,).
 
         Estimates of noise may be wrong by what `excess` says.
         """
-        counts = self._counts(fitted, fast=fast)
         decides = self._fit.decides
-        most = [decides.fall_of(n) / n for n in (*counts, sum(counts))]
-        each = (1.0 + decides.excess) * np.array(most)
-        return each[:-1], float(each[-1])
+        most = [decides.fall_of(n) / n for n in self._counts(fitted, fast=fast)]
+        return (1.0 + decides.excess) * np.array(most)
 
     def noise_alone(self, fitted: FittedModel, *, fast: bool) -> bool:
         """Whether a fit leaves no more than noise does in 95 of 100 sets."""
@@ -77,7 +75,7 @@ class CrossValidation:
         if self._fit.unknowns.count == 1:
             return []
         was, now = self.squares(before, fast=fast), self.squares(after, fast=fast)
-        worse = now > np.maximum(was, self.chance(after, fast=fast)[0])
+        worse = now > np.maximum(was, self.chance(after, fast=fast))
         return [name for name, one in zip(self._fit.tests, worse, strict=True) if one]
 
     def explained(self, less: FittedModel, best: FittedModel, *, fast: bool) -> tuple[float, float]:

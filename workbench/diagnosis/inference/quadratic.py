@@ -16,6 +16,7 @@ Key = tuple[str, str]
 
 _ROUNDING = 1e-12  # least eigenvalue of a scaled normal matrix that is not rounding
 _SHOWN = 1e-10  # share of the largest from which on the data show what an eigenvalue stands for
+_ALONE = 1e-8  # share of what an unknown explains alone, below which others do as well
 _CERTAIN = 1e-7  # reciprocal condition far above both, however it is estimated
 
 
@@ -285,6 +286,20 @@ class Joint:
     def total(self) -> Quadratic:
         """Chi-squared of all stops and the prior."""
         return add([*self.stops(), self.prior])
+
+    def reduced(self, keys: Sequence[Key]) -> tuple[Matrix, Vector]:
+        """Normal matrix and gradient of some unknowns, the others at their best."""
+        total = self.total()
+        own = np.array([key in keys for key in self.shared])
+        others = total.N[np.ix_(~own, ~own)]
+        both = np.column_stack([total.N[np.ix_(~own, own)], total.g[~own]])
+        solved = np.linalg.lstsq(others, both, rcond=None)[0]
+        before = np.diag(total.N)[own]
+        N = total.N[np.ix_(own, own)] - total.N[np.ix_(own, ~own)] @ solved[:, :-1]
+        g = total.g[own] - total.N[np.ix_(own, ~own)] @ solved[:, -1]
+        # What the others do as well, but for rounding, the data do not show.
+        shown = np.diag(N) > _ALONE * before
+        return N * np.outer(shown, shown), g * shown
 
     def covariance(self) -> Matrix:
         """Of the common unknowns, then of each deviation's mean over all stops, (p + d, p + d)."""

@@ -118,6 +118,12 @@ class Cause:
     explained: float
     phases: Vector | None
 
+    @property
+    def may_be_none(self) -> bool:
+        """Whether the interval of its size holds zero."""
+        size = self.parameters[self.effect.label]
+        return size.low <= 0.0 <= size.high
+
 
 @dataclass(frozen=True)
 class Gain:
@@ -242,6 +248,11 @@ def conclude(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnos
             _cause(fit, chosen, effect, noise_alone=noise_alone)
             for effect in _strongest_first(fit, chosen, catalogue)
         ]
+        # Beside others, one that what remains may as well make zero only stands for a part of it.
+        if len(causes) > 1 and (idle := [c.effect.name for c in causes if c.may_be_none]):
+            objections.append(f"{' and '.join(idle)} may be zero within what remains")
+            verdict, causes, gain = "unexplained", [], None
+    if causes:
         twins = [fits.values() for fits in chosen.twins.values()]
         rivals = (best, *(fit for fits in twins for fit in fits))
     else:
@@ -329,7 +340,7 @@ def _fewest(
         return chosen
     for effect in best.active:
         size = best.point.sizes[effect.name, effect.label]
-        limit = _limit(fit, best, effect, effect.label)
+        limit = binding_bound(fit, best, effect, effect.label)
         if not limit or _set_by_nature(size, fit.unknowns.unit(effect, effect.size)):
             continue
         if _passed(fit, best, effect, effect.label, limit)[1]:
@@ -375,8 +386,9 @@ def _objections(
         for name in validation.worsened(base, best, fast=fast)
     ]
     left = []
-    noise = gain.after**2 <= validation.chance(best, fast=fast)[1]
-    # Beside the others, each must explain what a right cause does of what it is to explain.
+    # Several causes bend to much that is neither of them: what they leave must be noise, or each
+    # must explain, beside the others, what a right cause does of what it is to explain.
+    noise = validation.noise_alone(best, fast=fast)
     shares = [validation.explained(less, best, fast=fast)[0] for less in chosen.less.values()]
     if not whole or not (noise or min(shares) >= 1.0 - fit.decides.left):
         left.append(f"{gain.after:.1f} times the noise remains in cross-validation")
@@ -425,7 +437,7 @@ def _reasons(fit: Fit, chosen: Selection, fitted: FittedModel, *, fast: bool) ->
     reasons = [
         f"{parameter} is at its bound"
         for _, parameter in fitted.point.sizes
-        if _limit(fit, fitted, effect, parameter)
+        if binding_bound(fit, fitted, effect, parameter)
     ]
     worse = validation.worsened(chosen.base, fitted, fast=fast)
     reasons += [f"{' and '.join(worse)} would be predicted worse"] * bool(worse)
@@ -513,7 +525,7 @@ def _gain(fit: Fit, chosen: Selection) -> Gain:
     )
 
 
-def _limit(fit: Fit, best: FittedModel, effect: Effect, label: str) -> str:
+def binding_bound(fit: Fit, best: FittedModel, effect: Effect, label: str) -> str:
     """The bound at which a fit stopped, "least" or "greatest"; empty within them."""
     value = best.point.sizes[effect.name, label]
     low, high = fit.unknowns.bounds(effect, effect.size if label == effect.label else label)
@@ -569,7 +581,7 @@ def _cause(fit: Fit, chosen: Selection, effect: Effect, *, noise_alone: bool) ->
         form = np.hypot(share * value, _COMPANY * effect.matters * of_size)
         noise = np.hypot(sigma[trial.joint.known.index(key)], correlated.get(key, 0.0))
         reach = float(BAND * np.hypot(noise, form))
-        limit = _limit(fit, best, effect, key[1])
+        limit = binding_bound(fit, best, effect, key[1])
         unit = unknowns.unit(effect, parameter)
         least, greatest = max(value - reach, low), min(value + reach, high)
         further = (np.nan, False)

@@ -25,7 +25,7 @@ from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.search import FittedModel, Step, beyond, forward_selection
 from workbench.diagnosis.inference.selection import anew
 from workbench.diagnosis.inference.thresholds import Thresholds, of_system
-from workbench.diagnosis.inference.verdict import Diagnosis
+from workbench.diagnosis.inference.verdict import Diagnosis, binding_bound
 from workbench.diagnosis.laws.forms import ClosedForm, candidates
 from workbench.diagnosis.laws.free import FittedLaw, estimated
 from workbench.diagnosis.laws.outcome import Proposal, description_length
@@ -37,10 +37,12 @@ from workbench.models.modelica import Library
 from workbench.runtime.engine import Engine
 from workbench.runtime.files import write_whole
 
-__all__ = ["Proposal", "needs_law", "propose"]
+__all__ = ["Proposal", "compared_with_one_law", "needs_law", "propose"]
 
 _OF_PLACE = 2  # of one place, since about the nominal model a wrong place may fake anything
 _OF_FORMS = 2  # closed forms: sizes of some are not sure beside their own shape
+_BESIDE = 2  # laws that are fitted beside several causes: it costs time in each diagnosis
+_WIDENED = 2  # times that bounds are widened, by ten each
 _TRIED = 6  # laws that are fitted in full, of the likeliest: it costs time only
 
 
@@ -57,6 +59,24 @@ def _more(found: Diagnosis) -> bool:
         return True
     lasting = float(found.best.linearised.variance_factors.max())
     return len(found.causes) == 1 and lasting >= Thresholds.wrong
+
+
+def compared_with_one_law(outcome: Outcome, problem: Problem, engine: Engine) -> Outcome:
+    """Ask whether one free law in a slot of several causes explains as much with less.
+
+    By the description length of the causes, and the marginal likelihood of the law. Returns the
+    outcome with the law's text, or as it was.
+    """
+    found = outcome.diagnosis
+    if len(found.causes) < 2 or found.interrupted or problem.library is None:
+        return outcome
+    slots = {slot for cause in found.causes for slot in cause.effect.slots}
+    able = _likeliest(Scan(problem, found.base, engine, slots).prospects)[:_BESIDE]
+    laws = estimated(problem, able, found.base, engine) if able else []
+    less = description_length(found.base) - description_length(found.best)
+    if not laws or laws[0].evidence < less:
+        return outcome
+    return replace(outcome, one_law=laws[0].law.text)
 
 
 def propose(before: Outcome, problem: Problem, engine: Engine) -> Proposal:
@@ -90,7 +110,7 @@ def propose(before: Outcome, problem: Problem, engine: Engine) -> Proposal:
     tied = [estimate for estimate in estimates if estimates[0].evidence - estimate.evidence < near]
     if not tied or tied[0].evidence < odds:
         return Proposal(before, tuple(scan.prospects), tuple(estimates), (), {}, None)
-    forms = {form.written.name: form for estimate in tied for form in _forms(estimate)}
+    forms = {form.name: form for estimate in tied for form in _forms(estimate)}
     forms = _surviving(problem, forms, about, engine)
     found = (tuple(scan.prospects), tuple(estimates), tuple(tied))
     proposal = Proposal(before, *found, forms, None)
@@ -165,19 +185,23 @@ def _called(law: Law) -> tuple[str, ...]:
 
 def _forms(estimate: FittedLaw) -> list[ClosedForm]:
     """Closed forms of a law."""
-    prospect = estimate.prospect
+    prospect, largest = estimate.prospect, float(np.abs(estimate.function()[1]).max())
     # Of an output that is nominally zero, what it seems to be.
-    scale = prospect.largest or float(np.abs(estimate.function()[1]).max())
-    return list(candidates(prospect.law, prospect.knots, scale))
+    return list(candidates(prospect.law, prospect.knots, prospect.largest or largest, largest))
 
 
 def _surviving(
-    problem: Problem, forms: Mapping[str, ClosedForm], about: FittedModel, engine: Engine
+    problem: Problem,
+    forms: Mapping[str, ClosedForm],
+    about: FittedModel,
+    engine: Engine,
+    left: int = _WIDENED,
 ) -> dict[str, ClosedForm]:
     """The closed form with the shortest description, first, and those that are as good.
 
     They are found as causes are, by what they predict of recordings that they were not fitted to.
-    Beside others each would be one of many: forms of one law are alike.
+    Beside others each would be one of many: forms of one law are alike. Where the first is at a
+    bound, bounds are widened so many times as are `left`.
     """
     system = problem.system
     engine.report(f"{len(forms)} closed forms, each alone")
@@ -194,13 +218,24 @@ def _surviving(
             forward_selection(
                 fit, own, anew(fit, about.point, about.active), steps, (), engine.report
             )
+            rivals = steps[0].rivals if steps else ()
+            bound = {
+                name
+                for rival in rivals
+                for name, parameter in rival.point.sizes
+                if name in forms and binding_bound(fit, rival, rival.active[-1], parameter)
+            }
     if not steps:
         return {}
-    before, rivals = steps[0].before, steps[0].rivals
+    before = steps[0].before
     near = max(decides.form, decides.form_share * beyond(before, rivals[0]))
     alike = [rival for rival in rivals if beyond(rival, rivals[0]) < near]
-    names = [model.active[-1].name for model in sorted(alike, key=description_length)]
-    return {name: forms[name] for name in names}
+    first, *others = [model.active[-1] for model in sorted(alike, key=description_length)]
+    if first.name in bound and left:
+        engine.report(f"{first.name} is at a bound, which is widened")
+        wider = {name: form.widened if name in bound else form for name, form in forms.items()}
+        return _surviving(problem, wider, about, engine, left - 1)
+    return {effect.name: forms[effect.name] for effect in (first, *others)}
 
 
 def _as_effects(

@@ -5,11 +5,11 @@ power, saturation, decay, exponential growth, threshold (bent or stepped).
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from workbench.diagnosis.laws.places import CLOCK, Law, LawInfluence
+from workbench.diagnosis.laws.places import CLOCK, Law
 from workbench.diagnosis.laws.splines import Knots
 from workbench.diagnosis.laws.writing import LawClass, clock, effect, number, unit_of
 
@@ -17,7 +17,10 @@ MARK = "proposed, not known physics"
 _ROUNDED = 0.01  # of the range, over which a kink is rounded: no event, and below what is resolved
 _MATTERS = 0.01  # of an output: what parameters of machines are known to, at best
 _TURNS = 1e-5  # of an output, of a harmonic: no tolerance turns with a shaft
-_REACH, _KEPT = 10.0, 0.9  # sizes beyond which no law is sought; what of an output one may take
+# Sizes beyond which no law is sought, over what its free function and its output are; what of an
+# output one may take.
+_REACH, _KEPT = 10.0, 0.9
+_WIDER = 10.0  # times bounds that bind are widened
 
 
 @dataclass(frozen=True)
@@ -103,111 +106,138 @@ CONSTANT = Form("Constant", "always alike", "1.0")
 
 @dataclass(frozen=True)
 class ClosedForm:
-    """A closed form of a law."""
+    """A closed form of a law.
+
+    Attributes
+    ----------
+    knots : range of what it depends on; None of a constant, and of what turns.
+    scale : of the output, where the law is added to it.
+    largest : of the law itself, as a free function; bounds of sizes follow from it.
+    room : times bounds are wider than usual.
+    """
 
     law: Law
     form: Form
-    written: LawClass
+    knots: Knots | None
+    scale: float
+    largest: float
+    room: float = 1.0
 
     @property
     def text(self) -> str:
         """What it is, for people."""
         return f"{self.law.text}: {self.form.text}"
 
+    @property
+    def widened(self) -> "ClosedForm":
+        """The same with bounds further out."""
+        return replace(self, room=_WIDER * self.room)
 
-def candidates(law: Law, knots: Knots | None, scale: float) -> Iterator[ClosedForm]:
-    """Closed forms of a law.
+    @property
+    def name(self) -> str:
+        """Of its class."""
+        place, influence = self.law.place, self.law.influence
+        where = {"1.0": "Added", place.nominal: "Times"}.get(self.law.carrier.expression, "Share")
+        by = "" if influence is None else influence.name
+        return f"{place.name}{by}{where}{self.form.name}"
 
-    Parameters
-    ----------
-    knots : range of what it depends on; None of a constant.
-    scale : of the output, where the law is added to it.
-    """
+    @property
+    def written(self) -> LawClass:
+        """Its class."""
+        lines, shapes = self._shape()
+        sizes = ("cosine", "sine") if self._turns else ("s",)
+        known = _bounded(self.law.carrier.unit, *self._reach())
+        text = {"cosine": "Part of cosine", "sine": "Part of sine"}
+        about = "Size, at the largest that was seen"
+        declared, equations = clock(self.law.influence)
+        times = f"({self._expression()})" if self._turns else f"s*({self._expression()})"
+        return LawClass(
+            name=self.name,
+            about=f"{MARK}: {self.text}",
+            place=self.law.place,
+            declarations=(
+                *(f'parameter Real {n}({known}) = 0.0 "{text.get(n, about)}";' for n in sizes),
+                *lines,
+                *declared,
+            ),
+            equations=equations,
+            change=f"{self.law.carrier.expression}*{times}",
+            annotation=effect(
+                sizes,
+                (_TURNS if self._turns else _MATTERS) * self._unit,
+                self.law.place.slot.name,
+                shapes,
+            ),
+        )
+
+    @property
+    def _turns(self) -> bool:
+        return self.law.influence is not None and self.law.influence.turns
+
+    @property
+    def _unit(self) -> float:
+        """What a size is counted in: 1 of what is relative, else what the output is."""
+        return self.scale if self.law.carrier.expression == "1.0" else 1.0
+
+    def _reach(self) -> tuple[float, float]:
+        """Least and greatest size."""
+        far = self.room * _REACH * max(self._unit, self.largest)
+        if self.law.carrier.expression != self.law.place.nominal:
+            return -far, far
+        # An inertia or a friction that is multiplied keeps its sign.
+        return (-_KEPT, _KEPT) if self._turns else (-_KEPT, far)
+
+    def _range(self) -> Knots:
+        return self.knots or Knots(0.0, 1.0)
+
+    def _expression(self) -> str:
+        if self._turns:
+            return self.form.expression.format(a=f"{number(2.0 * np.pi)}*{CLOCK}/period")
+        knots, influence = self._range(), self.law.influence
+        return self.form.expression.format(
+            q="" if influence is None else influence.expression,
+            Q=number(max(abs(knots.low), abs(knots.high))),
+            w=number(_ROUNDED * (knots.high - knots.low)),
+        )
+
+    def _shape(self) -> tuple[tuple[str, ...], dict[str, tuple[float, ...]]]:
+        """Declarations of what is not a size, and values to begin with."""
+        form, influence, knots = self.form, self.law.influence, self._range()
+        if influence is not None and influence.turns:
+            unit, span = unit_of(influence.unit), number(influence.span)
+            return (f'parameter Real period({unit}) = {span} "As errors have it";',), {}
+        if not form.shape:
+            return (), {}
+        powers = form.shape == "n"
+        # A zone or a limit is the same to both sides.
+        sizes = knots if knots.low >= 0.0 else Knots(0.0, max(abs(knots.low), abs(knots.high)))
+        values = form.values if powers else _rounded(sizes, form.values)
+        low, high = (0.1, 6.0) if powers else (min(values) / 20.0, 2.0 * sizes.high)
+        unit = form.unit.format(unit="" if influence is None else influence.unit)
+        known = _bounded(unit, low / self.room, high * self.room)
+        line = f'parameter Real {form.shape}({known}) = {number(values[0])} "Of its form";'
+        return (line,), {form.shape: values}
+
+
+def candidates(
+    law: Law, knots: Knots | None, scale: float, largest: float = 0.0
+) -> Iterator[ClosedForm]:
+    """Closed forms of a law; see `ClosedForm`."""
     if law.influence is not None and law.influence.turns:
-        yield ClosedForm(law, HARMONIC, _harmonic(law, law.influence, scale))
-        return
-    if knots is None or law.influence is None:
-        yield ClosedForm(law, CONSTANT, _written(law, CONSTANT, Knots(0.0, 1.0), scale))
-        return
-    for form in FORMS:
+        forms: tuple[Form, ...] = (HARMONIC,)
+    elif knots is None or law.influence is None:
+        forms = (CONSTANT,)
+    else:
         # What has a scale or a threshold has no sign.
-        if not form.shape or knots.low >= 0.0:
-            yield ClosedForm(law, form, _written(law, form, knots, scale))
-    if knots.low < 0.0 < knots.high:
-        for form in SIGNED:
-            yield ClosedForm(law, form, _written(law, form, knots, scale))
-
-
-def _harmonic(law: Law, influence: LawInfluence, scale: float) -> LawClass:
-    """A harmonic of a period that errors have; its phase differs from recording to recording."""
-    declared, equations = clock(influence)
-    unit = _unit(law, scale)
-    known = _bounded(law.carrier.unit, -_KEPT * unit, _KEPT * unit)
-    period = f"parameter Real period({unit_of(influence.unit)}) = {number(influence.span)}"
-    lines = [
-        *(f'parameter Real {part}({known}) = 0.0 "Part of {part}";' for part in ("cosine", "sine")),
-        f'{period} "As errors have it";',
-    ]
-    angle = f"{number(2.0 * np.pi)}*{CLOCK}/period"
-    return LawClass(
-        name=_name(law, HARMONIC),
-        about=f"{MARK}: {law.text}: {HARMONIC.text}",
-        place=law.place,
-        declarations=(*lines, *declared),
-        equations=equations,
-        change=f"{law.carrier.expression}*({HARMONIC.expression.format(a=angle)})",
-        annotation=effect(("cosine", "sine"), _TURNS * unit, law.place.slot.name, {}),
-    )
-
-
-def _unit(law: Law, scale: float) -> float:
-    """What a size is counted in: 1 of what is relative, else what the output is."""
-    return scale if law.carrier.expression == "1.0" else 1.0
+        forms = tuple(form for form in FORMS if not form.shape or knots.low >= 0.0)
+        forms += SIGNED if knots.low < 0.0 < knots.high else ()
+    for form in forms:
+        yield ClosedForm(law, form, knots, scale, largest)
 
 
 def _bounded(unit: str, low: float, high: float) -> str:
     """Modifiers of a parameter."""
     return ", ".join(filter(None, (unit_of(unit), f"min={number(low)}, max={number(high)}")))
-
-
-def _name(law: Law, form: Form) -> str:
-    name = law.place.name + ("" if law.influence is None else law.influence.name)
-    where = {"1.0": "Added", law.place.nominal: "Times"}.get(law.carrier.expression, "Share")
-    return f"{name}{where}{form.name}"
-
-
-def _written(law: Law, form: Form, knots: Knots, scale: float) -> LawClass:
-    largest = max(abs(knots.low), abs(knots.high))
-    declared, equations = clock(law.influence)
-    quantity = "" if law.influence is None else law.influence.expression
-    expression = form.expression.format(
-        q=quantity, Q=number(largest), w=number(_ROUNDED * (knots.high - knots.low))
-    )
-    unit = _unit(law, scale)
-    # An inertia or a friction that is multiplied keeps its sign.
-    least = -_KEPT if law.carrier.expression == law.place.nominal else -_REACH * unit
-    known = _bounded(law.carrier.unit, least, _REACH * unit)
-    lines = [f'parameter Real s({known}) = 0.0 "Size, at the largest that was seen";']
-    shapes = {}
-    if form.shape:
-        own = form.unit.format(unit="" if law.influence is None else law.influence.unit)
-        powers = form.shape == "n"
-        # A zone or a limit is the same to both sides.
-        sizes = knots if knots.low >= 0.0 else Knots(0.0, largest)
-        values = form.values if powers else _rounded(sizes, form.values)
-        low, high = (0.1, 6.0) if powers else (min(values) / 20.0, 2.0 * sizes.high)
-        shapes = {form.shape: values}
-        given = _bounded(own, low, high)
-        lines.append(f'parameter Real {form.shape}({given}) = {number(values[0])} "Of its form";')
-    return LawClass(
-        name=_name(law, form),
-        about=f"{MARK}: {law.text}: {form.text}",
-        place=law.place,
-        declarations=(*lines, *declared),
-        equations=equations,
-        change=f"{law.carrier.expression}*s*({expression})",
-        annotation=effect(("s",), _MATTERS * unit, law.place.slot.name, shapes),
-    )
 
 
 def _rounded(knots: Knots, shares: tuple[float, ...]) -> tuple[float, ...]:

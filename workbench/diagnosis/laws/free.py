@@ -19,7 +19,7 @@ from workbench.diagnosis.inference.quadratic import Key
 from workbench.diagnosis.inference.search import FittedModel, fitted
 from workbench.diagnosis.inference.selection import anew
 from workbench.diagnosis.laws.places import Law
-from workbench.diagnosis.laws.scan import LawScore, effect_at, eliminated
+from workbench.diagnosis.laws.scan import LawScore, effect_at
 from workbench.diagnosis.laws.splines import COEFFICIENTS, smoothest
 from workbench.diagnosis.laws.writing import LawClass, clock, extended_library, number, unit_of
 from workbench.diagnosis.problem import Problem
@@ -221,7 +221,7 @@ def _fitted(
         start = _started(fit, best, keys, smoothness.coefficients)
         best = fitted(fit, start, active, spread=start.spread)
         lin = fit.linearise(best.linearised, active)
-        N, g = eliminated(fit.quadratics(lin), keys)
+        N, g = fit.quadratics(lin).reduced(keys)
         # Of the data alone, about no function: the prior is put in anew.
         now = np.array([best.point.sizes[key] for key in keys])
         N = N - effect.precision

@@ -1,20 +1,19 @@
 """Where a law acts and what it depends on: all of them about what is known, by evidence."""
 
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from workbench.arrays import Matrix, Vector
+from workbench.arrays import Matrix
 from workbench.diagnosis import given_values
 from workbench.diagnosis.data.motion import ModelSource
 from workbench.diagnosis.effects.catalogue import Effect
 from workbench.diagnosis.effects.extension import ExtendedModel, build, variables
 from workbench.diagnosis.effects.slots import read_slots
 from workbench.diagnosis.inference.fit import Fit
-from workbench.diagnosis.inference.quadratic import Joint, Key
 from workbench.diagnosis.inference.search import FittedModel
 from workbench.diagnosis.inference.selection import anew
 from workbench.diagnosis.laws.periods import Period, strongest_period
@@ -36,7 +35,6 @@ from workbench.models.modelica import Library
 from workbench.runtime.engine import Engine
 
 _AT_ONCE = 300  # columns of derivatives: some hundred megabytes
-_ROUNDING = 1e-8  # share of what an unknown explains alone
 _SPAN = 0.25  # of what lasts, over which a rate is taken: it settles within that
 _SEEN = 0.01  # share of the samples that are beyond the ends of a function
 _BEGINS = 10.0  # of what lasts, that a beginning takes at most
@@ -94,16 +92,30 @@ class Scan:
     A law that is small acts as a parameter that is added to the output of its slot, and that
     changes in time as the law says along the motion without it; so one FMU serves all of them.
 
+    Parameters
+    ----------
+    about : what is known, fitted.
+    slots : where laws are sought; None: in all.
+
     Attributes
     ----------
-    base : what is known, fitted.
     prospects : of all laws, the likeliest first.
     """
 
-    def __init__(self, problem: Problem, about: FittedModel, engine: Engine) -> None:
+    def __init__(
+        self,
+        problem: Problem,
+        about: FittedModel,
+        engine: Engine,
+        slots: Collection[str] | None = None,
+    ) -> None:
         system, library, base = problem.system, problem.modelica, problem.base
         self._lasting = system.comparison.lasting
-        where = tuple(places(library, base, read_slots(library, base)))
+        asked = [s for s in read_slots(library, base) if slots is None or s.name in slots]
+        where = tuple(places(library, base, asked))
+        if not where:
+            self.prospects: list[LawScore] = []
+            return
         names = list(
             dict.fromkeys(f"{place.slot.name}.{name}" for place in where for name in _seen(place))
         )
@@ -118,8 +130,8 @@ class Scan:
             source = ModelSource(path, system, given_values(path, system))
             with ResidualModel(source, problem.cases, engine) as simulations:
                 self._fit = Fit(simulations, effects)
-                self.base = anew(self._fit, about.point, about.active)
-                values = self._fit.unknowns.values(self.base.point)
+                self._base = anew(self._fit, about.point, about.active)
+                values = self._fit.unknowns.values(self._base.point)
                 tables = simulations.along(values, [f"watched{k}" for k in range(len(names))])
                 self._recordings = [
                     (recording.time, dict(zip(names, table.T, strict=True)))
@@ -138,7 +150,7 @@ class Scan:
         values: Sequence[Mapping[str, float]],
         every: Sequence[Law],
     ) -> list[LawScore]:
-        lin = self.base.linearised
+        lin = self._base.linearised
         scores: list[LawScore] = []
         each = max(1, _AT_ONCE // COEFFICIENTS)
         for first in range(0, len(every), each):
@@ -160,7 +172,7 @@ class Scan:
                 more = [derivative[:, at : at + count] for derivative in derivatives]
                 joint = self._fit.quadratics(lin.extended(keys, more), keys)
                 largest = self._largest(law.place)
-                smoothness = smoothest(*eliminated(joint, keys), most=_most(law, largest))
+                smoothness = smoothest(*joint.reduced(keys), most=_most(law, largest))
                 scores.append(LawScore(law, knots, smoothness, largest))
                 at += count
         return scores
@@ -203,9 +215,9 @@ class Scan:
             more = [np.zeros((len(derivative), len(keys))) for derivative in derivatives]
             for k, derivative in enumerate(derivatives):
                 more[k][:, 2 * k : 2 * k + 2] = derivative[:, 2 * n : 2 * n + 2]
-            joint = self._fit.quadratics(self.base.linearised.extended(keys, more), keys)
+            joint = self._fit.quadratics(self._base.linearised.extended(keys, more), keys)
             largest = self._largest(law.place)
-            likeliest = smoothest(*eliminated(joint, keys), APART, _most(law, largest))
+            likeliest = smoothest(*joint.reduced(keys), APART, _most(law, largest))
             evidence = likeliest.evidence - float(np.log(period.tried))
             likeliest = replace(likeliest, evidence=evidence)
             scores.append(LawScore(law, None, likeliest, largest))
@@ -222,7 +234,7 @@ class Scan:
             influence.course(place, watched, time)[at]
             for (time, watched), at in zip(self._recordings, middles, strict=True)
         ]
-        lin = self.base.linearised
+        lin = self._base.linearised
         return strongest_period(
             [recording.errors for recording in lin.residuals], clocks, lin.lasting
         )
@@ -274,18 +286,3 @@ def watching(text: str, names: Sequence[str]) -> str:
 
 def _seen(place: Place) -> list[str]:
     return [place.output.name, *(variable.name for variable in place.inputs)]
-
-
-def eliminated(joint: Joint, keys: Sequence[Key]) -> tuple[Matrix, Vector]:
-    """Normal matrix and gradient of some unknowns, the others at their best."""
-    total = joint.total()
-    own = np.array([key in keys for key in joint.shared])
-    others = total.N[np.ix_(~own, ~own)]
-    both = np.column_stack([total.N[np.ix_(~own, own)], total.g[~own]])
-    solved = np.linalg.lstsq(others, both, rcond=None)[0]
-    before = np.diag(total.N)[own]
-    N = total.N[np.ix_(own, own)] - total.N[np.ix_(own, ~own)] @ solved[:, :-1]
-    g = total.g[own] - total.N[np.ix_(own, ~own)] @ solved[:, -1]
-    # What the others do as well, but for rounding, the data do not show.
-    shown = np.diag(N) > _ROUNDING * before
-    return N * np.outer(shown, shown), g * shown

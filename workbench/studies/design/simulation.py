@@ -105,12 +105,12 @@ def _simulate(
         ends = experiments.ends
         if ends is not None and abs(float(ends.formula(feels))) < ends.below:
             return u[:k], y[:k]
-        raise_on_failure(_step_block(running, h, held, u[block], y[block]), model)
+        raise_on_failure(step_block(running, h, held, u[block], y[block]), model)
     return u, y
 
 
 @compiled
-def _step_block(model, h, held, u, y):  # type: ignore[no-untyped-def]
+def step_block(model, h, held, u, y):  # type: ignore[no-untyped-def]
     """Write readings y (n, c) for inputs u (n, m), samples h [s] apart; returns a status.
 
     A step from sample k - 1 to k is driven by (u_{k-1} + u_k) / 2, or by u_{k-1} if held.

@@ -1,6 +1,6 @@
 """What a system's plugin provides for recordings in which effects are injected."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Protocol, Self, runtime_checkable
 
@@ -55,13 +55,19 @@ class FollowingRig(VirtualRig, Protocol):
         """
 
 
-def open_virtual_rig(system: System, names: Sequence[str], model: Path | None) -> VirtualRig:
+def open_virtual_rig(
+    system: System,
+    names: Sequence[str],
+    model: Path | None,
+    own: Callable[[], VirtualRig] | None = None,
+) -> VirtualRig:
     """The virtual rig of a system.
 
     Parameters
     ----------
     names : of the recordings of a set; the usual ones if none is named.
     model : FMU that makes them; None where the rig has equations of its own.
+    own : makes one of the system's own model, where no plugin has any.
 
     Raises
     ------
@@ -69,6 +75,8 @@ def open_virtual_rig(system: System, names: Sequence[str], model: Path | None) -
         If the system has none, or it refuses what is asked.
     """
     make = load(find_plugin(system.plugin).virtual_rig)
+    if make is None and own is not None:
+        return own()
     if make is None:
         raise InputError(
             where=str(system.source),
