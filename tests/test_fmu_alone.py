@@ -137,6 +137,25 @@ def test_parameters_that_act_alike_are_named_together(tank, tmp_path):
     assert "another value of" in outcome.summary()
 
 
+@pytest.mark.long
+def test_on_forty_sets_the_wrong_value_is_named_and_nothing_else(tank, tmp_path):
+    """Of 30 wrong sets 95 % are right; 10 clean ones raise no alarm in 98 of 100 runs of this."""
+    rng, right = np.random.default_rng(5), 0
+    for number in range(40):
+        sign = rng.choice((-1.0, 1.0))
+        truth, name = (
+            ({}, ""),
+            ({"area": 0.5 * (1.0 + sign * rng.uniform(0.05, 0.15))}, "A"),
+            ({"gain": sign * rng.uniform(0.03, 0.08)}, "SensorGain[inflow]"),
+            ({"outlet": 1e-3 * (1.0 + sign * rng.uniform(0.04, 0.1))}, "c"),
+        )[number % 4]
+        causes = diagnosed(tank, tmp_path / str(number), seed=number, **truth).diagnosis.causes
+        groups = [{cause.effect.name, *cause.confusable_with} for cause in causes]
+        assert all(name in group for group in groups), (truth, groups)
+        right += bool(groups) if name else 0
+    assert right >= 0.95 * 30
+
+
 def test_candidates_are_parameters_and_sensors_of_a_stated_size(tank):
     names = [effect.name for effect in catalogue(tank, None)]
     # A leak of zero without bounds or nominal value has no size that a change can be small to.
