@@ -20,8 +20,9 @@ from workbench.__main__ import main
 from workbench.cli.parser import command_line
 from workbench.errors import InputError
 from workbench.models.compiler.archive import PLATFORMS
+from workbench.models.compiler.flat import flatten
 from workbench.observers import Estimator, Gains, choose
-from workbench.observers.export import ObserverModel, build_observer, observer, write_package
+from workbench.observers.export import build_observer, model_name, write_package
 from workbench.observers.gains_file import format_gains
 from workbench.recordings.case import Case, read_cases
 from workbench.system.registry import load_system, open_model
@@ -39,7 +40,8 @@ OUTPUTS = {
     "Fx": "Fx",
     "slip": "slip",
 }
-# Of the largest value in a stop. Measured: 1e-10 or less; the law is the same, so rounding is all.
+# Of the largest value in a stop. Measured: equal to the bit; elementary functions of another
+# library may differ in their last bit.
 AGREEMENT = 1e-6
 
 
@@ -56,10 +58,9 @@ def default_gains(name: str) -> Gains:
         return KINDS[name].default_gains(fmu, SYSTEM)
 
 
-def write_fmu(folder: Path, gains: Gains, fmi: int = 2) -> Path:
-    model = ObserverModel(SYSTEM, KINDS[gains.estimator], gains, "")
-    path = folder / f"fmi{fmi}" / f"{model.model.rpartition('.')[2]}.fmu"
-    build_observer(model, path, fmi, lambda _: None, platforms=["linux-x86_64"])
+def write_fmu(folder: Path, estimator: Estimator, fmi: int = 2) -> Path:
+    path = folder / f"fmi{fmi}" / f"{model_name(estimator).rpartition('.')[2]}.fmu"
+    build_observer(estimator, path, fmi, platforms=["linux-x86_64"])
     return path
 
 
@@ -81,8 +82,8 @@ def exported(request, tmp_path_factory) -> Iterator[Exported]:
     kind = KINDS[request.param]
     with open_model(SYSTEM, kind.role) as fmu:
         gains = with_all_gains(kind.default_gains(fmu, SYSTEM))
-        path = write_fmu(tmp_path_factory.mktemp(kind.name), gains)
-        yield Exported(path, kind(fmu, SYSTEM, gains))
+        python = kind(fmu, SYSTEM, gains)
+        yield Exported(write_fmu(tmp_path_factory.mktemp(kind.name), python), python)
 
 
 @pytest.fixture(scope="module")
@@ -165,8 +166,8 @@ def test_a_tool_without_python_of_ours_gets_the_same(tmp_path, dry_case, name, f
     """FMPy's own simulation, which sees the estimate at the end of a step, one sample later."""
     with open_model(SYSTEM, KINDS[name].role) as fmu:
         gains = KINDS[name].default_gains(fmu, SYSTEM)
-        path = write_fmu(tmp_path, gains, fmi)
         estimator = KINDS[name](fmu, SYSTEM, gains)
+        path = write_fmu(tmp_path, estimator, fmi)
         expected = run_python(estimator, dry_case.time, dry_case.u, dry_case.y)
     assert validate_fmu(str(path)) == []
     time = np.arange(dry_case.time.size) * 0.005
@@ -205,12 +206,45 @@ def test_a_restored_state_repeats_the_steps(exported, dry_case):
         fmu.freeFMUState(state)
 
 
+def test_gains_are_parameters_that_another_tool_may_set(exported, tmp_path, dry_case):
+    """Built with the default gains, set to those of the estimator in Python."""
+    python = exported.python
+    gains = default_gains(python.name)
+    with open_model(SYSTEM, python.role) as fmu:
+        path = write_fmu(tmp_path, type(python)(fmu, SYSTEM, gains))
+    own = {variable.name: variable for variable in fmpy.read_model_description(path).modelVariables}
+    meanings = type(python).meanings(python.fmu, SYSTEM, gains)
+    assert all(own[name].unit == unit for name, (_, unit) in meanings.items())
+    samples = np.hstack([dry_case.u, dry_case.y])
+    recorded = np.array(
+        [(0.005 * k, *sample) for k, sample in enumerate(samples)],
+        [(name, float) for name in ("time", *INPUTS)],
+    )
+    found = fmpy.simulate_fmu(
+        str(path),
+        start_values=dict(zip(gains.names, python.gains.values.tolist(), strict=True)),
+        input=recorded,
+        stop_time=recorded["time"][-1],
+        output=[*OUTPUTS],
+        output_interval=0.005,
+    )
+    estimates = np.column_stack([found[output] for output in OUTPUTS])
+    expected = run_python(python, recorded["time"], dry_case.u, dry_case.y)
+    assert disagreement(estimates[1:], expected[:-1]) < AGREEMENT
+
+
 def test_default_gains_of_the_modelica_classes_are_the_reasoned_ones():
     for name in NAMES:
         gains = default_gains(name)
-        flat = observer.flatten(SYSTEM.library, ObserverModel(SYSTEM, KINDS[name], gains, "").model)
+        flat = flatten(
+            SYSTEM.library, f"{SYSTEM.library.parent.name}.{SYSTEM.export.classes[name]}"
+        )
         defaults = {v.name: v.start for v in flat.parameters}
-        for parameter, value in observer.parameter_values(gains, SYSTEM).items():
+        values = dict(zip(gains.names, gains.values, strict=True))
+        for constant, effects in gains.design.items():
+            names = [f"{constant}_{quantity.name}" for quantity in SYSTEM.estimated]
+            values |= dict(zip(names, effects, strict=True))
+        for parameter, value in values.items():
             # The classes give nine digits.
             assert defaults[parameter] == pytest.approx(value, rel=1e-8, abs=1e-9), parameter
 
@@ -255,8 +289,9 @@ def test_the_command_writes_the_gains_of_the_file(package):
 @pytest.mark.long
 def test_an_observer_is_for_all_platforms_unless_others_are_asked_for(tmp_path):
     gains = default_gains("disturbance_observer")
-    model = ObserverModel(SYSTEM, KINDS[gains.estimator], gains, "")
-    build_observer(model, tmp_path / "observer.fmu", 2, lambda _: None)
+    with open_model(SYSTEM, KINDS[gains.estimator].role) as fmu:
+        estimator = KINDS[gains.estimator](fmu, SYSTEM, gains)
+        build_observer(estimator, tmp_path / "observer.fmu", 2)
     with zipfile.ZipFile(tmp_path / "observer.fmu") as archive:
         folders = {Path(n).parts[1] for n in archive.namelist() if n.startswith("binaries/")}
     assert folders == {fmi2_name for fmi2_name, *_ in PLATFORMS.values()}

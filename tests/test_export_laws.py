@@ -1,4 +1,4 @@
-"""Estimators without a Modelica class as FMUs: the law in C against the law in Python."""
+"""Estimators as FMUs: the law in C against the law in Python."""
 
 import importlib.util
 import json
@@ -27,7 +27,7 @@ from workbench.models.compiler import native
 from workbench.models.fmu import FMU
 from workbench.observers import Estimator, choose
 from workbench.observers.estimators.kalman import ExtendedKalmanFilter
-from workbench.observers.export import EstimatorLaw, build_law
+from workbench.observers.export import build_observer, model_name
 from workbench.observers.gains_file import format_gains
 from workbench.recordings.case import Case, read_case
 from workbench.system.registry import load_system, open_model
@@ -57,13 +57,12 @@ def write_fmu(path: Path, estimator: Estimator, fmi: int = 2) -> Path:
     package = ROOT / "workbench"
     files = [package / "models" / "native.py", *(package / "observers").rglob("*.[pch]*")]
     texts = [file.read_text() for file in sorted(files) if file.suffix in (".py", ".c", ".h")]
-    law = EstimatorLaw(estimator, "")
-    parts = law.model, estimator.fmu.sha256, str(estimator.gains.summary()), str(fmi)
+    parts = model_name(estimator), estimator.fmu.sha256, str(estimator.gains.summary()), str(fmi)
     texts.append(estimator.system.source.read_text())
     fmu_cache.fetch(
         fmu_cache.key(estimator.system.library, *texts, *parts),
         path,
-        lambda path: build_law(law, path, fmi, lambda _: None, platforms=[native()]),
+        lambda path: build_observer(estimator, path, fmi, platforms=[native()]),
     )
     return path
 
@@ -431,18 +430,18 @@ def test_what_does_not_become_c_is_refused_in_words(tmp_path, minimal, name, mat
     module = importlib.util.module_from_spec(found)
     found.loader.exec_module(module)
     kind = getattr(module, name)
-    law = EstimatorLaw(kind(minimal, SYSTEM, kind.default_gains(minimal, SYSTEM)), "")
+    estimator = kind(minimal, SYSTEM, kind.default_gains(minimal, SYSTEM))
     with pytest.raises(InputError, match=match):
-        build_law(law, tmp_path / "own.fmu", 2, lambda _: None, platforms=[native()])
+        build_observer(estimator, tmp_path / "own.fmu", 2, platforms=[native()])
     assert not (tmp_path / "own.fmu").exists()
 
 
 def test_a_model_that_is_not_of_the_library_is_refused(tmp_path, reference_path):
     with FMU(reference_path) as fmu:
         gains = ExtendedKalmanFilter.default_gains(fmu, SYSTEM)
-        law = EstimatorLaw(ExtendedKalmanFilter(fmu, SYSTEM, gains), "")
+        estimator = ExtendedKalmanFilter(fmu, SYSTEM, gains)
         with pytest.raises(InputError, match=r"expected what WheelsetRig\.MinimalObserver has"):
-            build_law(law, tmp_path / "own.fmu", 2, lambda _: None, platforms=[native()])
+            build_observer(estimator, tmp_path / "own.fmu", 2, platforms=[native()])
 
 
 # --- the command ---

@@ -1,18 +1,18 @@
 """An input that is held between samples acts as it was at the beginning of each step."""
 
 from collections.abc import Iterator
-from dataclasses import replace
 
+import fmpy
 import numpy as np
 import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
 
 from workbench import case_from_frame
-from workbench.errors import InputError
+from workbench.models.compiler import native
 from workbench.models.fmu import FMU
 from workbench.observers import estimators_of
-from workbench.observers.export import ObserverModel, build_observer
+from workbench.observers.export import build_observer
 from workbench.observers.replay import replay
 from workbench.recordings.case import Case
 from workbench.system.registry import open_model
@@ -102,9 +102,16 @@ def test_a_switched_pump_is_integrated_exactly_and_nothing_is_made_of_the_switch
     assert_allclose(run.signal("through"), filled["through"], rtol=0.0, atol=1e-12)
 
 
-def test_a_modelica_class_of_an_observer_is_not_exported_with_it(vessel, fmu, tmp_path):
+def test_an_exported_observer_holds_the_input_too(vessel, fmu, filled, tmp_path):
     kind = estimators_of(vessel)["disturbance_observer"]
-    listed = replace(vessel, export=replace(vessel.export, classes={kind.name: "Observer"}))
-    model = ObserverModel(listed, kind, kind.default_gains(fmu, vessel), "")
-    with pytest.raises(InputError, match=r"the input q that is held.*leave disturbance_observer"):
-        build_observer(model, tmp_path / "observer.fmu", 2, lambda _: None)
+    estimator = kind(fmu, vessel, kind.default_gains(fmu, vessel))
+    path = tmp_path / "observer.fmu"
+    build_observer(estimator, path, 2, platforms=[native()])
+    names = [signal.name for signal in (*vessel.inputs, *vessel.outputs)]
+    recorded = np.array(
+        list(zip(filled.time, *(filled[name] for name in names), strict=True)),
+        [(name, float) for name in ("time", *names)],
+    )
+    shown = fmpy.simulate_fmu(str(path), input=recorded, output=["VEstimate"], output_interval=1.0)
+    # A tool shows each estimate one step later.
+    assert_allclose(shown["VEstimate"][1:], filled["V"][: len(shown) - 1], rtol=0.0, atol=1e-12)

@@ -5,13 +5,10 @@ from __future__ import annotations
 import argparse
 import hashlib
 import tempfile
-from collections.abc import Callable, Sequence
-from contextlib import ExitStack
 from dataclasses import dataclass
-from functools import partial
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any
 
 from workbench.cli.arguments import (
     Commands,
@@ -29,10 +26,6 @@ if TYPE_CHECKING:
     from workbench.models.compiler import BuiltFMU
     from workbench.observers import Estimator, Gains
     from workbench.system.system import System
-
-
-# Writes the FMU to a file, of a version of FMI, and says which platform comes next.
-_Make: TypeAlias = "Callable[[Path, int, Callable[[str], None]], BuiltFMU]"
 
 
 def add(commands: Commands, text: str) -> argparse.ArgumentParser:
@@ -60,7 +53,7 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
     export.add_argument(
         "--estimator",
         metavar="NAME",
-        help="estimator (default: the first in [export.classes] of the system, else ekf)",
+        help="estimator (default: the first that [export.classes] of the system names, else ekf)",
     )
     add_system(export)
     export.add_argument(
@@ -79,26 +72,36 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
 
 def run(options: argparse.Namespace, output: Output) -> CommandResult:
     """Write the observer as an FMU, and the package."""
-    from workbench.system.registry import load_system, model_path
+    from workbench.system.registry import load_system, model_path, open_model
     from workbench.system.system import REFERENCE
 
     require_compiler()
     from workbench.models.compiler import PLATFORMS, native
-    from workbench.observers.export import write_package
+    from workbench.observers.export import build_observer, model_name, write_package
 
     system = load_system(options.system)
     chosen = _choose(system, options.estimator, options.gains)
     reference: Path | None = options.reference
     if reference is None and REFERENCE in system.models:
         reference = model_path(system, REFERENCE)
-    with locked_folder(options.out), tempfile.TemporaryDirectory() as folder, ExitStack() as stack:
-        platforms = tuple(PLATFORMS) if options.platforms == "all" else (native(),)
-        model, make = _maker(stack, system, chosen, platforms)
-        name = model.rpartition(".")[2]
+    platforms = tuple(PLATFORMS) if options.platforms == "all" else (native(),)
+    with (
+        locked_folder(options.out),
+        tempfile.TemporaryDirectory() as folder,
+        open_model(system, chosen.estimator.role) as fmu,
+    ):
+        estimator = chosen.estimator(fmu, system, chosen.gains)
+        name = model_name(estimator).rpartition(".")[2]
 
         def build(fmi: int) -> BuiltFMU:
-            path = Path(folder) / f"fmi{fmi}" / f"{name}.fmu"
-            return make(path, fmi, lambda done: output.stage(f"{name}, FMI {fmi}.0: {done}"))
+            return build_observer(
+                estimator,
+                Path(folder) / f"fmi{fmi}" / f"{name}.fmu",
+                fmi,
+                chosen.text,
+                lambda platform: output.stage(f"{name}, FMI {fmi}.0: {platform}"),
+                platforms,
+            )
 
         built = build(options.fmi)
         summary = _summary(system, chosen, built)
@@ -153,22 +156,6 @@ def _choose(system: System, name: str | None, path: Path | None) -> _Choice:
         return _Choice(estimator, gains, format_gains(gains, estimator.meaning, {}), gains.source)
     gains = read_gains(path, {tuned: gains})
     return _Choice(estimator, gains, path.read_text(encoding="utf-8"), path.name)
-
-
-def _maker(
-    stack: ExitStack, system: System, chosen: _Choice, platforms: Sequence[str]
-) -> tuple[str, _Make]:
-    """Dotted name of an estimator's FMU, and what builds it: of its Modelica class, or its law."""
-    from workbench.observers.export import EstimatorLaw, ObserverModel, build_law, build_observer
-    from workbench.system.registry import open_model
-
-    estimator, gains = chosen.estimator, chosen.gains
-    if estimator.name in system.export.classes:
-        observer = ObserverModel(system, estimator, gains, chosen.text)
-        return observer.model, partial(build_observer, observer, platforms=platforms)
-    fmu = stack.enter_context(open_model(system, estimator.role))
-    law = EstimatorLaw(estimator(fmu, system, gains), chosen.text)
-    return law.model, partial(build_law, law, platforms=platforms)
 
 
 def _summary(system: System, chosen: _Choice, built: BuiltFMU) -> dict[str, Any]:

@@ -675,10 +675,11 @@ class View:
 
 @declared
 class Export:
-    """Estimators that the library has as Modelica classes, for FMUs that run without Python."""
+    """Estimators as FMUs that run without Python, and their package."""
 
     classes: Mapping[str, str] = key(
-        "by estimator, without the library's name; all others become FMUs by their laws", absent={}
+        "names of FMUs in the library, by estimator; all others have that of their Python class",
+        absent={},
     )
     start: OperatingPoint = key(
         "at which a package starts the reference model", absent=AT_REST, otherwise="at rest"

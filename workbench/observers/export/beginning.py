@@ -128,6 +128,34 @@ def said_by_first(estimator: Estimator) -> list[FirstValue]:
     ]
 
 
+def gains_in_settings(estimator: Estimator) -> dict[str, list[str]]:
+    """Places in C among the settings, by gain; none if a gain does more than stand there as it is.
+
+    That is found by making the estimator anew with other gains: a law whose settings and memory
+    change by nothing else follows its gains when they change later.
+    """
+    system, gains, parts = estimator.system, estimator.gains, estimator.parts
+    if parts.several or not gains.names:
+        return {}
+    # Of each gain another share and another zero, so that no two have one value.
+    shares = np.random.default_rng(0).uniform(0.5, 1.0, (2, gains.values.size))
+    others = gains.with_values(gains.values * shares[0] + 1e-9 * shares[1])
+    moved = type(estimator)(estimator.fmu, system, others)
+    sample = usual_sample(estimator)
+    before, after = (_flat(remembered(e, sample))[1] for e in (estimator, moved))
+    numbers = list(_numbers(parts.settings, "settings"))
+    changed = [number for _, number in _numbers(moved.parts.settings, "settings")]
+    places: dict[str, list[str]] = {name: [] for name in gains.names}
+    index = {value: k for k, value in enumerate(others.values.tolist())}
+    for (place, number), other in zip(numbers, changed, strict=True):
+        k = index.get(other)
+        if k is not None and number == gains.values[k]:
+            places[gains.names[k]].append(place)
+        elif _change(np.array(number), np.array(other)) != 0.0:
+            return {}
+    return places if not np.any(_change(before, after)) and all(places.values()) else {}
+
+
 def _change(before: Vector, after: Vector) -> Vector:
     """Difference; where one of them alone is no number, as large as a number can be."""
     same = (before == after) | (np.isnan(before) & np.isnan(after))

@@ -3,7 +3,8 @@
  * The law itself, law_code.h, is translated from Python. The FMU's inputs are the measured inputs
  * and outputs of the system, its states the entries of the law's estimate. A communication step takes
  * one sample: the inputs that stand at its start; the law advances by the time since the sample
- * before, which is the size of the communication step before. The first sample is the first that is
+ * before, which is the size of the communication step before. Parameters are those of the gains that
+ * the settings have as they are. The first sample is the first that is
  * whole: measured outputs that are NaN are missing, and such that are all zero are inputs that a tool
  * has not connected yet.
  */
@@ -170,7 +171,7 @@ static int is_first(const double *y) {
 
 Outcome rosenbrock_integrate(Rosenbrock *r, const double *u, const double *p, double tolerance,
                              double end, double *t, double *x, Memory *memory) {
-    (void)p, (void)tolerance;
+    (void)tolerance;
     if (memory->step > 0.0 || is_first(u + LAW_INPUTS)) {
         double row[LAW_ROW];
         for (int k = 0; k < LAW_ROW; k++) {
@@ -181,7 +182,7 @@ Outcome rosenbrock_integrate(Rosenbrock *r, const double *u, const double *p, do
         } else {
             memory->before = memory->now;
         }
-        if (estimator_step(&memory->now, memory->step, u, row) != LAW_OK) {
+        if (estimator_step(&memory->now, memory->step, u, p, row) != LAW_OK) {
             memory->now = memory->before;
             r->bad = REFERENCE_U;
             r->t_bad = *t;

@@ -1,13 +1,15 @@
-"""An estimator without a Modelica class to a Co-Simulation FMU: its law in C, sample by sample.
+"""An estimator to a Co-Simulation FMU: its law in C, sample by sample.
 
 The law is translated from Python (`observers.export.translation`); the compiler makes C of the
-model, and `law.c` takes the place of the integrator. Settings become constants, memory a part of
-the FMU's state, so that nothing is allocated after the start and a saved state has all of it.
+model, and `law.c` takes the place of the integrator. Settings become constants, but gains that
+stand in them as they are stay parameters; memory is a part of the FMU's state, so that nothing is
+allocated after the start and a saved state has all of it.
 """
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+import xml.etree.ElementTree as ET
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import casadi as ca
@@ -18,8 +20,12 @@ from workbench.models.compiler.explicit import StateSpace
 from workbench.models.compiler.flat import FlatVariable
 from workbench.models.modelica import read_library
 from workbench.observers import Estimator
-from workbench.observers.export.beginning import remembered, said_by_first, usual_sample
-from workbench.observers.export.description import sampled
+from workbench.observers.export.beginning import (
+    gains_in_settings,
+    remembered,
+    said_by_first,
+    usual_sample,
+)
 from workbench.observers.export.plant import plant_code, plant_of
 from workbench.observers.export.translation import (
     Array,
@@ -41,39 +47,40 @@ _CALLS = {"set_sample": 2, "set_inputs": 3, "set_states": 1, "place": 1, "evalua
 _CALLS |= {"differentiate": 3, "linearise": 2}
 
 
-@dataclass(frozen=True)
-class EstimatorLaw:
-    """What an FMU of an estimator is made of.
-
-    Attributes
-    ----------
-    estimator : with its gains, on its FMU, which is started anew.
-    gains_file : text of gains.toml, kept in the FMU.
-    """
-
-    estimator: Estimator
-    gains_file: str
-
-    @property
-    def model(self) -> str:
-        """Dotted name of the FMU."""
-        library = read_library(self.estimator.system.library)
-        return f"{library.name}.{type(self.estimator).__name__}"
+_OF_DERIVATIVES = (
+    "providesDirectionalDerivative",
+    "providesDirectionalDerivatives",
+    "providesAdjointDerivatives",
+)
+_WITH_DERIVATIVES = (
+    *("Derivatives", "InitialUnknowns"),  # of FMI 2.0
+    *("ContinuousStateDerivative", "InitialUnknown"),  # of FMI 3.0
+)
 
 
-def build_law(
-    law: EstimatorLaw,
+def model_name(estimator: Estimator) -> str:
+    """Dotted name of an estimator's FMU."""
+    system, own = estimator.system, type(estimator)
+    name = system.export.classes.get(own.name, own.__name__)
+    return f"{read_library(system.library).name}.{name}"
+
+
+def build_observer(
+    estimator: Estimator,
     fmu: Path,
     fmi: int,
-    report: Callable[[str], None],
+    gains_file: str = "",
+    report: Callable[[str], None] = lambda platform: None,
     platforms: Sequence[str] = tuple(PLATFORMS),
 ) -> BuiltFMU:
     """Compile an estimator with its gains to a Co-Simulation FMU.
 
     Parameters
     ----------
+    estimator : on its FMU, which is started anew.
     fmu : file to write; written whole or not at all.
     fmi : 2 or 3.
+    gains_file : text of gains.toml, kept in the FMU.
     report : called with the name of each platform when it is about to be compiled.
     platforms : names from `archive.PLATFORMS`.
 
@@ -83,20 +90,54 @@ def build_law(
         If the law has what is not translated, with file and line; its memory has no fixed size, or
         does not follow the first sample linearly; its FMU is not of the system's library.
     """
-    estimator = law.estimator
-    plant = plant_of(estimator)
+    plant, model = plant_of(estimator), model_name(estimator)
+    gains = gains_in_settings(estimator)
     stepped = SteppingLaw(
         sources=_SOURCES,
-        tables={**plant_code(plant, estimator), **_law_code(estimator)},
-        described=lambda description: sampled(description, estimator.system.sample_time),
-        resources={"gains.toml": law.gains_file},
+        tables={**plant_code(plant, estimator), **_law_code(estimator, gains)},
+        described=lambda text: _description(text, estimator.system.sample_time),
+        resources={"gains.toml": gains_file},
     )
-    shell = replace(_shell(estimator), name=law.model, experiment=plant.experiment)
-    return assemble(shell, law.model, fmu, fmi, platforms, stepped, report)
+    shell = replace(_shell(estimator, list(gains)), name=model, experiment=plant.experiment)
+    return assemble(shell, model, fmu, fmi, platforms, stepped, report)
 
 
-def _law_code(estimator: Estimator) -> dict[str, str]:
-    """Text of law_data.h, sizes and structs, and of law_code.h, contents and functions."""
+def _description(plain: str, sample_time: float) -> str:
+    """The model description of an FMU that takes samples, from that of a model with states.
+
+    Co-Simulation alone, with the time from sample to sample [s]; states are what it shows, and have
+    no derivatives.
+    """
+    root = ET.fromstring(plain)
+    (variables,) = root.findall("ModelVariables")
+    (structure,) = root.findall("ModelStructure")
+    (units,) = root.findall("UnitDefinitions")
+    (experiment,) = root.findall("DefaultExperiment")
+    derivatives = [v for v in variables if v.get("name", "").startswith("der(")]
+    for part in derivatives:
+        variables.remove(part)
+    used = {part.get("unit") for part in variables.iter()}
+    for whole, parts in (
+        (root, root.findall("ModelExchange")),
+        (structure, [part for part in structure if part.tag in _WITH_DERIVATIVES]),
+        (units, [unit for unit in units if unit.get("name") not in used]),
+    ):
+        for part in parts:
+            whole.remove(part)
+    for part in root.iter():
+        for name in ("dependencies", *_OF_DERIVATIVES):
+            part.attrib.pop(name, None)
+    experiment.set("stepSize", repr(sample_time))
+    return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(root, encoding="unicode") + "\n"
+
+
+def _law_code(estimator: Estimator, gains: Mapping[str, Sequence[str]]) -> dict[str, str]:
+    """Text of law_data.h, sizes and structs, and of law_code.h, contents and functions.
+
+    Parameters
+    ----------
+    gains : places in C among the settings, by gain that is a parameter.
+    """
     begin, parts = remembered(estimator, usual_sample(estimator)), estimator.parts
     data = Data(f"estimator {estimator.name}")
     of_settings = data.type_of(parts.settings, "settings")
@@ -128,6 +169,7 @@ def _law_code(estimator: Estimator) -> dict[str, str]:
             row,
         ],
     )
+    settings = "settings" if gains else "law_settings"
     named = f"typedef {of_settings.name} LawSettings_;\ntypedef {of_memory.name} LawMemory_;\n"
     header = [
         f"/* Sizes and structs of the law of {estimator.name}. */",
@@ -148,11 +190,18 @@ def _law_code(estimator: Estimator) -> dict[str, str]:
         *(f"    {assignment.text}" for assignment in said_by_first(estimator)),
         "}",
         "",
-        "static int estimator_step(Law *law, double h, const double *sample, double *row) {",
+        "static int estimator_step(Law *law, double h, const double *sample, const double *gain,",
+        "                          double *row) {",
+        *(["    LawSettings_ settings = law_settings;"] if gains else ["    (void)gain;"]),
+        *(
+            f"    {place} = gain[{k}];"
+            for k, places in enumerate(gains.values())
+            for place in places
+        ),
         "    const double *const y = sample + LAW_INPUTS;",
         "    double u[LAW_INPUTS + 1] = {0.0};  /* the plant has no explicit time */",
         "    memcpy(u, sample, LAW_INPUTS * sizeof *u);",
-        f"    int status = {step}(law->model, &law_settings, &law->memory, h, u, y, row);",
+        f"    int status = {step}(law->model, &{settings}, &law->memory, h, u, y, row);",
         f"    for (int k = 0; k < {estimator.bands.size}; k++) {{",
         f"        row[{estimator.bands.size} + k] *= law_bands[k];",
         "    }",
@@ -180,8 +229,13 @@ def _sizes(estimator: Estimator) -> dict[str, int]:
     }
 
 
-def _shell(estimator: Estimator) -> StateSpace:
+def _shell(estimator: Estimator, gains: Sequence[str]) -> StateSpace:
     """The FMU as other tools see it: samples are inputs, entries of an estimate are its states."""
+    meanings = estimator.meanings(estimator.fmu, estimator.system, estimator.gains)
+    parameters = [
+        _variable(name, meanings[name][1], f"Gain: {meanings[name][0]}", estimator.gains[name])
+        for name in gains
+    ]
     system, defaults = estimator.system, estimator.fmu.defaults
     inputs = [
         _variable(
@@ -190,9 +244,9 @@ def _shell(estimator: Estimator) -> StateSpace:
         for signal in (*system.inputs, *system.outputs)
     ]
     states = _entries(estimator)
-    x, u = (
+    x, u, p = (
         ca.vertcat(ca.SX(0, 1), *(variable.symbol for variable in group))
-        for group in (states, inputs)
+        for group in (states, inputs, parameters)
     )
     nothing = ca.SX(0, 1)
     return StateSpace(
@@ -202,15 +256,15 @@ def _shell(estimator: Estimator) -> StateSpace:
         t=ca.SX.sym("time"),
         x=x,
         u=u,
-        p=nothing,
+        p=p,
         f=ca.SX.zeros(len(states), 1),
         w=nothing,
         assertions=nothing,
         assertion_texts=[],
         states=states,
         inputs=inputs,
-        parameters=[],
-        tunable=[],
+        parameters=parameters,
+        tunable=[False] * len(parameters),
         outputs=[],
         state_outputs=[state.name for state in states],
     )
