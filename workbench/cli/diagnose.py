@@ -9,15 +9,7 @@ from fnmatch import fnmatchcase
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
-from workbench.cli.arguments import (
-    Commands,
-    add_effects,
-    add_model,
-    add_platforms,
-    add_recordings,
-    add_run,
-    add_system,
-)
+from workbench.cli import arguments
 from workbench.cli.extras import require_compiler
 from workbench.cli.output import CommandResult, Output, read_result
 from workbench.errors import unknown_name
@@ -31,7 +23,7 @@ if TYPE_CHECKING:
 WORKERS_NEED = ("workbench.diagnosis", "workbench.diagnosis.laws")
 
 
-def add(commands: Commands, text: str) -> argparse.ArgumentParser:
+def add(commands: arguments.Commands, text: str) -> argparse.ArgumentParser:
     """Add the command to the parser; `text` is its line in the list of all."""
     parser = commands.add_parser(
         "diagnose",
@@ -51,8 +43,8 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         "  python -m workbench diagnose my_recordings --propose\n"
         "  python -m workbench diagnose --list",
     )
-    add_recordings(parser, out="results/diagnose")
-    add_system(parser)
+    arguments.add_recordings(parser, out="results/diagnose")
+    arguments.add_system(parser)
     parser.add_argument(
         "--held-out",
         nargs="+",
@@ -61,12 +53,12 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         help="recordings by name (* is any letters), on which only errors of both models are "
         "measured",
     )
-    add_model(parser)
-    add_effects(parser, "consider")
+    arguments.add_model(parser)
+    arguments.add_effects(parser, "consider")
     parser.add_argument(
         "--list", action="store_true", help="list the effects of the library, and end"
     )
-    add_platforms(parser, "the extended FMU", "native")
+    arguments.add_platforms(parser, "the extended FMU", "native")
     parser.add_argument(
         "--certainty",
         action="store_true",
@@ -79,7 +71,7 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         help="if something is missing that no effect explains, infer a law for it: where it acts, "
         "on what it depends, its form (into OUT/proposed)",
     )
-    add_run(parser)
+    arguments.add_run(parser)
     return parser
 
 

@@ -2,16 +2,7 @@
 
 import argparse
 
-from workbench.cli.arguments import (
-    Commands,
-    add_model,
-    add_recordings,
-    add_run,
-    add_seed,
-    add_system,
-    count,
-    positive,
-)
+from workbench.cli import arguments
 from workbench.cli.output import CommandResult, Output, read_result
 from workbench.errors import InputError
 from workbench.runtime.engine import Engine
@@ -22,7 +13,7 @@ _UNITS = {"distance": "m", "deceleration": "m/s2", "response": "s", "asked": "SI
 WORKERS_NEED = ("workbench.studies.distance",)
 
 
-def add(commands: Commands, text: str) -> argparse.ArgumentParser:
+def add(commands: arguments.Commands, text: str) -> argparse.ArgumentParser:
     """Add the command to the parser; `text` is its line in the list of all."""
     parser = commands.add_parser(
         "distance",
@@ -41,8 +32,8 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         "  python -m workbench distance --system my_machine my_stops --safety 0\n"
         "  python -m workbench distance --system my_machine my_stops --plain 100000",
     )
-    add_recordings(parser, out="results/distance")
-    add_system(parser)
+    arguments.add_recordings(parser, out="results/distance")
+    arguments.add_system(parser)
     parser.add_argument(
         "--ask",
         action="append",
@@ -53,29 +44,29 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
     )
     parser.add_argument(
         "--safety",
-        type=count,
+        type=arguments.count,
         default=9,
         metavar="K",
         help="safety level down to one stop in 10^K; 0: none (default: %(default)s)",
     )
     parser.add_argument(
         "--samples",
-        type=positive,
+        type=arguments.positive,
         default=4000,
         metavar="N",
         help="stops of the distribution (default: %(default)s)",
     )
     parser.add_argument(
         "--plain",
-        type=count,
+        type=arguments.count,
         default=0,
         metavar="N",
         help="check the safety level by so many stops, each drawn by itself; 1e5 take minutes, 1e7 "
         "hours, and Ctrl-C keeps those that are drawn (default: %(default)s)",
     )
-    add_model(parser)
-    add_seed(parser, "all that is drawn")
-    add_run(parser)
+    arguments.add_model(parser)
+    arguments.add_seed(parser, "all that is drawn")
+    arguments.add_run(parser)
     return parser
 
 

@@ -10,14 +10,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from workbench.cli.arguments import (
-    Commands,
-    add_isolated,
-    add_out,
-    add_platforms,
-    add_reference,
-    add_system,
-)
+from workbench.cli import arguments
 from workbench.cli.extras import require_compiler
 from workbench.cli.output import CommandResult, Output
 from workbench.runtime.files import locked_folder, write_json, write_whole
@@ -28,7 +21,7 @@ if TYPE_CHECKING:
     from workbench.system.system import System
 
 
-def add(commands: Commands, text: str) -> argparse.ArgumentParser:
+def add(commands: arguments.Commands, text: str) -> argparse.ArgumentParser:
     """Add the command to the parser; `text` is its line in the list of all."""
     export = commands.add_parser(
         "export",
@@ -55,7 +48,7 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         metavar="NAME",
         help="estimator (default: the first that [export.classes] of the system names, else ekf)",
     )
-    add_system(export)
+    arguments.add_system(export)
     export.add_argument(
         "--fmi",
         type=int,
@@ -63,10 +56,10 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         default=2,
         help="version of the FMU; SSP 1.0 packages hold FMI 2.0 (default: %(default)s)",
     )
-    add_platforms(export, "the FMU", "all")
-    add_reference(export, "(FMI 2.0) that the package connects the observer to")
-    add_out(export, "results/export")
-    add_isolated(export)
+    arguments.add_platforms(export, "the FMU", "all")
+    arguments.add_reference(export, "(FMI 2.0) that the package connects the observer to")
+    arguments.add_out(export, "results/export")
+    arguments.add_isolated(export)
     return export
 
 

@@ -9,14 +9,7 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from workbench.cli.arguments import (
-    Commands,
-    add_models,
-    add_recordings,
-    add_run,
-    add_system,
-    example_case,
-)
+from workbench.cli import arguments
 from workbench.cli.output import CommandResult, Output, read_result
 from workbench.runtime.files import locked_folder
 from workbench.runtime.pool import Pool
@@ -30,9 +23,9 @@ if TYPE_CHECKING:
 WORKERS_NEED = ("workbench.observers.observability_report",)
 
 
-def add(commands: Commands, text: str) -> argparse.ArgumentParser:
+def add(commands: arguments.Commands, text: str) -> argparse.ArgumentParser:
     """Add the command to the parser; `text` is its line in the list of all."""
-    own = example_case()
+    own = arguments.example_case()
     observability = commands.add_parser(
         "observability",
         help=text,
@@ -44,10 +37,10 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         f"  python -m workbench observability {own} --out /tmp/one\n"
         "  python -m workbench observability my_cases --system my/system.toml",
     )
-    add_recordings(observability, out="results/observability")
-    add_system(observability)
-    add_models(observability)
-    add_run(observability)
+    arguments.add_recordings(observability, out="results/observability")
+    arguments.add_system(observability)
+    arguments.add_models(observability)
+    arguments.add_run(observability)
     return observability
 
 

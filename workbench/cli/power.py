@@ -9,19 +9,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from workbench.cli.arguments import (
-    Commands,
-    above_zero,
-    add_effects,
-    add_isolated,
-    add_out,
-    add_pdf,
-    add_reference,
-    add_seed,
-    add_system,
-    add_workers,
-    count,
-)
+from workbench.cli import arguments
 from workbench.cli.extras import require_compiler
 from workbench.cli.output import CommandResult, Output, read_result
 from workbench.errors import InputError, unknown_name
@@ -38,7 +26,7 @@ if TYPE_CHECKING:
 WORKERS_NEED = ("workbench.studies.power", "workbench.studies.power.report")
 
 
-def add(commands: Commands, text: str) -> argparse.ArgumentParser:
+def add(commands: arguments.Commands, text: str) -> argparse.ArgumentParser:
     """Add the command to the parser; `text` is its line in the list of all."""
     parser = commands.add_parser(
         "power",
@@ -62,20 +50,20 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         "  python -m workbench power --system train --recorded labelled healthy",
     )
     _add_sets(parser)
-    add_workers(parser)
+    arguments.add_workers(parser)
     _add_checks(parser)
     parser.add_argument("--resume", action="store_true", help="go on from the verdicts in --out")
-    add_system(parser)
-    add_reference(parser, "that makes the recordings")
-    add_out(parser, "results/power")
-    add_pdf(parser)
-    add_isolated(parser)
+    arguments.add_system(parser)
+    arguments.add_reference(parser, "that makes the recordings")
+    arguments.add_out(parser, "results/power")
+    arguments.add_pdf(parser)
+    arguments.add_isolated(parser)
     return parser
 
 
 def _add_sets(parser: argparse.ArgumentParser) -> None:
     """Add which sets of recordings are made."""
-    add_effects(parser, "plant, also those that the catalogue lacks, by the rig's names")
+    arguments.add_effects(parser, "plant, also those that the catalogue lacks, by the rig's names")
     for option, default, text in (
         ("--clean", 50, "sets without an effect"),
         ("--repeats", 3, "sets of each effect at each size"),
@@ -84,20 +72,20 @@ def _add_sets(parser: argparse.ArgumentParser) -> None:
     ):
         parser.add_argument(
             option,
-            type=count,
+            type=arguments.count,
             default=default,
             metavar="N",
             help=f"{text} (default: %(default)s)",
         )
     parser.add_argument(
         "--sizes",
-        type=above_zero,
+        type=arguments.above_zero,
         nargs="+",
         default=[0.5, 1.0, 2.0, 4.0],
         metavar="X",
         help="multiples of the least size that is worth a finding (default: 0.5 1 2 4)",
     )
-    add_seed(parser, "all sets")
+    arguments.add_seed(parser, "all sets")
     parser.add_argument(
         "--recorded",
         nargs="+",

@@ -11,16 +11,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from workbench.cli.arguments import (
-    Commands,
-    add_isolated,
-    add_models,
-    add_pdf,
-    add_recordings,
-    add_system,
-    add_workers,
-    example_case,
-)
+from workbench.cli import arguments
 from workbench.cli.output import CommandResult, Output, warn
 from workbench.errors import InputError
 from workbench.runtime.files import locked_folder, write_json
@@ -34,9 +25,9 @@ if TYPE_CHECKING:
 WORKERS_NEED = ("workbench.observers.simulation", "workbench.observers.report")
 
 
-def add(commands: Commands, text: str) -> argparse.ArgumentParser:
+def add(commands: arguments.Commands, text: str) -> argparse.ArgumentParser:
     """Add the command to the parser; `text` is its line in the list of all."""
-    own = example_case()
+    own = arguments.example_case()
     parser = commands.add_parser(
         "simulate",
         help=text,
@@ -50,9 +41,9 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         f"  python -m workbench simulate {own} --live\n"
         "  python -m workbench simulate --estimator disturbance_observer --estimator ekf",
     )
-    add_recordings(parser, out="results/simulate")
-    add_system(parser)
-    add_models(parser)
+    arguments.add_recordings(parser, out="results/simulate")
+    arguments.add_system(parser)
+    arguments.add_models(parser)
     parser.add_argument(
         "--gains",
         type=Path,
@@ -72,14 +63,14 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         metavar="NAME",
         help="run this one, may be repeated (default: the standard ones of the system)",
     )
-    add_workers(parser)
+    arguments.add_workers(parser)
     parser.add_argument(
         "--live",
         action="store_true",
         help="show each run in a window as it goes, one after the other",
     )
-    add_pdf(parser)
-    add_isolated(parser)
+    arguments.add_pdf(parser)
+    arguments.add_isolated(parser)
     return parser
 
 

@@ -10,17 +10,7 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from workbench.cli.arguments import (
-    Commands,
-    add_isolated,
-    add_map,
-    add_pdf,
-    add_recording_options,
-    add_seed,
-    add_system,
-    add_workers,
-    positive,
-)
+from workbench.cli import arguments
 from workbench.cli.output import CommandResult, Output, warn
 from workbench.errors import InputError, WorkerError
 from workbench.runtime.files import locked_folder
@@ -34,7 +24,7 @@ if TYPE_CHECKING:
 WORKERS_NEED = ("workbench.tuning",)
 
 
-def add(commands: Commands, text: str) -> argparse.ArgumentParser:
+def add(commands: arguments.Commands, text: str) -> argparse.ArgumentParser:
     """Add the command to the parser; `text` is its line in the list of all."""
     parser = commands.add_parser(
         "tune",
@@ -53,7 +43,7 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
     parser.add_argument(
         "estimator", metavar="ESTIMATOR", help="one with gains, such as disturbance_observer or ekf"
     )
-    add_system(parser)
+    arguments.add_system(parser)
     parser.add_argument(
         "--cases",
         nargs="+",
@@ -62,18 +52,18 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         metavar="CASE",
         help="case folders, or folders of case folders (default: those of the system)",
     )
-    add_recording_options(parser)
+    arguments.add_recording_options(parser)
     parser.add_argument(
         "--fmu",
         type=Path,
         metavar="FILE",
         help="observer model (default: that of the estimator)",
     )
-    add_map(parser)
+    arguments.add_map(parser)
     _add_search(parser)
     _add_work(parser)
-    add_pdf(parser)
-    add_isolated(parser)
+    arguments.add_pdf(parser)
+    arguments.add_isolated(parser)
     return parser
 
 
@@ -81,19 +71,19 @@ def _add_search(parser: argparse.ArgumentParser) -> None:
     """Add what decides about the gains."""
     parser.add_argument(
         "--budget",
-        type=positive,
+        type=arguments.positive,
         default=100,
         metavar="GENERATIONS",
         help="most generations to search (default: %(default)s)",
     )
     parser.add_argument(
         "--population",
-        type=positive,
+        type=arguments.positive,
         default=15,
         metavar="N",
         help="candidates per gain (default: %(default)s)",
     )
-    add_seed(parser, "the search")
+    arguments.add_seed(parser, "the search")
     parser.add_argument(
         "--scale-error",
         "--radius-error",
@@ -125,7 +115,7 @@ def _add_search(parser: argparse.ArgumentParser) -> None:
 
 def _add_work(parser: argparse.ArgumentParser) -> None:
     """Add who does the work, and what is shown and kept of it."""
-    add_workers(parser)
+    arguments.add_workers(parser)
     parser.add_argument(
         "--cluster",
         metavar="ADDRESS",
@@ -133,7 +123,7 @@ def _add_work(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--timeout",
-        type=positive,
+        type=arguments.positive,
         default=60,
         metavar="SECONDS",
         help="a candidate that takes longer ends its worker (default: %(default)s)",

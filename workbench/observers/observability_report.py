@@ -24,75 +24,16 @@ from workbench.pages.answer import (
     whole_percent,
     with_answer,
 )
-from workbench.pages.figures import CaseFigure, Curve, Panel, save_figure, styled
+from workbench.pages.figures import CaseFigure, Curve, Panel, draw_case
 from workbench.pages.parts import Definitions, Numbers, Page, Part, Table, number, zoomable
 from workbench.pages.views import called, capital, named, per_shown, shown_unit
 from workbench.runtime.files import write_json, write_whole
 from workbench.system.system import System
 
-_COLOURS = ("#0072B2", "#D55E00")
-
-
-_LINES = ("-", "--")
-
 
 def draw_observability(observability: CaseObservability, path: Path) -> None:
-    """Draw one recording to `path` (PNG): an input and an output, then the bounds of quantities.
-
-    Bounds are drawn at the end of their window and shaded where the first model's are useful.
-    """
-    system, case = observability.system, observability.case
-    with styled(9.0, 7.0) as figure:
-        top, *rows = figure.subplots(1 + len(system.estimated), 1, sharex=True)
-        figure.suptitle(f"{case.name}: {case.title}", fontsize=10)
-        for first in system.inputs[:1]:
-            values = case[first.name] / per_shown(system, first.name, first.shown)
-            top.plot(case.time, values, color="#D55E00", label=first.name)
-            top.set_ylabel(f"{first.name} [{first.shown}]")
-        beside = _beside(system)
-        other = top.twinx()
-        other.plot(case.time, observability.run.signal(beside), color="#0072B2", label=beside)
-        other.set_ylabel(f"{called(system, beside)} [{system.unit(beside)}]")
-        other.grid(visible=False)
-        other.spines["right"].set_visible(True)
-        handles = [*top.get_lines(), *other.get_lines()]
-        top.legend(handles, [str(h.get_label()) for h in handles], loc="upper right", ncols=2)
-        for j, axes in enumerate(rows):
-            _draw_bounds(observability, j, axes)
-        rows[-1].set_xlabel("time [s]")
-        figure.align_ylabels()
-        save_figure(figure, [path])
-
-
-def _beside(system: System) -> str:
-    """What shows the state of the machine beside its first input: what the model reports last."""
-    return [*(output.name for output in system.outputs), *system.reported][-1]
-
-
-def _draw_bounds(observability: CaseObservability, j: int, axes: Any) -> None:
-    """Bounds of quantity j by all models."""
-    quantity, known = observability.system.estimated[j], float(prior(observability.system)[j])
-    for test, colour, line in zip(observability.tests, _COLOURS, _LINES, strict=False):
-        axes.semilogy(test.time, test.bound[:, j], line, color=colour, label=test.model)
-    first = observability.tests[0]
-    axes.fill_between(
-        first.time,
-        0.0,
-        1.0,
-        where=list(first.useful()[:, j]),
-        transform=axes.get_xaxis_transform(),
-        color=_COLOURS[0],
-        alpha=0.08,
-        linewidth=0,
-    )
-    axes.axhline(
-        quantity.useful, color="black", linewidth=0.8, label=f"useful below {quantity.useful:g}"
-    )
-    axes.axhline(known, color="#999999", linewidth=0.8, linestyle=":", label="known beforehand")
-    axes.set_ylabel(f"bound of {quantity.correction} [{quantity.unit}]")
-    # Room for the legend above the prior.
-    axes.set_ylim(3e-4 * known, 20.0 * known)
-    axes.legend(loc="upper center", ncols=4, fontsize=7)
+    """Draw one recording to `path` (PNG): an input, then the bounds of quantities by model."""
+    draw_case(_figure(observability), [path])
 
 
 def write_windows(observability: CaseObservability, path: Path) -> None:
