@@ -19,7 +19,7 @@ from workbench.recordings.case import read_cases
 from workbench.system.registry import open_model
 from workbench.system.system import System
 from workbench.tuning import evaluate_gains, pose
-from workbench.tuning.settling import Settling
+from workbench.tuning.cost import Settling
 
 from .built import build_here
 

@@ -24,7 +24,15 @@ from workbench.observers import Gains, SearchSpace
 from workbench.observers.estimators.disturbance import DisturbanceObserver
 from workbench.observers.score import corner
 from workbench.recordings.case import Case
-from workbench.tuning import Job, Plan, Search, evaluate_gains, recording, search
+from workbench.tuning import (
+    Checkpointing,
+    Job,
+    Plan,
+    Search,
+    evaluate_gains,
+    recording,
+    search,
+)
 
 from .built import declare
 
@@ -332,7 +340,12 @@ def test_search_finds_the_kalman_gain_from_an_observer_without_feedback(
     blind = gains_of(0.0, 0.0, process.rate)
     job = prepare_rolling(blind, FORCE_ALONE, record(process, samples, np.random.default_rng(2)))
     found = search(
-        inline(job), job, around(blind, free), [0], Plan(40, 1, seed=2), tmp_path / "c.json"
+        inline(job),
+        job,
+        around(blind, free),
+        [0],
+        Plan(40, 1, seed=2),
+        Checkpointing(tmp_path / "c.json"),
     )
     assert found.history[0].z > 2 * z
 
@@ -386,7 +399,12 @@ def test_search_ends_where_the_two_worst_cases_are_equally_bad(prepare_rolling, 
     cases = [record(process, samples, rng) for process in (lively, noisy)]
     job = prepare_rolling(blind, FORCE_ALONE, *cases)
     found = search(
-        inline(job), job, around(blind, ["L41"]), [0, 1], Plan(40, 1, seed=3), tmp_path / "c.json"
+        inline(job),
+        job,
+        around(blind, ["L41"]),
+        [0, 1],
+        Plan(40, 1, seed=3),
+        Checkpointing(tmp_path / "c.json"),
     )
     assert found.history[0].z > 1.5 * expected(lively, crossing)
     # A search ends when z is spread by 1e-3; next to the crossing that is a difference of so much.

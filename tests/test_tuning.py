@@ -17,6 +17,7 @@ from workbench.system.registry import open_model
 from workbench.system.system import System
 from workbench.tuning import (
     Candidate,
+    Checkpointing,
     Plan,
     Search,
     TuningResult,
@@ -53,7 +54,9 @@ def test_planted_gains_are_found(system, prepare, stop_beginnings, inline, tmp_p
     everything = range(len(forces))
     pool = inline(job)
     plan = Plan(80, 5, seed=2)
-    found = search(pool, job, problem.space, everything, plan, tmp_path / "checkpoint.json")
+    found = search(
+        pool, job, problem.space, everything, plan, Checkpointing(tmp_path / "checkpoint.json")
+    )
     z_reasoned = evaluate_gains(pool, job, [reasoned.values]).max()
     assert found.z < 0.02 * z_reasoned
     # Columns that decide about the force; a tenth is what is left of z over its slope.
@@ -150,10 +153,10 @@ def test_folds_are_judged_by_gains_that_have_not_seen_them(
 
     def tune(number: int, on: Sequence[int]) -> Search | None:
         seen.append(on)
-        return search(pool, job, space, on, plan, tmp_path / f"{number}.json")
+        return search(pool, job, space, on, plan, Checkpointing(tmp_path / f"{number}.json"))
 
     reasoned = job.gains.values
-    folds = cross_validate(pool, job, stop_beginnings, reasoned, 3, tune)
+    folds = cross_validate(pool, job, stop_beginnings, 3, tune)
     assert seen == [[1, 2], [0, 2], [0, 1]]
     z_k = evaluate_gains(pool, job, [reasoned])[0]
     assert [fold.cases for fold in folds] == [(r.name,) for r in job.recordings]
@@ -172,7 +175,9 @@ def test_a_gain_without_effect_does_not_matter(problem, pool, tmp_path):
     """A decay of 0.02 1/s forgets 12 % of a deviation in 6 s; L42 is the loop of muDC."""
     job, space = problem.job, problem.space
     plan = Plan(generations=1, population=1, seed=3)
-    found = search(pool, job, space, range(len(job.recordings)), plan, tmp_path / "c.json")
+    found = search(
+        pool, job, space, range(len(job.recordings)), plan, Checkpointing(tmp_path / "c.json")
+    )
     matters = {e.gain: e.matters for e in sensitivities(pool, job, space, found)}
     assert matters["L42"]
     assert not matters["T_muWR"]
@@ -183,13 +188,15 @@ def test_gains_are_as_good_as_the_last_candidates_that_lose_one_percent_at_most(
 ):
     job, space = problem.job, problem.space
     plan = Plan(generations=0, population=1, seed=3)
-    found = search(pool, job, space, range(len(job.recordings)), plan, tmp_path / "c.json")
+    found = search(
+        pool, job, space, range(len(job.recordings)), plan, Checkpointing(tmp_path / "c.json")
+    )
     assert not found.converged
     members = np.tile(found.coordinates, (3, 1))
     members[:, 0] = 0.55, 0.65, 0.95
     last = Population(members, found.z * np.array([1.0, 1.009, 1.011]), found.last.z_k[:3])
     tuned = TuningResult(problem, plan, replace(found, last=last), found.z_k, interrupted=False)
-    told = summarise_tuning(tuned, 0)
+    told = summarise_tuning(tuned)
     assert (told["work"]["as_good"], told["work"]["last"]) == (2, 3)
     assert_allclose(told["gains"]["L11"]["as_good"], space.gains(members)[:2, 0])
     low, high = told["gains"]["L21"]["as_good"]

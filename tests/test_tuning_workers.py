@@ -25,6 +25,7 @@ from workbench.runtime.files import previous_path
 from workbench.runtime.pool import Pool
 from workbench.tuning import (
     Candidate,
+    Checkpointing,
     Evaluation,
     Evaluator,
     NoWorkersError,
@@ -46,7 +47,8 @@ SMALL = Plan(generations=4, population=1, seed=3)
 
 def run(pool: Workers, problem: Problem, path: Path, plan: Plan, **options) -> Search:
     job, space = problem.job, problem.space
-    return search(pool, job, space, range(len(job.recordings)), plan, path, **options)
+    kept = Checkpointing(path, **options)
+    return search(pool, job, space, range(len(job.recordings)), plan, kept)
 
 
 def test_economy_changes_nothing_but_the_work(problem, pool, tmp_path):

@@ -188,13 +188,19 @@ def _run(
         write_tuning_page,
     )
 
-    plan = Plan(options.budget, options.population, options.seed, not options.full_evaluation)
+    plan = Plan(
+        generations=options.budget,
+        population=options.population,
+        seed=options.seed,
+        economy=not options.full_evaluation,
+        folds=options.folds,
+    )
     size = problem.space.start.size
     output.stage(
         f"{options.estimator}: {size} gains, {cases} cases, at most {plan.generations} "
         f"generations of {plan.population * size} candidates"
     )
-    progress = PrintedProgress(output, plan, options.folds, out, live=options.live)
+    progress = PrintedProgress(output, plan, out, live=options.live)
     job = problem.job
     pool: Pool[Evaluator] | DaskPool[Evaluator]
     if options.cluster is None:
@@ -203,21 +209,13 @@ def _run(
         pool = open_cluster(options.cluster, Evaluator, job, options.timeout, job.system, warn)
     try:
         with _one_interruption(), closing(pool):
-            tuned = tune(
-                pool,
-                problem,
-                plan,
-                out,
-                folds=options.folds,
-                resume=options.resume,
-                progress=progress,
-            )
+            tuned = tune(pool, problem, plan, out, resume=options.resume, progress=progress)
     except NoWorkersError as error:
         raise WorkerError(f"{error}; nothing was evaluated") from None
     if tuned is None:
         output.progress("interrupted before the first generation was evaluated; nothing is written")
         return CommandResult(status=130)
-    content = summarise_tuning(tuned, options.folds)
+    content = summarise_tuning(tuned)
     content["provenance"] |= {"run": run_of("tune", job.system, sources(problem.cases))}
     summary = with_answer(tuning_answer(headline(content), content), content)
     text = json.dumps(summary, indent=2) + "\n"

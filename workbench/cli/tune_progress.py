@@ -30,9 +30,8 @@ class PrintedProgress(Progress):
     kept : whether the gains could be written.
     """
 
-    def __init__(self, output: Output, plan: Plan, folds: int, out: Path, *, live: bool) -> None:
-        self._output, self._plan, self._folds = output, plan, folds
-        self._out, self._live = out, live
+    def __init__(self, output: Output, plan: Plan, out: Path, *, live: bool) -> None:
+        self._output, self._plan, self._out, self._live = output, plan, out, live
         self._drawn = -np.inf
         self.kept = False
 
@@ -41,7 +40,7 @@ class PrintedProgress(Progress):
         self._begin = time.perf_counter()
         self._done: list[Generation] = []
         if fold:
-            self._output.progress(f"fold {fold} of {self._folds}")
+            self._output.progress(f"fold {fold} of {self._plan.folds}")
 
     def evolved(self, history: Sequence[Generation]) -> None:
         """See Progress."""

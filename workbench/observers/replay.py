@@ -2,7 +2,6 @@
 
 import time
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,10 +15,6 @@ from workbench.recordings.case import Case
 from workbench.system.plugins import find_plugin, load
 from workbench.system.registry import open_model
 from workbench.system.system import System
-
-if TYPE_CHECKING:
-    pass
-
 
 SURE = 0.95  # probability, that of a band
 

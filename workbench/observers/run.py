@@ -128,8 +128,15 @@ def run_figure(run: Run) -> CaseFigure:
             curve = Curve("2", run.signal(name), half_band(run, name, 1.0))
             panels.append(_panel(name, unit, claimed_parts(curve, run, name)))
     panels += [panel for panel in [probability_panel([run])] if panel.curves]
-    legend = (("2", run.estimator),)
-    return CaseFigure(run.case, run.summary(), "", run.time, None, legend, tuple(panels))
+    return CaseFigure(
+        name=run.case,
+        title=run.summary(),
+        finding="",
+        time=run.time,
+        window=None,
+        legend=(("2", run.estimator),),
+        panels=tuple(panels),
+    )
 
 
 def probability_panel(runs: Iterable[Run]) -> Panel:

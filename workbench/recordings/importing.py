@@ -273,9 +273,9 @@ def _piece(
     signals = {signal: values[part] for signal, values in measured.signals.items()}
     shown = conditions_shown(signals, system)
     unknown = {
-        kind.name: UNKNOWN
-        for kind in system.conditions
-        if kind.name not in given and kind.name not in shown and not (kind.sign or kind.sets)
+        condition.name: UNKNOWN
+        for condition in system.conditions
+        if condition.name not in {**given, **shown} and not (condition.sign or condition.sets)
     }
     conditions = {**unknown, **shown, **given}
     table = Table(conditions, f"{where}, conditions")
@@ -285,9 +285,15 @@ def _piece(
         for key in read
     }
     origin = Origin(f"{where}, {name}", None, {}, "command line, --condition")
-    doubtful = doubts(time, signals, read, system, origin)
-    ordered = {key: conditions[key] for key in read}
-    return Piece(name, (cut.first, cut.end), time, signals, ordered, sources, doubtful)
+    return Piece(
+        name=name,
+        samples=(cut.first, cut.end),
+        time=time,
+        signals=signals,
+        conditions={key: conditions[key] for key in read},
+        sources=sources,
+        doubts=doubts(time, signals, read, system, origin),
+    )
 
 
 def store(out: Path, named: Mapping[str, NamedChannel]) -> None:

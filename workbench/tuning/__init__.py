@@ -28,7 +28,7 @@ from workbench.tuning.recipe import (
     tune,
     tuned_gains,
 )
-from workbench.tuning.search import Plan, Search, search
+from workbench.tuning.search import Checkpointing, Plan, Search, search
 from workbench.tuning.validation import (
     Fold,
     Sensitivity,
@@ -41,6 +41,7 @@ from workbench.tuning.validation import (
 __all__ = [
     "LIMIT",
     "Candidate",
+    "Checkpointing",
     "Evaluation",
     "Evaluator",
     "Fold",

@@ -24,7 +24,7 @@ from workbench.system.registry import open_model
 from workbench.system.system import System
 from workbench.tuning.checkpoint import Generation
 from workbench.tuning.cost import Job, Workers, recordings
-from workbench.tuning.search import Plan, Search, search
+from workbench.tuning.search import Checkpointing, Plan, Search, search
 from workbench.tuning.validation import (
     NEGLIGIBLE,
     Fold,
@@ -100,7 +100,7 @@ class TuningResult:
 
     def to_dict(self) -> dict[str, Any]:
         """All that is known of the tuning, as in summary.json."""
-        return summarise_tuning(self, len(self.folds))
+        return summarise_tuning(self)
 
     def summary(self) -> str:
         """Table of cases, and what is to be said of gains and folds."""
@@ -230,7 +230,6 @@ def tune(
     plan: Plan,
     checkpoints: Path,
     *,
-    folds: int = 0,
     resume: bool = False,
     progress: Progress | None = None,
 ) -> TuningResult | None:
@@ -242,7 +241,6 @@ def tune(
     ----------
     pool : workers prepared with the problem's job.
     checkpoints : folder where each search keeps its state after every generation.
-    folds : how many times to tune without a part of the cases and evaluate on it; 0 for none.
     resume : go on from the checkpoints that are there.
 
     Returns
@@ -267,7 +265,7 @@ def tune(
         return None
     tuned = TuningResult(problem, plan, result, before, result.interrupted)
     run.progress.found(tuned)
-    return tuned if result.interrupted else run.examine(tuned, folds)
+    return tuned if result.interrupted else run.examine(tuned)
 
 
 @dataclass(frozen=True, eq=False)
@@ -284,30 +282,21 @@ class _Run:
     def search(self, fold: int, on: Sequence[int]) -> Search | None:
         """Search on some cases."""
         self.progress.begins(fold)
-        return search(
-            self.pool,
-            self.problem.job,
-            self.problem.space,
-            on,
-            self.plan,
-            self.checkpoints / (f"checkpoint_fold{fold}.json" if fold else "checkpoint.json"),
-            resume=self.resume,
-            report=self.progress.evolved,
-            warn=self.progress.warn,
-        )
+        file = self.checkpoints / (f"checkpoint_fold{fold}.json" if fold else "checkpoint.json")
+        kept = Checkpointing(file, self.resume, self.progress.evolved, self.progress.warn)
+        return search(self.pool, self.problem.job, self.problem.space, on, self.plan, kept)
 
-    def examine(self, tuned: TuningResult, folds: int) -> TuningResult:
+    def examine(self, tuned: TuningResult) -> TuningResult:
         """Find out what gains are worth; Ctrl-C leaves out the rest."""
-        pool, problem = self.pool, self.problem
-        job, reasoned = problem.job, problem.job.gains.values
+        pool, problem, folds = self.pool, self.problem, self.plan.folds
+        job = problem.job
         try:
             effects = sensitivities(pool, job, problem.space, tuned.search)
             tuned = replace(tuned, sensitivities=effects)
             tuned = replace(tuned, beside=untuned_filters(job))
             if folds:
                 done = cross_validate(
-                    *(pool, job, problem.cases, reasoned, folds),
-                    lambda number, on: self.search(number + 1, on),
+                    pool, job, problem.cases, folds, lambda number, on: self.search(number + 1, on)
                 )
                 tuned = replace(tuned, folds=done, interrupted=len(done) < folds)
         except KeyboardInterrupt:
@@ -334,13 +323,8 @@ def tuned_gains(tuned: TuningResult) -> str:
     return format_gains(job.gains.with_values(search.best), meaning, came_from)
 
 
-def summarise_tuning(tuned: TuningResult, folds: int) -> dict[str, Any]:
-    """All that is known of a tuning, as it is written to summary.json.
-
-    Parameters
-    ----------
-    folds : asked for; an interruption may have left fewer.
-    """
+def summarise_tuning(tuned: TuningResult) -> dict[str, Any]:
+    """All that is known of a tuning, as it is written to summary.json."""
     search, history, job = tuned.search, tuned.search.history, tuned.problem.job
     following = job.system.following if job.follows else None
     before, after = (_by_case(tuned, z_k) for z_k in (tuned.before, search.z_k))
@@ -392,7 +376,7 @@ def summarise_tuning(tuned: TuningResult, folds: int) -> dict[str, Any]:
             "converged": search.converged,
             "as_good": len(_as_good(tuned)),
             "last": len(search.last.z),
-            "folds": folds,
+            "folds": tuned.plan.folds,  # asked for; an interruption may have left fewer
         },
         "convergence": [g.z for g in history],
         "provenance": _provenance(tuned),

@@ -38,12 +38,32 @@ class Plan:
     population : candidates per gain.
     seed : of the random numbers.
     economy : drop candidates that have lost; the result is the same without, later.
+    folds : how many times to tune without a part of the cases and evaluate on it; 0 for none.
     """
 
     generations: int = 100
     population: int = 15
     seed: int = 0
     economy: bool = True
+    folds: int = 0
+
+
+@dataclass(frozen=True)
+class Checkpointing:
+    """Where a search keeps its state, and who hears of it.
+
+    Attributes
+    ----------
+    file : written after every generation.
+    resume : go on from it, if it is there.
+    report : called with the history after every generation.
+    warn : called where it cannot be written, or is damaged and the one before is read.
+    """
+
+    file: Path
+    resume: bool = False
+    report: Callable[[Sequence[Generation]], None] = lambda history: None
+    warn: Callable[[str], None] = lambda message: None
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,11 +115,7 @@ def search(
     space: SearchSpace,
     cases: Sequence[int],
     plan: Plan,
-    checkpoint: Path,
-    *,
-    resume: bool = False,
-    report: Callable[[Sequence[Generation]], None] = lambda history: None,
-    warn: Callable[[str], None] = lambda message: None,
+    kept: Checkpointing,
 ) -> Search | None:
     """Minimise the worst of z_k over cases by differential evolution.
 
@@ -107,17 +123,13 @@ def search(
     ----------
     pool : workers prepared with the job.
     cases : numbers of the cases to search on.
-    checkpoint : file that is written after every generation.
-    resume : go on from it, if it is there.
-    report : called with the history after every generation.
-    warn : called where a checkpoint cannot be written, or is damaged and the one before is read.
 
     Returns
     -------
     Search, or None if it was interrupted before there was anything to return.
     """
     mark = identity(job, space, cases, plan)
-    state = load(checkpoint, mark, warn) if resume else None
+    state = load(kept.file, mark, kept.warn) if kept.resume else None
     interrupted = False
     try:
         while state is None or not (state.converged or len(state.history) > plan.generations):
@@ -128,15 +140,15 @@ def search(
             history = (*history, _generation(job, cases, population, objective.evaluations, begin))
             state = Checkpoint(mark, population, converged, history)
             try:
-                save(state, checkpoint)
+                save(state, kept.file)
             except InputError as error:
-                warn(f"the checkpoint before is kept: {error}")
-            report(history)
+                kept.warn(f"the checkpoint before is kept: {error}")
+            kept.report(history)
     except KeyboardInterrupt:
         interrupted = True
     except NoWorkersError as error:
         interrupted = True
-        warn(f"{error}; the best so far is kept, and --resume goes on from there")
+        kept.warn(f"{error}; the best so far is kept, and --resume goes on from there")
     if state is None:
         return None
     best = state.population

@@ -127,7 +127,6 @@ def cross_validate(
     pool: Workers,
     job: Job,
     cases: Sequence[Case],
-    reasoned: Vector,
     folds: int,
     tune: Callable[[int, Sequence[int]], Search | None],
 ) -> list[Fold]:
@@ -136,11 +135,10 @@ def cross_validate(
     Parameters
     ----------
     cases : that the job's recordings were made from.
-    reasoned : (n,) untuned gains.
     tune : searches on some cases; called with the number of the fold and the cases. Ends the whole
         by returning None or an interrupted search.
     """
-    everything = range(len(job.recordings))
+    everything, reasoned = range(len(job.recordings)), job.gains.values
     results: list[Fold] = []
     for number, held_out in enumerate(
         split([recording.case for recording in job.recordings], folds)

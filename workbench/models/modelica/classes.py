@@ -50,10 +50,10 @@ class Component:
     type: str
     prefixes: frozenset[str]
     modifier: Modifier
-    constraint: str
-    constraining: Modifier
     description: str
     where: str
+    constraint: str = ""
+    constraining: Modifier = field(default_factory=Modifier)
 
 
 @dataclass(frozen=True)

@@ -247,10 +247,7 @@ class Reader(Cursor):
         if self.took("if"):
             self._expression()
         description = self._inner_comment()
-        nothing = Modifier()
-        return Component(
-            name, self._owner, declared, prefixes, modifier, "", nothing, description, where
-        )
+        return Component(name, self._owner, declared, prefixes, modifier, description, where)
 
     def _constraint(self) -> tuple[str, Modifier, str]:
         """Constraining class, its modifier, and description; empty where there is none."""
@@ -299,11 +296,14 @@ class Reader(Cursor):
             where, name = self.where, self.identifier()
             self.expect("=")
             (base,) = self._alias() or [Extends("", Modifier(), where)]
-            description = self._inner_comment()
-            nothing = Modifier()
             component = Component(
-                *(name, self._owner, base.name, prefixes | kind, base.modifier),
-                *("", nothing, description, where),
+                name=name,
+                owner=self._owner,
+                type=base.name,
+                prefixes=prefixes | kind,
+                modifier=base.modifier,
+                description=self._inner_comment(),
+                where=where,
             )
         else:
             declared = self.name()

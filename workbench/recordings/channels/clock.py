@@ -62,9 +62,9 @@ class Clock:
     ----------
     channel : name of the channel that holds them; empty: the file itself says them.
     times : (n,) s, NaN where there is none.
+    reason : why these are the times, for people; `certain`: nothing was concluded.
     start : of their zero [s since 1970], NaN where that is not known.
     unit : that the channel was read in.
-    reason : why these are the times, for people; `certain`: nothing was concluded.
     counted : whether samples are counted at a rate, and have no times of their own.
     corrections : how they were made to go on, in words.
     stated : how the user says that dates are to be read.
@@ -74,10 +74,10 @@ class Clock:
 
     channel: str
     times: Vector
-    start: float
-    unit: str
     reason: str
-    certain: bool
+    start: float = math.nan
+    unit: str = "s"
+    certain: bool = True
     counted: bool = False
     corrections: tuple[str, ...] = ()
     stated: str = ""
@@ -113,16 +113,15 @@ def _read_clock(
 ) -> Clock:
     count = np.arange(group.channels[0].values.size, dtype=np.float64)
     if step is not None:
-        return Clock("", count * step, math.nan, "s", f"every {step:g} s, as given", True, True)
+        return Clock("", count * step, f"every {step:g} s, as given", counted=True)
     if named is not None:
         own = (*group.channels, *group.left)
         channel_of_time = next((channel for channel in own if channel.name == named.channel), None)
         if channel_of_time is not None:
             return _going_on(_named_clock(channel_of_time, named, system, where), where)
     if group.time is not None:
-        time = group.time
-        said = "the file says it"
-        own_clock = Clock("", time.values, time.start, "s", said, True, zoned=time.zoned)
+        time, said = group.time, "the file says it"
+        own_clock = Clock("", time.values, said, start=time.start, zoned=time.zoned)
         return _going_on(own_clock, where)
     # Stamps are often coarser than a counted time beside them.
     channels = sorted(group.channels, key=lambda channel: channel.stamp)
@@ -148,7 +147,7 @@ def _read_clock(
         )
     if math.isfinite(group.step):
         said = f"every {group.step:g} s, as the file says"
-        return Clock("", count * group.step, math.nan, "s", said, False, True)
+        return Clock("", count * group.step, said, certain=False, counted=True)
     if clocks:
         return _going_on(next((c for c in clocks if _increases(c.times)), clocks[0]), where)
     raise _no_time(group, system, where)
@@ -269,9 +268,7 @@ def _stamp_clock(channel: FileChannel) -> Clock:
         channel=channel.name,
         times=channel.values,
         start=channel.start,
-        unit="s",
         reason="; ".join(("time stamps", *channel.corrections)),
-        certain=True,
         corrections=channel.corrections,
         zoned=channel.zoned,
     )
@@ -345,7 +342,7 @@ def _packed(channel: FileChannel) -> Clock | None:
             continue
         start = math.nan if alone else (moments[0] - datetime(1970, 1, 1)).total_seconds()
         name = re.sub("%", "", form)
-        return Clock(channel.name, times, start, "s", f"figures of time, {name}", True)
+        return Clock(channel.name, times, f"figures of time, {name}", start=start)
     return None
 
 
@@ -372,7 +369,6 @@ def _count_clock(channel: FileChannel, unit: str, factor: float, reason: str) ->
         start=start,
         unit=unit,
         reason="; ".join((reason, *rounds)),
-        certain=True,
         corrections=rounds,
         zoned=channel.zoned or (math.isfinite(start) and not math.isfinite(channel.start)),
     )
@@ -422,7 +418,7 @@ def _since(channel: FileChannel, system: System) -> Clock | None:
         if _UNIX[0] <= held.min() * factor - zero and held.max() * factor - zero <= _UNIX[1]:
             times = (channel.values - held[0]) * factor
             start = float(held[0]) * factor - zero
-            clock = Clock(channel.name, times, start, "s", reason, True)
+            clock = Clock(channel.name, times, reason, start=start)
     likely = _unstated(channel.values, system)
     for name, (zero, least, most) in _DAYS.items():
         whole = bool((held == np.round(held)).all())
@@ -430,16 +426,10 @@ def _since(channel: FileChannel, system: System) -> Clock | None:
             # Doubles hold such days to microseconds; files mostly to a tenth of a second.
             times = np.round((channel.values - held[0]) * _DAY, 6)
             start = round((float(held[0]) - zero) * _DAY, 3)
-            clock = Clock(
-                channel.name,
-                times,
-                start,
-                "d",
-                f"days as {name} counts them" if name in ("Excel", "MATLAB") else name,
-                True,
-            )
+            reason = f"days as {name} counts them" if name in ("Excel", "MATLAB") else name
+            clock = Clock(channel.name, times, reason, start=start, unit="d")
     if _DAYS_OF_YEAR.intersection(words(channel.name)) and held.max() <= 367.0:
-        clock = Clock(channel.name, channel.values * _DAY, math.nan, "d", "days of a year", True)
+        clock = Clock(channel.name, channel.values * _DAY, "days of a year", unit="d")
     if clock is None:
         return None
     steps = np.abs(np.diff(clock.times[np.isfinite(clock.times)]))

@@ -238,15 +238,15 @@ def _candidate(
     own_doubts = marked, size_doubt(values, unit, signal, column)
     doubt = "; ".join(filter(None, (doubt, *own_doubts)))
     return Assignment(
-        place.file,
-        place.group,
-        channel,
-        place.label,
-        unit,
-        scale.factor,
-        scale.zero,
-        formula,
-        unit_reason(reason, unit, concluded) + said,
+        file=place.file,
+        group=place.group,
+        channel=channel,
+        label=place.label,
+        unit=unit,
+        factor=scale.factor,
+        zero=scale.zero,
+        formula=formula,
+        reason=unit_reason(reason, unit, concluded) + said,
         certain=likeness == EXACT
         and channel.name == signal.name
         and bool(channel.unit)
