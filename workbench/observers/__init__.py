@@ -27,8 +27,11 @@ def estimators_of(system: System) -> dict[str, type[Estimator]]:
         If the system has bands of an estimator that there is not.
     """
     packages = (f"{__name__}.estimators", find_plugin(system.plugin).estimators)
-    kinds = [kind for package in packages if package for kind in _estimators(package)]
-    known = {kind.name: kind for kind in sorted(kinds, key=lambda kind: kind.rank)}
+    kinds = [estimator for package in packages if package for estimator in _estimators(package)]
+    known = {
+        estimator.name: estimator
+        for estimator in sorted(kinds, key=lambda estimator: estimator.rank)
+    }
     for name in system.bands:
         _refuse_unknown(name, known, f"{system.source}, [bands.{name}]")
     return known
@@ -46,7 +49,9 @@ def choose(system: System, names: Sequence[str]) -> dict[str, type[Estimator]]:
     for name in names:
         _refuse_unknown(name, known, f"estimator '{name}'")
     return {
-        name: kind for name, kind in known.items() if (name in names if names else kind.standard)
+        name: estimator
+        for name, estimator in known.items()
+        if (name in names if names else estimator.standard)
     }
 
 
@@ -75,7 +80,7 @@ def _estimators(package: str) -> tuple[type[Estimator], ...]:
         import_module(module.name)
         for module in pkgutil.walk_packages(parent.__path__, f"{package}.")
     ]
-    return tuple(kind for module in modules for kind in _defined(module))
+    return tuple(estimator for module in modules for estimator in _defined(module))
 
 
 def _defined(module: ModuleType) -> list[type[Estimator]]:

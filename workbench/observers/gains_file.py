@@ -76,14 +76,14 @@ def format_gains(gains: Gains, meaning: str, provenance: Mapping[str, Any]) -> s
     return "\n".join([*parts, tomli_w.dumps({"provenance": provenance})])
 
 
-def usual_gains(kind: type[Estimator], fmu: FMU, system: System) -> Gains:
+def usual_gains(estimator: type[Estimator], fmu: FMU, system: System) -> Gains:
     """Gains of an estimator where none are given.
 
     Those that the system's plugin brings serve the model that they were tuned on; another one
     gets gains that follow from its linearisation. The FMU is left at an operating point.
     """
-    reasoned = kind.default_gains(fmu, system)
-    name = kind.tuned_as or kind.name
+    reasoned = estimator.default_gains(fmu, system)
+    name = estimator.tuned_as or estimator.name
     path = tuned_file(system, name)
     if path is None:
         return reasoned

@@ -19,7 +19,9 @@ from workbench.system.system import System
 SURE = 0.95  # probability, that of a band
 
 
-def observed(case: Case, system: System, kind: type[Estimator], gains: Gains | None = None) -> Run:
+def observed(
+    case: Case, system: System, estimator: type[Estimator], gains: Gains | None = None
+) -> Run:
     """Feed a recording to an estimator on the system's model, with its usual gains unless given.
 
     Raises
@@ -27,8 +29,8 @@ def observed(case: Case, system: System, kind: type[Estimator], gains: Gains | N
     InputError
         If the model is not fit for it.
     """
-    with open_model(system, kind.role) as fmu:
-        return replay(case, kind(fmu, system, gains or usual_gains(kind, fmu, system)))
+    with open_model(system, estimator.role) as fmu:
+        return replay(case, estimator(fmu, system, gains or usual_gains(estimator, fmu, system)))
 
 
 def replay(case: Case, estimator: Estimator) -> Run:

@@ -273,8 +273,8 @@ class Simulation:
         with ExitStack() as stack:
             models = _models(stack, self.system, self.kinds)
             yield {
-                name: kind(models[kind.role], self.system, self.gains[name])
-                for name, kind in self.kinds.items()
+                name: estimator(models[estimator.role], self.system, self.gains[name])
+                for name, estimator in self.kinds.items()
             }
 
     def meanings(self) -> dict[str, dict[str, tuple[str, str]]]:
@@ -282,8 +282,8 @@ class Simulation:
         with ExitStack() as stack:
             models = _models(stack, self.system, self.kinds)
             return {
-                name: kind.meanings(models[kind.role], self.system, self.gains[name])
-                for name, kind in self.kinds.items()
+                name: estimator.meanings(models[estimator.role], self.system, self.gains[name])
+                for name, estimator in self.kinds.items()
             }
 
     def run(self, case: Case) -> CaseResult:
@@ -389,16 +389,17 @@ def prepare(
         models = _models(stack, system, kinds)
         system = with_readings(system, list(models.values()))
         gains = {
-            name: gains_for(kind, models[kind.role], system, tuned) for name, kind in kinds.items()
+            name: gains_for(estimator, models[estimator.role], system, tuned)
+            for name, estimator in kinds.items()
         }
     if file is not None:
         gains |= _given(kinds, gains, file)
     return Simulation(system, kinds, gains)
 
 
-def gains_for(kind: type[Estimator], fmu: FMU, system: System, tuned: bool) -> Gains:
+def gains_for(estimator: type[Estimator], fmu: FMU, system: System, tuned: bool) -> Gains:
     """Gains of an estimator, tuned or reasoned; the FMU is left at an operating point."""
-    return usual_gains(kind, fmu, system) if tuned else kind.default_gains(fmu, system)
+    return usual_gains(estimator, fmu, system) if tuned else estimator.default_gains(fmu, system)
 
 
 def _given(
@@ -406,9 +407,9 @@ def _given(
 ) -> dict[str, Gains]:
     """Gains of a file, by each estimator that takes them."""
     takers: dict[str, list[str]] = {}
-    for name, kind in kinds.items():
-        if kind.tunable or kind.tuned_as:
-            takers.setdefault(kind.tuned_as or name, []).append(name)
+    for name, estimator in kinds.items():
+        if estimator.tunable or estimator.tuned_as:
+            takers.setdefault(estimator.tuned_as or name, []).append(name)
     given = read_gains(file, {owner: gains[names[0]] for owner, names in takers.items()})
     return next(
         {name: replace(given, estimator=name) for name in names}
@@ -450,7 +451,7 @@ def _work(given: tuple[Simulation, Callable[[CaseResult], None] | None], case: C
 def _models(
     stack: ExitStack, system: System, kinds: Mapping[str, type[Estimator]]
 ) -> dict[str, FMU]:
-    roles = dict.fromkeys(kind.role for kind in kinds.values())
+    roles = dict.fromkeys(estimator.role for estimator in kinds.values())
     return {role: stack.enter_context(open_model(system, role)) for role in roles}
 
 

@@ -499,15 +499,15 @@ def _column_names(measurement: Table, system: System) -> dict[str, str]:
     return columns
 
 
-def _refuse_shared(names: Mapping[str, str], where: str, kind: str) -> None:
+def _refuse_shared(names: Mapping[str, str], where: str, noun: str) -> None:
     taken: dict[str, str] = {}
     for ours, name in names.items():
         if name in taken:
             raise InputError(
                 where=f"{where} {ours}",
-                found=f"{kind} '{name}', which is already {taken[name]}",
-                expected=f"a different {kind} for each",
-                remedy=f"correct the name of one of the two {kind}s",
+                found=f"{noun} '{name}', which is already {taken[name]}",
+                expected=f"a different {noun} for each",
+                remedy=f"correct the name of one of the two {noun}s",
             )
         taken[name] = ours
 

@@ -157,12 +157,12 @@ class Settling:
     Parameters
     ----------
     fmu : the estimator's model; its state is left at the operating point.
-    kind : of estimator.
+    estimator : its class.
     """
 
-    def __init__(self, fmu: FMU, system: System, kind: type[Estimator]) -> None:
-        self._model = linearised(fmu, system).of(kind.acts_on(fmu, system))
-        self._kind, self._asked = kind, system.following
+    def __init__(self, fmu: FMU, system: System, estimator: type[Estimator]) -> None:
+        self._model = linearised(fmu, system).of(estimator.acts_on(fmu, system))
+        self._estimator, self._asked = estimator, system.following
         self._names = [quantity.name for quantity in system.estimated]
 
     def left(self, gains: Gains) -> float:
@@ -171,7 +171,7 @@ class Settling:
         A method that makes its gains as it goes is not judged.
         """
         model, asked = self._model, self._asked
-        error_model = self._kind.error_dynamics(model.A, model.B, model.C, gains)
+        error_model = self._estimator.error_dynamics(model.A, model.B, model.C, gains)
         if error_model is None or asked is None:
             return 0.0
         dynamics, error = error_model
@@ -226,9 +226,9 @@ class Evaluator:
     def __init__(self, job: Job) -> None:
         self._job = job
         self._fmu = load_model(job)
-        kind = estimators_of(job.system)[job.estimator]
-        names = list(kind.fed(job.system).columns)
-        self._settling = Settling(self._fmu, job.system, kind) if job.follows else None
+        estimator = estimators_of(job.system)[job.estimator]
+        names = list(estimator.fed(job.system).columns)
+        self._settling = Settling(self._fmu, job.system, estimator) if job.follows else None
         scored = [scored_column(job.system, names, n) for n in job.system.objective.weights]
         self._judged = [names.index(name) for name in scored]
         # The loop is compiled here, so that no candidate's time is spent on it.

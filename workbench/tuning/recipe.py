@@ -172,7 +172,7 @@ def pose(
     InputError
         If there is no such estimator, the model is not fit for it, or a case cannot judge.
     """
-    kind = tunable(system, estimator)
+    estimator_class = tunable(system, estimator)
     if judge_by is not None:
         cases = with_reference(cases, system, judge_by)
     if scale_errors is None:
@@ -182,11 +182,11 @@ def pose(
     # A recording shows nothing slower than itself, and its samples carry nothing faster.
     slowest = 1.0 / max(case.time[-1] - case.time[0] for case in cases)
     fastest = 1.0 / max(float(np.median(np.diff(case.time))) for case in cases)
-    with open_model(system, kind.role) as model:
+    with open_model(system, estimator_class.role) as model:
         system = with_readings(system, [model])
-        gains = kind.default_gains(model, system)
-        space = kind.space(model, system, gains, slowest, fastest)
-        meanings = kind.meanings(model, system, gains)
+        gains = estimator_class.default_gains(model, system)
+        space = estimator_class.space(model, system, gains, slowest, fastest)
+        meanings = estimator_class.meanings(model, system, gains)
         provenance = {
             "workbench": version("wheelset-workbench"),
             "python": platform.python_version(),
@@ -212,7 +212,11 @@ def tunable(system: System, estimator: str) -> type[Estimator]:
     InputError
         If the system has none of this name.
     """
-    known = {name: kind for name, kind in estimators_of(system).items() if kind.tunable}
+    known = {
+        name: estimator_class
+        for name, estimator_class in estimators_of(system).items()
+        if estimator_class.tunable
+    }
     if estimator not in known:
         raise unknown_name(
             estimator,
@@ -438,7 +442,11 @@ def with_reference(cases: Sequence[Case], system: System, estimator: str) -> lis
     InputError
         If there is no such estimator, or it fails.
     """
-    known = {name: kind for name, kind in estimators_of(system).items() if kind.offline}
+    known = {
+        name: estimator_class
+        for name, estimator_class in estimators_of(system).items()
+        if estimator_class.offline
+    }
     if estimator not in known:
         raise unknown_name(
             estimator,

@@ -87,9 +87,9 @@ def untuned_filters(job: Job) -> dict[str, Vector]:
     known, system = estimators_of(job.system), job.system
     with load_model(job) as fmu:
         makes = {
-            name: kind.default_gains(fmu, system)
-            for name, kind in known.items()
-            if kind.tunable and kind.adapts
+            name: estimator.default_gains(fmu, system)
+            for name, estimator in known.items()
+            if estimator.tunable and estimator.adapts
         }
     if not makes or job.estimator in makes:
         return {}

@@ -76,8 +76,8 @@ class _Checker:
         self._reached = {}
         written = self.library.classes[name]
         for base in written.extends:
-            kind = self._type(base.name, name, base.where)
-            self._modifier(base.modifier, kind, _NOTHING, inherits=True)
+            type_name = self._type(base.name, name, base.where)
+            self._modifier(base.modifier, type_name, _NOTHING, inherits=True)
         if written.constraint:
             self._type(written.constraint, name, written.where)
         seen: dict[str, str] = {}
@@ -96,24 +96,24 @@ class _Checker:
         return tuple(self._reached)
 
     def outside(
-        self, kind: str, modifier: Modifier, around: tuple[str, ...]
+        self, type_name: str, modifier: Modifier, around: tuple[str, ...]
     ) -> Iterator[Component]:
         """Outer components of a class, as modified, for which it has no inner one."""
-        cls = self.library.classes.get(kind)
+        cls = self.library.classes.get(type_name)
         if cls is None:
             return
-        if kind in around:
+        if type_name in around:
             _refuse(
                 cls.where,
-                f"{kind}, which has a component of its own class",
+                f"{type_name}, which has a component of its own class",
                 "components that end in predefined types",
                 "remove it",
             )
-        parts = self._parts(kind, modifier).values()
+        parts = self._parts(type_name, modifier).values()
         inner = {part.name for part in parts if "inner" in part.prefixes}
         for part in parts:
             if "outer" not in part.prefixes:
-                deeper = self.outside(self._kind(part), part.modifier, (*around, kind))
+                deeper = self.outside(self._type_of(part), part.modifier, (*around, type_name))
                 yield from (outer for outer in deeper if outer.name not in inner)
             elif "inner" not in part.prefixes:
                 yield part
@@ -121,12 +121,12 @@ class _Checker:
     # --- what a class declares ---
 
     def _component(self, component: Component) -> None:
-        kind = self._type(component.type, component.owner, component.where)
-        self._modifier(component.modifier, kind, _NOTHING, inherits=False)
+        type_name = self._type(component.type, component.owner, component.where)
+        self._modifier(component.modifier, type_name, _NOTHING, inherits=False)
         if component.constraint:
             constraint = self._type(component.constraint, component.owner, component.where)
             self._modifier(component.constraining, constraint, _NOTHING, inherits=False)
-            self._fits(kind, constraint, component)
+            self._fits(type_name, constraint, component)
 
     def _type(self, name: str, scope: str, where: str) -> str:
         """Dotted name of a class that something is of."""
@@ -143,45 +143,47 @@ class _Checker:
             )
         return full_name
 
-    def _parts(self, kind: str, modifier: Modifier) -> Mapping[str, Component]:
+    def _parts(self, type_name: str, modifier: Modifier) -> Mapping[str, Component]:
         """Components of a class, as modified."""
-        if kind not in self.library.classes:
+        if type_name not in self.library.classes:
             return {}
-        return self.library.modified(self.library.components(kind), modifier)
+        return self.library.modified(self.library.components(type_name), modifier)
 
-    def _predefined(self, kind: str) -> str:
+    def _predefined(self, type_name: str) -> str:
         """Predefined type that a class extends in the end; empty if none."""
-        while (cls := self.library.classes.get(kind)) is not None:
+        while (cls := self.library.classes.get(type_name)) is not None:
             if not cls.extends:
                 return "enumeration" if cls.kind == "type" else ""
-            kind = self.library.bases(kind)[0]
-        return kind
+            type_name = self.library.bases(type_name)[0]
+        return type_name
 
     # --- modifiers ---
 
-    def _modifier(self, modifier: Modifier, kind: str, before: Modifier, *, inherits: bool) -> None:
+    def _modifier(
+        self, modifier: Modifier, type_name: str, before: Modifier, *, inherits: bool
+    ) -> None:
         """Check a modifier of something of a class, which has been modified before.
 
         Where a class inherits, it may modify what is protected.
         """
-        predefined = self._predefined(kind)
+        predefined = self._predefined(type_name)
         if predefined:
-            self._attributes(modifier, predefined, kind, before)
+            self._attributes(modifier, predefined, type_name, before)
             return
-        parts = self._parts(kind, before)
+        parts = self._parts(type_name, before)
         redeclared = {n: m for n, m in modifier.inner.items() if m.redeclared and n not in parts}
         parts = self.library.modified(parts, Modifier(inner=redeclared))
         for name, modification in modifier.inner.items():
             part = parts.get(name)
             if part is None:
-                self._class(name, modification, kind, parts)
+                self._class(name, modification, type_name, parts)
                 continue
             if "protected" in part.prefixes and not inherits:
                 _refuse(
                     modification.where,
                     f"a modifier of '{name}', which is protected in {part.owner}",
                     "a public element",
-                    f"make '{name}' public, or set it in a class that extends {kind}",
+                    f"make '{name}' public, or set it in a class that extends {type_name}",
                 )
             if "final" in part.prefixes or part.modifier.final:
                 _refuse(
@@ -193,9 +195,11 @@ class _Checker:
             if modification.redeclared is not None:
                 self._redeclaration(part, modification.redeclared)
             else:
-                self._modifier(modification, self._kind(part), part.modifier, inherits=False)
+                self._modifier(modification, self._type_of(part), part.modifier, inherits=False)
 
-    def _attributes(self, modifier: Modifier, predefined: str, kind: str, before: Modifier) -> None:
+    def _attributes(
+        self, modifier: Modifier, predefined: str, type_name: str, before: Modifier
+    ) -> None:
         known = ATTRIBUTES.get(predefined, frozenset())
         for name, modification in modifier.inner.items():
             if name not in known or modification.inner or modification.redeclared is not None:
@@ -206,33 +210,33 @@ class _Checker:
                     f"one of {', '.join(sorted(known)) or 'none'}",
                     "correct or remove it",
                 )
-            if self._final(name, kind, before):
+            if self._final(name, type_name, before):
                 _refuse(
                     modification.where,
-                    f"a modifier '{name}', which is final in {kind}",
+                    f"a modifier '{name}', which is final in {type_name}",
                     "an attribute that may change",
                     "remove it, or choose another type",
                 )
 
-    def _final(self, attribute: str, kind: str, before: Modifier) -> bool:
+    def _final(self, attribute: str, type_name: str, before: Modifier) -> bool:
         """Whether a type, or what modified it before, has fixed an attribute for good."""
         modifiers = [before]
-        while (cls := self.library.classes.get(kind)) is not None and cls.extends:
+        while (cls := self.library.classes.get(type_name)) is not None and cls.extends:
             modifiers.append(cls.extends[0].modifier)
-            kind = self.library.bases(kind)[0]
+            type_name = self.library.bases(type_name)[0]
         return any(m.inner[attribute].final for m in modifiers if attribute in m.inner)
 
     # --- redeclarations ---
 
     def _class(
-        self, name: str, modifier: Modifier, kind: str, parts: Mapping[str, Component]
+        self, name: str, modifier: Modifier, type_name: str, parts: Mapping[str, Component]
     ) -> None:
         """Check a modifier of a class within another one."""
-        inside = self.library.inside(name, kind)
+        inside = self.library.inside(name, type_name)
         if not inside:
             _refuse(
                 modifier.where,
-                f"a modifier of '{name}', but {kind or 'it'} has no such element"
+                f"a modifier of '{name}', but {type_name or 'it'} has no such element"
                 f"{closest(name, parts)}",
                 f"one of {', '.join(parts) or 'none'}",
                 "correct the name, or remove the modifier",
@@ -254,7 +258,7 @@ class _Checker:
             _not_replaceable(new.where, old.name, old.where)
         self._component(new)
         wanted = self.library.resolve(old.constraint or old.type, old.owner)
-        self._fits(self._kind(new), wanted, new)
+        self._fits(self._type_of(new), wanted, new)
 
     def _fits(self, made: str, wanted: str, where: Component) -> None:
         """Check that a class has what another one, in whose place it stands, has."""
@@ -279,14 +283,16 @@ class _Checker:
             if "protected" in part.prefixes:
                 continue
             mine = have.get(name)
-            if mine is None or self._lacking(self._kind(mine), self._kind(part), (*around, wanted)):
+            if mine is None or self._lacking(
+                self._type_of(mine), self._type_of(part), (*around, wanted)
+            ):
                 lacking.append(f"{part.type} {name}")
         return lacking
 
-    def _lineage(self, kind: str) -> tuple[str, ...]:
-        return self.library.ancestors(kind) if kind in self.library.classes else ()
+    def _lineage(self, type_name: str) -> tuple[str, ...]:
+        return self.library.ancestors(type_name) if type_name in self.library.classes else ()
 
-    def _kind(self, component: Component) -> str:
+    def _type_of(self, component: Component) -> str:
         return self.library.resolve(component.type, component.owner)
 
     # --- connections ---
@@ -307,50 +313,51 @@ class _Checker:
 
     def _end(self, names: tuple[str, ...], connection: Connection, owner: str) -> str | None:
         """Class of a connector at one end; None for what an expandable connector may get."""
-        kind, modifier, whole = owner, _NOTHING, ".".join(names)
+        type_name, modifier, whole = owner, _NOTHING, ".".join(names)
         for name in names:
-            parts = self._parts(kind, modifier)
+            parts = self._parts(type_name, modifier)
             if name not in parts:
-                if "expandable" in self._prefixes(kind):
+                if "expandable" in self._prefixes(type_name):
                     return None
                 _refuse(
                     connection.where,
-                    f"connect with '{whole}', but {kind} has no '{name}'{closest(name, parts)}",
+                    f"connect with '{whole}', but {type_name} has no '{name}'"
+                    f"{closest(name, parts)}",
                     "a connector",
                     "correct the name",
                 )
             part = parts[name]
-            if "protected" in part.prefixes and kind != owner:
+            if "protected" in part.prefixes and type_name != owner:
                 _refuse(
                     connection.where,
-                    f"connect with '{whole}', but '{name}' is protected in {kind}",
+                    f"connect with '{whole}', but '{name}' is protected in {type_name}",
                     "a public connector",
                     f"make '{name}' public",
                 )
-            kind, modifier = self._kind(part), part.modifier
-        cls = self.library.classes.get(kind)
+            type_name, modifier = self._type_of(part), part.modifier
+        cls = self.library.classes.get(type_name)
         if cls is None or not self._connector(cls):
             _refuse(
                 connection.where,
-                f"connect with '{whole}', which is a {kind}",
+                f"connect with '{whole}', which is a {type_name}",
                 "a connector",
                 "connect connectors; write an equation for anything else",
             )
-        return kind
+        return type_name
 
     def _connector(self, cls: Class) -> bool:
         lineage = (cls.name, *self.library.ancestors(cls.name))
         return any(self.library.classes[ancestor].kind == "connector" for ancestor in lineage)
 
-    def _prefixes(self, kind: str) -> frozenset[str]:
-        cls = self.library.classes.get(kind)
+    def _prefixes(self, type_name: str) -> frozenset[str]:
+        cls = self.library.classes.get(type_name)
         return cls.prefixes if cls is not None else frozenset()
 
-    def _signature(self, kind: str) -> object:
+    def _signature(self, type_name: str) -> object:
         """What two connectors must share: a predefined type, or names, kinds and what flows."""
-        return self._predefined(kind) or {
-            name: (part.prefixes & {"flow", "stream"}, self._signature(self._kind(part)))
-            for name, part in self._parts(kind, _NOTHING).items()
+        return self._predefined(type_name) or {
+            name: (part.prefixes & {"flow", "stream"}, self._signature(self._type_of(part)))
+            for name, part in self._parts(type_name, _NOTHING).items()
         }
 
 

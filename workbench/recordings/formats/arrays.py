@@ -120,15 +120,15 @@ def _plotted_signals(content: Mapping[str, Any]) -> Mapping[str, Any]:
         return content
     held = {"(1)": signals} if "(1)" not in signals else signals
     members = {"time": times, **held}
-    found: dict[str, Any] = {}
+    plotted: dict[str, Any] = {}
     for key, member in members.items():
         _, values = _entry(member, _VALUES) if isinstance(member, Mapping) else ("", None)
         if not isinstance(values, np.ndarray):
             return content
         name = "time" if member is times else _element(key, member)[0]
         _, unit = _entry(member, ("unit", "units"))
-        found |= {name: values, f"{name}_unit": unit if isinstance(unit, str) else ""}
-    return found
+        plotted |= {name: values, f"{name}_unit": unit if isinstance(unit, str) else ""}
+    return plotted
 
 
 def _with_own_names(content: Mapping[str, Any]) -> Mapping[str, Any]:

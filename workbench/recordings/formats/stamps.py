@@ -109,8 +109,8 @@ def is_stamp(cell: str) -> bool:
 def _match(text: str) -> re.Match[str] | None:
     text = _plc(text)
     patterns = (_DAY, _OF_DAY, _OF_HOUR, _COMPACT, _COMPACT_SHORT, _CALLED_FIRST, _DURATION)
-    found = next((match for pattern in patterns if (match := pattern.fullmatch(text))), None)
-    return found if found is None or _zone_known(found.groupdict().get("zone")) else None
+    match = next((match for pattern in patterns if (match := pattern.fullmatch(text))), None)
+    return match if match is None or _zone_known(match.groupdict().get("zone")) else None
 
 
 def _plc(text: str) -> str:

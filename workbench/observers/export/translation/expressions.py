@@ -90,12 +90,7 @@ class Expressions(ABC):
         What an earlier one reads is kept where a later one changes memory, and C may call functions
         in any order, so that what they give is kept, too.
         """
-        parts = []
-        outer = self.lines
-        for node in nodes:
-            self.lines = []
-            parts.append((self.value(node), self.lines))
-        self.lines = outer
+        parts = self.with_statements(self.value, nodes)
         last = max(
             (k for k, (operand, lines) in enumerate(parts) if lines or operand.acts), default=-1
         )
@@ -111,7 +106,7 @@ class Expressions(ABC):
 
     def value(self, node: ast.expr) -> Value:
         """One value."""
-        value = self.found(node)
+        value = self.resolve(node)
         if isinstance(value, tuple):
             raise self.refused(node, "a tuple where one value is needed")
         return value
@@ -132,7 +127,7 @@ class Expressions(ABC):
             self._checked(node, value)
         return values
 
-    def found(self, node: ast.expr) -> Found:
+    def resolve(self, node: ast.expr) -> Found:
         """One value or several."""
         method = getattr(self, f"_{type(node).__name__.lower()}", None)
         if method is None:
@@ -192,7 +187,7 @@ class Expressions(ABC):
 
     def _subscript(self, node: ast.Subscript) -> Value:
         listed = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
-        of = self.found(node.value)
+        of = self.resolve(node.value)
         if isinstance(of, tuple):
             index = self.number(node.slice)
             if not isinstance(index.known, int) or not -len(of) <= index.known < len(of):
@@ -295,7 +290,8 @@ class Expressions(ABC):
 
     def _ifexp(self, node: ast.IfExp) -> Value:
         test = self.test(node.test)
-        (then, before), (other, instead) = self._apart(node.body), self._apart(node.orelse)
+        ways = self.with_statements(self.number, [node.body, node.orelse])
+        (then, before), (other, instead) = ways
         kind = common(then.kind, other.kind)
         if not before and not instead:
             # Operands of a choice are evaluated in order, and only those that are chosen.
@@ -309,7 +305,7 @@ class Expressions(ABC):
 
     def _boolop(self, node: ast.BoolOp) -> Value:
         """The operand that decides, as in Python."""
-        values = [self._apart(value) for value in node.values]
+        values = self.with_statements(self.number, node.values)
         kinds = {value.kind for value, _ in values}
         if DOUBLE in kinds:
             raise self.refused(node, "a number that is no whole one as a truth")
@@ -333,36 +329,25 @@ class Expressions(ABC):
         sign = " || " if isinstance(op, ast.Or) else " && "
         return expression(BOOL, sign.join(v.operand for v, _ in values), *(v for v, _ in values))
 
-    def _apart(self, node: ast.expr) -> tuple[Value, list[str]]:
-        """A number, and the statements that it needs before it."""
-        outer, self.lines = self.lines, []
-        value = self.number(node)
-        before, self.lines = self.lines, outer
-        return value, before
-
-    def apart(self, nodes: Sequence[ast.expr]) -> list[tuple[Value, list[str]]]:
-        """Numbers, each with the statements that it needs before it."""
-        return [self._apart(node) for node in nodes]
+    def with_statements(
+        self, translate: Callable[[ast.expr], Value], nodes: Sequence[ast.expr]
+    ) -> list[tuple[Value, list[str]]]:
+        """Values of expressions, each with the statements that it needs before it."""
+        values, outer = [], self.lines
+        for node in nodes:
+            self.lines = []
+            values.append((translate(node), self.lines))
+        self.lines = outer
+        return values
 
     def test(self, node: ast.expr) -> Value:
         """A truth; any whole number but zero is one."""
         if isinstance(node, ast.BoolOp):
-            values = [
-                (self._truth(node, test), before) for test, before in self.tests_apart(node.values)
-            ]
+            tests = self.with_statements(self.test, node.values)
+            values = [(self._truth(node, test), before) for test, before in tests]
             if not any(before for _, before in values[1:]):
                 return self._joined(node.op, values)
         return self._truth(node, self.number(node))
-
-    def tests_apart(self, nodes: Sequence[ast.expr]) -> list[tuple[Value, list[str]]]:
-        """Truths, each with the statements that it needs before it."""
-        values = []
-        for node in nodes:
-            outer, self.lines = self.lines, []
-            value = self.test(node)
-            values.append((value, self.lines))
-            self.lines = outer
-        return values
 
     def _truth(self, node: ast.expr, value: Value) -> Value:
         if value.kind == DOUBLE:

@@ -114,7 +114,7 @@ class Statements(Expressions):
     def _while(self, node: ast.While) -> None:
         if node.orelse:
             raise self.refused(node, "a loop with an else")
-        ((test, before),) = self.tests_apart([node.test])
+        ((test, before),) = self.with_statements(self.test, [node.test])
         head = f"while ({test.text}) {{"
         leave: list[str] = []
         if before or test.known:
@@ -156,7 +156,7 @@ class Statements(Expressions):
         return end.known is None and (end.reads or bool(within & changing))
 
     def _return(self, node: ast.Return) -> None:
-        returned = () if node.value is None else self.found(node.value)
+        returned = () if node.value is None else self.resolve(node.value)
         values = returned if isinstance(returned, tuple) else (returned,)
         if not all(isinstance(value.type, Number) for value in values):
             raise self.refused(node, "a result that is no number")
@@ -196,7 +196,7 @@ class Statements(Expressions):
         used = {n.id for statement in later for n in ast.walk(statement) if isinstance(n, ast.Name)}
         if target.id in used:
             return False
-        ((start, before),), rest = self.apart([first]), self.apart(later)
+        (start, before), *rest = self.with_statements(self.number, [first, *later])
         if {INT} != {value.kind for value, _ in [(start, before), *rest]}:
             return False
         self.lines += before
@@ -226,7 +226,7 @@ class Statements(Expressions):
         return wider
 
     def _assign_several(self, node: ast.Assign, target: ast.Tuple) -> None:
-        assigned = self.found(node.value)
+        assigned = self.resolve(node.value)
         values = list(assigned) if isinstance(assigned, tuple) else self._parts(node, assigned)
         if len(values) != len(target.elts):
             raise self.refused(node, "another number of values than of names")
@@ -263,7 +263,7 @@ class Statements(Expressions):
 
     def _place(self, target: ast.Subscript) -> Value:
         """An element that is assigned to."""
-        of, place = self.found(target.value), self.value(target)
+        of, place = self.resolve(target.value), self.value(target)
         if isinstance(of, tuple) or not isinstance(of.type, Array):
             raise self.refused(target, "what is no array")
         if not isinstance(place.type, Number):
