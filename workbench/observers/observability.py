@@ -132,14 +132,8 @@ def remaining(scaled: Matrix) -> Matrix:
 
 
 WINDOW = 0.5  # [s] the time within which a control has to react
-
-
 STRIDE = 0.1  # [s] from one window to the next
-
-
 _SECOND = 200  # samples of the linear test at least, which are a second at 200 Hz
-
-
 _POINTS = 200  # of a recording at which it is linearised to tell quantities apart
 _NOTHING = 1e-6  # of a state's size: what rounding and differences leave where nothing moves it
 _PART = 0.1  # share of a direction that counts as part of it

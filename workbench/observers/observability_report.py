@@ -223,8 +223,6 @@ def _case_lines(system: System, done: Sequence[CaseObservability]) -> list[str]:
 
 
 _STYLES = ("2", "1")  # of the models
-
-
 _REACH = 3.0  # times the bound from which on an estimate serves: what is far above tells nothing
 
 
@@ -266,8 +264,6 @@ _EXPLAINED = (
     "panel say that the samples tell nothing. A bound holds for a right model: an estimate may err "
     "by more where the model differs."
 )
-
-
 _LINEAR = (
     "Some time about one operating point: what is left of the standard deviation of a state after "
     "it, over that before it. A state that keeps nearly all of it cannot be observed there."

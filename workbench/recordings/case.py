@@ -27,8 +27,6 @@ from workbench.system.tables import Table, read_table, shown
 from workbench.system.units import quantity, si_factor
 
 Value = float | int | str | tuple[Any, ...]
-
-
 UNKNOWN = "unknown"  # a condition that nobody knows any more
 
 
@@ -128,8 +126,6 @@ def conditions_shown(signals: Mapping[str, Vector], system: System) -> dict[str,
 
 
 _NOTHING = RecordingOptions()
-
-
 KEYS = ("title", "date", "conditions", "measurement", "model")  # of case.toml
 
 

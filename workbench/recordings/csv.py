@@ -14,20 +14,10 @@ from workbench.errors import InputError, closest
 from workbench.runtime.files import read_text
 
 _HEADER_CELL = re.compile(r"(?P<name>[^\[]*?)\s*(?:\[\s*(?P<unit>[^\]]*?)\s*\])?")
-
-
 _NUMBER_CHARACTERS = frozenset("0123456789+-eE., ")
-
-
 _NUMBER = re.compile(r" *[+-]?[0-9.,]*[0-9][0-9.,]*([eE][+-]?[0-9]+)? *")
-
-
 _THOUSANDS = re.compile(r" *[+-]?[1-9][0-9]{0,2}[.,][0-9]{3} *")
-
-
 _STAND_IN = "0"  # in empty fields that may be, while numbers are read
-
-
 _LARGEST = 1e100  # no measurement comes near; leaves room for the factors of units
 
 
@@ -56,13 +46,19 @@ def header(cell: str) -> tuple[str, str | None]:
     return (match["name"], match["unit"] or None) if match else (cell, None)
 
 
-def cell(value: float) -> str:
-    """A number as it stands in a recording, with all digits; empty where nothing was measured.
+def table_text(columns: Mapping[str, Vector]) -> str:
+    """Text of a recording, with all digits; empty where nothing was measured.
 
-    >>> cell(0.1), cell(float("nan"))
-    ('0.1', '')
+    Parameters
+    ----------
+    columns : (n,) each, by `name [unit]`.
+
+    >>> table_text({"time [s]": np.array([0.0, 0.1]), "p [bar]": np.array([1.5, np.nan])}).split()
+    ['time', '[s],p', '[bar]', '0.0,1.5', '0.1,']
     """
-    return "" if math.isnan(value) else repr(value)
+    rows = zip(*(values.tolist() for values in columns.values()), strict=True)
+    lines = [",".join("" if math.isnan(value) else repr(value) for value in row) for row in rows]
+    return "\n".join([",".join(columns), *lines]) + "\n"
 
 
 def read_columns(

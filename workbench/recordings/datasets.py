@@ -17,7 +17,7 @@ import tomli_w
 from workbench.arrays import Vector
 from workbench.errors import InputError
 from workbench.recordings.case import KEYS, Case, read_case
-from workbench.recordings.csv import cell
+from workbench.recordings.csv import table_text
 from workbench.runtime.files import locked_folder, write_json, write_whole
 from workbench.runtime.resources import commit
 from workbench.system.installed import system_path
@@ -308,9 +308,7 @@ def _texts(recording: PublishedRecording) -> dict[str, str]:
     dated = {"date": recording.date} if recording.date else {}
     case = {"title": recording.title, **dated, "measurement": measurement}
     conditions = {"conditions": dict(recording.conditions)} if recording.conditions else {}
-    rows = zip(*(column.tolist() for column in recording.columns.values()), strict=True)
-    lines = [",".join(recording.columns), *(",".join(map(cell, row)) for row in rows)]
     return {
         _CASE: tomli_w.dumps(case | conditions),
-        "measured.csv": "\n".join(lines) + "\n",
+        "measured.csv": table_text(recording.columns),
     }

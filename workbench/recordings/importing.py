@@ -1,7 +1,7 @@
 """Files of recorders become case folders; what was done to them is written down.
 
-A file is read (`foreign`), its channels are proposed for the signals of a system and confirmed
-(`mapping`), and it is cut where it holds several recordings. Originals are only read.
+A file is read (`formats`), its channels are proposed for the signals of a system and confirmed
+(`channels`), and it is cut where it holds several recordings. Originals are only read.
 """
 
 import json
@@ -25,7 +25,7 @@ from workbench.recordings.channels import (
     ProposedRecording,
     merge,
 )
-from workbench.recordings.csv import cell
+from workbench.recordings.csv import table_text
 from workbench.recordings.plausibility import Origin, doubts
 from workbench.runtime.files import write_json, write_whole
 from workbench.runtime.resources import commit
@@ -326,12 +326,8 @@ def write(imported: Import, out: Path, system: System) -> None:
         conditions = {"conditions": dict(piece.conditions)} if piece.conditions else {}
         measurement = {"measurement": {"file": "measured.csv"}}
         written[f"{piece.name}/case.toml"] = tomli_w.dumps({**case, **conditions, **measurement})
-        columns = {"time": piece.time, **piece.signals}
-        units = {"time": "s", **{n: system.signals[n].unit for n in piece.signals}}
-        rows = zip(*(values.tolist() for values in columns.values()), strict=True)
-        lines = [",".join(f"{name} [{units[name]}]" for name in columns)]
-        lines += [",".join(map(cell, row)) for row in rows]
-        written[f"{piece.name}/measured.csv"] = "\n".join(lines) + "\n"
+        signals = {f"{n} [{system.signals[n].unit}]": v for n, v in piece.signals.items()}
+        written[f"{piece.name}/measured.csv"] = table_text({"time [s]": piece.time, **signals})
     for path, text in written.items():
         write_whole(out / path, text)
 

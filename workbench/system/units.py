@@ -66,14 +66,8 @@ _UNIT = re.compile(
     r"(1/|\()*[A-Za-z\u00b5\u03bc°%]+(\^?-?[1-9])?"
     r"([.·*/]\(?[A-Za-z\u00b5\u03bc°]+(\^?-?[1-9])?\)*)*"
 )
-
-
 _LONGEST = 60  # characters, twice what any unit has; pint takes the square of them
-
-
 _REVOLUTIONS_PER_MINUTE = frozenset({"1/min", "min-1", "min^-1", "U/min", "rpm"})
-
-
 _QUANTITY = re.compile(
     r"(?P<number>[+-]?[0-9]{1,15}(\.[0-9]+)?([eE][+-]?[0-9]{1,2})?)"
     r"(?: *(?=[^0-9., ])| +(?=1/))(?P<unit>.*)"
@@ -224,14 +218,8 @@ _SAID = {
     "kg/(s.Pa)": (("g/(min.bar)", 1e-8 / 60.0), ("mg/(min.bar)", 1e-11 / 60.0)),
     "m3/(s.Pa)": (("l/(min.bar)", 1e-8 / 60.0), ("ml/(min.bar)", 1e-11 / 60.0)),
 }
-
-
 _LEAST = {"m2": 0.01}  # of a unit that is said, 1 unless given: areas go by squares
-
-
 _STEPS = (1, 10, 100)  # of what a share is said per
-
-
 _WHOLE = 0.01  # share from which on it reads as whole percents
 
 
