@@ -27,7 +27,7 @@ def one_process() -> Iterator[None]:
                     raise Hang from None
                 raise
 
-        patch.setattr(formats, "_apart", apart)
+        patch.setattr(formats, "_in_own_process", apart)
         yield
 
 

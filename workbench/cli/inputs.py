@@ -129,10 +129,10 @@ def _load(options: argparse.Namespace) -> System:
     except InputError:
         if not options.map:
             raise
-        return load_system(options.system, options.fmu, _mapped(options.map))
+        return load_system(options.system, options.fmu, _mapping(options.map))
 
 
-def _mapped(entries: Sequence[str]) -> dict[str, str]:
+def _mapping(entries: Sequence[str]) -> dict[str, str]:
     """What --map says: the FMU's names by ours.
 
     Raises
@@ -169,7 +169,7 @@ def model_names(
     InputError
         If an entry cannot be read, names no variable of ours, or cases contradict each other.
     """
-    typed = check_names(_mapped(mapped), "command line, --map", system)
+    typed = check_names(_mapping(mapped), "command line, --map", system)
     names: dict[str, str] = {}
     for case in cases:
         for ours, theirs in case.names.items():

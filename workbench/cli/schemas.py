@@ -215,7 +215,7 @@ def power_summaries() -> dict[str, Schema]:
         "sheet_error": _sheet_error(),
         "left_out": _left_out(),
         "plan": _plan(),
-        "followed": _followed(),
+        "followed": _following(),
     }
 
 
@@ -267,7 +267,7 @@ def _left_out() -> Schema:
     return summary("power --leave-out-effect", _SETS, {**shares, "sets": rows})
 
 
-def _followed() -> Schema:
+def _following() -> Schema:
     shares = {name: SHARE for name in following.SHARES}
     rows = listed(declared(following.FollowingRow))
     return summary("power --follow", _SETS, {**shares, "sets": rows})

@@ -80,10 +80,10 @@ def _estimators(package: str) -> tuple[type[Estimator], ...]:
         import_module(module.name)
         for module in pkgutil.walk_packages(parent.__path__, f"{package}.")
     ]
-    return tuple(estimator for module in modules for estimator in _defined(module))
+    return tuple(estimator for module in modules for estimator in _classes_of(module))
 
 
-def _defined(module: ModuleType) -> list[type[Estimator]]:
+def _classes_of(module: ModuleType) -> list[type[Estimator]]:
     return [
         var
         for var in vars(module).values()

@@ -143,10 +143,10 @@ class _Problem:
                 remedy="export the model with an output that is a scalar number",
             )
         self._u = np.column_stack(
-            [self._moved(v) for v in self._inputs] or [np.zeros((_INTERVALS + 1, 0))]
+            [self._jumping_input(v) for v in self._inputs] or [np.zeros((_INTERVALS + 1, 0))]
         )
 
-    def _moved(self, variable: Variable) -> Vector:
+    def _jumping_input(self, variable: Variable) -> Vector:
         """An input that jumps twice, by 0.3 and -0.5 of its nominal value.
 
         Of a Co-Simulation it rests at 0.3: FMPy reads its outputs before a jump, not after it.

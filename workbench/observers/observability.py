@@ -367,7 +367,7 @@ def case_observability(
             run = replay(case, DisturbanceObserver(fmu, system, gains))
         except InputError:
             run = replay(case, OpenLoop(fmu, system, OpenLoop.default_gains(fmu, system)))
-            run = replace(run, estimate=_measured(case, system, run))
+            run = replace(run, estimate=_estimate_of_outputs(case, system, run))
     if run.ending is not Ending.OK:
         raise FMUError(f"{case.name}: {run.ending.value} {run.message}".strip())
     tests, unknowns = [], max(map(len, scales.values())) + len(system.estimated)
@@ -378,7 +378,7 @@ def case_observability(
     return CaseObservability(system, case, run, counted, tuple(tests), whole)
 
 
-def _measured(case: Case, system: System, run: Run) -> Matrix:
+def _estimate_of_outputs(case: Case, system: System, run: Run) -> Matrix:
     """An open loop's estimate, (n, w), with outputs as measured; samples that are missing hold."""
     columns = {name: run.signal(name) for name in run.columns}
     for output in system.outputs:
@@ -466,7 +466,7 @@ def trajectory(fmu: FMU, system: System, case: Case) -> Trajectory | None:
     if not np.isfinite(values).all() or not np.isfinite(u).all():
         return None
     fmu.begin_at(case.model_time)
-    return Trajectory(kept, _led(fmu, system, case.time[kept], held, values, u), u)
+    return Trajectory(kept, _states_that_follow(fmu, system, case.time[kept], held, values, u), u)
 
 
 def information(fmu: FMU, system: System, case: Case) -> Information | None:
@@ -532,10 +532,10 @@ def follow(fmu: FMU, system: System, case: Case, run: Run) -> tuple[Matrix, Matr
     ]
     u = np.column_stack([case.u, *corrections])
     fmu.begin_at(case.model_time)
-    return _led(fmu, system, case.time, held, values, u), u
+    return _states_that_follow(fmu, system, case.time, held, values, u), u
 
 
-def _led(
+def _states_that_follow(
     fmu: FMU, system: System, time: Vector, held: Sequence[str], values: Matrix, u: Matrix
 ) -> Matrix:
     """States, (n, k), of a model of which some are held at values, (n, h), and others follow."""

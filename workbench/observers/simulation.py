@@ -393,7 +393,7 @@ def prepare(
             for name, estimator in kinds.items()
         }
     if file is not None:
-        gains |= _given(kinds, gains, file)
+        gains |= _gains_of_file(kinds, gains, file)
     return Simulation(system, kinds, gains)
 
 
@@ -402,7 +402,7 @@ def gains_for(estimator: type[Estimator], fmu: FMU, system: System, tuned: bool)
     return usual_gains(estimator, fmu, system) if tuned else estimator.default_gains(fmu, system)
 
 
-def _given(
+def _gains_of_file(
     kinds: Mapping[str, type[Estimator]], gains: Mapping[str, Gains], file: Path
 ) -> dict[str, Gains]:
     """Gains of a file, by each estimator that takes them."""
@@ -472,9 +472,9 @@ def case_figure(result: CaseResult, styles: Sequence[str] = ESTIMATORS) -> CaseF
     window = judged_window(case, system)
     counted, panels = case.time[window], []
     for view in views(system):
-        panels.append(_seen(result, chosen, view))
+        panels.append(_signal_panel(result, chosen, view))
         if system.objective.signal in view.signals:
-            panels.append(_residual(result, chosen, window))
+            panels.append(_residual_panel(result, chosen, window))
     panels.append(probability_panel(result.runs.values()))
     return CaseFigure(
         name=case.name,
@@ -487,7 +487,7 @@ def case_figure(result: CaseResult, styles: Sequence[str] = ESTIMATORS) -> CaseF
     )
 
 
-def _seen(result: CaseResult, styles: dict[str, str], view: View) -> Panel:
+def _signal_panel(result: CaseResult, styles: dict[str, str], view: View) -> Panel:
     """One panel: what was measured of its signals, and what was estimated.
 
     Of the judged signal, what was measured sets the range: an estimator may start or end with a
@@ -504,7 +504,7 @@ def _seen(result: CaseResult, styles: dict[str, str], view: View) -> Panel:
         factor, is_reference = per_shown(system, name, unit), name == system.objective.signal
         if is_reference or name not in fed:
             for style, run in known if name in fed else known + best:
-                curves += _estimated(run, style, name, factor)
+                curves += _estimate_curves(run, style, name, factor)
         if is_reference and (measured := result.measured()) is not None:
             measured = measured / factor
             if below(system):
@@ -533,7 +533,7 @@ def _is_fed(system: System, name: str) -> bool:
     )
 
 
-def _residual(result: CaseResult, styles: dict[str, str], window: slice) -> Panel:
+def _residual_panel(result: CaseResult, styles: dict[str, str], window: slice) -> Panel:
     """Error of the judged signal by estimator."""
     system = result.system
     reference = system.objective.signal
@@ -549,7 +549,7 @@ def _residual(result: CaseResult, styles: dict[str, str], window: slice) -> Pane
     return Panel(title, unit, -reach, reach, 1.1, tuple(curves))
 
 
-def _estimated(run: Run, style: str, signal: str, factor: float) -> list[Curve]:
+def _estimate_curves(run: Run, style: str, signal: str, factor: float) -> list[Curve]:
     """Curves of an estimator that knows the signal, with its band."""
     if signal not in run.columns or not np.isfinite(run.signal(signal)).any():
         return []

@@ -343,7 +343,7 @@ def read_case(folder: Path, system: System) -> Case:
     measurement = document.table("measurement")
     measurement.refuse_unknown(("file", "columns", "counts_from", "model_time"))
     source = folder / measurement.take("file", str)
-    time, signals, origin = _recorded(source, measurement, system)
+    time, signals, origin = _read_recording(source, measurement, system)
     origin = replace(origin, conditions=f"{toml}, [conditions]")
     model = document.table("model")
     model.refuse_unknown(("names",))
@@ -360,7 +360,7 @@ def read_case(folder: Path, system: System) -> Case:
     )
 
 
-def _recorded(
+def _read_recording(
     source: Path, measurement: Table, system: System
 ) -> tuple[Vector, Mapping[str, Vector], Origin]:
     """Time and signals of a case's recording, SI, and where they stand.

@@ -164,7 +164,7 @@ def write_cases(which: str, source: Path, out: Path) -> list[PublishedRecording]
     layout = _layout(known, source)
     recordings = list(layout.read(source))
     with locked_folder(out):
-        before = _written(out)
+        before = _hashes_before(out)
         written: dict[str, str] = {}
         for recording in recordings:
             written |= {
@@ -185,7 +185,7 @@ def write_cases(which: str, source: Path, out: Path) -> list[PublishedRecording]
                 "read": layout.found(source),
                 "held_out": [recording.name for recording in recordings if recording.held_out],
                 "written": {path: _sha256(text.encode()) for path, text in written.items()},
-                "cases": {recording.name: _described(recording) for recording in recordings},
+                "cases": {recording.name: _description(recording) for recording in recordings},
             },
         )
     return recordings
@@ -219,7 +219,7 @@ def read_recorded(folder: Path, system: System) -> Case:
     return replace(case, source=folder.parent / recording.file)
 
 
-def _described(recording: PublishedRecording) -> dict[str, Any]:
+def _description(recording: PublishedRecording) -> dict[str, Any]:
     time = next(iter(recording.columns.values()))
     return {
         "file": recording.file,
@@ -281,7 +281,7 @@ def _sha256(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()
 
 
-def _written(out: Path) -> dict[str, str]:
+def _hashes_before(out: Path) -> dict[str, str]:
     """SHA-256 of the files that were written into a folder before, by their path there."""
     path = out / PREPARED
     if not path.is_file():

@@ -383,7 +383,7 @@ def _conditions(
         values = system.evaluate(condition.agrees.formula, signals)
         sample = 0 if at_start else int(np.argsort(values)[-min(_FEW, values.size)])
         said = float(conditions[condition.name])
-        share = _apart(shown, said, condition.agrees.tolerance)
+        share = _relative_difference(shown, said, condition.agrees.tolerance)
         if not share > condition.agrees.tolerance.likely:
             continue
         names = [name for name in signals if name in condition.agrees.formula.names]
@@ -416,7 +416,7 @@ def shown_by(condition: Condition, signals: Mapping[str, Vector], system: System
     )
 
 
-def _apart(first: float, other: float, tolerance: Tolerance) -> float:
+def _relative_difference(first: float, other: float, tolerance: Tolerance) -> float:
     """Difference as a share of the larger one, 0 where it means nothing."""
     difference = abs(first - other)
     return difference / max(abs(first), abs(other)) if difference > tolerance.slack else 0.0

@@ -132,7 +132,7 @@ def check_references(
         that is no sum of outputs.
     """
     known = known_names(system, model)
-    for signal, earlier in _derived(system) if model else ():
+    for signal, earlier in _derived_signals(system) if model else ():
         for name in sorted(signal.formula.names):
             _refuse_unknown(name, earlier, signal.formula.where, FORMULA)
     for where, name, of in references:
@@ -148,7 +148,7 @@ def _refuse_unknown(name: str, known: Collection[str], where: str, expected: str
         raise unknown_name(name, known, where=where, expected=expected)
 
 
-def _derived(system: System) -> Iterator[tuple[DerivedSignal, Collection[str]]]:
+def _derived_signals(system: System) -> Iterator[tuple[DerivedSignal, Collection[str]]]:
     """Derived signals, and what each may be made of: also those before it."""
     measured = {*system.signals, *system.values}
     for signal in system.derived:

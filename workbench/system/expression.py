@@ -140,13 +140,13 @@ class Expression:
                 name = self._name(node)
                 return lambda value_of: value_of(name)
             case ast.UnaryOp(op=op, operand=operand) if type(op) in _OPERATORS:
-                return _applied(_OPERATORS[type(op)], self._built(operand))
+                return _apply(_OPERATORS[type(op)], self._built(operand))
             case ast.BinOp(left=left, op=op, right=right) if type(op) in _OPERATORS:
-                return _applied(_OPERATORS[type(op)], self._built(left), self._built(right))
+                return _apply(_OPERATORS[type(op)], self._built(left), self._built(right))
             case ast.Call(func=ast.Name(id=name), args=args, keywords=[]) if (
                 name in _FUNCTIONS and len(args) == _FUNCTIONS[name].nin
             ):
-                return _applied(_FUNCTIONS[name], *map(self._built, args))
+                return _apply(_FUNCTIONS[name], *map(self._built, args))
         raise self._wrong(ast.unparse(node))
 
     def _name(self, node: ast.AST) -> str:
@@ -171,7 +171,7 @@ class Expression:
         )
 
 
-def _applied(function: Callable[..., Any], *parts: Formula) -> Formula:
+def _apply(function: Callable[..., Any], *parts: Formula) -> Formula:
     """A function of one or two parts."""
     if len(parts) == 1:
         (only,) = parts

@@ -280,7 +280,7 @@ class _Item:
         if kind is Path:
             return self.scope.file.parent / self.table.take(self.name, str)
         if kind is str:
-            (text,) = self._known([self.table.take(self.name, str)], "one of ")
+            (text,) = self._choices([self.table.take(self.name, str)], "one of ")
             return text
         if kind is Expression:
             return self._formula()
@@ -334,7 +334,7 @@ class _Item:
                 return tuple(value for _, value in self._each(inside[0]))
             return tuple(read(kind, part, self.scope) for part in self.table.tables(self.name))
         if kind is str and not others:
-            return self._known(self.table.texts(self.name), "some of ")
+            return self._choices(self.table.texts(self.name), "some of ")
         items = self.table.take(self.name, list)
         if kind is not float:
             return tuple(items)
@@ -364,7 +364,7 @@ class _Item:
             )
         return numbers
 
-    def _known(self, texts: Sequence[str], some: str) -> tuple[str, ...]:
+    def _choices(self, texts: Sequence[str], some: str) -> tuple[str, ...]:
         """Texts that may be here."""
         choices, of = self.declared.choices, self.declared.of
         for text in texts:

@@ -33,17 +33,17 @@ def schema(cls: type) -> Schema:
     """
     properties: Schema = {}
     required = []
-    for entry in _expanded(cls):
+    for entry in _inner_keys(cls):
         described = _of_entry(entry)
         outer, _, inner = entry.name.rpartition(".")
         if outer:
-            own = properties.setdefault(outer, _closed({}, []))
+            own = properties.setdefault(outer, _closed_table({}, []))
             own["properties"][inner] = described
             continue
         properties |= {name: described for name in (entry.name, *entry.key.aliases)}
-        if _required(entry):
+        if _is_required(entry):
             required.append([entry.name, *entry.key.aliases])
-    made = _closed(properties, [names[0] for names in required if len(names) == 1])
+    made = _closed_table(properties, [names[0] for names in required if len(names) == 1])
     if choices := [[{"required": [n]} for n in names] for names in required if len(names) > 1]:
         made["allOf"] = [{"anyOf": names} for names in choices]
     if either := getattr(cls, "EITHER", None):
@@ -53,7 +53,7 @@ def schema(cls: type) -> Schema:
     return made
 
 
-def _closed(properties: Schema, required: list[str]) -> Schema:
+def _closed_table(properties: Schema, required: list[str]) -> Schema:
     return {
         "type": "object",
         "required": required,
@@ -62,7 +62,7 @@ def _closed(properties: Schema, required: list[str]) -> Schema:
     }
 
 
-def _expanded(cls: type) -> Iterator[Entry]:
+def _inner_keys(cls: type) -> Iterator[Entry]:
     """Keys of a table, those included that are fields of another class."""
     for entry in entries(cls):
         if entry.key.inline:
@@ -73,12 +73,12 @@ def _expanded(cls: type) -> Iterator[Entry]:
             yield entry
 
 
-def _required(entry: Entry) -> bool:
+def _is_required(entry: Entry) -> bool:
     """Whether a key must be there: it has no default, and is no table whose keys all have one."""
     if entry.optional or entry.key.absent is not REQUIRED:
         return False
     kind = kinds_of(entry.hint)[0]
-    return not is_table(kind) or any(_required(inner) for inner in _expanded(kind))
+    return not is_table(kind) or any(_is_required(inner) for inner in _inner_keys(kind))
 
 
 def _of_entry(entry: Entry) -> Schema:
@@ -124,7 +124,7 @@ def _of_type(hint: Any, declared: Key) -> Schema:
 def tables(cls: type) -> dict[str, type]:
     """All tables that there may be in a table, and itself, by the name of the class."""
     classes = {cls.__name__: cls}
-    for entry in _expanded(cls):
+    for entry in _inner_keys(cls):
         for inner in _tables_in(entry.hint):
             if inner.__name__ not in classes:
                 classes |= tables(inner)
@@ -149,7 +149,7 @@ def reference(cls: type, apart: Collection[type] = ()) -> str:
 
 
 def _rows(cls: type, apart: Collection[type], before: str) -> Iterator[tuple[str, str, str, str]]:
-    for entry in _expanded(cls):
+    for entry in _inner_keys(cls):
         name = f"{before}{entry.name}"
         also = "".join(f", `{before}{alias}`" for alias in entry.key.aliases)
         yield f"`{name}`{also}", _value_of(entry), _default(entry), entry.key.meaning
@@ -190,7 +190,7 @@ def _words(hint: Any, declared: Key) -> str:
 
 
 def _table(kind: type) -> str:
-    names = [entry.name for entry in _expanded(kind)]
+    names = [entry.name for entry in _inner_keys(kind)]
     return f"`{{ {', '.join(names)} }}`" if len(names) <= 4 else "a table"
 
 
@@ -205,7 +205,7 @@ def _number(declared: Key) -> str:
 def _default(entry: Entry) -> str:
     """What a key is where nobody writes it, in words."""
     absent, otherwise = entry.key.absent, entry.key.otherwise
-    if otherwise or _required(entry):
+    if otherwise or _is_required(entry):
         return otherwise
     if entry.optional or absent in (REQUIRED, None, "", (), {}):
         return "none"

@@ -98,7 +98,7 @@ def si_factor(unit: str, si: str, where: str) -> float:
     if unit == si:
         return 1.0
     remedy = "convert the values, or correct the unit if it is misspelt (case matters)"
-    parsed, expected = _parsed(unit), _parsed(si)
+    parsed, expected = _parse(unit), _parse(si)
     if parsed is None or expected is None:
         fault = f"unknown unit [{unit}]"
     elif parsed.is_compatible_with(expected):
@@ -120,7 +120,7 @@ def check_unit(unit: str, where: str) -> None:
     InputError
         If the unit is unknown.
     """
-    if unit != "1" and _parsed(unit) is None:
+    if unit != "1" and _parse(unit) is None:
         raise InputError(
             where=where,
             found=f"unknown unit [{unit}]",
@@ -138,7 +138,9 @@ def quotient(unit: str, divisor: str) -> str:
     ('1', 'm/s3')
     """
     registry = _units()
-    ratio = registry.Quantity(1.0, _spelled(unit)) / registry.Quantity(1.0, _spelled(divisor))
+    ratio = registry.Quantity(1.0, _pint_spelling(unit)) / registry.Quantity(
+        1.0, _pint_spelling(divisor)
+    )
     above: list[str] = []
     below: list[str] = []
     for name, power in ratio.to_reduced_units().unit_items():
@@ -150,19 +152,19 @@ def quotient(unit: str, divisor: str) -> str:
     return f"{whole}/({'.'.join(sorted(below))})" if len(below) > 1 else f"{whole}/{below[0]}"
 
 
-def _parsed(unit: str) -> "pint.Unit | None":
+def _parse(unit: str) -> "pint.Unit | None":
     """A unit, or None if it is none."""
     if unit == "1":
         return _units().Unit("")
     if len(unit) > _LONGEST or not _UNIT.fullmatch(unit):
         return None
     try:
-        return _units().parse_units(_spelled(unit))
+        return _units().parse_units(_pint_spelling(unit))
     except (pint.PintError, ValueError, TokenError):  # ValueError: "nan", a number to pint
         return None
 
 
-def _spelled(unit: str) -> str:
+def _pint_spelling(unit: str) -> str:
     """A unit as pint reads it."""
     if unit in _REVOLUTIONS_PER_MINUTE:
         return "rpm"

@@ -95,7 +95,7 @@ def save(checkpoint: Checkpoint, path: Path) -> None:
     """
     with suppress(FileNotFoundError, InputError):
         last = path.read_text()
-        _parsed(last, path)  # a damaged one does not take the place of a sound one
+        _parse(last, path)  # a damaged one does not take the place of a sound one
         write_whole(previous_path(path), last)
     population = checkpoint.population
     content = {
@@ -144,10 +144,10 @@ def _read(path: Path) -> Checkpoint | None:
     """A checkpoint, None without a file."""
     if not path.exists():
         return None
-    return _parsed(read_text(path, "run without --resume"), path)
+    return _parse(read_text(path, "run without --resume"), path)
 
 
-def _parsed(text: str, path: Path) -> Checkpoint:
+def _parse(text: str, path: Path) -> Checkpoint:
     try:
         content = check_checksum(text)
         population = Population(*(np.array(content[name]) for name in ("members", "z", "z_k")))

@@ -83,7 +83,7 @@ def recordings(
     for output, error in scale_errors.items():
         signs = (error if i % 2 == 0 else -error for i in range(len(cases)))
         prepared += [
-            _scaled(recording, case, output, sign, system)
+            _rescale(recording, case, output, sign, system)
             for recording, case, sign in zip(prepared, cases, signs, strict=False)
         ]
     return tuple(prepared)
@@ -105,7 +105,7 @@ def recording(case: Case, system: System) -> Recording:
     return Recording(case.name, case.name, steps, *signals, shares, case.conditions)
 
 
-def _scaled(
+def _rescale(
     original: Recording, case: Case, output: str, error: float, system: System
 ) -> Recording:
     """The recording of a sensor whose scale is wrong by a share."""

@@ -111,7 +111,7 @@ def write_tuning_page(summary: Mapping[str, Any], folder: Path) -> Path:
         Part("search", "Search", [_convergence(summary), _work(summary)]),
         Part("definitions", "Definitions", [Definitions(_terms(summary))]),
     ]
-    if compared := _compared(summary):
+    if compared := _comparison(summary):
         parts.insert(1, Part("beside", "Other estimators, not tuned", [compared]))
     if summary["folds"]:
         parts.insert(1, Part("folds", "On cases not seen, worst first", [_unseen(summary)]))
@@ -241,7 +241,7 @@ def _unseen(summary: Mapping[str, Any]) -> Table:
     )
 
 
-def _compared(summary: Mapping[str, Any]) -> Table | None:
+def _comparison(summary: Mapping[str, Any]) -> Table | None:
     """These gains among untuned estimators, the least z first; None if there is none to compare."""
     if not summary.get("beside"):
         return None

@@ -188,7 +188,7 @@ class Library:
             for key, component in self.modified(inherited, base.modifier).items():
                 modifier = component.modifier
                 if key in components:  # a class may be inherited on two ways
-                    modifier = _merged(components[key].modifier, modifier)
+                    modifier = _merge(components[key].modifier, modifier)
                 components[key] = replace(component, modifier=modifier)
         return components | {
             component.name: component for component in self.classes[name].components
@@ -203,10 +203,10 @@ class Library:
             new = modification.redeclared
             if key in modified and new is None:
                 modified[key] = replace(
-                    modified[key], modifier=_merged(modified[key].modifier, modification)
+                    modified[key], modifier=_merge(modified[key].modifier, modification)
                 )
             elif key in modified and new is not None:
-                modified[key] = self._redeclared(modified[key], new)
+                modified[key] = self._redeclare(modified[key], new)
             elif new is not None:  # a class, of which components may be
                 for name, old in components.items():
                     if self.resolve(old.type, old.owner).rpartition(".")[2] == key:
@@ -215,7 +215,7 @@ class Library:
                         )
         return modified
 
-    def _redeclared(self, old: Component, new: Component) -> Component:
+    def _redeclare(self, old: Component, new: Component) -> Component:
         constraint, scope = old.constraint or old.type, old.owner
         if new.constraint:
             constraint, scope = new.constraint, new.owner
@@ -224,7 +224,7 @@ class Library:
             type=self._absolute(new.type, new.owner),
             prefixes=(old.prefixes - {"replaceable"}) | (new.prefixes - {"redeclare"}),
             constraint=self._absolute(constraint, scope),
-            modifier=_merged(old.constraining, new.modifier),
+            modifier=_merge(old.constraining, new.modifier),
         )
 
     def _absolute(self, name: str, scope: str) -> str:
@@ -312,10 +312,10 @@ def _outward(scope: str) -> list[str]:
     return [".".join(parts[:count]) for count in range(len(parts), -1, -1)]
 
 
-def _merged(old: Modifier, new: Modifier) -> Modifier:
+def _merge(old: Modifier, new: Modifier) -> Modifier:
     inner = dict(old.inner)
     for name, modification in new.inner.items():
-        inner[name] = _merged(inner[name], modification) if name in inner else modification
+        inner[name] = _merge(inner[name], modification) if name in inner else modification
     return Modifier(
         value=new.value or old.value,
         inner=inner,

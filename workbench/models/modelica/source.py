@@ -226,9 +226,9 @@ class Reader(Cursor):
         components = [self._component(declared, prefixes)]
         while self.took(","):
             components.append(self._component(declared, prefixes))
-        return self._constrained(components)
+        return self._with_constraint(components)
 
-    def _constrained(self, components: list[Component]) -> list[Component]:
+    def _with_constraint(self, components: list[Component]) -> list[Component]:
         constraint, constraining, description = self._constraint()
         return [
             replace(
@@ -309,7 +309,7 @@ class Reader(Cursor):
             declared = self.name()
             self.subscripts()
             component = self._component(declared, prefixes)
-        return self._constrained([component])[0]
+        return self._with_constraint([component])[0]
 
     def _expression(self) -> str:
         """Text up to what cannot be of the same expression."""

@@ -65,11 +65,11 @@ def wiring(system: System) -> Wiring:
     shown |= {name: (name, unit) for name, unit in system.reported.items() if name not in shown}
     truth = {reading: unit for reading, unit in shown.values()}
     return Wiring(
-        machine=inputs | _given({**readings, **truth}),
-        observer=inputs | outputs | _given({**estimates, **seen}),
+        machine=inputs | _output_connectors({**readings, **truth}),
+        observer=inputs | outputs | _output_connectors({**estimates, **seen}),
         whole=inputs
-        | _given({name: unit for name, (_, unit) in shown.items()})
-        | _given({f"{name}Estimate": unit for name, unit in estimates.items()}),
+        | _output_connectors({name: unit for name, (_, unit) in shown.items()})
+        | _output_connectors({f"{name}Estimate": unit for name, unit in estimates.items()}),
         connections=(
             *(("", name, to, name) for name in inputs for to in (_MACHINE, _OBSERVER)),
             *((_MACHINE, output.reading, _OBSERVER, output.name) for output in system.outputs),
@@ -79,7 +79,7 @@ def wiring(system: System) -> Wiring:
     )
 
 
-def _given(units: Mapping[str, str]) -> dict[str, tuple[str, str]]:
+def _output_connectors(units: Mapping[str, str]) -> dict[str, tuple[str, str]]:
     return {name: ("output", unit) for name, unit in units.items()}
 
 

@@ -210,7 +210,7 @@ def _no_time(group: Group, system: System, where: str) -> InputError:
             )
     for channel in group.channels:
         if not channel.unit and is_time(channel.name):
-            units = _unstated(channel.values, system)
+            units = _likely_units(channel.values, system)
             likely = f"likely in {' or in '.join(units)}" if units else "likely in none"
             problem, name = f"'{channel.name}' without a unit, {likely}", channel.name
     return InputError(
@@ -229,7 +229,7 @@ def _named_clock(channel: FileChannel, named: NamedChannel, system: System, wher
     own = channel.unit if channel.stamp else named.unit or channel.unit
     if not own and (since := _since(channel, system)) is not None:
         return since
-    likely = [own] if own else _unstated(channel.values, system)
+    likely = [own] if own else _likely_units(channel.values, system)
     unit = likely[0] if len(likely) == 1 else ""
     scale = conversion(unit, "s") if unit else None
     if scale is None:
@@ -287,9 +287,9 @@ def _candidate(channel: FileChannel, group: Group, system: System) -> Clock | No
     if not channel.unit and is_time(channel.name):
         if (since := _since(channel, system)) is not None:
             return since
-        if (packed := _packed(channel)) is not None:
+        if (packed := _packed_clock(channel)) is not None:
             return packed
-        likely = _unstated(channel.values, system)
+        likely = _likely_units(channel.values, system)
         scale = conversion(likely[0], "s") if len(likely) == 1 else None
         if scale is not None:
             clock = _count_clock(channel, likely[0], scale.factor, _unit_reason(likely[0]))
@@ -314,7 +314,7 @@ def _minutes_or_hours(clock: Clock, channel: FileChannel, system: System) -> Clo
     )
 
 
-def _packed(channel: FileChannel) -> Clock | None:
+def _packed_clock(channel: FileChannel) -> Clock | None:
     """Times in figures such as 101500, where they go on evenly as such, and not as numbers."""
     held = channel.values[np.isfinite(channel.values)]
     if held.size < 3 or (held < 0.0).any() or (held >= 1e14).any():
@@ -354,7 +354,7 @@ def _unevenness(times: Vector) -> float:
 
 def _count_clock(channel: FileChannel, unit: str, factor: float, reason: str) -> Clock:
     """Times that are numbers; a counter that goes round goes on."""
-    values, rounds = _unwrapped(channel.values)
+    values, rounds = _unwrap(channel.values)
     start = channel.start
     first = next((float(value) for value in values if math.isfinite(value)), math.nan)
     if math.isfinite(start):
@@ -374,7 +374,7 @@ def _count_clock(channel: FileChannel, unit: str, factor: float, reason: str) ->
     )
 
 
-def _unwrapped(values: Vector) -> tuple[Vector, tuple[str, ...]]:
+def _unwrap(values: Vector) -> tuple[Vector, tuple[str, ...]]:
     """A counter that goes on where it went round; and that it was, in words."""
     known = np.flatnonzero(np.isfinite(values))
     steps = np.diff(values[known])
@@ -419,7 +419,7 @@ def _since(channel: FileChannel, system: System) -> Clock | None:
             times = (channel.values - held[0]) * factor
             start = float(held[0]) * factor - zero
             clock = Clock(channel.name, times, reason, start=start)
-    likely = _unstated(channel.values, system)
+    likely = _likely_units(channel.values, system)
     for name, (zero, least, most) in _DAYS.items():
         whole = bool((held == np.round(held)).all())
         if least <= held.min() and held.max() <= most and not whole and "s" not in likely:
@@ -441,7 +441,7 @@ def _unit_reason(unit: str) -> str:
     return f"no unit in the file; in {unit} it is sampled as is usual"
 
 
-def _unstated(values: Vector, system: System) -> list[str]:
+def _likely_units(values: Vector, system: System) -> list[str]:
     """The units in which times step as those of usual recordings."""
     steps = np.diff(values[np.isfinite(values)])
     usual = float(np.median(steps)) if steps.size else 0.0

@@ -113,7 +113,7 @@ def missing_of(
     return (*known, *others), said, doubt
 
 
-def _beyond(name: str, unit: str, values: Vector, signal: Signal) -> str:
+def _impossible_value(name: str, unit: str, values: Vector, signal: Signal) -> str:
     """Why values cannot be those of a signal: the first that is not possible, and what may be."""
     low, high = signal.possible
     first = int(np.flatnonzero((values < low) | (values > high))[0])
@@ -227,7 +227,7 @@ def _candidate(
     if not np.isfinite(values).any():
         return None, f"'{channel.name}' holds no numbers"
     if np.nanmin(values) < low or np.nanmax(values) > high:
-        return None, _beyond(channel.name, unit, values, signal)
+        return None, _impossible_value(channel.name, unit, values, signal)
     reason = "name and unit" if likeness else "the only one of its unit"
     doubt = ""
     if concluded:

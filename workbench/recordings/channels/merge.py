@@ -131,12 +131,12 @@ def merge(
         for (file, _), clock in proposal.clocks.items()
         for text in clock.corrections
     ]
-    doubts = *damaged, *proposal.contradictions, *mended, *_mixed(files, proposal)
+    doubts = *damaged, *proposal.contradictions, *mended, *_mixed_groups(files, proposal)
     zoned = bool(begun) and all(c.zoned for c in proposal.clocks.values() if math.isfinite(c.start))
     return MergedRecording(time[known], signals, zero, tuple(notes), doubts, zoned)
 
 
-def _mixed(files: Sequence[RecordedFile], proposal: ProposedMapping) -> Iterator[str]:
+def _mixed_groups(files: Sequence[RecordedFile], proposal: ProposedMapping) -> Iterator[str]:
     """Signals of groups of a file that may be two recordings: one holds the other's channel, too.
 
     Where both have dates, they are brought together by these.

@@ -77,12 +77,12 @@ def read_named(table: Table, system: System) -> dict[str, NamedChannel]:
         own.refuse_unknown("channel unit reversed missing")
         unit = spelled(own.text("unit", ""))
         other = "reversed" in own and own.take("reversed", bool)
-        missing = _missing(own) if "missing" in own else None
+        missing = _missing_values(own) if "missing" in own else None
         channels[signal] = NamedChannel(own.take("channel", str), unit, other, missing)
     return channels
 
 
-def _missing(table: Table) -> tuple[float, ...]:
+def _missing_values(table: Table) -> tuple[float, ...]:
     values = table.take("missing", list)
     if not all(isinstance(value, int | float) and not isinstance(value, bool) for value in values):
         raise table.wrong("missing", "a list of numbers, as the file has them, such as [-9999]")

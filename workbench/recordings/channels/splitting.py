@@ -131,7 +131,7 @@ def propose_recordings(
     whole = _propose_part("", files, system, stored, options)
     settled = isinstance(whole, ProposedRecording) and not whole.proposal.problems
     single = options.apart is False or len(files) > 1 or settled or _names_a_group(options, files)
-    parts = None if single else _apart(files[0], system, stored, options)
+    parts = None if single else _recordings_within(files[0], system, stored, options)
     if parts is not None:
         doubt = "" if options.apart else at_one_time(parts.held, system)
         if not doubt:
@@ -181,7 +181,7 @@ def _with_doubt(
     )
 
 
-def _apart(
+def _recordings_within(
     file: RecordedFile,
     system: System,
     stored: Mapping[str, NamedChannel],
@@ -198,7 +198,7 @@ def _apart(
             name = "/".join(path) or file.path.name  # what stands outside of all others
             held[name] = replace(file, groups=tuple(groups))
             outcomes[name] = _propose_part(name, [held[name]], system, stored, options)
-        alike = _alike(
+        alike = _same_channels(
             [
                 recording
                 for recording in outcomes.values()
@@ -211,17 +211,19 @@ def _apart(
     return None
 
 
-def _needed(system: System) -> list[str]:
+def _needed_signals(system: System) -> list[str]:
     return [signal.name for signal in (*system.inputs, *system.outputs)]
 
 
-def _alike(outcomes: Sequence[ProposedRecording], system: System) -> list[ProposedRecording]:
+def _same_channels(
+    outcomes: Sequence[ProposedRecording], system: System
+) -> list[ProposedRecording]:
     """Most of those that hold the same channels, at least two; those without problems first."""
     classes: dict[_Signature, list[ProposedRecording]] = {}
     for recording in outcomes:
         # A part with fewer channels than a recording has signals is that of one logger.
         if not recording.proposal.problems or len(_names(recording.files[0])) >= len(
-            _needed(system)
+            _needed_signals(system)
         ):
             classes.setdefault(_signature(recording, system), []).append(recording)
     several = [held for held in classes.values() if len(held) > 1]
@@ -235,7 +237,9 @@ def _signature(recording: ProposedRecording, system: System) -> _Signature:
     A unit that was named for all sheets is not taken for one that states another.
     """
     named, proposal = recording.proposal.named, recording.proposal
-    needed = tuple((name, named[name]) for name in (TIME, *_needed(system)) if name in named)
+    needed = tuple(
+        (name, named[name]) for name in (TIME, *_needed_signals(system)) if name in named
+    )
     names = _names(recording.files[0]) if proposal.problems else frozenset()
     return needed, proposal.contradictions, names
 
@@ -252,7 +256,9 @@ def _sorted_out(
 ) -> ProposedRecordings:
     """Recordings, and of what else the file holds which parts look like further ones."""
     first = alike[0].proposal
-    taken = {first.assigned[name].channel.name for name in _needed(system) if name in first.named}
+    taken = {
+        first.assigned[name].channel.name for name in _needed_signals(system) if name in first.named
+    }
     refused: list[InputError] = []
     beside: list[str] = []
     for name, outcome in outcomes.items():
@@ -303,7 +309,7 @@ def _differences(
 ) -> Iterator[str]:
     """Channels that are not those of another recording, in words."""
     named, others = recording.proposal.named, other.proposal.named
-    for signal in (TIME, *_needed(system)):
+    for signal in (TIME, *_needed_signals(system)):
         if signal in named and named[signal] != others.get(signal):
             own, theirs = (
                 f"'{held.channel}'{f' [{held.unit}]' * bool(held.unit)}" if held else "-"

@@ -91,7 +91,7 @@ def read_recorded_file(path: Path) -> RecordedFile:
     sha256 = hashlib.sha256(raw).hexdigest()
     packed = raw.startswith(b"\x1f\x8b")
     if packed:
-        raw = _unpacked(path, raw)
+        raw = _unpack(path, raw)
     words, groups, notes, doubts = _reader(path, raw)(path, raw)
     if not any(group.channels for group in groups):
         raise InputError(
@@ -105,7 +105,7 @@ def read_recorded_file(path: Path) -> RecordedFile:
     )
 
 
-def _unpacked(path: Path, raw: bytes) -> bytes:
+def _unpack(path: Path, raw: bytes) -> bytes:
     try:
         with gzip.GzipFile(fileobj=io.BytesIO(raw)) as stream:
             unpacked = stream.read(_MOST + 1)
@@ -143,8 +143,8 @@ def _reader(path: Path, raw: bytes) -> _Reader:
             expected="the extra [files], which holds what reads such files",
             remedy=installing("files"),
         ) from None
-    reader = partial(_apart if module in _NATIVE else _here, module)
-    return partial(_undamaged, reader, called)
+    reader = partial(_in_own_process if module in _NATIVE else _here, module)
+    return partial(_read_whole, reader, called)
 
 
 def _refuse_unread(path: Path, raw: bytes, *, is_workbook: bool) -> None:
@@ -195,13 +195,13 @@ def _here(module: str, path: Path, raw: bytes) -> Contents:
     return contents._replace(notes=[*contents.notes, *dict.fromkeys(notes)])
 
 
-def _apart(module: str, path: Path, raw: bytes) -> Contents:
+def _in_own_process(module: str, path: Path, raw: bytes) -> Contents:
     """Read a file in a process of its own."""
     with Pool(1, nullcontext, module, limit=_START + len(raw) / _RATE) as pool:
         return pool.submit(_here, path, raw).result()
 
 
-def _undamaged(reader: _Reader, called: str, path: Path, raw: bytes) -> Contents:
+def _read_whole(reader: _Reader, called: str, path: Path, raw: bytes) -> Contents:
     """What a library reads of a file, if it is whole."""
     try:
         return reader(path, raw)

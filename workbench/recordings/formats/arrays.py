@@ -64,7 +64,7 @@ def _collect(
                 by_size.setdefault(len(value), []).append(stamps)
         elif isinstance(value, Mapping):
             name, value = _element(name, value)
-            timed = _simulink(name, value) or _timed(name, value)
+            timed = _simulink(name, value) or _time_series(name, value)
             if timed is not None:
                 groups.append(replace(timed, within=within))
             elif (channel := _single(name, value)) is not None:
@@ -198,7 +198,7 @@ def _entry(content: Mapping[str, Any], names: tuple[str, ...]) -> tuple[str, Any
     )
 
 
-def _timed(name: str, content: Mapping[str, Any]) -> Group | None:
+def _time_series(name: str, content: Mapping[str, Any]) -> Group | None:
     """A structure with times and values of one channel, such as a time series."""
     key, times = _entry(content, _TIMES)
     channel = _single(name, content)
@@ -206,7 +206,7 @@ def _timed(name: str, content: Mapping[str, Any]) -> Group | None:
         return None
     if times.size != channel.values.size or times.size < 2:
         return None
-    unit = _units(content).get(key, "") or _within(content, "TimeInfo")
+    unit = _units(content).get(key, "") or _inner_units(content, "TimeInfo")
     clock = FileChannel(key, unit, _flat(times))
     return Group(name, (clock, channel))
 
@@ -252,13 +252,13 @@ def _single(name: str, content: Mapping[str, Any]) -> FileChannel | None:
         name,
         spelled(unit)
         if isinstance(unit, str)
-        else _units(content).get(key, "") or _within(content, "DataInfo"),
+        else _units(content).get(key, "") or _inner_units(content, "DataInfo"),
         _flat(values),
         about if isinstance(about, str) else "",
     )
 
 
-def _within(content: Mapping[str, Any], key: str) -> str:
+def _inner_units(content: Mapping[str, Any], key: str) -> str:
     """Units that a time series has in a structure beside its arrays; empty: none."""
     unit = content[key].get("Units") if isinstance(content.get(key), Mapping) else None
     return spelled(unit) if isinstance(unit, str) else ""

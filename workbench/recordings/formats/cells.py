@@ -159,7 +159,7 @@ def find_table(rows: Sequence[Sequence[str]], lines: Sequence[int], where: str) 
     head = tuple(" ".join(filter(None, row)) for row in rows[:first])
     kept = [i for i in samples if i >= first]
     body = [list(rows[i][:width]) for i in kept]
-    if 0 < len(_trimmed(names)) == width - 1:
+    if 0 < len(_trim(names)) == width - 1:
         body = _with_whole_stamps(body)
         width = len(body[0])
     if names:
@@ -180,7 +180,7 @@ def _samples(
     """
     data = [i for i, row in enumerate(rows) if is_sample(row)]
     width = Counter(len(rows[i]) for i in data).most_common(1)[0][0] if data else 0
-    samples = [i for i in data if len(rows[i]) == width or len(_trimmed(rows[i])) == width]
+    samples = [i for i in data if len(rows[i]) == width or len(_trim(rows[i])) == width]
     texts = {i for i in samples if _is_text(rows[i][0])}
     if 2 * len(texts) < len(samples):
         samples = [i for i in samples if i not in texts]
@@ -235,8 +235,8 @@ def _refuse_narrow(
 
     R writes row numbers without a name; numbers with decimal commas between commas are two cells.
     """
-    named = len(_trimmed(names))
-    held = max(len(_trimmed(row)) for row in samples)
+    named = len(_trim(names))
+    held = max(len(_trim(row)) for row in samples)
     if named >= held and (not units or len(units) >= named):
         return
     raise InputError(
@@ -250,7 +250,7 @@ def _refuse_narrow(
     )
 
 
-def _trimmed(row: Sequence[str]) -> Sequence[str]:
+def _trim(row: Sequence[str]) -> Sequence[str]:
     """A row without empty cells at its end."""
     end = len(row)
     while end and not row[end - 1].strip():
@@ -274,9 +274,9 @@ def _header(above: Sequence[Sequence[str]], width: int) -> tuple[list[str], list
         cells = [cell.strip() for cell in row]
         if len(cells) == width + 1 and _REMARK.fullmatch(cells[-1]):
             cells = cells[:width]
-        if not _trimmed(cells):
+        if not _trim(cells):
             continue
-        if len(_trimmed(cells)) > width or len(_trimmed(cells)) < max(2, width // 2):
+        if len(_trim(cells)) > width or len(_trim(cells)) < max(2, width // 2):
             break
         rows.insert(0, cells)
         if len(rows) == _HEADER_ROWS:
@@ -287,8 +287,8 @@ def _header(above: Sequence[Sequence[str]], width: int) -> tuple[list[str], list
         at = 1
     # Below units stand kinds, such as Avg; channel numbers are no names.
     named = [row for row in rows[:at] if not all(is_number(cell) for cell in row if cell)]
-    labelled = _labelled(above, _UNIT_ROW, width) if at is None else []
-    if labelled and (own := _labelled(above, _NAME_ROW, width)):
+    labelled = _labelled_row(above, _UNIT_ROW, width) if at is None else []
+    if labelled and (own := _labelled_row(above, _NAME_ROW, width)):
         named = [own]
     if not named:
         return (rows[-1], []) if rows and at is None else ([], [])
@@ -306,11 +306,11 @@ def _units_within(row: Sequence[str]) -> int:
     return sum(bool(named(cell)[1]) for cell in row)
 
 
-def _labelled(above: Sequence[Sequence[str]], label: re.Pattern[str], width: int) -> list[str]:
+def _labelled_row(above: Sequence[Sequence[str]], label: re.Pattern[str], width: int) -> list[str]:
     """The row of a preamble that a label of its own says what it is, over all columns; or none."""
     for row in reversed(above):
         cells = [cell.strip() for cell in row]
-        if 2 <= len(_trimmed(cells)) <= width and label.fullmatch(cells[0]):
+        if 2 <= len(_trim(cells)) <= width and label.fullmatch(cells[0]):
             return ["", *cells[1:], *[""] * (width - len(cells))]
     return []
 
@@ -322,7 +322,7 @@ def _whole_names(rows: Sequence[list[str]]) -> list[str]:
     """
     names = rows[-1]
     held = [name for name in names if name]
-    if len(rows) < 2 or (len(set(held)) == len(held) and len(held) == len(_trimmed(names))):
+    if len(rows) < 2 or (len(set(held)) == len(held) and len(held) == len(_trim(names))):
         return names
     over, last = [], ""
     for cell in rows[-2] + [""] * (len(names) - len(rows[-2])):

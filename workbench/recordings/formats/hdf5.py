@@ -31,10 +31,10 @@ def _members(group: h5py.Group, file: h5py.File) -> dict[str, Any]:
     structures = _structures(group, file)
     if structures:
         return numbered(structures)
-    return {**_entries(dict(group.items()), file), **_stated(group, ("unit", "units", *_RATES))}
+    return {**_entries(dict(group.items()), file), **_attributes(group, ("unit", "units", *_RATES))}
 
 
-def _stated(item: Any, keys: Collection[str]) -> dict[str, Any]:
+def _attributes(item: Any, keys: Collection[str]) -> dict[str, Any]:
     """Texts and numbers that attributes of an entry state under some names."""
     statements: dict[str, Any] = {}
     for key, value in item.attrs.items():
@@ -58,7 +58,7 @@ def _entries(items: Mapping[str, Any], file: h5py.File) -> dict[str, Any]:
         if value is None:
             continue
         members[name] = value
-        members |= _stated(item, _RATES)
+        members |= _attributes(item, _RATES)
         for key in _NAMES:
             labels = item.attrs.get(key)
             if isinstance(labels, np.ndarray | list) and len(labels) > 1:

@@ -23,7 +23,7 @@ def read(path: Path, raw: bytes) -> Contents:
     groups: list[Group] = []
     notes: list[str] = []
     doubts: dict[str, None] = {}
-    with _heard(doubts), MDF(io.BytesIO(raw)) as file:
+    with _take_down(doubts), MDF(io.BytesIO(raw)) as file:
         version, start = file.version, file.start_time.timestamp()
         for index, held in enumerate(file.groups):
             group = _group(file, index, held, start, notes)
@@ -33,7 +33,7 @@ def read(path: Path, raw: bytes) -> Contents:
 
 
 @contextmanager
-def _heard(doubts: dict[str, None]) -> Iterator[None]:
+def _take_down(doubts: dict[str, None]) -> Iterator[None]:
     """Take down what the library only logs, such as blocks that are missing."""
 
     def take(record: logging.LogRecord) -> bool:

@@ -70,7 +70,7 @@ def markers(values: Vector) -> tuple[dict[float, int], dict[float, int]]:
     samples = left[~coded]
     if samples.size > _FEWEST and _is_varied(samples):
         for value in np.unique(left[coded]):  # beside each other they are no range
-            if _apart(float(value), samples) > _FAR:
+            if _distance(float(value), samples) > _FAR:
                 known[float(value)] = int((left == value).sum())
         left = left[~np.isin(left, list(known))]
     while left.size > _FEWEST:
@@ -78,7 +78,7 @@ def markers(values: Vector) -> tuple[dict[float, int], dict[float, int]]:
             rest = left[left != extreme]
             if not _is_varied(rest):
                 continue
-            distance, at = _apart(extreme, rest), left == extreme
+            distance, at = _distance(extreme, rest), left == extreme
             count = left.size - rest.size
             # Far outside of all others, or out and back at once, as no machine moves.
             rare = count <= max(1.0, _RARE * left.size)
@@ -101,7 +101,7 @@ def _is_varied(values: Vector) -> bool:
     return np.unique(values[: 100 * _FEWEST]).size >= _FEWEST
 
 
-def _apart(value: float, others: Vector) -> float:
+def _distance(value: float, others: Vector) -> float:
     """How far a value is from all others, in widths of these."""
     return float(np.abs(others - value).min()) / float(np.ptp(others) or 1.0)
 

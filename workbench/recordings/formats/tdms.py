@@ -22,14 +22,14 @@ def read(path: Path, raw: bytes) -> Contents:
     groups: list[Group] = []
     notes: list[str] = []
     doubts: list[str] = []
-    with _heard(doubts):
+    with _take_down(doubts):
         for held in TdmsFile.read(io.BytesIO(raw)).groups():
             groups += _groups(held, notes)
     return Contents("TDMS", groups, notes, tuple(doubts))
 
 
 @contextmanager
-def _heard(doubts: list[str]) -> Iterator[None]:
+def _take_down(doubts: list[str]) -> Iterator[None]:
     """Take down what the library only prints, such as an end that is missing."""
     printed = io.StringIO()
     before = log_manager.console_handler.setStream(printed)

@@ -31,7 +31,7 @@ def read(path: Path, raw: bytes) -> Contents:
     InputError
         If it holds no table, or one that can be read in two ways.
     """
-    text, encoding = _decoded(path, raw)
+    text, encoding = _decode(path, raw)
     lines = (
         text.replace("\r\r\n", "\n")
         .replace("\r\n", "\n")
@@ -61,7 +61,7 @@ def read(path: Path, raw: bytes) -> Contents:
     return Contents(", ".join(words), groups, notes)
 
 
-def _decoded(path: Path, raw: bytes) -> tuple[str, str]:
+def _decode(path: Path, raw: bytes) -> tuple[str, str]:
     """Text and name of its encoding."""
     raw = raw.rstrip(b"\0")  # with which some recorders fill what they have reserved
     if raw.startswith((b"\xff\xfe\0\0", b"\0\0\xfe\xff")):
@@ -147,7 +147,7 @@ def _rows(lines: Sequence[str], separator: str) -> tuple[list[list[str]], list[i
             cells = bare.split(separator)
         else:
             try:
-                cells, left = _quoted(bare, lines[number : number + _FOLDED], separator)
+                cells, left = _split_quoted(bare, lines[number : number + _FOLDED], separator)
             except (csv.Error, ValueError):
                 broken += 1
                 continue
@@ -156,7 +156,7 @@ def _rows(lines: Sequence[str], separator: str) -> tuple[list[list[str]], list[i
     return rows, numbers, broken
 
 
-def _quoted(line: str, below: Sequence[str], separator: str) -> tuple[list[str], int]:
+def _split_quoted(line: str, below: Sequence[str], separator: str) -> tuple[list[str], int]:
     """Cells of a line with quotation marks, and how many lines below it they go on."""
     count = 0
     while line.count('"') % 2 and count < len(below):

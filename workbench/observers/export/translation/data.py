@@ -60,21 +60,21 @@ class Data:
             return Number(INT)
         if isinstance(value, float | np.floating):
             return Number(DOUBLE)
-        raise self._refused(place, f"{type(value).__name__}, which has no fixed size")
+        raise self._refusal(place, f"{type(value).__name__}, which has no fixed size")
 
     def _several(self, values: Sequence[Any], place: str) -> Several:
         types = [self.type_of(value, f"{place}[{k}]") for k, value in enumerate(values)]
         if not types or not isinstance(types[0], Record) or len(set(types)) > 1:
-            raise self._refused(place, "a tuple that is not of named tuples of one type")
+            raise self._refusal(place, "a tuple that is not of named tuples of one type")
         return Several(types[0], len(types))
 
     def _array(self, value: np.ndarray, place: str) -> Array:
         if not value.flags.c_contiguous:
-            raise self._refused(place, "an array that is not contiguous")
+            raise self._refusal(place, "an array that is not contiguous")
         kinds = {"f": DOUBLE, "i": INT, "u": INT, "b": BOOL}
         kind = kinds.get(value.dtype.kind)
         if kind is None or (kind == DOUBLE and value.dtype != np.float64):
-            raise self._refused(place, f"an array of {value.dtype}")
+            raise self._refusal(place, f"an array of {value.dtype}")
         if kind == INT and value.size:
             self._check_whole(max(int(value.max()), -int(value.min())), place)
         strides = tuple(step // value.itemsize for step in value.strides)
@@ -84,9 +84,9 @@ class Data:
 
     def _check_whole(self, value: Any, place: str) -> None:
         if abs(value) > _LARGEST_INT:
-            raise self._refused(place, f"a whole number beyond {_LARGEST_INT}")
+            raise self._refusal(place, f"a whole number beyond {_LARGEST_INT}")
 
-    def _refused(self, place: str, found: str) -> InputError:
+    def _refusal(self, place: str, found: str) -> InputError:
         return InputError(
             where=f"{self._where}, {place}",
             found=found,

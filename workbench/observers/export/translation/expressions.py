@@ -113,9 +113,9 @@ class Expressions(ABC):
 
     def number(self, node: ast.expr) -> Value:
         """One number."""
-        return self._checked(node, self.value(node))
+        return self._require_number(node, self.value(node))
 
-    def _checked(self, node: ast.expr, value: Value) -> Value:
+    def _require_number(self, node: ast.expr, value: Value) -> Value:
         if not isinstance(value.type, Number):
             raise self.refused(node, "an array or tuple where a number is needed")
         return value
@@ -124,7 +124,7 @@ class Expressions(ABC):
         """Operands that are numbers."""
         values = self.operands(nodes)
         for node, value in zip(nodes, values, strict=True):
-            self._checked(node, value)
+            self._require_number(node, value)
         return values
 
     def resolve(self, node: ast.expr) -> Found:
@@ -310,7 +310,7 @@ class Expressions(ABC):
         if DOUBLE in kinds:
             raise self.refused(node, "a number that is no whole one as a truth")
         if kinds == {BOOL} and not any(before for _, before in values[1:]):
-            return self._joined(node.op, values)
+            return self._join_truths(node.op, values)
         kind = INT if INT in kinds else BOOL
         first, before = values[0]
         self.lines += before
@@ -324,7 +324,7 @@ class Expressions(ABC):
         for value, before in values:
             self.branch(undecided, [*before, f"{name} = {value.text};"], [])
 
-    def _joined(self, op: ast.boolop, values: Sequence[tuple[Value, list[str]]]) -> Value:
+    def _join_truths(self, op: ast.boolop, values: Sequence[tuple[Value, list[str]]]) -> Value:
         self.lines += values[0][1]
         sign = " || " if isinstance(op, ast.Or) else " && "
         return expression(BOOL, sign.join(v.operand for v, _ in values), *(v for v, _ in values))
@@ -346,7 +346,7 @@ class Expressions(ABC):
             tests = self.with_statements(self.test, node.values)
             values = [(self._truth(node, test), before) for test, before in tests]
             if not any(before for _, before in values[1:]):
-                return self._joined(node.op, values)
+                return self._join_truths(node.op, values)
         return self._truth(node, self.number(node))
 
     def _truth(self, node: ast.expr, value: Value) -> Value:

@@ -81,7 +81,7 @@ class Program:
         """
         function = _function(law)
         assert function is not None, law
-        return self._translated(function, tuple(given)).name
+        return self._translation_of(function, tuple(given)).name
 
     def call(
         self, refused: Callable[[str], InputError], called: Any, given: Sequence[Value]
@@ -98,7 +98,7 @@ class Program:
             return Value(Number(INT), f"{primitive.name}({listed})", acts=True)
         if len(given) != function.__code__.co_argcount:
             raise refused(f"a call that does not have {function.__code__.co_argcount} arguments")
-        done = self._translated(function, tuple(argument.type for argument in given))
+        done = self._translation_of(function, tuple(argument.type for argument in given))
         listed = ", ".join(
             text for argument in given for text in (argument.address, *_open_sizes(argument))
         )
@@ -106,7 +106,7 @@ class Program:
         of = Number(done.result.kinds[0]) if len(done.result.kinds) == 1 else done.result
         return Value(of, text, reads=True, acts=done.acts)
 
-    def _translated(self, function: FunctionType, given: tuple[Type, ...]) -> _Translated:
+    def _translation_of(self, function: FunctionType, given: tuple[Type, ...]) -> _Translated:
         key = function, given
         if key not in self._done:
             self._done[key] = None
@@ -145,7 +145,7 @@ class Program:
         says = (inspect.getdoc(function) or "").split("\n")[0]
         self._texts[name] = "\n".join(
             [
-                *_commented(f"{function.__module__}.{function.__name__}: {says}".rstrip(": ")),
+                *_comment(f"{function.__module__}.{function.__name__}: {says}".rstrip(": ")),
                 f"static {result.name} {name}({shown}) {{",
                 *(f"    {line}" for line in [*used, *lines]),
                 "}",
@@ -232,7 +232,7 @@ def _arguments(body: Statements, tree: ast.FunctionDef, given: Sequence[Type]) -
     return declarations
 
 
-def _commented(text: str) -> list[str]:
+def _comment(text: str) -> list[str]:
     """A comment of C."""
     first, *others = textwrap.wrap(text.replace("*/", ""), 94)
     lines = [f"/* {first}", *(f" * {line}" for line in others)]

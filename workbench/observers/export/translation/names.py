@@ -80,7 +80,7 @@ def _uses(block: list[ast.stmt], path: tuple[int, ...]) -> Iterator[tuple[str, _
             heads = [statement.test]
         elif isinstance(statement, ast.For):
             heads = [statement.iter]
-        given = list(_given(statement))
+        given = list(_assigned_names(statement))
         for head in heads:
             for node in ast.walk(head):
                 if isinstance(node, ast.Name) and node.id not in given:
@@ -93,7 +93,7 @@ def _uses(block: list[ast.stmt], path: tuple[int, ...]) -> Iterator[tuple[str, _
             yield from _uses(inner, (*path, id(inner)))
 
 
-def _given(statement: ast.stmt) -> Iterator[str]:
+def _assigned_names(statement: ast.stmt) -> Iterator[str]:
     if isinstance(statement, ast.Assign):
         for target in statement.targets:
             yield from _targets(target)

@@ -122,7 +122,7 @@ class Statements(Expressions):
             leave = (
                 before if test.known else [*before, f"if (!({test.text})) {{", "    break;", "}"]
             )
-        self.lines += [head, *_indented([*leave, *self.block(node.body)]), "}"]
+        self.lines += [head, *_indent([*leave, *self.block(node.body)]), "}"]
 
     def _for(self, node: ast.For) -> None:
         call, target = node.iter, node.target
@@ -145,7 +145,7 @@ class Statements(Expressions):
         del self.env[target.id]
         stays = f"{name} {'<' if step > 0 else '>'} {last.operand}"
         self.lines.append(f"for (int {name} = {first.text}; {stays}; {advance}) {{")
-        self.lines += [*_indented(body), "}"]
+        self.lines += [*_indent(body), "}"]
 
     def _moves(self, end: Value) -> bool:
         """Whether a loop may change its own end."""
@@ -257,7 +257,7 @@ class Statements(Expressions):
         elif isinstance(target, ast.Subscript) and isinstance(value.type, Number):
             value = self.temporary(value) if value.acts else value
             place = self._place(target)
-            self.lines.append(f"{place.text} = {_converted(place, value)};")
+            self.lines.append(f"{place.text} = {_conversion(place, value)};")
         else:
             raise self.refused(target, "what is not assigned to, or no number that is assigned")
 
@@ -320,15 +320,15 @@ class Statements(Expressions):
             kind = self._widen(node.target.id, after.kind)
             place = self.env[node.target.id] = Value(Number(kind), place.text)
         if sign is None or place.kind != DOUBLE:
-            self.lines.append(f"{place.text} = {_converted(place, after)};")
+            self.lines.append(f"{place.text} = {_conversion(place, after)};")
         else:
             self.lines.append(f"{place.text} {sign} {value.text};")
 
 
-def _converted(place: Value, value: Value) -> str:
+def _conversion(place: Value, value: Value) -> str:
     whole = place.kind != DOUBLE and value.kind == DOUBLE
     return f"(int){value.operand}" if whole else value.text
 
 
-def _indented(lines: Sequence[str]) -> list[str]:
+def _indent(lines: Sequence[str]) -> list[str]:
     return [f"    {line}" for line in lines]
