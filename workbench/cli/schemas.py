@@ -16,6 +16,7 @@ from workbench.diagnosis.inference.sample_errors import Errors
 from workbench.diagnosis.inference.timing import LateSignals
 from workbench.diagnosis.inference.verdict import NearestCandidate
 from workbench.observers import estimators_of
+from workbench.observers.trust import Contradiction
 from workbench.pages.answer import Measure
 from workbench.recordings.case import UNKNOWN
 from workbench.studies.distance.outcome import SafetyLevel
@@ -312,13 +313,12 @@ def _simulate() -> Schema:
         "additionalProperties": False,
     }
     texts = {"title": TEXT, "doubts": listed(TEXT), "reference": or_null(TEXT)}
-    test = {"test": TEXT, "signal": TEXT, "value": NUMBER, "narrow": FLAG, "reason": TEXT}
     trust = {
         "warnings": listed(TEXT),
         "guesses": listed(TEXT),
         "inseparable": listed(closed({"names": listed(TEXT), "correlation": NUMBER})),
         "contradicted": by_name(NUMBER),
-        "contradictions": by_name(listed(closed(test))),
+        "contradictions": by_name(listed(declared(Contradiction))),
     }
     case = closed({**texts, **trust, "estimators": by_name(score)})
     meanings = by_name(by_name(closed({"text": TEXT, "unit": TEXT})))
