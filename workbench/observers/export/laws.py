@@ -232,10 +232,10 @@ def _sizes(estimator: Estimator) -> dict[str, int]:
 def _shell(estimator: Estimator, gains: Sequence[str]) -> StateSpace:
     """The FMU as other tools see it: samples are inputs, entries of an estimate are its states."""
     meanings = estimator.meanings(estimator.fmu, estimator.system, estimator.gains)
-    parameters = [
-        _variable(name, meanings[name][1], f"Gain: {meanings[name][0]}", estimator.gains[name])
-        for name in gains
-    ]
+    parameters = []
+    for name in gains:
+        meaning, unit = meanings.get(name, (name, "1"))
+        parameters.append(_variable(name, unit, f"Gain: {meaning}", estimator.gains[name]))
     system, defaults = estimator.system, estimator.fmu.defaults
     inputs = [
         _variable(
