@@ -213,5 +213,5 @@ def _numbers(value: Any, place: str) -> Iterator[tuple[str, float]]:
         listed = value.ravel().tolist() if isinstance(value, np.ndarray) else value
         for k, entry in enumerate(listed):
             yield from _numbers(entry, f"{place}[{k}]")
-    else:
+    elif isinstance(value, int | float | np.generic):  # all else is refused where it becomes C
         yield place, float(value)
