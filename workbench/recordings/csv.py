@@ -92,8 +92,8 @@ def read_columns(
     lines = text.rstrip("\n").split("\n")
     _refuse_long(path, lines)
     separator = _separator(path, lines[0])
-    header, *rows = _split(path, lines, separator)
-    columns = _find(path, header, required, optional)
+    first, *rows = _split(path, lines, separator)
+    columns = _find(path, first, required, optional)
     if not rows:
         raise InputError(
             where=f"{path}, line 2",
@@ -189,11 +189,11 @@ def _ends_quotation(line: str, separator: str) -> bool:
 
 
 def _find(
-    path: Path, header: list[str], required: Sequence[str], optional: Sequence[str]
+    path: Path, cells: list[str], required: Sequence[str], optional: Sequence[str]
 ) -> dict[str, tuple[int, str]]:
     """Return index and unit of each wanted column."""
-    parsed = [_HEADER_CELL.fullmatch(cell.strip()) for cell in header]
-    names = [match["name"] if match else cell for match, cell in zip(parsed, header, strict=True)]
+    parsed = [header(cell) for cell in cells]
+    names = [name for name, _ in parsed]
     columns: dict[str, tuple[int, str]] = {}
     for name in (*required, *optional):
         indices = [index for index, other in enumerate(names) if other == name]
@@ -214,12 +214,11 @@ def _find(
                 expected="one",
                 remedy="rename or remove the others",
             )
-        match = parsed[indices[0]]
-        unit = match["unit"] if match else None
+        unit = parsed[indices[0]][1]
         if not unit:
             raise InputError(
                 where=where,
-                found=f"no unit in '{header[indices[0]]}'",
+                found=f"no unit in '{cells[indices[0]]}'",
                 expected=f"'{name} [unit]'",
                 remedy="write the unit in brackets behind the name",
             )

@@ -140,20 +140,6 @@ def _with_rest(parts: list[Cut], size: int) -> Iterator[Cut]:
         yield Cut(last, size, "between recordings")
 
 
-__all__ = [
-    "IMPORTED",
-    "Cut",
-    "Import",
-    "Piece",
-    "case_name",
-    "describe",
-    "import_recording",
-    "imported",
-    "store",
-    "write",
-    "write_record",
-]
-
 IMPORTED = "import.json"
 
 
