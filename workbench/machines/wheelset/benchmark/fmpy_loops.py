@@ -7,7 +7,6 @@ second time from their equations, without square roots of covariances and hand-m
 import shutil
 from ctypes import POINTER, c_double
 from pathlib import Path
-from types import TracebackType
 from typing import Self
 
 import numpy as np
@@ -65,12 +64,7 @@ class FMPyModel:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        error_type: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self.fmu.terminate()
         self.fmu.freeInstance()
         shutil.rmtree(self._folder, ignore_errors=True)
