@@ -9,7 +9,7 @@ from workbench.machines.wheelset.accuracy import COVERED, ROWS, Worst
 from workbench.machines.wheelset.accuracy_report import cell
 from workbench.observers import label
 from workbench.system.registry import load_system
-from workbench.system.units import said
+from workbench.system.units import in_spoken_unit
 
 TUNED = ("disturbance_observer", "parameter_estimator")
 SYSTEM = load_system("wheelset")
@@ -109,7 +109,7 @@ def sizes(cause: Summary) -> str:
     for name, parameter in cause["parameters"].items():
         ends = [parameter[key] for key in ("value", "low", "high")]
         # Four digits: three may hide that an interval misses.
-        (value, low, high), unit = said(ends, parameter["unit"])
+        (value, low, high), unit = in_spoken_unit(ends, parameter["unit"])
         texts.append(f"{name} {value:.4g} ({low:.4g} to {high:.4g}) {unit}")
     return "; ".join(texts)
 

@@ -8,7 +8,7 @@ import numpy as np
 from figure import Figure, Summary, Table
 from figure_tables import labelled, sizes, verdict
 
-from workbench.system.units import said
+from workbench.system.units import in_spoken_unit
 
 # What an independent simulator planted in four stops each, by the name of the set.
 FAULTS = {
@@ -120,7 +120,7 @@ def named(summary: Summary) -> Table:
             for word in others:
                 others[word] += summary["confusion"][name].get(word, 0)
         ((multiple, _),) = one["right_first"].items()
-        (size,), unit = said([one["size"] * float(multiple)], one["unit"])
+        (size,), unit = in_spoken_unit([one["size"] * float(multiple)], one["unit"])
         wrong += of - hits - sum(others.values())
         text = ", ".join(f"{count} {word}" for word, count in others.items() if count)
         rows.append([f"{kind}, {size:.3g} {unit}", f"{hits} of {of}", text])

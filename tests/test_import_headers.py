@@ -14,7 +14,7 @@ from numpy.testing import assert_allclose
 from workbench.errors import InputError
 from workbench.recordings.formats import read_recorded_file
 from workbench.recordings.formats.numbers import is_missing
-from workbench.recordings.formats.spelling import named
+from workbench.recordings.formats.spelling import name_and_unit
 from workbench.recordings.formats.stamps import iso
 
 
@@ -302,12 +302,12 @@ def test_merged_cells_of_a_workbook_name_all_columns_below(tmp_path):
 
 
 def test_a_number_in_brackets_is_that_of_a_channel():
-    assert named("log(1)") == ("log(1)", "")
-    assert named("log(1)[s]") == ("log(1)", "s")
-    assert named("slip [1]") == ("slip", "1")
-    assert named("x [3]") == ("x [3]", "")
-    assert named("flow {l/s}") == named("flow <l/s>") == ("flow", "l/s")
-    assert named("flow [l/s] (raw)") == ("flow (raw)", "l/s")
+    assert name_and_unit("log(1)") == ("log(1)", "")
+    assert name_and_unit("log(1)[s]") == ("log(1)", "s")
+    assert name_and_unit("slip [1]") == ("slip", "1")
+    assert name_and_unit("x [3]") == ("x [3]", "")
+    assert name_and_unit("flow {l/s}") == name_and_unit("flow <l/s>") == ("flow", "l/s")
+    assert name_and_unit("flow [l/s] (raw)") == ("flow (raw)", "l/s")
 
 
 @pytest.mark.parametrize(

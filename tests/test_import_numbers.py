@@ -15,7 +15,7 @@ from workbench.errors import InputError
 from workbench.recordings.channels import NamedChannel, propose
 from workbench.recordings.channels.clock import Clock
 from workbench.recordings.formats import read_recorded_file
-from workbench.recordings.formats.spelling import conversion, spelled
+from workbench.recordings.formats.spelling import conversion, spell_unit
 from workbench.recordings.formats.stamps import iso
 from workbench.system.registry import load_system
 from workbench.system.system import System
@@ -293,7 +293,7 @@ def test_a_channel_that_judges_is_named_and_not_dropped_in_silence(tmp_path, sys
     ],
 )
 def test_units_of_workshops_are_known(unit, si, factor):
-    found = conversion(spelled(f"[{unit}]"), si)
+    found = conversion(spell_unit(f"[{unit}]"), si)
     assert found.factor == pytest.approx(factor, rel=1e-15)
     assert found.zero == 0.0
 

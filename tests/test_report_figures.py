@@ -19,7 +19,7 @@ from numpy.testing import assert_allclose
 from workbench.observers import choose
 from workbench.observers.report import standings, summarise_runs, write_estimates, write_page
 from workbench.observers.simulation import CaseResult, case_figure, prepare
-from workbench.pages.drawing import drawing, extremes, packed
+from workbench.pages.drawing import drawing, extremes, pack_samples
 from workbench.pages.figures import DARK, LIGHT
 from workbench.pages.provenance import run_of
 from workbench.system.registry import load_system
@@ -126,7 +126,7 @@ def test_speeds_are_told_in_kilometres_per_hour_beside(uncertain):
 def test_samples_are_those_of_the_curves(uncertain):
     """What packing.py says of its codes, taken back by hand."""
     figure = case_figure(uncertain)
-    told, text = packed(figure)
+    told, text = pack_samples(figure)
     count = json.loads(told)["samples"]
     planes = np.frombuffer(zlib.decompress(base64.b64decode(text)), np.uint8)
     low, high = planes.reshape(2, -1, count).astype(np.int64)

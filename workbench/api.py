@@ -21,7 +21,7 @@ from workbench.diagnosis import Outcome, Problem, laws
 from workbench.diagnosis.laws import Proposal
 from workbench.errors import InputError
 from workbench.observers import Gains
-from workbench.observers.replay import observed
+from workbench.observers.replay import run_on_model
 from workbench.observers.run import Run
 from workbench.recordings.case import Case, check_recording, make_case, read_conditions
 from workbench.recordings.channels import RecordingOptions, parse_named
@@ -174,7 +174,7 @@ def observe(system: System, case: Case, estimator: str, gains: Gains | None = No
         If there is no such estimator, or the model is not fit for it.
     """
     (chosen,) = observers.choose(system, [estimator]).values()
-    return observed(case, system, chosen, gains)
+    return run_on_model(case, system, chosen, gains)
 
 
 def tune(

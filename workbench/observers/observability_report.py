@@ -94,7 +94,7 @@ def write_observability(
             for result in done
         },
     }
-    write_json(path, with_answer(observed(system, summary), summary))
+    write_json(path, with_answer(observability_answer(system, summary), summary))
 
 
 def _guesses(result: CaseObservability) -> list[str]:
@@ -399,7 +399,7 @@ def _terms(summary: Mapping[str, Any]) -> dict[str, str]:
     }
 
 
-def observed(system: System, summary: Mapping[str, Any]) -> Answer:
+def observability_answer(system: System, summary: Mapping[str, Any]) -> Answer:
     """The answer of `observability`."""
     headline, details = {}, {}
     cases = summary["cases"]

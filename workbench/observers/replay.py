@@ -19,7 +19,7 @@ from workbench.system.system import System
 SURE = 0.95  # probability, that of a band
 
 
-def observed(
+def run_on_model(
     case: Case, system: System, estimator: type[Estimator], gains: Gains | None = None
 ) -> Run:
     """Feed a recording to an estimator on the system's model, with its usual gains unless given.

@@ -56,7 +56,7 @@ def summarise_runs(
         "weights": dict(system.objective.weights),
         "cases": {result.case.name: result.to_dict() for result in results},
     }
-    return with_answer(simulated(system, summary), summary)
+    return with_answer(simulation_answer(system, summary), summary)
 
 
 def format_table(system: System, results: Sequence[CaseResult]) -> str:
@@ -168,7 +168,7 @@ def usual_error(errors: Sequence[float]) -> tuple[float | None, float | None, fl
     return middle, float(middle * np.exp(-reach)), float(middle * np.exp(reach))
 
 
-def simulated(system: System, summary: Mapping[str, Any]) -> Answer:
+def simulation_answer(system: System, summary: Mapping[str, Any]) -> Answer:
     """The answer of `simulate`."""
     reference = system.objective.signal
     ranking = standings(summary, reference)

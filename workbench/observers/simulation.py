@@ -19,7 +19,7 @@ from workbench.observers.estimators.open_loop import OpenLoop
 from workbench.observers.estimators.smoother import Smoother
 from workbench.observers.gains_file import read_gains, usual_gains
 from workbench.observers.observability import guesses, information, trajectory
-from workbench.observers.replay import observed, replay
+from workbench.observers.replay import replay, run_on_model
 from workbench.observers.run import (
     Ending,
     Run,
@@ -344,7 +344,7 @@ class Simulation:
         kept = 5 * 8 * case.time.size * len(self.system.columns) ** 2
         if any(signal.name in case for signal in self.system.reference_signals) or kept > _MOST:
             return None
-        return runs.get(Smoother.name) or smoothed(case, self.system)
+        return runs.get(Smoother.name) or smoother_run(case, self.system)
 
 
 def hidden(system: System) -> tuple[str, ...]:
@@ -353,7 +353,7 @@ def hidden(system: System) -> tuple[str, ...]:
     return tuple(name for name in system.columns if name not in fed)
 
 
-def smoothed(case: Case, system: System) -> Run | None:
+def smoother_run(case: Case, system: System) -> Run | None:
     """The best estimate of a recording that is over; None where nothing is hidden.
 
     And where the model is not fit for it, or it fails.
@@ -361,7 +361,7 @@ def smoothed(case: Case, system: System) -> Run | None:
     if not hidden(system):
         return None
     try:
-        run = observed(case, system, Smoother)
+        run = run_on_model(case, system, Smoother)
     except InputError:
         return None
     return run if run.ending is Ending.OK else None

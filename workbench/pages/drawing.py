@@ -21,7 +21,7 @@ _NONE = 65535
 _TICKS = 2**32 - 1  # of the time from the first to the last sample
 
 
-def packed(figure: CaseFigure) -> tuple[str, str]:
+def pack_samples(figure: CaseFigure) -> tuple[str, str]:
     """All samples of a figure: ranges of the channels as JSON, and their codes.
 
     The first two channels are the high and the low half of the time in ticks of the whole; then
@@ -73,7 +73,7 @@ _HEAD, _FOOT = 24, 40  # room for a panel's title, for the time axis [px]
 
 def drawing(figure: CaseFigure) -> dict[str, Any]:
     """Geometry of a figure for the template, in pixels, and in the units of the panels inside."""
-    header, samples = packed(figure)
+    header, samples = pack_samples(figure)
     whole = len(samples) <= _MOST
     begin, end = float(figure.time[0]), float(figure.time[-1])
     panels = []

@@ -32,13 +32,13 @@ from workbench.recordings.channels.names import (
     EXACT,
     WITHIN,
     WORDS,
-    alike,
     is_asked,
     is_time,
-    labelled,
+    likeness_to,
+    placed_channels,
 )
 from workbench.recordings.formats import FileChannel, RecordedFile
-from workbench.recordings.formats.spelling import conversion, spelled
+from workbench.recordings.formats.spelling import conversion, spell_unit
 from workbench.system.reader import system_of
 from workbench.system.units import check_unit
 
@@ -157,7 +157,7 @@ def _match(
     """Signals, why other inputs and outputs have no channel, and channels that nobody takes."""
     names = signal_names(description)
     places: dict[str, PlacedChannel] = {}
-    for placed in labelled(files[:1]):
+    for placed in placed_channels(files[:1]):
         place = PlacedChannel(*placed)
         if not _is_time(place.channel):
             places.setdefault(place.channel.name, place)
@@ -174,13 +174,15 @@ def _match(
         if not role or not variable.holds_number or variable.array:
             continue
         if channel := named.get(own):
-            unit = spelled(variable.unit or "") or channel.unit or "1"
+            unit = spell_unit(variable.unit or "") or channel.unit or "1"
             unit = unit if _is_known(unit) else "1"
             signals[own] = DraftSignal(own, variable, role, unit, channel, "named by you")
             continue
         called = [variable.name, own, variable.name.split(".")[-1], variable.text]
         for place in places.values():
-            likeness = alike(place.channel.name, place.channel.about, [c for c in called if c])
+            likeness = likeness_to(
+                place.channel.name, place.channel.about, [c for c in called if c]
+            )
             # A variable that is no output is meant only where a channel has its name.
             if likeness < EXACT and variable.causality == "local":
                 continue
@@ -243,7 +245,7 @@ def _candidate(
     name: str, variable: Variable, role: str, place: PlacedChannel, likeness: int
 ) -> tuple[DraftSignal | None, str]:
     """A channel as a variable, or None and why it cannot be."""
-    stated, own = place.channel.unit, spelled(variable.unit or "")
+    stated, own = place.channel.unit, spell_unit(variable.unit or "")
     if not likeness and not (stated and own):
         return None, ""
     doubt = "" if likeness else f"{name}: nothing but its unit speaks for '{place.channel.name}'"

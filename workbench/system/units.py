@@ -225,21 +225,23 @@ _STEPS = (1, 10, 100)  # of what a share is said per
 _WHOLE = 0.01  # share from which on it reads as whole percents
 
 
-def said(values: Sequence[float], unit: str) -> tuple[list[float], str]:
+def in_spoken_unit(values: Sequence[float], unit: str) -> tuple[list[float], str]:
     """Values in the unit in which people say the first of them.
 
     Parameters
     ----------
     values : in the SI `unit`; the first decides, others are ends of its interval.
 
-    >>> said([7.07e-4], "1/K"), said([0.0021, 0.002], "m")
+    >>> in_spoken_unit([7.07e-4], "1/K"), in_spoken_unit([0.0021, 0.002], "m")
     (([7.07], '% per 100 K'), ([2.1, 2.0], 'mm'))
-    >>> said([1.06], "1/s"), said([1.2], "1/K")
+    >>> in_spoken_unit([1.06], "1/s"), in_spoken_unit([1.2], "1/K")
     (([1.06], '1/s'), ([1.2], '1/K'))
-    >>> said([0.05], "m2"), said([1e-3], "m2")
+    >>> in_spoken_unit([0.05], "m2"), in_spoken_unit([1e-3], "m2")
     (([0.05], 'm2'), ([1000.0], 'mm2'))
-    >>> said([150.0], "N"), said([12e3], "Pa"), said([4.05e-4], "m2/s")
-    (([150.0], 'N'), ([120.0], 'mbar'), ([0.000405], 'm2/s'))
+    >>> in_spoken_unit([150.0], "N"), in_spoken_unit([12e3], "Pa")
+    (([150.0], 'N'), ([120.0], 'mbar'))
+    >>> in_spoken_unit([4.05e-4], "m2/s")
+    ([0.000405], 'm2/s')
     """
     size = abs(values[0])
     numerator, _, divisor = unit.partition("/")
@@ -260,7 +262,7 @@ def with_unit(value: float, unit: str) -> str:
     >>> with_unit(4e-4, "1/K"), with_unit(0.02, "1"), with_unit(150.0, "N")
     ('4 % per 100 K', '2 %', '150 N')
     """
-    (shown,), name = said([value], unit)
+    (shown,), name = in_spoken_unit([value], unit)
     return f"{shown:.3g} {name}"
 
 
@@ -270,6 +272,6 @@ def with_interval(value: float, low: float, high: float, unit: str) -> str:
     >>> with_interval(7.07e-4, 6.8e-4, 7.4e-4, "1/K")
     '7.07 % per 100 K (95 %: 6.8 to 7.4)'
     """
-    (middle, first, last), shown = said([value, low, high], unit)
+    (middle, first, last), shown = in_spoken_unit([value, low, high], unit)
     further = f", {3.6 * value:.3g} km/h" if unit == "m/s" else ""
     return f"{middle:.3g} {shown} (95 %: {first:.3g} to {last:.3g}{further})"

@@ -14,7 +14,7 @@ from workbench.arrays import Matrix, Vector
 from workbench.errors import FMUError, InputError, unknown_name
 from workbench.observers import Estimator, Gains, SearchSpace, estimators_of
 from workbench.observers.gains_file import format_gains
-from workbench.observers.replay import observed
+from workbench.observers.replay import run_on_model
 from workbench.observers.run import Ending
 from workbench.observers.score import with_readings
 from workbench.recordings.case import Case
@@ -457,7 +457,7 @@ def with_reference(cases: Sequence[Case], system: System, estimator: str) -> lis
         )
     judged_cases = []
     for case in cases:
-        run = observed(case, system, known[estimator])
+        run = run_on_model(case, system, known[estimator])
         if run.ending is not Ending.OK:
             raise InputError(
                 where=str(case.source),

@@ -9,7 +9,7 @@ from workbench.diagnosis.data.clocks import case_in_time
 from workbench.diagnosis.outcome import Outcome
 from workbench.observers.run import Run
 from workbench.observers.score import judged_window, score
-from workbench.observers.simulation import CaseResult, hidden, smoothed
+from workbench.observers.simulation import CaseResult, hidden, smoother_run
 from workbench.system.reader import with_model
 from workbench.system.system import OBSERVER
 from workbench.system.units import BAND
@@ -29,7 +29,9 @@ def best_estimate(outcome: Outcome, recording: str) -> CaseResult | None:
     models = {"nominal_model": (system, case)}
     if extension is not None:
         models["extended_model"] = (with_model(system, OBSERVER, extension.fmu), in_time)
-    smoothed_runs = {name: smoothed(recorded, model) for name, (model, recorded) in models.items()}
+    smoothed_runs = {
+        name: smoother_run(recorded, model) for name, (model, recorded) in models.items()
+    }
     runs = {name: run for name, run in smoothed_runs.items() if run is not None}
     scores = {name: score(in_time, run, system) for name, run in runs.items()}
     return CaseResult(system, in_time, runs, scores, None) if runs else None

@@ -57,7 +57,7 @@ def files(package: Path) -> tuple[Path, ...]:
     return tuple(sorted(p for p in package.parent.rglob("*") if p.suffix in (".mo", ".order")))
 
 
-def beside(file: Path) -> Path:
+def library_folder(file: Path) -> Path:
     """Folder in which libraries stand beside this one."""
     return file.parent.parent if file.name == PACKAGE else file.parent
 
@@ -108,7 +108,7 @@ class _Uses(Cursor):
 
 
 def _used(name: str, version: str, by: Path, where: str) -> Path:
-    places = [folder / name / PACKAGE for folder in (beside(by), resources.modelica())]
+    places = [folder / name / PACKAGE for folder in (library_folder(by), resources.modelica())]
     for folder in _modelica_path():
         places += [folder / f"{name} {version}" / PACKAGE, folder / name / PACKAGE]
         places += [folder / f"{name}.mo"]

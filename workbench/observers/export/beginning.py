@@ -73,7 +73,7 @@ class FirstValue:
         return f"{self.place} = {' + '.join(terms)};"
 
 
-def remembered(estimator: Estimator, sample: Vector) -> Remembered:
+def memory_after(estimator: Estimator, sample: Vector) -> Remembered:
     """All that is remembered after a first sample, (m + l,)."""
     m = len(estimator.system.inputs)
     estimator.start(sample[:m], sample[m:])
@@ -92,7 +92,7 @@ def usual_sample(estimator: Estimator) -> Vector:
     )
 
 
-def said_by_first(estimator: Estimator) -> list[FirstValue]:
+def values_of_first_sample(estimator: Estimator) -> list[FirstValue]:
     """What the first sample says, of all that is remembered.
 
     Raises
@@ -103,17 +103,17 @@ def said_by_first(estimator: Estimator) -> list[FirstValue]:
     usual = usual_sample(estimator)
     signals = (*estimator.system.inputs, *estimator.system.outputs)
     sizes = np.array([abs(signal.scale) or 1.0 for signal in signals])
-    places, begin = _flat(remembered(estimator, usual))
+    places, begin = _flat(memory_after(estimator, usual))
     # By powers of two, so that what is measured is found without rounding where zero is usual.
     steps = 2.0 ** np.round(np.log2(sizes))
-    moved = [_flat(remembered(estimator, usual + step))[1] for step in np.diag(steps)]
+    moved = [_flat(memory_after(estimator, usual + step))[1] for step in np.diag(steps)]
     slopes = np.array([_change(begin, step) for step in moved]).T / steps
     whole = np.round(slopes)
     slopes = np.where(np.abs(slopes - whole) < _ROUNDING, whole, slopes)
     share = np.random.default_rng(0).uniform(0.5, 1.0, sizes.size)  # of each signal another one
     for trial in _TRIALS:
         change = trial * share * sizes
-        changed = _change(begin, _flat(remembered(estimator, usual + change))[1])
+        changed = _change(begin, _flat(memory_after(estimator, usual + change))[1])
         large = np.abs(slopes) @ np.abs(change) + np.abs(np.where(np.isfinite(begin), begin, 0.0))
         if (bad := np.flatnonzero(np.abs(changed - slopes @ change) > _ROUNDING * large)).size:
             raise InputError(
@@ -142,7 +142,7 @@ def gains_in_settings(estimator: Estimator) -> dict[str, list[str]]:
     others = gains.with_values(gains.values * shares[0] + 1e-9 * shares[1])
     moved = type(estimator)(estimator.fmu, system, others)
     sample = usual_sample(estimator)
-    before, after = (_flat(remembered(e, sample))[1] for e in (estimator, moved))
+    before, after = (_flat(memory_after(e, sample))[1] for e in (estimator, moved))
     numbers = list(_numbers(parts.settings, "settings"))
     changed = [number for _, number in _numbers(moved.parts.settings, "settings")]
     places: dict[str, list[str]] = {name: [] for name in gains.names}

@@ -22,9 +22,9 @@ from workbench.models.modelica import read_library
 from workbench.observers import Estimator
 from workbench.observers.export.beginning import (
     gains_in_settings,
-    remembered,
-    said_by_first,
+    memory_after,
     usual_sample,
+    values_of_first_sample,
 )
 from workbench.observers.export.plant import plant_code, plant_of
 from workbench.observers.export.translation import (
@@ -138,7 +138,7 @@ def _law_code(estimator: Estimator, gains: Mapping[str, Sequence[str]]) -> dict[
     ----------
     gains : places in C among the settings, by gain that is a parameter.
     """
-    begin, parts = remembered(estimator, usual_sample(estimator)), estimator.parts
+    begin, parts = memory_after(estimator, usual_sample(estimator)), estimator.parts
     data = Data(f"estimator {estimator.name}")
     of_settings = data.type_of(parts.settings, "settings")
     of_memory = data.type_of(begin.memory, "memory")
@@ -187,7 +187,7 @@ def _law_code(estimator: Estimator, gains: Mapping[str, Sequence[str]]) -> dict[
         program.text(step),
         "static void estimator_begin(Law *law, const double *sample) {",
         "    *law = law_start;",
-        *(f"    {assignment.text}" for assignment in said_by_first(estimator)),
+        *(f"    {assignment.text}" for assignment in values_of_first_sample(estimator)),
         "}",
         "",
         "static int estimator_step(Law *law, double h, const double *sample, const double *gain,",

@@ -7,10 +7,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from workbench.arrays import Vector
-from workbench.recordings.channels.names import EXACT, WITHIN, WORDS, NamedChannel, alike, is_asked
+from workbench.recordings.channels.names import (
+    EXACT,
+    WITHIN,
+    WORDS,
+    NamedChannel,
+    is_asked,
+    likeness_to,
+)
 from workbench.recordings.formats import FileChannel, Group
 from workbench.recordings.formats.numbers import markers
-from workbench.recordings.formats.spelling import Conversion, conversion, is_unit, spelled
+from workbench.recordings.formats.spelling import Conversion, conversion, is_unit, spell_unit
 from workbench.system.parts import Signal
 from workbench.system.system import System
 
@@ -173,7 +180,7 @@ def size_doubt(values: Vector, unit: str, signal: Signal, column: str) -> str:
     return ""
 
 
-def unconfirmed(signal: str, channel: str, unit: str) -> str:
+def unit_doubt(signal: str, channel: str, unit: str) -> str:
     """That nobody has said a unit, and how to."""
     return f"no unit in the file, --column '{signal}={channel} [{unit}]' confirms [{unit}]"
 
@@ -231,7 +238,7 @@ def _candidate(
     reason = "name and unit" if likeness else "the only one of its unit"
     doubt = ""
     if concluded:
-        doubt = unconfirmed(signal.name, place.label, unit)
+        doubt = unit_doubt(signal.name, place.label, unit)
     elif not likeness:
         confirms = f"--column '{signal.name}={place.label}' confirms it"
         doubt = f"nothing but its unit speaks for it, {confirms}"
@@ -267,7 +274,7 @@ def _by_name(
     candidates: dict[int, list[tuple[Signal, Assignment]]] = {EXACT: [], WORDS: [], WITHIN: []}
     for signal in system.signals.values():
         for place in places:
-            likeness = alike(place.channel.name, place.channel.about, signal.names)
+            likeness = likeness_to(place.channel.name, place.channel.about, signal.names)
             if likeness and is_asked(place.channel.name) and not signal.exact:
                 doubts[signal.name] = f"'{place.channel.name}' is asked for, not measured"
             elif likeness:
@@ -381,5 +388,5 @@ def fitting_units(samples: Vector, signal: Signal, system: System) -> list[str]:
 def unit_in_name(name: str, signal: Signal, system: System) -> str:
     """A unit at the end of a name, as in `p_bar`; one letter may mean anything."""
     _, _, last = name.replace(" ", "_").rpartition("_")
-    unit = spelled(last)
+    unit = spell_unit(last)
     return unit if len(last) > 1 and last != name and conversion_to(unit, signal, system) else ""

@@ -9,7 +9,7 @@ from typing import Any
 
 from workbench.errors import InputError
 from workbench.recordings.formats import FileChannel, Group, RecordedFile
-from workbench.recordings.formats.spelling import named, spelled
+from workbench.recordings.formats.spelling import name_and_unit, spell_unit
 from workbench.system.system import System
 from workbench.system.tables import Table, read_table
 
@@ -75,7 +75,7 @@ def read_named(table: Table, system: System) -> dict[str, NamedChannel]:
         table.take(signal, dict)
         own = table.table(signal)
         own.refuse_unknown("channel unit reversed missing")
-        unit = spelled(own.text("unit", ""))
+        unit = spell_unit(own.text("unit", ""))
         other = "reversed" in own and own.take("reversed", bool)
         missing = _missing_values(own) if "missing" in own else None
         channels[signal] = NamedChannel(own.take("channel", str), unit, other, missing)
@@ -111,7 +111,7 @@ def parse_named(text: str, where: str, signals: Collection[str]) -> tuple[str, N
     if match := _MISSING.fullmatch(channel):
         own, values = match["channel"], re.split(r"[,\s]+", match["values"].strip())
         missing = () if values == ["none"] else tuple(map(float, values))
-    name, unit = named(own.removeprefix("-").strip())
+    name, unit = name_and_unit(own.removeprefix("-").strip())
     return signal, NamedChannel(name, unit, channel.startswith("-"), missing)
 
 
@@ -137,7 +137,7 @@ def is_asked(name: str) -> bool:
     return bool(_ASKED.intersection(own)) or any(map(_ASKED_WITHIN.search, own))
 
 
-def alike(channel: str, about: str, known: Sequence[str]) -> int:
+def likeness_to(channel: str, about: str, known: Sequence[str]) -> int:
     """How alike a channel's name is to those of a signal: EXACT, WORDS, WITHIN, or 0."""
     own = words(channel)
     best = 0
@@ -197,7 +197,7 @@ def stored_columns(folder: Path, system: System) -> dict[str, NamedChannel]:
     return read_named(table.table("columns"), system)
 
 
-def labelled(
+def placed_channels(
     files: Sequence[RecordedFile],
 ) -> Iterator[tuple[int, int, Group, FileChannel, str]]:
     """All channels with file and group, counted from 0, and a name that no other channel has.
@@ -224,7 +224,7 @@ def usable(
 ) -> dict[str, NamedChannel]:
     """Of stored channels those that some files have, in no other unit than what was confirmed."""
     units: dict[str, str] = {}
-    for _, _, group, channel, label in labelled(files):
+    for _, _, group, channel, label in placed_channels(files):
         unit = "" if channel.stamp else channel.unit
         units[channel.name] = units[f"{group.name}/{channel.name}"] = units[label] = unit
     units |= {text.name: "" for file in files for group in file.groups for text in group.left}

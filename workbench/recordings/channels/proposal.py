@@ -16,10 +16,16 @@ from workbench.recordings.channels.matching import (
     missing_of,
     samples_of,
     size_doubt,
-    unconfirmed,
+    unit_doubt,
     unit_reason,
 )
-from workbench.recordings.channels.names import TIME, NamedChannel, alike, labelled, listed
+from workbench.recordings.channels.names import (
+    TIME,
+    NamedChannel,
+    likeness_to,
+    listed,
+    placed_channels,
+)
 from workbench.recordings.formats import FileChannel, RecordedFile
 from workbench.recordings.formats.spelling import conversion, is_unit
 from workbench.recordings.formats.stamps import is_said
@@ -64,7 +70,7 @@ class ProposedMapping:
         ]
         times = {clock.channel: clock.unit for clock in self.clocks.values() if not clock.certain}
         return texts + [
-            f"{TIME}: {unconfirmed(TIME, name, unit)}" for name, unit in times.items() if name
+            f"{TIME}: {unit_doubt(TIME, name, unit)}" for name, unit in times.items() if name
         ]
 
     @property
@@ -140,7 +146,7 @@ def propose(
 def _text_of(signal: Signal, texts: Sequence[FileChannel]) -> str:
     """Why a signal has no channel: one of its name may hold texts."""
     for channel in texts:
-        if alike(channel.name, channel.about, signal.names):
+        if likeness_to(channel.name, channel.about, signal.names):
             example = next(filter(None, channel.texts), "")
             return f"'{channel.name}' holds texts such as '{example}', no numbers"
     return "no channel whose name or unit tells"
@@ -148,7 +154,7 @@ def _text_of(signal: Signal, texts: Sequence[FileChannel]) -> str:
 
 def _places(files: Sequence[RecordedFile]) -> list[PlacedChannel]:
     """All channels, each with a name that no other has."""
-    return [PlacedChannel(*placed) for placed in labelled(files)]
+    return [PlacedChannel(*placed) for placed in placed_channels(files)]
 
 
 def _find(
@@ -201,7 +207,7 @@ def _as_named(
     with np.errstate(over="ignore", invalid="ignore"):  # what no machine reads
         values = scale.factor * samples + scale.zero
     large = "" if channel.unit else size_doubt(values, unit, signal, column)
-    doubt = unconfirmed(signal.name, place.label, unit) if concluded else ""
+    doubt = unit_doubt(signal.name, place.label, unit) if concluded else ""
     return Assignment(
         file=place.file,
         group=place.group,

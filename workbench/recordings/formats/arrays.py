@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from workbench.recordings.formats.contents import FileChannel, Group
-from workbench.recordings.formats.spelling import conversion, named, spelled
+from workbench.recordings.formats.spelling import conversion, name_and_unit, spell_unit
 from workbench.recordings.formats.stamps import is_stamp, read_stamps
 
 _UNIT = re.compile(r"(?P<of>.*?)[_.]?(units?|einheit)", re.IGNORECASE)
@@ -55,7 +55,7 @@ def _collect(
     units, step = _units(content), _step(content, step)
     by_size: dict[int, list[FileChannel]] = {}
     for key, value in content.items():
-        name, unit = named(key)
+        name, unit = name_and_unit(key)
         unit = unit or units.get(key, "")
         if isinstance(value, Opaque):
             notes.append(f"'{key}' is {value}")
@@ -161,7 +161,7 @@ def _with_own_names(content: Mapping[str, Any]) -> Mapping[str, Any]:
 def _step(content: Mapping[str, Any], outer: float) -> float:
     """Time between samples that a number beside the arrays states [s]; else that further out."""
     unit = next((v for k, v in content.items() if k.lower() in _TIME_UNITS), "s")
-    scale = conversion(spelled(unit), "s") if isinstance(unit, str) else None
+    scale = conversion(spell_unit(unit), "s") if isinstance(unit, str) else None
     for key, value in content.items():
         if isinstance(value, Mapping | str | list) or np.size(value) != 1:
             continue
@@ -182,12 +182,12 @@ def _units(content: Mapping[str, Any]) -> dict[str, str]:
         if match is None:
             continue
         if isinstance(value, str) and match["of"]:
-            units[match["of"]] = spelled(value)
+            units[match["of"]] = spell_unit(value)
         elif isinstance(value, list) and len(value) == len(vectors):
-            units |= {name: spelled(unit) for name, unit in zip(vectors, value, strict=True)}
+            units |= {name: spell_unit(unit) for name, unit in zip(vectors, value, strict=True)}
         elif isinstance(value, Mapping):
             texts = {name: unit for name, unit in value.items() if isinstance(unit, str)}
-            units |= {name: spelled(unit) for name, unit in texts.items()}
+            units |= {name: spell_unit(unit) for name, unit in texts.items()}
     return units
 
 
@@ -223,8 +223,8 @@ def _simulink(name: str, content: Mapping[str, Any]) -> Group | None:
         if not isinstance(values, np.ndarray):
             return None
         label = str(signal.get("label") or "").strip() or key
-        own, unit = named(label)
-        unit = unit or (spelled(entry) if isinstance(entry := signal.get("unit"), str) else "")
+        own, unit = name_and_unit(label)
+        unit = unit or (spell_unit(entry) if isinstance(entry := signal.get("unit"), str) else "")
         channels += [replace(channel, about=key) for channel in _columns(own, unit, values, {})]
     if not channels or len({channel.values.size for channel in channels}) > 1:
         return None
@@ -250,7 +250,7 @@ def _single(name: str, content: Mapping[str, Any]) -> FileChannel | None:
     _, about = _entry(content, _TEXTS)
     return FileChannel(
         name,
-        spelled(unit)
+        spell_unit(unit)
         if isinstance(unit, str)
         else _units(content).get(key, "") or _inner_units(content, "DataInfo"),
         _flat(values),
@@ -261,7 +261,7 @@ def _single(name: str, content: Mapping[str, Any]) -> FileChannel | None:
 def _inner_units(content: Mapping[str, Any], key: str) -> str:
     """Units that a time series has in a structure beside its arrays; empty: none."""
     unit = content[key].get("Units") if isinstance(content.get(key), Mapping) else None
-    return spelled(unit) if isinstance(unit, str) else ""
+    return spell_unit(unit) if isinstance(unit, str) else ""
 
 
 def _columns(
@@ -282,9 +282,9 @@ def _columns(
     units = next((held for key, held in lists.items() if _UNIT.fullmatch(key)), [unit] * width)
     names = [held for key, held in lists.items() if not _UNIT.fullmatch(key)]
     own = names[0] if len(names) == 1 else [f"{name}({i + 1})" for i in range(width)]
-    labels = [named(label) for label in own]
+    labels = [name_and_unit(label) for label in own]
     return [
-        FileChannel(label, stated or spelled(units[i]), _flat(table[:, i]))
+        FileChannel(label, stated or spell_unit(units[i]), _flat(table[:, i]))
         for i, (label, stated) in enumerate(labels)
     ]
 
@@ -295,13 +295,13 @@ def _channel(name: str, unit: str, values: np.ndarray) -> FileChannel:
     zero = read_stamps("", [since["date"]] * 2) if since else None
     if since is None or zero is None or not math.isfinite(zero.start):
         return FileChannel(name, unit, values)
-    return FileChannel(name, spelled(since["unit"]), values, start=zero.start, zoned=zero.zoned)
+    return FileChannel(name, spell_unit(since["unit"]), values, start=zero.start, zoned=zero.zoned)
 
 
 def _flat(value: np.ndarray) -> np.ndarray:
     return np.asarray(value, dtype=np.float64).ravel()
 
 
-def numbered(entries: Sequence[Any]) -> dict[str, Any]:
+def by_place(entries: Sequence[Any]) -> dict[str, Any]:
     """Structures of an array of them, by the place that MATLAB gives them."""
     return {f"({number})": entry for number, entry in enumerate(entries, 1)}

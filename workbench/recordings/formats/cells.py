@@ -21,7 +21,7 @@ from workbench.recordings.formats.numbers import (
     reading_of,
     values_of,
 )
-from workbench.recordings.formats.spelling import is_unit, named, spelled
+from workbench.recordings.formats.spelling import is_unit, name_and_unit, spell_unit
 from workbench.recordings.formats.stamps import (
     has_day,
     has_day_alone,
@@ -296,14 +296,14 @@ def _header(above: Sequence[Sequence[str]], width: int) -> tuple[list[str], list
         with_units = max(named, key=_units_within)
         if 2 * _units_within(with_units) > width and all(with_units):  # above a row of kinds
             return with_units, []
-        return _whole_names(named), [spelled(cell) for cell in labelled]
+        return _whole_names(named), [spell_unit(cell) for cell in labelled]
     units = [cell if is_unit(cell) or not _says_nothing(cell) else "" for cell in rows[at]]
-    return _whole_names(named), [spelled(cell) for cell in units]
+    return _whole_names(named), [spell_unit(cell) for cell in units]
 
 
 def _units_within(row: Sequence[str]) -> int:
     """How many names of a row have a unit behind them."""
-    return sum(bool(named(cell)[1]) for cell in row)
+    return sum(bool(name_and_unit(cell)[1]) for cell in row)
 
 
 def _labelled_row(above: Sequence[Sequence[str]], label: re.Pattern[str], width: int) -> list[str]:
@@ -349,7 +349,7 @@ def by_tag(table: Cells) -> list[tuple[str, Cells]]:
     other kind is one, without a name.
     """
     columns = [[cell.strip() for cell in column] for column in zip(*table.rows, strict=True)]
-    labels = [named(name)[0].casefold() for name in table.names]
+    labels = [name_and_unit(name)[0].casefold() for name in table.names]
     at = {part: i for i, name in enumerate(labels) if (part := _PARTS_OF_TAGS.get(name))}
     if not at.keys() >= {"tag", "value"}:
         return [("", table)]
@@ -363,7 +363,7 @@ def by_tag(table: Cells) -> list[tuple[str, Cells]]:
         names[at["value"]], names[at["tag"]] = tag, "tag"
         if "unit" in at:
             own_units = {columns[at["unit"]][k] for k in kept}
-            units[at["value"]] = spelled(own_units.pop()) if len(own_units) == 1 else ""
+            units[at["value"]] = spell_unit(own_units.pop()) if len(own_units) == 1 else ""
         own_table = replace(
             table,
             rows=[table.rows[k] for k in kept],
@@ -459,12 +459,12 @@ def _numbers_within(cells: Sequence[str], unit: str) -> tuple[list[str], str] | 
     own = next(iter(units), "")
     if len(units) != 1 or not is_unit(own) or 2 * units[own] <= len(held):
         return None
-    if unit and spelled(unit) != spelled(own):
+    if unit and spell_unit(unit) != spell_unit(own):
         return None
     bare = [
         match["number"] if match else cell for match, cell in zip(matches, plainer, strict=True)
     ]
-    return bare, spelled(own)
+    return bare, spell_unit(own)
 
 
 def _join_date_parts(
@@ -578,7 +578,7 @@ def _with_parts(
 
 def _label(table: Cells, i: int) -> tuple[str, str]:
     """Name and unit of a column."""
-    name, unit = named(table.names[i])
+    name, unit = name_and_unit(table.names[i])
     return name or f"column {i + 1}", unit or table.units[i]
 
 

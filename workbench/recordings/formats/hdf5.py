@@ -8,7 +8,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from workbench.recordings.formats.arrays import Opaque, numbered, read_groups
+from workbench.recordings.formats.arrays import Opaque, by_place, read_groups
 from workbench.recordings.formats.contents import Contents
 
 _CLASS = "MATLAB_class"
@@ -30,7 +30,7 @@ def _members(group: h5py.Group, file: h5py.File) -> dict[str, Any]:
     """What a group holds, by name; #refs# are what cells point at."""
     structures = _structures(group, file)
     if structures:
-        return numbered(structures)
+        return by_place(structures)
     return {**_entries(dict(group.items()), file), **_attributes(group, ("unit", "units", *_RATES))}
 
 

@@ -10,9 +10,9 @@ import numpy as np
 from scipy.io import loadmat
 from scipy.io.matlab import MatlabOpaque
 
-from workbench.recordings.formats.arrays import Opaque, numbered, read_groups
+from workbench.recordings.formats.arrays import Opaque, by_place, read_groups
 from workbench.recordings.formats.contents import Contents, FileChannel, Group
-from workbench.recordings.formats.spelling import spelled
+from workbench.recordings.formats.spelling import spell_unit
 
 _UNIT = re.compile(r".*\[([^\[\]|]*)(\|[^\[\]]*)?\]\s*")  # of a description: Level [m|cm]
 _OBJECT = (
@@ -49,7 +49,7 @@ def _plain(value: Any) -> Any:
         return {key: _plain(entry) for key, entry in value.items()}
     listed = isinstance(value, list | np.ndarray) and len(np.shape(value)) == 1 and len(value) > 0
     if listed and all(isinstance(entry, dict) for entry in value):
-        return _plain(numbered(list(value)))
+        return _plain(by_place(list(value)))
     if isinstance(value, np.ndarray) and value.dtype.kind in "OU":
         return [str(entry) for entry in value.ravel() if isinstance(entry, str)]
     return value
@@ -86,7 +86,7 @@ def _result(content: Mapping[str, Any]) -> Contents:
         unit = _UNIT.fullmatch(about[k]) if k < len(about) else None
         if matrix == 2 and abs(row) > 1:
             values = np.sign(row) * data[abs(row) - 1][last]
-            stated = spelled(unit[1]) if unit else ""
+            stated = spell_unit(unit[1]) if unit else ""
             channels.append(FileChannel(name, stated, values, about[k] if k < len(about) else ""))
     clock = FileChannel("time", "s", times[last])
     return Contents("MAT 4, results of a Modelica tool", [Group("", (clock, *channels))], notes)

@@ -11,7 +11,7 @@ import numpy as np
 from asammdf import MDF
 
 from workbench.recordings.formats.contents import Contents, FileChannel, Group
-from workbench.recordings.formats.spelling import named, spelled
+from workbench.recordings.formats.spelling import name_and_unit, spell_unit
 
 _TIME = 1  # what a group counts its samples by: 0 nothing said, 1 time, 2 angle, 3 way, 4 index
 
@@ -57,7 +57,7 @@ def _group(file: MDF, index: int, held: Any, start: float, notes: list[str]) -> 
         if number == master:
             continue
         signal = file.get(group=index, index=number, ignore_invalidation_bits=True)
-        name, unit = named(channel.name)
+        name, unit = name_and_unit(channel.name)
         if signal.samples.dtype.kind not in "fiub" or signal.samples.ndim > 1:
             notes.append(f"'{name}' holds no numbers")
             continue
@@ -65,7 +65,7 @@ def _group(file: MDF, index: int, held: Any, start: float, notes: list[str]) -> 
         if signal.invalidation_bits is not None:
             values = np.where(np.asarray(signal.invalidation_bits), np.nan, values)
         channels.append(
-            FileChannel(name, unit or spelled(signal.unit), values, signal.comment or "")
+            FileChannel(name, unit or spell_unit(signal.unit), values, signal.comment or "")
         )
         clock = FileChannel("time", "s", np.asarray(signal.timestamps, np.float64), start=start)
     if not channels or channels[0].values.size < 2:

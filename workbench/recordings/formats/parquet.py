@@ -10,7 +10,7 @@ import pyarrow.parquet as pq
 
 from workbench.recordings.formats.cells import Cells, read_group
 from workbench.recordings.formats.contents import Contents, FileChannel, Group
-from workbench.recordings.formats.spelling import named, spelled
+from workbench.recordings.formats.spelling import name_and_unit, spell_unit
 
 _UNITS = (b"unit", b"units", b"Unit", b"Units", b"UNIT")
 _ABOUT = (b"description", b"comment", b"long_name")
@@ -23,9 +23,9 @@ def read(path: Path, raw: bytes) -> Contents:
     notes: list[str] = []
     texts: dict[str, list[str]] = {}
     for field, column in zip(table.schema, table.columns, strict=True):
-        name, unit = named(field.name)
+        name, unit = name_and_unit(field.name)
         known = field.metadata or {}
-        unit = unit or spelled(_first(known, _UNITS))
+        unit = unit or spell_unit(_first(known, _UNITS))
         about = _first(known, _ABOUT)
         arrow_type = field.type
         if pa.types.is_timestamp(arrow_type):

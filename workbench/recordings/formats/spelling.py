@@ -61,10 +61,10 @@ class Conversion:
     zero: float = 0.0
 
 
-def spelled(text: str) -> str:
+def spell_unit(text: str) -> str:
     """A unit as the workbench spells it, from what stands in a file; empty: nothing stands there.
 
-    >>> spelled("[ U/Min ]"), spelled("m/s²"), spelled("-"), spelled("kNm")
+    >>> spell_unit("[ U/Min ]"), spell_unit("m/s²"), spell_unit("-"), spell_unit("kNm")
     ('rpm', 'm/s2', '1', 'kNm')
     """
     bare = text.strip()
@@ -80,7 +80,7 @@ def conversion(unit: str, si: str) -> Conversion | None:
 
     Parameters
     ----------
-    unit : as `spelled`.
+    unit : as `spell_unit`.
     """
     base, factor, zero = _OTHER.get(unit, (unit, 1.0, 0.0))
     try:
@@ -91,7 +91,7 @@ def conversion(unit: str, si: str) -> Conversion | None:
 
 def is_unit(text: str) -> bool:
     """Whether a text is a unit that can be converted, or a sign for none."""
-    unit = spelled(text)
+    unit = spell_unit(text)
     try:
         check_unit(unit, "")
     except InputError:
@@ -106,12 +106,14 @@ _WITHIN = re.compile(r"(?P<name>.*\S)\s*\[(?P<unit>[^\[\]]+)\]\s*(?P<rest>\S.*)"
 _TRAILING = re.compile(r"(?P<name>.*\S)\s*(?:\s/\s?|\s+in\s+|,\s*)(?P<unit>\S+)")
 
 
-def named(cell: str) -> tuple[str, str]:
+def name_and_unit(cell: str) -> tuple[str, str]:
     """Name and unit of a column; the unit is empty where none is told.
 
-    >>> named("pC [bar]"), named("pC (bar)"), named("Kraft (gefiltert)"), named("Druck in bar")
-    (('pC', 'bar'), ('pC', 'bar'), ('Kraft (gefiltert)', ''), ('Druck', 'bar'))
-    >>> named("flow (1)")
+    >>> [name_and_unit(text) for text in ("pC [bar]", "pC (bar)", "Kraft (gefiltert)")]
+    [('pC', 'bar'), ('pC', 'bar'), ('Kraft (gefiltert)', '')]
+    >>> name_and_unit("Druck in bar")
+    ('Druck', 'bar')
+    >>> name_and_unit("flow (1)")
     ('flow (1)', '')
     """
     text = cell.strip().strip("'\"").strip()
@@ -120,9 +122,9 @@ def named(cell: str) -> tuple[str, str]:
         # A number is one of a channel, not its unit; [1] is none of a quantity without one.
         number = unit.strip().isdecimal() and (match["square"] is None or unit.strip() != "1")
         if match["name"] and not number and (match["square"] is not None or is_unit(unit)):
-            return match["name"], spelled(unit)
+            return match["name"], spell_unit(unit)
     if (match := _WITHIN.fullmatch(text)) and is_unit(match["unit"]) and match["unit"] != "1":
-        return f"{match['name']} {match['rest']}", spelled(match["unit"])
+        return f"{match['name']} {match['rest']}", spell_unit(match["unit"])
     if (match := _TRAILING.fullmatch(text)) and is_unit(match["unit"]):
-        return match["name"], spelled(match["unit"])
+        return match["name"], spell_unit(match["unit"])
     return text, ""

@@ -11,7 +11,7 @@ from nptdms import TdmsFile
 from nptdms.log import log_manager
 
 from workbench.recordings.formats.contents import Contents, FileChannel, Group
-from workbench.recordings.formats.spelling import conversion, named, spelled
+from workbench.recordings.formats.spelling import conversion, name_and_unit, spell_unit
 from workbench.recordings.formats.stamps import read_stamps
 
 _UNITS = ("unit_string", "NI_UnitDescription", "unit", "Unit", "units")
@@ -44,9 +44,9 @@ def _groups(held: Any, notes: list[str]) -> list[Group]:
     """A group of the file; channels with other times or lengths are groups of their own."""
     by_times: dict[tuple[int, float, float, float], list[FileChannel]] = {}
     for recorded in held.channels():
-        name, unit = named(recorded.name)
+        name, unit = name_and_unit(recorded.name)
         stated: Mapping[str, Any] = recorded.properties
-        unit = unit or spelled(str(next((stated[key] for key in _UNITS if key in stated), "")))
+        unit = unit or spell_unit(str(next((stated[key] for key in _UNITS if key in stated), "")))
         values = recorded[:]
         step, offset = _waveform_clock(stated)
         begun = stated.get("wf_start_time")
@@ -79,7 +79,7 @@ def _waveform_clock(stated: Mapping[str, Any]) -> tuple[float, float]:
     """Step and begin of a waveform [s]; zeros where it is none, or none over time."""
     step = float(stated.get("wf_increment", 0.0) or 0.0)
     # Without a unit LabVIEW means seconds; a spectrum has Hz.
-    scale = conversion(spelled(str(stated.get("wf_xunit_string", "") or "s")), "s")
+    scale = conversion(spell_unit(str(stated.get("wf_xunit_string", "") or "s")), "s")
     if scale is None or not step > 0.0:
         return 0.0, 0.0
     return scale.factor * step, scale.factor * float(stated.get("wf_start_offset", 0.0) or 0.0)
