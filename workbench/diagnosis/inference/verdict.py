@@ -47,6 +47,7 @@ _DRAWS = 2000  # of the bootstrap over stops
 # Share from which on a part has the right place, if not the right form: of squares, an offset in
 # place of a ramp takes 75 %, a line in place of a parabola 94 %.
 _MOST = 0.9
+_PART = 0.5  # share of what others leave that a part explains beside them: as much as remains
 _NEAREST = 3  # candidates that are told where none is accepted
 
 
@@ -117,12 +118,6 @@ class Cause:
     confusable_with: tuple[str, ...]
     explained: float
     phases: Vector | None
-
-    @property
-    def may_be_none(self) -> bool:
-        """Whether the interval of its size holds zero."""
-        size = self.parameters[self.effect.label]
-        return size.low <= 0.0 <= size.high
 
 
 @dataclass(frozen=True)
@@ -248,9 +243,10 @@ def conclude(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnos
             _cause(fit, chosen, effect, noise_alone=noise_alone)
             for effect in _strongest_first(fit, chosen, catalogue)
         ]
-        # Beside others, one that what remains may as well make zero only stands for a part of it.
-        if len(causes) > 1 and (idle := [c.effect.name for c in causes if c.may_be_none]):
-            objections.append(f"{' and '.join(idle)} may be zero within what remains")
+        # A part that explains less than remains may only stand for a piece of what is missing.
+        minor = [cause.effect.name for cause in causes if cause.explained < _PART]
+        if verdict == "partly explained" and len(causes) > 1 and minor:
+            objections.append(f"{' and '.join(minor)} would explain less than what remains")
             verdict, causes, gain = "unexplained", [], None
     if causes:
         twins = [fits.values() for fits in chosen.twins.values()]
