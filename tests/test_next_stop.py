@@ -311,6 +311,18 @@ def test_the_first_proposal_parts_what_the_recordings_before_did_not(
     assert (cause.effect.name, cause.confusable_with) == ("Draught", ())
 
 
+def test_a_difference_that_the_models_own_error_drowns_is_told_so(proposed):
+    """By 20 times the noise; a separation of 0.0 would say that they are the same."""
+    best = proposed.tried[0]
+    nothing = np.zeros_like(best.prediction.pairwise)
+    same = replace(best.prediction, pairwise=nothing, chance=nothing)
+    lost = replace(best, prediction=same)
+    rivals = replace(proposed.rivals, variance_factors=np.full(len(proposed.channels), 400.0))
+    found = replace(proposed, tried=(lost,), rivals=rivals)
+    assert "20 times the noise, drowns their difference" in found.sentence
+    assert "0.0" not in lost.measures
+
+
 def test_what_is_beside_the_best_of_a_fraction_is_tried_too(block, undecided, monkeypatch):
     monkeypatch.setattr(candidates, "_GRID", 1)
     knob = FurtherSetting("knob", "a knob", "1", (Setting(0.0, "0"), Setting(1.0, "1")))

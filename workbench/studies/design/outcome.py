@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from workbench.diagnosis.inference.rivals import Rivals
+from workbench.diagnosis.inference.thresholds import Thresholds
 from workbench.studies.design.prediction import Prediction
 from workbench.system.comparison import Channel
 from workbench.system.system import System
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 PROPOSED = 3
+_LEAST = 0.05  # standard deviations, which are told as 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,10 +44,11 @@ class RankedExperiment:
             return f"{_ratio(prediction):.2g} times as sure, {cost}"
         several = 1 < len(prediction.groups) < len(prediction.pairwise)
         group = " or its group" if several else ""
-        return (
-            f"separation {prediction.separation:.1f} standard deviations, chance "
-            f"{prediction.right:.0%} that the right one{group} is then named, {cost}"
-        )
+        apart = f"separation {prediction.separation:.1f} standard deviations"
+        if prediction.separation < _LEAST:
+            apart = "no separation beside what the models leave unexplained"
+        named = f"chance {prediction.right:.0%} that the right one{group} is then named"
+        return f"{apart}, {named}, {cost}"
 
     def to_dict(self) -> dict[str, Any]:
         """All of it as plain numbers and texts."""
@@ -130,11 +133,25 @@ class NextStop:
         for group in prediction.groups:
             if len(group) > 1:
                 names = " and ".join(self.names[i] for i in group)
-                sentences.append(f"No experiment here likely parts {names}, whichever is true.")
+                sentences.append(
+                    f"No experiment here likely parts {names}, whichever is true{self._drowned}."
+                )
         for sensor, experiment in self.sensors.items():
             groups = self._groups(experiment.prediction)
             sentences.append(f"A sensor of {sensor} would part {groups}: {experiment.text}.")
         return " ".join(sentences)
+
+    @property
+    def _drowned(self) -> str:
+        """Why differences do not show, where models leave far more than noise; else empty."""
+        left = self.rivals.variance_factors
+        if left.max() < Thresholds.wrong:
+            return ""
+        channel = self.channels[int(left.argmax())].label
+        return (
+            f": what they leave of {channel}, {np.sqrt(left.max()):.3g} times the noise, drowns "
+            "their difference. Look for its cause first, with workbench diagnose ... --propose"
+        )
 
     def _groups(self, prediction: Prediction) -> str:
         groups = (" or ".join(self.names[i] for i in group) for group in prediction.groups)

@@ -238,8 +238,10 @@ def write_power_page(summary: Mapping[str, Any], out: Path) -> Path:
         warnings.append("Interrupted: the same command with --resume goes on from here.")
     if summary["failed"]:
         warnings.append(f"{len(summary['failed'])} diagnoses failed; they count as not right.")
+    machine = f"Recordings are made by {provenance.get('machine', 'a virtual rig')}."
+    shown = [machine, _INTERVAL, _share_dots(summary["answer"])]
     parts = [
-        Part("shown", "How often it is right", [_INTERVAL, _share_dots(summary["answer"])]),
+        Part("shown", "How often it is right", shown),
         Part("definitions", "Definitions", [Definitions(_TERMS)]),
     ]
     if summary["effects"]:
