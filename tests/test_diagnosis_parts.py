@@ -436,7 +436,7 @@ def test_a_tolerance_at_its_bound_stays_there_while_the_rest_does_its_best():
 def linearised(errors: Matrix) -> LinearizedPoint:
     residuals = (
         WhitenedResiduals(
-            errors, 0.0, np.zeros((2, errors.shape[1])), np.zeros((errors.size + 1, 0))
+            errors, np.zeros(1), np.zeros((2, errors.shape[1])), np.zeros((errors.size + 1, 0))
         ),
     )
     return LinearizedPoint(Point({}, {}, np.zeros((1, 5)), {}), (), residuals, 20, np.ones(3), 0.0)

@@ -38,10 +38,16 @@ from workbench.studies.power import (
     share,
     summarise,
 )
-from workbench.studies.power.campaign import SURE, clear, predict_campaign
+from workbench.studies.power.campaign import SURE, clear, limits_of_effects, predict_campaign
 from workbench.studies.power.diagnosing import build_everything, library_effects
 from workbench.studies.power.planting import Group, Kind
-from workbench.studies.power.report import campaign_check, draw_chances, format_power, write_power
+from workbench.studies.power.report import (
+    campaign_check,
+    draw_chances,
+    format_power,
+    oracle_check,
+    write_power,
+)
 from workbench.studies.power.run import PowerStudy
 from workbench.studies.power.statistics import intervals_cover, named_all, named_right
 from workbench.system.registry import load_system
@@ -397,6 +403,19 @@ def test_a_plan_foresees_what_its_recordings_show(tmp_path):
     assert row.count("%") == 2 + len(
         sizes
     )  # of the size that matters, of chances, and that is sure
+
+    # What an oracle knows, the diagnosis does not: that nothing else is missing, and that all that
+    # the model leaves is noise. It linearises about the nominal model, which moves 5 % at most.
+    limits = limits_of_effects(study, PLANTABLE, 1)
+    shown = {row.effect: row for row in limits if row.sigma is not None}
+    assert all(row.sigma < 1.05 * by_name[name].sigma for name, row in shown.items() if row.sigma)
+    assert "FallingFriction" not in shown
+    # A gain of 8 kN that are read with noise of 80 N, a hundredth, in 1000 samples: 3e-4.
+    assert 0.0 < shown["FxGain"].sigma < 1e-3
+    oracle = oracle_check(limits)
+    oracle.write(PROVENANCE, tmp_path)
+    check("oracle", json.loads((tmp_path / "oracle.json").read_text()))
+    assert oracle.text.count("cannot show it") == len(limits) - len(shown)
 
 
 @pytest.mark.parametrize("unknowns", [1, 7])

@@ -12,14 +12,17 @@ from tests import growth
 from workbench.__main__ import main
 from workbench.api import observe
 from workbench.arrays import Matrix
+from workbench.diagnosis.data.motion import ModelSource
 from workbench.diagnosis.inference.verdict import Cause
+from workbench.diagnosis.simulation.residual_model import ResidualModel
 from workbench.errors import InputError
 from workbench.machines.train.planting import PLANTABLE, PlantedTrain, virtual_rig
 from workbench.observers.estimators.kalman import ExtendedKalmanFilter
-from workbench.recordings.case import Case, read_cases
+from workbench.recordings.case import Case, read_case, read_cases
 from workbench.studies.power import Planting, Repertoire, read_recorded_sets
 from workbench.studies.power.diagnosing import build_everything, diagnose_set, library_effects
-from workbench.system.registry import load_system, open_model
+from workbench.system.registry import load_system, model_path, open_model
+from workbench.system.system import OBSERVER
 
 SYSTEM = load_system("train")
 TRUE_TO_SHEET = {"tolerances": -1.0, "noise": -1.0}
@@ -57,7 +60,7 @@ def test_a_fault_acts_in_its_place(name, tmp_path):
     faulty = stop(tmp_path / "faulty", {**TRUE_TO_SHEET, name: size})
     n = min(sound.time.size, faulty.time.size) - 60
     signals = [f"pB{j}" for j in range(1, 5)] + [f"omega{i}" for i in range(1, 9)]
-    if name.startswith("reading"):
+    if name.startswith(("reading", "zero")):
         moved = [np.abs(faulty[s][:n] - sound[s][:n]).max() for s in signals[:4]]
         assert np.argmax(moved) == 2
         return
@@ -269,3 +272,39 @@ def test_water_and_a_wrong_track_file_are_named(
     cause = named({name: size}, 81, everything, tmp_path)
     assert cause.effect.name == right
     assert_allclose(cause.parameters[told].value, size, rtol=within)
+
+
+@pytest.mark.parametrize(
+    ("seed", "name", "size", "right"),
+    [
+        (5102, "late[3]", 0.002, "LateSpeed[3]"),
+        (5103, "drag[5]", 400.0, "DraggingBrake[5]"),
+        (5108, "zero[2]", 2000.0, "PressureSensorOffset[2]"),  # it shows while the train coasts
+        (5109, "accelerometer_bias", 0.12, "AccelerometerBias"),
+        (5110, "accelerometer_gain", 0.03, "AccelerometerGain"),
+        (5111, "glazing", 0.03, "Glazing"),
+        # Gone when brakes have hardly begun, as if all cylinders lagged.
+        (5106, "drying", 3000.0, "WaterFilm"),
+    ],
+)
+def test_faults_of_some_deviations_of_the_sheet_are_named_alone(
+    seed, name, size, right, everything, tmp_path
+):
+    cause = named({name: size}, seed, everything, tmp_path)
+    assert (cause.effect.name, cause.confusable_with) == (right, ())
+
+
+def test_only_a_recording_that_begins_unbraked_tells_what_a_sensor_reads_at_rest(tmp_path):
+    whole = stop(tmp_path, {"tolerances": -1.0, "zero[2]": 2000.0})
+    braked = whole.time > whole.time[np.argmax(whole["pB1"] > 2e5)]
+    (name,) = (path.parent for path in tmp_path.glob("*/measured.csv"))
+    header, *rows = (name / "measured.csv").read_text().splitlines()
+    kept = [row for row, wanted in zip(rows, braked, strict=True) if wanted]
+    (name / "measured.csv").write_text("\n".join([header, *kept]))
+    begun = read_case(name, SYSTEM)
+    source = ModelSource(model_path(SYSTEM, OBSERVER), SYSTEM, SYSTEM.given)
+    with ResidualModel(source, [whole, begun]) as simulations:
+        coasted, late = simulations.recordings
+    # Means of 200 samples of 2.3 mbar; the sheet's own zero is left out.
+    assert_allclose(coasted.rest, [0.0, 2000.0, 0.0, 0.0], atol=100.0)
+    assert np.isinf(late.rest_noise).all()

@@ -33,6 +33,8 @@ partial model Train "Longitudinal dynamics of a train with rigid couplings"
   parameter Real gradientError(unit="1", min=-0.02, max=0.02) = 0.0
     "True gradient less that of the track file";
   parameter Real bias(unit="m/s2", min=-1.0, max=1.0) = 0.0 "Of the accelerometer, at rest";
+  parameter Real sensitivity(unit="1", min=0.1, max=2.0) = 1.0
+    "Reading of the accelerometer over the acceleration";
   parameter Real omega0(unit="rad/s", min=1e-6) = 0.05 "Speed below which torques are smoothed";
   constant Real g(unit="m/s2") = 9.81 "Gravity";
 
@@ -102,7 +104,7 @@ equation
   end for;
   weight*acceleration = -sum(Fx) - (rest + B*v + air*v*noEvent(abs(v)))*tanh(v/0.01)
     - g*weight*(uphill + curves*tanh(v/0.01));
-  felt = acceleration + g*slope[1] + bias;
+  felt = sensitivity*(acceleration + g*slope[1]) + bias;
   annotation (Documentation(info="<html>
 <p><code>m*v' = -sum(Fx) - R(v) - g*m*(gradient + curves)</code>, <code>JW*omega' = r*Fx - tauB -
 losses</code>, Polach's law for <code>Fx</code>. Pads rub by an affine law of speed, a power of force and

@@ -1,6 +1,8 @@
 within TrainRig;
 model TwoVehicles "Two vehicles with four axles each"
   extends Train(final vehicles=2);
+  parameter Real zero[bogies](each unit="Pa", each min=-1e5, each max=1e5) = zeros(bogies)
+    "Readings of the pressure sensors of empty cylinders";
   input Real pB1(unit="Pa") "Pressure of bogie 1";
   input Real pB2(unit="Pa") "Pressure of bogie 2";
   input Real pB3(unit="Pa") "Pressure of bogie 3";
@@ -42,14 +44,16 @@ model TwoVehicles "Two vehicles with four axles each"
   output Real omega7(unit="rad/s", start=0.0, fixed=true, nominal=50.0) "Of axle 7";
   output Real omega8(unit="rad/s", start=0.0, fixed=true, nominal=50.0) "Of axle 8";
   output Real omegaReading[8](each unit="rad/s") = speedSensor.y "Readings of the speed sensors";
+  output Real pBRest[bogies](each unit="Pa") = cylinder.rest "Readings of empty cylinders";
   output Real slip(unit="m/s") = v - rA[1]*omega1 "Slip velocity of axle 1";
   output Real vGNSS(unit="m/s") = v "Speed that satellites tell";
   output Real force(unit="N") = sum(Fx) "Braking force of all axles";
   output Real a(unit="m/s2", start=0.0, fixed=true, nominal=1.0) "Of the accelerometer";
   output Real vTrain(unit="m/s", start=0.0, fixed=true, nominal=20.0) "Speed of the train";
 
-  replaceable Slots.UnchangedBogies cylinder(u={pB1, pB2, pB3, pB4})
-    constrainedby Slots.PartialBogies(u={pB1, pB2, pB3, pB4}) "From a bogie's valve to its cylinders";
+  replaceable Slots.UnchangedBogies cylinder(u={pB1, pB2, pB3, pB4} - zero, restBefore=zero)
+    constrainedby Slots.PartialBogies(u={pB1, pB2, pB3, pB4} - zero, restBefore=zero)
+    "From the reading of a bogie's sensor to its cylinders";
   replaceable Slots.UnchangedPads padFriction(u=ordinary, T=T, power=frictionPower)
     constrainedby Slots.PartialPads(u=ordinary, T=T, power=frictionPower) "Pads";
   replaceable Slots.UnchangedAxles brakeUnits(u=fill(units, n))
@@ -70,6 +74,8 @@ model TwoVehicles "Two vehicles with four axles each"
     constrainedby Common.Interfaces.Signal(u=C) "Resistance of the air";
   replaceable Slots.UnchangedAxles speedSensor(u=omega)
     constrainedby Slots.PartialAxles(u=omega) "Speed sensors";
+  replaceable Common.Signals.Unchanged accelerometer(u=felt)
+    constrainedby Common.Interfaces.Signal(u=felt) "Accelerometer";
 equation
   // Of the pads alone, in place of forces that follow from loads themselves.
   braking = sum(tauB[i]/rA[i] for i in 1:n)/weight;
@@ -98,7 +104,7 @@ equation
   der(omega8) = rate[8];
   der(vTrain) = acceleration;
   // A filter of first order at 5 Hz.
-  der(a) = 6.283185307179586*5.0*(felt + dbias - a);
+  der(a) = 6.283185307179586*5.0*(accelerometer.y + dbias - a);
   annotation (
     experiment(StopTime=60.0, Tolerance=1e-6),
     Documentation(info="<html>

@@ -44,6 +44,7 @@ def add(commands: arguments.Commands, text: str) -> argparse.ArgumentParser:
         "  python -m workbench power --clean 200 --resume\n"
         "  python -m workbench power --thresholds --sets 8\n"
         "  python -m workbench power --plan --case 01_dry_80_1.5 --case 04_dry_160_4.2\n"
+        "  python -m workbench power --oracle --system train\n"
         "  python -m workbench power --follow --case 24_alike_80_2.7 --case 25_alike_80_2.7\n"
         "  python -m workbench power --leave-out-effect --sizes 8 --repeats 1 --clean 0\n"
         "  python -m workbench power --sheet-error --repeats 2\n"
@@ -123,6 +124,12 @@ def _add_checks(parser: argparse.ArgumentParser) -> None:
             "--plan",
             "before a recording is made: the chance that the recordings named by --case show each "
             "effect at --sizes, from one set without any (into OUT/plan)",
+        ),
+        (
+            "--oracle",
+            "the least that the recordings named by --case can show of each effect, by the exact "
+            "model, the noise of the sensors and the tolerances of the system file; no diagnosis "
+            "finds less (into OUT/oracle)",
         ),
         (
             "--follow",
@@ -318,6 +325,17 @@ def _check_campaign(
     return campaign_check(rows, sizes), False
 
 
+def _check_limits(
+    options: argparse.Namespace, study: PowerStudy, engine: Engine
+) -> tuple[Check, bool]:
+    from workbench.studies.power.campaign import limits_of_effects
+    from workbench.studies.power.report import oracle_check
+
+    engine.report("one set without any effect is made and linearised")
+    rows = limits_of_effects(study, _select(options.effects, study.rig), options.seed)
+    return oracle_check(rows), False
+
+
 def _check_proposals(
     options: argparse.Namespace, study: PowerStudy, engine: Engine
 ) -> tuple[Check, bool]:
@@ -334,6 +352,7 @@ _CHECKS = {
     "sheet_error": _check_sheet_errors,
     "leave_out_effect": _check_left_out,
     "plan": _check_campaign,
+    "oracle": _check_limits,
     "follow": _check_proposals,
 }
 

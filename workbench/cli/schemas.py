@@ -22,7 +22,7 @@ from workbench.recordings.case import UNKNOWN
 from workbench.studies.distance.outcome import SafetyLevel
 from workbench.studies.distance.plain import PlainLevel
 from workbench.studies.power import following, left_out
-from workbench.studies.power.campaign import EffectChance
+from workbench.studies.power.campaign import EffectChance, EffectLimit
 from workbench.studies.power.sensitivity import VerdictChange
 from workbench.system.installed import installed_plugins
 from workbench.system.parts import Condition, StepTracking
@@ -216,6 +216,7 @@ def power_summaries() -> dict[str, Schema]:
         "sheet_error": _sheet_error(),
         "left_out": _left_out(),
         "plan": _plan(),
+        "oracle": summary("power --oracle", _SETS, {"effects": listed(declared(EffectLimit))}),
         "followed": _following(),
     }
 

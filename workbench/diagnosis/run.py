@@ -292,7 +292,7 @@ class _Found:
         system, usual = self.problem.system, {}
         for (name, choice), value in self.diagnosis.best.point.levels.items():
             level = system.comparison.levels.get(name)
-            if level is None or np.isfinite(level.spread):
+            if level is None or not level.free:
                 continue
             if not level.by or choice == str(system.condition(level.by).choices[0]):
                 usual[name] = value

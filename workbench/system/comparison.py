@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 from typing import ClassVar
 
+import numpy as np
+
 from workbench.system.declaration import Either, Scope, Unit, declared, key, table_name
 from workbench.system.expression import Expression
 from workbench.system.parts import (
@@ -92,6 +94,17 @@ class Level:
     spread: float = key(
         "relative standard deviation of the common level", absent=ENDLESS, otherwise="any"
     )
+    deviation: float = key(
+        "standard deviation of the common level in the parameter's SI unit, in place of `spread` "
+        "where the sheet's value is zero",
+        absent=ENDLESS,
+        otherwise="any",
+    )
+
+    @property
+    def free(self) -> bool:
+        """Whether nothing is expected of it."""
+        return bool(np.isinf(self.spread) and np.isinf(self.deviation))
 
 
 @declared
@@ -207,7 +220,7 @@ class Comparison:
         otherwise=f"{_LEAST_SKEW} samples",
     )
     begins: Threshold | None = key("input that is applied, by how much above its rest", absent=None)
-    rest: Rest | None = key("readings before that", absent=None)
+    rests: tuple[Rest, ...] = key("readings before that", name="rest", absent=())
     leading: LeadingOutput | None = key(
         "an output that leads a slow motion, which integrates the noise of inputs",
         name="leads",

@@ -104,7 +104,7 @@ def _of_type(hint: Any, declared: Key) -> Schema:
         item = _of_type(inside[0], declared)
         if table_name_of(kinds_of(inside[0])[0]):
             return {"type": "object", "additionalProperties": item}
-        return {"type": "array", "items": item}
+        return {"anyOf": [{"type": "array", "items": item}, item]}
     if origin is tuple:
         sizes = {} if inside[-1] is ... else {"minItems": len(inside), "maxItems": len(inside)}
         several = kinds_of(inside[0])

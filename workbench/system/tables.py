@@ -93,8 +93,11 @@ class Table:
         return stamp.removesuffix("T00:00:00")
 
     def tables(self, key: str) -> list["Table"]:
-        """A list of tables within."""
-        items = self.take(key, list) if key in self.content else []
+        """A list of tables within; a table alone is a list of one."""
+        alone = isinstance(self.content.get(key), dict)
+        items = (
+            [self.take(key, dict)] if alone else self.take(key, list) if key in self.content else []
+        )
         if not all(isinstance(item, dict) for item in items):
             raise self.wrong(key, "a list of tables")
         name = f"{self._header[1:-1]}.{key}" if self._header else key

@@ -6,7 +6,7 @@ equation
   y = u*(1.0 - loss);
   annotation (
     __Workbench(effect(
-      size="loss", matters=0.06,
+      size="loss", matters=0.03,
       separation="the material of the pads, read off them")),
     Documentation(info="<html>
 <p>Another material on the whole train.</p>

@@ -12,9 +12,10 @@ equation
     tau[i]*der(past[i]) = u[i] - past[i];
     y[i] = u[i] - lag[i]/tau[i]*(u[i] - past[i]);
   end for;
+  rest = restBefore;
   annotation (
     __Workbench(effect(
-      size="lag", matters=0.03,
+      size="lag", matters=0.012,
       separation="a gauge at a cylinder of the bogie")),
     Documentation(info="<html>
 <p>A narrowed pipe behind the valve: first order, exactly nothing at zero.</p>

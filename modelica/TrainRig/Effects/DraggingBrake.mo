@@ -8,7 +8,7 @@ equation
   end for;
   annotation (
     __Workbench(effect(
-      size="torque", matters=400.0,
+      size="torque", matters=100.0,
       separation="the temperature of the axle's discs after a run without braking")),
     Documentation(info="<html>
 <p>Pads that stay on their discs, also while nobody brakes.</p>

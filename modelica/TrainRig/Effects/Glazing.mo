@@ -10,7 +10,7 @@ equation
   end for;
   annotation (
     __Workbench(effect(
-      size="loss", matters=0.05,
+      size="loss", matters=0.005,
       separation="two stops in a row, the second with warm discs")),
     Documentation(info="<html>
 <p>The binder of the pads melts and covers them: friction falls over a few degrees.</p>

@@ -14,7 +14,7 @@ equation
   end for;
   annotation (
     __Workbench(effect(
-      size="lag", matters=0.003, slots={"speedSensor"},
+      size="lag", matters=3e-4, slots={"speedSensor"},
       separation="the reading beside another axle's while the train brakes hard")),
     Documentation(info="<html>
 <p>A filter with another time: first order, exactly nothing at zero.</p>

@@ -6,9 +6,10 @@ equation
   for i in 1:n loop
     y[i] = u[i]/(1.0 + gain[i]);
   end for;
+  rest = restBefore;
   annotation (
     __Workbench(effect(
-      size="gain", matters=0.03,
+      size="gain", matters=0.025,
       separation="the reading beside a gauge")),
     Documentation(info="<html>
 <p>The cylinders have less than what is read. Weak pads on both axles of the bogie look alike.</p>

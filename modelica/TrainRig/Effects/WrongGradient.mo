@@ -6,7 +6,7 @@ equation
   y = u + offset;
   annotation (
     __Workbench(effect(
-      size="offset", matters=1.5e-3, slots={"gradient"},
+      size="offset", matters=4.5e-4, slots={"gradient"},
       separation="the same way in the other direction")),
     Documentation(info="<html>
 <p>Another line, or a wrong sign of small gradients.</p>

@@ -8,7 +8,7 @@ equation
   end for;
   annotation (
     __Workbench(effect(
-      size="gain", matters=0.08,
+      size="gain", matters=0.06,
       separation="the vehicle on scales")),
     Documentation(info="<html>
 <p>An air spring that leaks reads less than its load.</p>

@@ -3,4 +3,5 @@ model UnchangedBogies "Null version: nothing changes"
   extends PartialBogies;
 equation
   y = u;
+  rest = restBefore;
 end UnchangedBogies;

@@ -22,11 +22,14 @@ model SizeZeroIsNominal "With every effect at size zero the train moves as the n
     redeclare Effects.IsolatedUnit brakeUnits, redeclare Effects.DraggingBrake dragging,
     redeclare Effects.WheelRadius radius, redeclare Effects.WrongMass weighed,
     redeclare Effects.LowAdhesion adhesion, redeclare Effects.WrongGradient gradient,
-    redeclare Effects.AirResistance airResistance, redeclare Effects.LateSpeed speedSensor);
+    redeclare Effects.AirResistance airResistance, redeclare Effects.LateSpeed speedSensor,
+    redeclare Effects.AccelerometerBias accelerometer);
 equation
   // A solver may leave its tolerance of 30 m/s and of 65 rad/s, tenfold for what adds up.
   assert(abs(zero.vTrain - nominal.vTrain) < 10.0*tolerance*30.0, "The train moves otherwise");
   assert(abs(zero.omegaReading[5] - nominal.omegaReading[5]) < 10.0*tolerance*65.0,
     "The reading is another one");
+  // Of the 2 m/s2 that are felt.
+  assert(abs(zero.a - nominal.a) < 10.0*tolerance*2.0, "Another acceleration is read");
   annotation (experiment(StopTime=5.0, Tolerance=1e-8));
 end SizeZeroIsNominal;

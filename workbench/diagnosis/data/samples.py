@@ -58,7 +58,8 @@ class Samples:
     restarts : where states are set as measured, or None if nowhere.
     held : (m,) whether an input is held from a sample to the next; else it goes there.
     begin : outputs, and what rolls along, at the start.
-    rest : mean of the input at rest, before it is applied; rest_noise : its standard deviation.
+    rest : (q,) means of inputs at rest, before they are applied; rest_noise : (q,) standard
+        deviations, infinite of one that is never at rest before it is applied.
     blocks : (b, 2) first sample and end of each block that counts.
     slopes : (c, c) of the channels by the signals.
     whitening : (b, c, c) makes the errors of a block, by channel, white with variance one.
@@ -82,8 +83,8 @@ class Samples:
     restarts: Restarts | None
     held: NDArray[np.bool_]
     begin: Mapping[str, float]
-    rest: float
-    rest_noise: float
+    rest: Vector
+    rest_noise: Vector
     blocks: NDArray[np.int64]
     slopes: Matrix
     whitening: NDArray[np.float64]
@@ -325,13 +326,21 @@ def _led(
     return gain, None, walked[:, None, None] * np.outer(along, along)
 
 
-def _at_rest(compare: Comparison, clean: Mapping[str, Vector], applied: int) -> tuple[float, float]:
-    """Mean of the input before it is applied, and its standard deviation."""
-    if compare.rest is None:
-        return 0.0, 1.0
-    rest = clean[compare.rest.signal][:applied]
-    spread = float(np.std(rest)) / np.sqrt(rest.size)
-    return float(np.mean(rest)), float(np.hypot(spread, compare.rest.zero))
+def _at_rest(
+    compare: Comparison, clean: Mapping[str, Vector], applied: int
+) -> tuple[Vector, Vector]:
+    """Means of inputs before they are applied, (q,), and their standard deviations, (q,).
+
+    A recording that begins while an input acts does not tell what its sensor reads at rest.
+    """
+    means, deviations = np.zeros((2, len(compare.rests)))
+    for q, rest in enumerate(compare.rests):
+        values = clean[rest.signal]
+        before = values[:applied]
+        means[q] = np.mean(before)
+        spread = float(np.std(before)) / np.sqrt(before.size)
+        deviations[q] = np.hypot(spread, rest.zero) if applied < values.size else np.inf
+    return means, deviations
 
 
 def _begin(system: System, measured: dict[str, float], motion: Motion) -> dict[str, float]:

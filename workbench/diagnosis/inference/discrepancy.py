@@ -47,9 +47,9 @@ def correlated_deviations(fit: Fit, best: FittedModel) -> dict[Key, float]:
     errors, slopes = [], []
     for system in joint.systems:
         follows, _ = system.follows()
-        beside = (system.J + system.P @ follows)[:-1]  # (b*c, p)
+        beside = (system.J + system.P @ follows)[: system.blocks]  # (b*c, p)
         slopes.append(beside.reshape(-1, system.channels, len(joint.shared)))
-        errors.append(system.r[:-1].reshape(-1, system.channels))
+        errors.append(system.r[: system.blocks].reshape(-1, system.channels))
     scores = np.zeros((len(joint.shared),) * 2)
     for c in range(joint.systems[0].channels):
         covariances = autocovariance([own[:, c] for own in errors])

@@ -162,7 +162,7 @@ class Fit:
         (residual,) = residuals
         errors, jacobian = residual.errors.copy(), residual.jacobian.copy()
         errors[self._hidden] = 0.0
-        jacobian[:-1].reshape(*errors.shape, -1)[self._hidden] = 0.0
+        jacobian[: errors.size].reshape(*errors.shape, -1)[self._hidden] = 0.0
         return (replace(residual, errors=errors, jacobian=jacobian),)
 
     @property
@@ -288,9 +288,10 @@ class Fit:
         point, case = lin.point, self._simulations.cases[k]
         residuals = lin.residuals[k]
         b, m = residuals.errors.shape
-        weight = np.append(np.tile(1.0 / np.sqrt(lin.variance_factors), b), 1.0)
+        q = residuals.rest.size
+        weight = np.append(np.tile(1.0 / np.sqrt(lin.variance_factors), b), np.ones(q))
         at = {key: residuals.jacobian[:, j] * weight for j, key in enumerate(lin.keys)}
-        J, P = np.zeros((b * m + 1, len(shared))), []
+        J, P = np.zeros((b * m + q, len(shared))), []
         for j, key in enumerate(shared):
             if key in point.levels and key[1] == SENSOR:
                 J[:, j] = at[_LOCAL, key[0]]
@@ -312,11 +313,11 @@ class Fit:
             at[_LOCAL, name] * self.unknowns.spread(point, name, k, spread)
             for name, spread in self.unknowns.local.items()
         ]
-        free = np.zeros((b * m + 1, 0))
+        free = np.zeros((b * m + q, 0))
         local = np.column_stack([free, *tolerances, *P])
         furthest = np.repeat([self.decides.furthest, _TURN], [len(tolerances), len(P)])
         r, deviations = residuals.residual * weight, point.deviations[k]
-        return RecordingSystem(r, J, local, deviations, furthest, m)
+        return RecordingSystem(r, J, local, deviations, furthest, m, rests=q)
 
     def _prior(self, point: Point, shared: Sequence[Key]) -> Quadratic:
         """What is known of the common unknowns beforehand."""

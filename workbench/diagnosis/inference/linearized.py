@@ -55,7 +55,7 @@ class LinearizedPoint:
     settled: bool = False
 
     def extended(self, keys: Iterable[Key], jacobians: Sequence[Matrix]) -> "LinearizedPoint":
-        """The same with more columns, (b*m + 1, p) of each stop."""
+        """The same with more columns, (b*m + q, p) of each stop."""
         residuals = tuple(
             replace(recording, jacobian=np.column_stack([recording.jacobian, more]))
             for recording, more in zip(self.residuals, jacobians, strict=True)
@@ -92,7 +92,7 @@ class LinearizedPoint:
         count, mean = self._squares
         noise = count * np.minimum(mean, 1.0 + self.excess)
         wrong = count / self.lasting * np.log(self.spread)
-        rest = sum(recording.rest**2 for recording in self.residuals)
+        rest = sum(float(recording.rest @ recording.rest) for recording in self.residuals)
         return float((noise + wrong).sum()) + rest + self.away
 
     @property
@@ -105,7 +105,7 @@ class LinearizedPoint:
         """Chi-squared, each channel in units of what is wrong with it, (m,)."""
         return float(
             sum(
-                (recording.errors**2 / variance_factors).sum() + recording.rest**2
+                (recording.errors**2 / variance_factors).sum() + recording.rest @ recording.rest
                 for recording in self.residuals
             )
         )

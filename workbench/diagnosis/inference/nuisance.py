@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
-from workbench.arrays import Matrix
 from workbench.diagnosis.effects.catalogue import Effect, variant
 from workbench.diagnosis.inference.fit import Fit
+from workbench.diagnosis.inference.quadratic import Quadratic, beside, minimum
 from workbench.diagnosis.inference.score_test import ScoreTest, shapes
 from workbench.diagnosis.inference.search import FittedModel
 from workbench.diagnosis.inference.unknowns import SENSOR
@@ -27,7 +27,8 @@ class ShiftedLevel:
     ----------
     name, choice : of the parameter, and of the condition that it is calibrated by.
     value, sheet : as calibrated, and as conditions or the model say, in `unit`.
-    declared : relative standard deviation by the system file; None where it declares none.
+    declared : relative standard deviation by the system file; None where it declares none,
+        or the sheet's value is zero.
     hides : effects that these recordings cannot tell from it.
     """
 
@@ -74,6 +75,11 @@ def hidden_effects(
         own.setdefault(key[0], []).append(joint.shared.index(key))
     every = [j for at in own.values() for j in at]
     sizes = [j for j, key in enumerate(joint.known) if key not in trial.levels]
+    known = [*sizes, *every]
+    left = np.diag(beside(N, known))
+    without = {
+        name: np.diag(beside(N, [j for j in known if j not in at])) for name, at in own.items()
+    }
     hidden: dict[str, dict[str, float]] = {}
     for effect in (effect for effect in catalogue if not effect.order_locked):
         keys = [(variant(effect, shape), effect.size) for shape in shapes(effect)]
@@ -81,26 +87,16 @@ def hidden_effects(
         if not columns or (effect.name, effect.label) in joint.known:
             continue
         for name, at in own.items():
-            others = [*sizes, *(j for j in every if j not in at)]
-            beside = [(_left(N, j, others), _left(N, j, [*sizes, *every]), j) for j in columns]
-            shows = (
-                max(before for before, _, _ in beside)
-                > (fit.decides.significant / effect.matters) ** 2
-            )
-            if shows and all(left < 2.0 * fit.decides.twin * before for before, left, _ in beside):
-                known = [*sizes, *every]
-                column = max(beside)[2]
-                taken = np.linalg.lstsq(N[np.ix_(known, known)], N[known, column], rcond=None)[0]
+            before = without[name][columns]
+            shows = before.max() > (fit.decides.significant / effect.matters) ** 2
+            if shows and (left[columns] < 2.0 * fit.decides.twin * before).all():
+                column = columns[int(np.argmax(before))]
+                taken = minimum(
+                    Quadratic(N[np.ix_(known, known)], -N[known, column], 0.0, 0)
+                )  # N_kk^-1 N_kj
                 share = max((taken[known.index(j)] for j in at), key=abs)
                 hidden.setdefault(name, {})[effect.name] = float(share)
     return hidden
-
-
-def _left(N: Matrix, column: int, known: Sequence[int]) -> float:
-    """Information on one unknown, where others are fitted freely."""
-    at = list(known)
-    solved = np.linalg.lstsq(N[np.ix_(at, at)], N[at, column], rcond=None)[0]
-    return float(N[column, column] - N[at, column] @ solved)
 
 
 def shifted_levels(
@@ -129,12 +125,12 @@ def shifted_levels(
         sigma = float(sigmas[trial.joint.known.index(key)])
         away = float(value) - sheet
         hides = tuple(hidden.get(key[0], {}))
-        far = np.isfinite(declared) and away**2 > limit * (sigma**2 + (declared * sheet) ** 2)
+        far = np.isfinite(declared) and away**2 > limit * (sigma**2 + declared**2)
         stands = abs(away) > fit.decides.significant * sigma and any(
             abs(away) > abs(share) * matters[name] for name, share in hidden.get(key[0], {}).items()
         )
         if far or stands:
             unit = fit.unknowns.level_unit(key)
-            known = float(declared) if np.isfinite(declared) else None
+            known = declared / abs(sheet) if np.isfinite(declared) and sheet else None
             shifted.append(ShiftedLevel(*key, float(value), sheet, unit, known, hides))
     return tuple(shifted)

@@ -83,6 +83,17 @@ def _definite(scaled: Matrix) -> tuple[Matrix, bool] | None:
     return (factor, False) if left > _CERTAIN else None
 
 
+def beside(N: Matrix, at: Sequence[int]) -> Matrix:
+    """Information on all unknowns where some are fitted freely, N - N_a (N_aa)^-1 N_a', (p, p).
+
+    Units of unknowns differ by ten powers of ten: unscaled, the least of them would be rounding.
+    """
+    scale, scaled = _scaled(N)
+    solved = np.linalg.lstsq(scaled[np.ix_(at, at)], scaled[at], rcond=None)[0]
+    left: Matrix = (scaled - scaled[:, at] @ solved) / scale[:, None] / scale[None, :]
+    return left
+
+
 def minimum(total: Quadratic) -> Vector:
     """Where chi-squared is least; unknowns that the data do not show stay."""
     scale, scaled = _scaled(total.N)
@@ -119,8 +130,9 @@ class RecordingSystem:
     r : (n,); J : (n, p); P : (n, q).
     deviations : (d,) of the present point, of the first unknowns in l; phases are free.
     furthest : (q,) from zero, of a deviation or of a step of what is no deviation.
-    channels : c; r holds the errors of blocks, each by channel, and last the one of the rest.
+    channels : c; r holds the errors of blocks, each by channel, and last those at rest.
     held : (q,) entries of l that are not free any more; NaN of those that are. None: all are.
+    rests : number of errors at rest.
     """
 
     r: Vector
@@ -130,11 +142,17 @@ class RecordingSystem:
     furthest: Vector
     channels: int
     held: Vector | None = None
+    rests: int = 1
+
+    @property
+    def blocks(self) -> int:
+        """Number of errors of blocks."""
+        return self.r.size - self.rests
 
     def errors(self, z: Vector) -> Matrix:
         """Whitened errors of the blocks, (b, c), for a step z of the common unknowns."""
         errors: Matrix = self.r + self.J @ z + self.P @ self.local(z)
-        return errors[:-1].reshape(-1, self.channels)
+        return errors[: self.blocks].reshape(-1, self.channels)
 
     @property
     def _free(self) -> NDArray[np.bool_]:
@@ -218,16 +236,17 @@ def part_edges(blocks: int, parts: int) -> NDArray[np.intp]:
 
 
 def _cut(system: RecordingSystem, parts: int) -> tuple[RecordingSystem, ...]:
-    """One recording in parts, of blocks that follow each other; the first has the error at rest."""
-    edges = part_edges((system.r.size - 1) // system.channels, parts) * system.channels
-    rest = np.zeros(system.r.size)
-    rest[-1] = 1.0
+    """One recording in parts, of blocks that follow each other; the first has errors at rest."""
+    edges = part_edges(system.blocks // system.channels, parts) * system.channels
+    at_rest = np.arange(system.blocks, system.r.size)
     cut = []
     for first, end in pairwise(edges):
-        rows = np.append(np.arange(first, end), system.r.size - 1)
-        weight = 1.0 - rest[rows] * (first > 0)
+        rows = np.append(np.arange(first, end), at_rest)
+        weight = np.ones(rows.size)
+        weight[end - first :] = first == 0
         part = (system.r[rows] * weight, system.J[rows] * weight[:, None], system.P[rows])
-        cut.append(RecordingSystem(*part, system.deviations, system.furthest, system.channels))
+        given = system.deviations, system.furthest, system.channels
+        cut.append(RecordingSystem(*part, *given, rests=system.rests))
     return tuple(cut)
 
 
@@ -270,7 +289,9 @@ class Joint:
             shared=(*self.known, *own, *extra),
             known=(*self.known, *own),
             levels=(*self.levels, *own),
-            systems=_cut(RecordingSystem(part.r, J, J[:, :0], none, none, part.channels), parts),
+            systems=_cut(
+                replace(part, J=J, P=J[:, :0], deviations=none, furthest=none, held=None), parts
+            ),
             prior=Quadratic(N, g, c, 0),
         )
 

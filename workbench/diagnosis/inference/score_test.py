@@ -9,7 +9,15 @@ from workbench.arrays import Matrix, Vector
 from workbench.diagnosis.effects.catalogue import Effect, variant
 from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.linearized import LinearizedPoint
-from workbench.diagnosis.inference.quadratic import Joint, Quadratic, add, covariance, minimum
+from workbench.diagnosis.inference.quadratic import (
+    Joint,
+    Key,
+    Quadratic,
+    add,
+    beside,
+    covariance,
+    minimum,
+)
 
 Candidate = tuple[Effect, Mapping[str, float]]
 
@@ -65,12 +73,16 @@ def shapes(effect: Effect) -> list[dict[str, float]]:
 
 def score_test(fit: Fit, lin: LinearizedPoint, candidates: Sequence[Candidate]) -> "ScoreTest":
     """Put candidates to the trial about a point that is fitted, with derivatives by all of them."""
-    extra = [
+    return ScoreTest(fit, fit.apart(lin, signatures(candidates)), candidates)
+
+
+def signatures(candidates: Sequence[Candidate]) -> list[Key]:
+    """Columns of the derivatives by the sizes of candidates."""
+    return [
         (variant(effect, shape), parameter)
         for effect, shape in candidates
         for parameter in effect.sizes
     ]
-    return ScoreTest(fit, fit.apart(lin, extra), candidates)
 
 
 class ScoreTest:
@@ -127,9 +139,7 @@ class ScoreTest:
 
     def _beside(self, at: Sequence[int]) -> Vector:
         """(p,) What stops say of each unknown, where others are fitted freely."""
-        N = add(self._stops).N
-        solved = np.linalg.lstsq(N[np.ix_(at, at)], N[at], rcond=None)[0]
-        left: Vector = np.diag(N) - np.einsum("ij,ij->j", N[at], solved)
+        left: Vector = np.diag(beside(add(self._stops).N, at))
         return left
 
     def _select(

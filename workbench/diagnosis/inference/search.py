@@ -162,7 +162,7 @@ def _simulated_start(fit: Fit, best: FittedModel, score: CandidateScore) -> Cand
     now = [recording.errors for recording in lin.residuals]
     slopes = [
         float(fit.unknowns.presence.at(effect, k))
-        * recording.jacobian[:-1, at].reshape(recording.errors.shape)
+        * recording.jacobian[: recording.errors.size, at].reshape(recording.errors.shape)
         for k, recording in enumerate(lin.residuals)
     ]
     slope = weighed(slopes)

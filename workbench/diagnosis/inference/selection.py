@@ -15,6 +15,7 @@ from workbench.diagnosis.effects.catalogue import Effect, variant
 from workbench.diagnosis.inference.crossvalidation import CrossValidation
 from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.linearized import Point
+from workbench.diagnosis.inference.quadratic import beside
 from workbench.diagnosis.inference.score_test import CandidateScore, ScoreTest, shapes
 from workbench.diagnosis.inference.search import (
     FittedModel,
@@ -236,8 +237,7 @@ def _confusability(trial: ScoreTest, catalogue: Sequence[Effect]) -> tuple[tuple
         at = [joint.shared.index(key) for key in keys if key in joint.shared]
         if at:
             own[effect.name] = at
-    solved = np.linalg.lstsq(total[np.ix_(levels, levels)], total[levels], rcond=None)[0]
-    rest = total - total[:, levels] @ solved
+    rest = beside(total, levels)
     roots = {name: _inverse_root(rest[np.ix_(at, at)]) for name, at in own.items()}
     cosines = np.eye(len(own))
     for i, (a, at_a) in enumerate(own.items()):

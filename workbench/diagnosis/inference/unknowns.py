@@ -196,29 +196,29 @@ class Unknowns:
         return self._compare.false_alarms
 
     def sheet(self, key: Key) -> tuple[float, float]:
-        """What conditions or the model say of a level, and its relative standard deviation.
+        """What conditions or the model say of a level, and its standard deviation, SI.
 
         That of the level itself, or else from recording to recording; infinite where neither is
         declared.
         """
         name, choice = key
         case = next(c for c in self._simulations.cases if self.choice(name, c) == choice)
-        spread = self._compare.levels[name].spread
-        if not np.isfinite(spread):
-            spread = self._compare.tolerances.get(name, np.inf)
-        return self._usual(name, case), spread
+        level, usual = self._compare.levels[name], self._usual(name, case)
+        if np.isfinite(level.deviation):
+            return usual, level.deviation
+        share = level.spread
+        if not np.isfinite(share):
+            share = self._compare.tolerances.get(name, np.inf)
+        return usual, share * abs(usual)
 
     def expected(self, key: Key) -> tuple[float, float]:
         """What is expected of a level, and its standard deviation, infinite for anything."""
         name, choice = key
         if choice == SENSOR:
             return 0.0, self.modes[name].late
-        spread = self._compare.levels[name].spread
-        if not np.isfinite(spread):
+        if self._compare.levels[name].free:
             return 0.0, np.inf
-        case = next(c for c in self._simulations.cases if self.choice(name, c) == choice)
-        middle = self._usual(name, case)
-        return middle, spread * abs(middle)
+        return self.sheet(key)
 
 
 def choice_of(system: System, level: str, conditions: Mapping[str, Value]) -> str:

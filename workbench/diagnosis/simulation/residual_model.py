@@ -201,7 +201,7 @@ class ResidualModel:
         columns: Sequence[Variation],
         sizes: Mapping[str, Sequence[str]] | None = None,
     ) -> list[Matrix]:
-        """Derivatives of every recording's [errors, rest] by the columns, each (b*c + 1, p).
+        """Derivatives of every recording's [errors, rest] by the columns, each (b*c + q, p).
 
         Parameters
         ----------

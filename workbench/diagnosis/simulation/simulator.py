@@ -44,14 +44,14 @@ class WhitenedResiduals:
     Attributes
     ----------
     errors : (b, c) whitened prediction errors of the blocks, by channel.
-    rest : whitened error of the input at rest.
+    rest : (q,) whitened errors of inputs at rest.
     sizes : (2, c) root mean square and mean absolute error of single samples, in SI units; NaN of
         a silent channel.
-    jacobian : (b*c + 1, p) derivatives of [errors, rest] in SI units, by delays and columns.
+    jacobian : (b*c + q, p) derivatives of [errors, rest] in SI units, by delays and columns.
     """
 
     errors: Matrix
-    rest: float
+    rest: Vector
     sizes: Matrix
     jacobian: Matrix
 
@@ -63,7 +63,7 @@ class WhitenedResiduals:
 
     @property
     def residual(self) -> Vector:
-        """(b*c + 1,) errors and rest in one vector."""
+        """(b*c + q,) errors and rest in one vector."""
         return np.append(self.errors.ravel(), self.rest)
 
 
@@ -88,8 +88,7 @@ class Simulator:
         self._delays = {
             j: (delay(signals[j]), mode.late) for j, mode in given.recordings[0].modes.items()
         }
-        rest = given.system.comparison.rest
-        self._rest = fmu.variables([rest.output]) if rest else None
+        self._rest = fmu.variables([rest.output for rest in given.system.comparison.rests])
         self._clocks = late_signals(given.system)
         self._sensors = sensor_errors(given.system)
         self._typical = {name: size for name, (_, _, size) in self._sensors.items()}
@@ -163,8 +162,9 @@ class Simulator:
             step = _DELAY_STEP * spread
             delayed = {**values, name: values[name] + step}
             late = self._whitened(number, self._read(number, simulated, delayed))
-            columns.append(np.append((late - errors).ravel() / step, 0.0))
-        jacobian = np.column_stack(columns) if columns else np.zeros((errors.size + 1, 0))
+            columns.append(np.append((late - errors).ravel() / step, np.zeros(rest.size)))
+        rows = errors.size + rest.size
+        jacobian = np.column_stack(columns) if columns else np.zeros((rows, 0))
         return WhitenedResiduals(errors, rest, self._recordings[number].sizes(read_), jacobian)
 
     def derivatives(
@@ -175,7 +175,7 @@ class Simulator:
         courses: Matrix | None = None,
         sizes: Mapping[str, Sequence[str]] | None = None,
     ) -> Matrix:
-        """Derivatives of one recording's [errors, rest] by the columns, (b*c + 1, p).
+        """Derivatives of one recording's [errors, rest] by the columns, (b*c + q, p).
 
         Parameters
         ----------
@@ -185,12 +185,13 @@ class Simulator:
             nothing depends on its states.
         """
         recording, fmu = self._in_time(number, values), self._fmu
-        jacobian = np.zeros((len(recording.blocks) * len(recording.slopes) + 1, len(columns)))
+        blocks = len(recording.blocks) * len(recording.slopes)
+        jacobian = np.zeros((blocks + recording.rest.size, len(columns)))
         differing = {*self._clocks, *self._typical}
         beside = [j for j, column in enumerate(columns) if column.variables[0] in differing]
         if beside:
             names = [columns[j].variables[0] for j in beside]
-            jacobian[:-1, beside] = self._by_differences(number, values, names)
+            jacobian[:blocks, beside] = self._by_differences(number, values, names)
         for part in _compatible(columns, beside):
             varied = [columns[j] for j in part]
             shares = None if courses is None else courses[:, part]
@@ -198,14 +199,14 @@ class Simulator:
             given = recording, self._known(values), varied, shares, absent
             _, along = self._predictor.derivatives(*given)
             by = self._whitened(number, self._late(number, along.errors, values))
-            jacobian[:-1, part] = by.reshape(-1, len(part))
-            if self._rest is not None and courses is None:
+            jacobian[:blocks, part] = by.reshape(-1, len(part))
+            if recording.rest.size and courses is None:
                 place = self._rest.references
-                slopes = (fmu.jacobian(place, fmu.variables(fmu.states)) @ along.states)[0]
-                for q, column in enumerate(varied):
+                slopes = fmu.jacobian(place, fmu.variables(fmu.states)) @ along.states  # (q, part)
+                for j, column in enumerate(varied):
                     acting = [name for name in column.variables if name not in fmu.states]
-                    slopes[q] += fmu.jacobian(place, fmu.variables(acting)).sum()
-                jacobian[-1, part] = -slopes / recording.rest_noise
+                    slopes[:, j] += fmu.jacobian(place, fmu.variables(acting)).sum(axis=1)
+                jacobian[blocks:, part] = -slopes / recording.rest_noise[:, None]
         return jacobian
 
     def _absent(
@@ -295,13 +296,11 @@ class Simulator:
         )
         return recording.channels(self._read(number, errors, values))
 
-    def _simulated(self, number: int, values: Mapping[str, float]) -> tuple[Matrix, float]:
-        """Prediction errors of all samples, and the whitened error of the input at rest."""
+    def _simulated(self, number: int, values: Mapping[str, float]) -> tuple[Matrix, Vector]:
+        """Prediction errors of all samples, and whitened errors of inputs at rest, (q,)."""
         recording, in_time = self._recordings[number], self._in_time(number, values)
         errors = self._predictor.errors(in_time, self._known(values)) + (recording.y - in_time.y)
-        if self._rest is None:
-            return errors, 0.0
-        return errors, (recording.rest - float(self._fmu.get(self._rest)[0])) / recording.rest_noise
+        return errors, (recording.rest - self._fmu.get(self._rest)) / recording.rest_noise
 
     def _in_time(self, number: int, values: Mapping[str, float]) -> Samples:
         """A recording as by one clock, and by right sensors."""

@@ -13,6 +13,7 @@ import numpy as np
 from workbench.errors import InputError, unknown_name
 from workbench.machines.train.rig import AXLES, BOGIES, VEHICLES, AskedStop
 from workbench.machines.train.stops import (
+    DRIES,
     USUAL,
     Faults,
     SimulatedStop,
@@ -25,7 +26,9 @@ from workbench.studies.power.planting import Plantable, SheetError
 
 # A quarter of what is worth a stop in the workshop, so that size 4 is pads with 15 % less friction,
 # one unit, a brake with 1500 N.m, a wheel turned by 2.5 mm, a lag of 0.4 s, a sensor a tenth off,
-# a vehicle of 56 t that is weighed as 49 t, a track file that is 4 permille off, a film of water.
+# or with an offset of 0.08 bar, one pole of a hundred, a vehicle of 56 t that is weighed as 49 t, a
+# track file that is 4 permille off, a film of water, 12 % less friction of all pads, a wet rail
+# that is called dry, an accelerometer that is tilted by 1.2 degrees or reads 8 % more.
 _SINGLE = (
     ("pads", "WeakPads", AXLES, "1", 0.15, False),
     ("units", "IsolatedUnit", AXLES, "1", 1.0, False),
@@ -34,17 +37,32 @@ _SINGLE = (
     ("late", "LateSpeed", AXLES, "s", 0.1, False),
     ("lag", "CylinderLag", BOGIES, "s", 0.4, False),
     ("reading", "PressureSensorGain", BOGIES, "1", 0.10, True),
+    ("zero", "PressureSensorOffset", BOGIES, "Pa", 8e3, True),
     ("mass", "WrongMass", VEHICLES, "1", 0.15, True),
+    ("poles", "PoleCount", AXLES, "1", 0.01, True),
 )
+_WHOLE = (
+    ("gradient", "WrongGradient", "1", 4e-3, True),
+    ("water", "WaterFilm", "1", 1.0, False),
+    ("glazing", "Glazing", "1", 0.15, False),
+    ("all_pads", "AllPads", "1", 0.12, False),
+    ("adhesion", "LowAdhesion", "1", 0.3, False),
+    ("accelerometer_bias", "AccelerometerBias", "m/s2", 0.2, True),
+    ("accelerometer_gain", "AccelerometerGain", "1", 0.08, True),
+)
+_SHAPES = {"water": {"E0": DRIES}}
 PLANTABLE = (
     *(
         Plantable(f"{name}[{i}]", unit, f"{effect}[{i}]", signed=signed, unit_size=size / 4)
         for name, effect, count, unit, size, signed in _SINGLE
         for i in range(1, count + 1)
     ),
-    Plantable("gradient", "1", "WrongGradient", signed=True, unit_size=4e-3 / 4),
-    Plantable("water", "1", "WaterFilm", signed=False, unit_size=1.0 / 4),
-    Plantable("glazing", "1", "Glazing", signed=False, unit_size=0.15 / 4),
+    *(
+        Plantable(
+            name, unit, effect, signed=signed, shapes=_SHAPES.get(name, {}), unit_size=size / 4
+        )
+        for name, effect, unit, size, signed in _WHOLE
+    ),
 )
 SHEET_ERRORS = (SheetError("noise", 2.0), SheetError("tolerances", 1.0))
 

@@ -22,6 +22,7 @@ _KNOWN = {  # what a truth calls a fault: as it is here, and the size of one of 
     "speed_delay": ("late", 1.0),
     "cylinder_lag_bogie": ("lag", 1.0),
     "pressure_sensor": ("reading", 1.0),
+    "pressure_offset": ("zero", 1e5),
     "glazing": ("glazing", 1.0),
 }
 

@@ -20,7 +20,7 @@ PLACES = np.array([0.0, 2.5, 19.0, 21.5, 26.4, 28.9, 45.4, 47.9])  # of the axle
 STEP = 2e-3  # [s]
 
 _BRAKE_RADIUS, _GRAVITY = 0.300, 9.81  # m, m/s2
-_WET, _DRIES = 0.12, 0.45e6  # friction of a wet disc, state that leaves 1/e of its water [J]
+_WET = 0.12  # friction of a wet disc
 _GRID = 5.0  # of what differs along the rail [m]
 _LEAD = 100.0  # of the rail before the start [m]
 _END = 6000.0  # of the rail [m]
@@ -61,7 +61,8 @@ class Train(NamedTuple):
     target, begin, lag : (4,) pressure of each bogie, when it begins to rise, lag of its cylinders.
     mass : (2,) of each vehicle.
     resistance : (3,) A, B, C.
-    law : (5,) of the pads: speed, exponent, fade, glazing, film of water at the start.
+    law : (6,) of the pads: speed, exponent, fade, glazing, film of water at the start, energy of a
+        disc that leaves 1/e of it [J].
     polach : (4,) kA, kS, A, B.
     """
 
@@ -231,7 +232,7 @@ def _pads(train, state, i, v):  # type: ignore[no-untyped-def]
         glazed = 1.0 - glazing / (1.0 + math.exp(-(T - 110.0) / 6.0))
         acting = min(max(train.units[i] - d, 0.0), 1.0)
         dry = common * (1.0 - fade * (T - 60.0)) * glazed
-        film = train.law[4] * math.exp(-state.rubbed[i, d] / _DRIES)
+        film = train.law[4] * math.exp(-state.rubbed[i, d] / train.law[5])
         state.heat[i, d] = acting * (dry + film * (_WET * force * _BRAKE_RADIUS - dry))
         torque += state.heat[i, d]
     return torque

@@ -25,6 +25,7 @@ from workbench.runtime.files import write_whole
 _RADIUS = 0.460  # of the sheet [m]
 _POLACH = {"dry": (1.0, 0.4, 0.4, 0.6), "wet": (0.3, 0.1, 0.4, 0.2)}  # kA, kS, A, B
 _START = 10_000.0  # kilometrage of the first axle at the start [m]
+DRIES = 0.45e6  # of water [J], see `Faults.drying`
 _PERIOD = 0.02  # of the computer's samples [s]
 _SATELLITES = 5  # samples until their speed is new
 _TUNNELS, _TUNNEL = 1 / 8, (200.0, 800.0)  # share of stops with one, and how long it is [m]
@@ -49,13 +50,19 @@ class Faults:
     units : (8,) brake units of an axle that are isolated.
     drag : (8,) torque of a brake that does not release.
     radius : (8,) true minus sheet.
+    poles : (8,) relative error of a speed by the poles that are counted.
     late : (8,) delay of a speed sensor.
     lag : (4,) time constant of a bogie's cylinders behind their valve.
     reading : (4,) relative error of a pressure sensor.
+    zero : (4,) offset of a pressure sensor.
     mass : (2,) true mass of a vehicle over the reported one, less one.
     gradient : true less that of the track file, everywhere [1].
+    all_pads : share of the friction of all pads that is lost.
     glazing : share of the friction that is lost on a disc far above 110 degrees C.
     water : film on every disc at the start of each stop, 1 where it is wet.
+    drying : friction energy of a disc that leaves 1/e of a whole film [J]; 0 where there is none.
+    adhesion : share of the friction wheel-rail that is lost.
+    accelerometer_bias, accelerometer_gain : of its reading beyond the acceleration, [m/s2], [1].
     noise, tolerances : of all sensors and draws, relative to the sheet's, less one.
     """
 
@@ -63,13 +70,20 @@ class Faults:
     units: Vector = field(default_factory=_no_axles)
     drag: Vector = field(default_factory=_no_axles)
     radius: Vector = field(default_factory=_no_axles)
+    poles: Vector = field(default_factory=_no_axles)
     late: Vector = field(default_factory=_no_axles)
     lag: Vector = field(default_factory=_no_bogies)
     reading: Vector = field(default_factory=_no_bogies)
+    zero: Vector = field(default_factory=_no_bogies)
     mass: Vector = field(default_factory=_no_vehicles)
     gradient: float = 0.0
+    all_pads: float = 0.0
     glazing: float = 0.0
     water: float = 0.0
+    drying: float = 0.0
+    adhesion: float = 0.0
+    accelerometer_bias: float = 0.0
+    accelerometer_gain: float = 0.0
     noise: float = 0.0
     tolerances: float = 0.0
 
@@ -168,6 +182,7 @@ def simulate_stop(
     track, gradient, curve = _line(rng, t)
     track[:, 1] -= 1e3 * faults.gradient
     mu0 = 0.40 * (1.0 + t * rng.normal(0.0, 0.02)) if stop.rail == "dry" else rng.uniform(0.25, 0.3)
+    mu0 *= 1.0 - faults.adhesion
     way = Way(
         mu0 * (1.0 + t * 0.03 * _walk(rng, 80.0)), gradient, curve, t * 1e-5 * _walk(rng, 150.0)
     )
@@ -175,7 +190,7 @@ def simulate_stop(
     level = 0.30 * (1.0 + t * rng.normal(0.0, 0.02)) * (1.0 + t * rng.normal(0.0, 0.007, AXLES))
     command = round(float(rng.uniform(20.0, 30.0)), 1)
     train = Train(
-        friction=level * (1.0 + tolerances.pads) * (1.0 - faults.pads),
+        friction=level * (1.0 + tolerances.pads) * (1.0 - faults.pads) * (1.0 - faults.all_pads),
         units=DISCS - faults.units,
         drag=faults.drag,
         radius=_RADIUS + tolerances.radius + faults.radius,
@@ -190,7 +205,7 @@ def simulate_stop(
         resistance=np.array(
             [1100.0 * (1.0 + tolerances.A) * wind, 12.0, 5.5 * (1.0 + tolerances.C) * wind]
         ),
-        law=np.array([*_law(tolerances), faults.glazing, faults.water]),
+        law=np.array([*_law(tolerances), faults.glazing, *_film(faults)]),
         polach=np.array(_POLACH[stop.rail]),
     )
     at_command = stop.speed * (1.0 + t * rng.normal(0.0, 0.01))
@@ -203,6 +218,11 @@ def simulate_stop(
 def _law(tolerances: TrainTolerances) -> tuple[float, float, float]:
     """Speed law, exponent and fade of the pads."""
     return 0.20 + tolerances.speed_law, 0.02 + tolerances.exponent, 3e-4 * (1.0 + tolerances.fade)
+
+
+def _film(faults: Faults) -> tuple[float, float]:
+    """Film of water at the start, and friction energy of a disc that leaves 1/e of it [J]."""
+    return (1.0, faults.drying) if faults.drying else (faults.water, DRIES)
 
 
 def _walk(rng: np.random.Generator, length: float) -> Vector:
@@ -243,18 +263,23 @@ def write_stop(simulated: SimulatedStop, seed: int, faults: Faults, folder: Path
     columns: dict[str, Vector] = {"time [s]": time}
     for j in range(BOGIES):
         pressure = np.interp(time, result.time, result.pressure[:, j]) * (1.0 + faults.reading[j])
-        read = pressure + tolerances.zero[j] + n * 500.0 * rng.standard_normal(time.size)
+        read = (
+            pressure
+            + tolerances.zero[j]
+            + faults.zero[j]
+            + n * 500.0 * rng.standard_normal(time.size)
+        )
         columns[f"pB{j + 1} [bar]"] = 0.0024 * np.round(1e-5 * read / 0.0024)
     speeds = np.empty((AXLES, time.size))
     for i in range(AXLES):
         true = np.interp(time - faults.late[i], result.time, result.omega[:, i])
+        true *= 1.0 + faults.poles[i]
         deviation = n * (0.002 + 3e-4 * true) * rng.standard_normal(time.size)
         speeds[i] = np.where(true < 0.5, 0.0, true + deviation)
         columns[f"omega{i + 1} [rad/s]"] = speeds[i]
-    felt = (
-        np.interp(time, result.time, _low_pass(result.a)) * (1.0 + tolerances.gain)
-        + tolerances.bias
-    )
+    gain = (1.0 + tolerances.gain) * (1.0 + faults.accelerometer_gain)
+    felt = gain * np.interp(time, result.time, _low_pass(result.a))
+    felt += tolerances.bias + faults.accelerometer_bias
     columns["a [m/s2]"] = felt + n * 0.02 * rng.standard_normal(time.size)
     columns["vGNSS [km/h]"] = _satellites(result, time, seed, stop.number, n)
     rolled = _PERIOD * np.cumsum(_RADIUS * np.median(speeds, axis=0))

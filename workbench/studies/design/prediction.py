@@ -311,7 +311,7 @@ class Refit(Fit):
         right = self._so_far.chi_squared + self.quadratics(self._start).prior.c
         value, lin = self.least(self._start, active, self._start.variance_factors, right)
         system = self.quadratics(lin.derived_as(self._start)).systems[0]
-        return value - right, system.r[:-1].reshape(-1, system.channels)
+        return value - right, system.r[: system.blocks].reshape(-1, system.channels)
 
 
 class ExperimentPredictor:

@@ -7,13 +7,18 @@ import numpy as np
 from scipy.special import chndtrinc
 from scipy.stats import ncx2
 
+from workbench.arrays import Matrix
 from workbench.diagnosis import Diagnosis, Effect
+from workbench.diagnosis.effects.catalogue import variant
+from workbench.diagnosis.inference.quadratic import Joint, beside
+from workbench.diagnosis.inference.score_test import shapes
 from workbench.diagnosis.inference.thresholds import Thresholds, of_system
-from workbench.studies.power.diagnosing import diagnose_set
+from workbench.studies.power.diagnosing import diagnose_set, information_of_set
 from workbench.studies.power.planting import Plantable, Planting
 from workbench.studies.power.run import PowerStudy
 
 SURE = 0.95  # chance from which on a size is called found
+_ALIKE = 1e-9  # share of a signature that is rounding: the other has the same
 
 
 @dataclass(frozen=True)
@@ -65,6 +70,107 @@ def predict_campaign(
         for plantable in wanted
         if plantable.effect in known
     ]
+
+
+@dataclass(frozen=True)
+class EffectLimit:
+    """The least that recordings can show of one effect, whatever the diagnosis.
+
+    Attributes
+    ----------
+    effect, unit : of the library, and of its sizes, SI.
+    sigma : standard deviation of its size by the exact model, which knows that nothing else is
+        missing [unit]; None where recordings cannot show it.
+    found : size from which on it is significant with the chance `SURE` [unit]; None as `sigma`.
+    like : the effect whose signature is most like its own; empty as `sigma`.
+    told : size from which on it is told from that one as surely [unit]; None where none is.
+    """
+
+    effect: str
+    unit: str
+    sigma: float | None
+    found: float | None
+    like: str
+    told: float | None
+
+
+def limits_of_effects(
+    study: PowerStudy, wanted: Sequence[Plantable], seed: int
+) -> list[EffectLimit]:
+    """What an oracle could tell: the information of a set in one effect beside all tolerances.
+
+    By Cramer and Rao no unbiased estimate has less variance than the inverse of the information
+    (H. Cramer 1946, Mathematical Methods of Statistics, section 32.3). Of what one effect does, all
+    but 1 - c^2 is done by another whose signature has the cosine c with its own, beside tolerances.
+
+    Parameters
+    ----------
+    study : whose rig makes the recordings.
+    wanted : effects that are asked for.
+    seed : of the machine's tolerances and the sensors' noise.
+
+    Raises
+    ------
+    InputError
+        If a model or the library is not what it should be.
+    """
+    with study.setup() as setup:
+        clean = Planting("clean", seed, 0.0, {}, ())
+        cases = setup.record(clean, study.rig.simulate(seed, {}))
+        joint = information_of_set(setup.system, setup.effects, setup.everything, cases)
+    at = _columns_of_effects(study.effects, joint)
+    left = beside(joint.total().N, range(len(joint.known)))
+    decides = of_system(study.system.comparison, len(study.effects))
+    found = clear(1, decides)
+    limits = []
+    for plantable in wanted:
+        if plantable.effect not in at:
+            if any(effect.name == plantable.effect for effect in study.effects):
+                limits.append(EffectLimit(plantable.effect, plantable.unit, None, None, "", None))
+            continue
+        own = _of_shape(at[plantable.effect], plantable, study.effects)
+        sigma = len(own) / float(np.trace(left[np.ix_(own, own)]))
+        sigma = float(np.sqrt(sigma))
+        apart = {
+            name: min(_unlike(left, own, other) for other in variants)
+            for name, variants in at.items()
+            if name != plantable.effect
+        }
+        like = min(apart, key=lambda name: apart[name], default="")
+        told = found * sigma / np.sqrt(apart[like]) if like and apart[like] > _ALIKE else None
+        limits.append(
+            EffectLimit(plantable.effect, plantable.unit, sigma, found * sigma, like, told)
+        )
+    return limits
+
+
+def _columns_of_effects(effects: Sequence[Effect], joint: Joint) -> dict[str, list[list[int]]]:
+    """Columns of each effect that recordings show, of each of its shapes."""
+    places = {key: j for j, key in enumerate(joint.shared)}
+    at: dict[str, list[list[int]]] = {}
+    for effect in effects:
+        for shape in shapes(effect):
+            own = [places.get((variant(effect, shape), name), -1) for name in effect.sizes]
+            if min(own) >= 0:
+                at.setdefault(effect.name, []).append(own)
+    return at
+
+
+def _of_shape(
+    variants: Sequence[list[int]], planted: Plantable, effects: Sequence[Effect]
+) -> list[int]:
+    """Columns of an effect in the shape that the rig has, or else in its middle one."""
+    effect = next(effect for effect in effects if effect.name == planted.effect)
+    every = shapes(effect)
+    index = every.index(dict(planted.shapes)) if dict(planted.shapes) in every else len(every) // 2
+    return variants[index]
+
+
+def _unlike(N: Matrix, own: Sequence[int], other: Sequence[int]) -> float:
+    """Share of what recordings say of an effect that another one does not take."""
+    taken = np.linalg.lstsq(N[np.ix_(other, other)], N[np.ix_(other, own)], rcond=None)[0]
+    whole = float(np.trace(N[np.ix_(own, own)]))
+    return float(1.0 - np.trace(N[np.ix_(own, other)] @ taken) / max(whole, 1e-300))
 
 
 def _effect_chance(

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,9 @@ from workbench import diagnosis
 from workbench.diagnosis import Diagnosis, Effect, catalogue
 from workbench.diagnosis.data.motion import ModelSource
 from workbench.diagnosis.inference.fit import Fit
+from workbench.diagnosis.inference.quadratic import Joint
 from workbench.diagnosis.inference.rivals import Rivals, gathered
+from workbench.diagnosis.inference.score_test import shapes, signatures
 from workbench.diagnosis.inference.search import FittedModel, examine, extended
 from workbench.diagnosis.inference.verdict import conclude
 from workbench.diagnosis.simulation.residual_model import ResidualModel
@@ -48,6 +51,26 @@ def diagnose_set(
     """Diagnose one set of recordings, in this process alone."""
     with _fit(system, effects, everything, cases) as (_, fit):
         return conclude(fit, effects, silent)
+
+
+def information_of_set(
+    system: System, effects: Sequence[Effect], everything: Path, cases: Sequence[Case]
+) -> Joint:
+    """Linearise one set about the nominal model: what it says of each effect and each level.
+
+    Errors have the variance of the sensors' noise; levels and what differs between recordings have
+    the tolerances of the system file.
+    """
+    with _fit(system, effects, everything, cases) as (_, fit):
+        candidates = [
+            (effect, shape)
+            for effect in effects
+            if not fit.unknowns.presence.unseen(effect)
+            for shape in shapes(effect)
+        ]
+        lin = fit.linearise(fit.at(fit.unknowns.start()), (), candidates)
+        lin = replace(lin, variance_factors=np.ones(lin.variance_factors.size))
+        return fit.apart(lin, signatures(candidates))
 
 
 def rivals_of_set(

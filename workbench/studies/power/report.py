@@ -25,7 +25,7 @@ from workbench.pages.parts import (
 from workbench.pages.views import capital
 from workbench.runtime.files import write_json
 from workbench.studies.power import CLEAR, VISIBLE, Findable, following, left_out
-from workbench.studies.power.campaign import SURE, EffectChance
+from workbench.studies.power.campaign import SURE, EffectChance, EffectLimit
 from workbench.studies.power.sensitivity import FACTORS, ThresholdSensitivity
 from workbench.system.units import with_unit
 
@@ -204,6 +204,33 @@ def campaign_check(rows: Sequence[EffectChance], sizes: Sequence[float]) -> Chec
         lines.append(f"{row}{with_unit(chance.least, chance.unit):>24}")
     content = {"sizes": list(sizes), "effects": list(map(asdict, rows))}
     return Check("plan", Answer(sentence, headline), content, "\n".join(lines))
+
+
+def oracle_check(rows: Sequence[EffectLimit]) -> Check:
+    """Report the least sizes that recordings can show, whatever the diagnosis."""
+    shown = [row for row in rows if row.sigma is not None]
+    sentence = (
+        f"Of {len(rows)} effects, these recordings can show {len(shown)}; of {_alone(shown)} they "
+        "tell the place or cause."
+    )
+    headline = {"effects that can be shown": Measure(float(len(shown)), "1", "higher")}
+    lines = [
+        f"{'effect':<30}{'one sigma':>18}{f'found by {SURE:.0%} from':>24}  told from the likest"
+    ]
+    for row in rows:
+        if row.sigma is None or row.found is None:
+            lines.append(f"{row.effect:<30}  these recordings cannot show it")
+            continue
+        sizes = [with_unit(row.sigma, row.unit), with_unit(row.found, row.unit)]
+        told = "never" if row.told is None else f"from {with_unit(row.told, row.unit)}"
+        lines.append(f"{row.effect:<30}{sizes[0]:>18}{sizes[1]:>24}  {row.like}: {told}")
+    return Check(
+        "oracle", Answer(sentence, headline), {"effects": list(map(asdict, rows))}, "\n".join(lines)
+    )
+
+
+def _alone(rows: Sequence[EffectLimit]) -> int:
+    return sum(row.told is not None for row in rows)
 
 
 def draw_chances(rows: Sequence[EffectChance], sizes: Sequence[float], out: Path) -> None:
