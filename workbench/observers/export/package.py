@@ -161,8 +161,8 @@ def _structure(wired: Wiring, observer: str, reference: str) -> str:
             "endConnector": end,
         }
         _add(connections, "Connection", **{key: value for key, value in ends.items() if value})
-    connectors = {**wired.machine, **wired.observer, **wired.whole}.values()
-    _add_units(_add(root, "Units"), {unit for _, unit in connectors})
+    all_connectors = {**wired.machine, **wired.observer, **wired.whole}.values()
+    _add_units(_add(root, "Units"), {unit for _, unit in all_connectors})
     _add(root, "DefaultExperiment", startTime="0.0", stopTime="20.0")
     return _text(root)
 
