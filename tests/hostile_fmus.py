@@ -13,6 +13,7 @@ import fmpy
 from .processes import COMPILER, ROOT, python
 
 NAME = "MinimalObserver"
+REFUSALS = {"void": "", "fmi2Component": "NULL", "fmi2Status": "fmi2Error"}
 
 
 def rewritten(original: Path, path: Path, change: Callable[[Path], None]) -> Path:
@@ -45,7 +46,7 @@ def hostile(path: Path) -> Path:
         attack = (ROOT / "tests" / "hostile" / "attack.c").read_text()
         text, functions = re.subn(
             r"^(fmi2Status|fmi2Component|void) (fmi2\w+)(\([^{;]*\) \{)",
-            r'\1 \2\3 attack("\2");',
+            lambda head: f'{head[0]} if (attack("{head[2]}")) return {REFUSALS[head[1]]};',
             file.read_text(),
             flags=re.MULTILINE,
         )

@@ -110,6 +110,16 @@ def test_an_archive_that_unpacks_to_much_more_is_refused_at_once(tmp_path, place
     assert list(places.iterdir()) == []
 
 
+@pytest.mark.parametrize(("count", "size"), [(60, 15 << 20), (2000, 1 << 19)])
+def test_many_files_that_unpack_to_much_more_together_are_refused(count, size, tmp_path):
+    path = tmp_path / "bomb.fmu"
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        for number in range(count):
+            archive.writestr(f"resources/{number}", bytes(size))
+    with pytest.raises(InputError, match=r"an archive with \d+ MB, which is \d+ times its size"):
+        FMU(path)
+
+
 def test_a_size_that_is_not_the_true_one_is_refused(tmp_path, places):
     """Where the list of contents says less than is there, no more is unpacked than it says."""
     path = with_entry(tmp_path / "liar.fmu", zipfile.ZipInfo("resources/zeros"), bytes(1 << 20))
@@ -225,6 +235,16 @@ DAMAGES: dict[str, tuple[Callable[[Path], None], str]] = {
     "index of nothing": (edited('derivative="', 'derivative="0'), "derivative = '0"),
     "index too large": (edited('derivative="', 'derivative="99'), "no FMU"),
     "name twice": (edited('name="tauR"', 'name="pB"'), "two variables 'pB'"),
+    "indicators below zero": (
+        edited('numberOfEventIndicators="0"', 'numberOfEventIndicators="-1"'),
+        "-1 event indicators",
+    ),
+    "unit without size": (edited('factor="1e-05"', 'factor="0"'), "factor 0 of a <DisplayUnit>"),
+    "base unit without size": (edited('m="1" s="-1"', 'm="1" s="-1" factor="0"'), "<BaseUnit>"),
+    "an output that is a parameter": (
+        edited('causality="output"', 'causality="parameter"'),
+        "a parameter '.*' among the outputs",
+    ),
     "no name": (edited('name="tauR"', 'name=""'), "a variable without a name"),
 }
 

@@ -1,6 +1,8 @@
 """Compiled code is kept whole or made again, whatever happened to the folder it is kept in."""
 
+import hashlib
 import os
+import pickle
 import shutil
 import subprocess
 import sys
@@ -76,6 +78,33 @@ def test_kept_code_is_used_and_damaged_code_is_made_again(home):
     assert solved(home) == "1 kept"
 
 
+class Malice:
+    """Makes a file when it is unpickled."""
+
+    def __init__(self, place: Path) -> None:
+        self.place = place
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return Path.touch, (self.place,)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="modes of files are those of POSIX")
+@pytest.mark.parametrize("mode", [0o700, 0o777, 0o730])
+def test_code_that_another_wrote_is_not_unpickled(mode, home):
+    """With a checksum that anybody can make; nor is a folder used that others may write."""
+    assert solved(home) == "0 kept"
+    (file,) = files(home)
+    content = pickle.dumps(Malice(home / "harmed"))
+    file.write_bytes(hashlib.sha256(content).digest() + content)
+    folder = next(path for path in file.parents if path.name == "wheelset-workbench")
+    folder.chmod(mode)
+    with started(home) as process:
+        out, errors = process.communicate(timeout=100)
+    assert out == "0 kept\n"
+    assert (f"the cache folder {folder} is not used" in errors) == (mode != 0o700)
+    assert not (home / "harmed").exists()
+
+
 @pytest.mark.parametrize(
     "name", ["observers/estimators/kalman.py", "models/native.py", "models/jit.py"]
 )
@@ -96,7 +125,7 @@ def test_what_two_processes_need_at_once_is_compiled_by_one(home):
         told = [process.communicate(timeout=LONGEST) for process in (one, other)]
     assert sorted(told) == [("0 kept\n", ""), ("1 kept\n", "")]
     names = {file.name for file in home.rglob("*") if file.is_file()}
-    assert {Path(name).suffix for name in names - {"turns"}} == {".code"}
+    assert {Path(name).suffix for name in names - {"turns", "key"}} == {".code"}
 
 
 @pytest.mark.skipif(os.name != "posix", reason="there each process compiles for itself")

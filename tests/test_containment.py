@@ -12,12 +12,13 @@ from typing import Any
 import pytest
 
 from workbench.__main__ import main
-from workbench.errors import InputError
+from workbench.errors import FMUError, InputError
 from workbench.models import fmu_cache, trial
 from workbench.models.checks import check
 from workbench.models.description import Description, read_description
 from workbench.models.fmu import FMU, CoSimulation
-from workbench.models.trial import ContainedError, Limits, NoAnswerError
+from workbench.models.trial import ContainedError, NoAnswerError
+from workbench.runtime.supervision import Limits
 
 from .hostile_fmus import rewritten
 from .processes import needs_compiler
@@ -32,6 +33,7 @@ def places(tmp_path, monkeypatch) -> Path:
         fmu_cache.platformdirs, "user_cache_dir", lambda name: str(tmp_path / "cache")
     )
     fmu_cache._remembered.cache_clear()
+    fmu_cache._is_own.cache_clear()
     folder = tmp_path / "tmp"
     folder.mkdir()
     monkeypatch.setattr(tempfile, "tempdir", str(folder))
@@ -66,6 +68,10 @@ ATTACKS = {
     "flood": f"crashed with SIGXFSZ in {CALL}.*files of 10 MB",
     "spin": rf"did not return from {CALL} within \d\.\d s of processor time",
     "daemon": f"ended the process with exit status 0 in {CALL}",
+    "split": f"ended the process with exit status 0 in {CALL}",
+    "spin_at_exit": "did not return from unloading of its library",
+    "scribble": "wrote to a file that another had opened",
+    "scribble_and_leave": f"ended the process with exit status 0 in {CALL}",
 }
 
 
@@ -75,6 +81,14 @@ def test_what_an_fmu_did_is_named_and_leaves_nothing(attack, hostile_path, place
     with pytest.raises(ContainedError, match=f"^evil.fmu: {ATTACKS[attack]}"):
         FMU(hostile_path)
     assert list(places.iterdir()) == []
+
+
+@pytest.mark.parametrize("refusal", ["beg", "refuse"])
+def test_an_error_within_the_limits_is_no_trial_that_was_passed(refusal, hostile_path, plan):
+    plan(f"{refusal} {CALL} 2")
+    for _ in range(2):
+        with pytest.raises(FMUError, match=f"{CALL} returned error: .* 512 MB of memory"):
+            FMU(hostile_path)
 
 
 @pytest.mark.parametrize("call", CALLS)
@@ -134,6 +148,16 @@ def test_a_sound_fmu_is_tried_once_and_remembered_by_its_hash(hostile_path, tmp_
     assert tried == ["copy.fmu", "other.fmu"]
 
 
+@pytest.mark.parametrize("forged", [b"", b"\0" * 32])
+def test_an_fmu_is_not_sound_because_another_says_so(forged, hostile_path, tmp_path, tried):
+    known = tmp_path / "cache" / "known"
+    known.mkdir(parents=True, mode=0o700)
+    for suffix in ("", "-me"):
+        (known / f"{read_description(hostile_path).sha256}{suffix}").write_bytes(forged)
+    FMU(hostile_path).close()
+    assert tried == ["evil.fmu"]
+
+
 def test_an_unsound_fmu_is_tried_again(hostile_path, tried, plan):
     plan("exit load 1")
     for _ in range(2):
@@ -160,7 +184,7 @@ def test_the_trial_makes_no_call_that_a_sound_fmu_refuses(root, version, interfa
     """A refusal ends the trial, so that it must be none of the trial's own making."""
     description = read_description(root / "fmus" / version / "Reference.fmu")
     with trial.unpacked(description, interface) as folder:
-        assert trial.run_trial(description, interface, folder, trial.Limits()) == ""
+        assert trial.run_trial(description, interface, folder, Limits()) == ""
 
 
 def test_a_trial_takes_no_longer_than_0_3_s(minimal_path):
@@ -170,7 +194,7 @@ def test_a_trial_takes_no_longer_than_0_3_s(minimal_path):
     with trial.unpacked(description, "Model Exchange") as folder:
         for _ in range(5):
             begin = time.perf_counter()
-            trial.run_trial(description, "Model Exchange", folder, trial.Limits())
+            trial.run_trial(description, "Model Exchange", folder, Limits())
             times.append(time.perf_counter() - begin)
     assert min(times) < 0.3
 

@@ -14,7 +14,7 @@ from workbench.__main__ import main
 from workbench.errors import InputError
 from workbench.models.checks import CheckResult, check, is_fit
 from workbench.models.fmu import FMU, CoSimulation
-from workbench.models.trial import Limits
+from workbench.runtime.supervision import Limits
 
 from .hostile_fmus import compile_library, rewritten
 from .processes import needs_compiler

@@ -65,6 +65,7 @@ def test_a_change_of_library_or_model_is_another_fmu(library):
 
 
 def test_a_cache_that_cannot_be_written_costs_only_time(cache, tmp_path):
+    cache.parent.rmdir()
     cache.parent.write_text("a file where the folder should be")
     fmu_cache.fetch("name", tmp_path / "one.fmu", lambda path: path.write_bytes(b"an FMU"))
     assert (tmp_path / "one.fmu").read_bytes() == b"an FMU"

@@ -29,6 +29,8 @@ COUNTS = {
     "gains": 250,
     "checkpoint": 500,
     "verdicts": 150,
+    "monitor state": 200,
+    "summary.json": 200,
     "system file": 250,
     "wheelset file": 50,
     "Modelica": 200,

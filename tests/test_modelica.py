@@ -247,7 +247,12 @@ def test_a_file_must_stand_where_its_class_belongs(tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("model A extends B; end A; model B extends A; end B;", "P.A extends itself"),
+        ("model A extends B; end A; model B extends A; end B;", "P.A extends itself, by P.B"),
+        (
+            "model A extends C; end A; model C extends D; end C; model D extends C; end D;",
+            "P.C extends itself, by P.D",
+        ),
+        ("type A = B; type B = A;", "P.A extends itself, by P.B"),
         ("package Q end Q; model A extends Q.X; end A;", "P.Q has no class 'X'"),
     ],
 )

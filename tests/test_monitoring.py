@@ -4,6 +4,7 @@ import json
 import shutil
 import sqlite3
 from collections.abc import Callable, Sequence
+from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
 from random import Random
@@ -21,6 +22,7 @@ from workbench.__main__ import main
 from workbench.arrays import Matrix, Vector
 from workbench.errors import InputError
 from workbench.pages.provenance import run_of
+from workbench.runtime.files import check_checksum, with_checksum
 from workbench.studies.monitoring import STATE, MonitoringResult
 from workbench.studies.monitoring.cause import known_from_before, recordings_after
 from workbench.studies.monitoring.chart import LARGEST, Chart, Scatter, run_length, threshold
@@ -288,6 +290,45 @@ def test_a_state_of_another_model_or_a_damaged_one_is_refused(history, train, tm
         state.write_bytes(content)
         with pytest.raises(InputError, match=r"state\.sqlite: found a state that cannot be read"):
             wb.monitor(train, tmp_path / "in", out=tmp_path / "out", workers=1)
+
+
+def _change(result: str, **changes: object) -> str:
+    """A result in the state, changed with or without its checksum."""
+    content = check_checksum(result)
+    estimate = {**content["estimate"], **changes}
+    return with_checksum({**content, "estimate": estimate} | {"date": changes.get("date", "")})
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda text: text.replace("1", "2"),
+        lambda text: text[: len(text) // 2],
+        lambda text: "[]",
+        lambda text: b"\xff\xfe",
+        lambda text: _change(text, covariance=[[-1.0]]),
+        lambda text: _change(text, counted=float("inf")),
+        lambda text: _change(text, values=["nan"]),
+        lambda text: _change(text, date="yesterday"),
+    ],
+)
+def test_a_damaged_or_impossible_result_is_left_out_until_its_recording_is_estimated_anew(
+    damage, history, train, tmp_path
+):
+    for name in ("01", "02"):
+        shutil.copytree(history / name, tmp_path / "in" / name)
+    before = wb.monitor(train, tmp_path / "in", out=tmp_path / "out", workers=1)
+    with closing(sqlite3.connect(tmp_path / "out" / STATE)) as connection, connection:
+        (text,) = connection.execute("SELECT result FROM results WHERE name = '01'").fetchone()
+        connection.execute("UPDATE results SET result = ? WHERE name = '01'", (damage(text),))
+    (tmp_path / "in" / "01").rename(tmp_path / "away")
+    without = wb.monitor(train, tmp_path / "in", out=tmp_path / "out", workers=1)
+    assert without.names == ("02",)
+    assert "its result in the state is damaged" in without.refused["01"]
+    (tmp_path / "away").rename(tmp_path / "in" / "01")
+    again = wb.monitor(train, tmp_path / "in", out=tmp_path / "out", workers=1)
+    assert again.names == before.names
+    assert not again.refused
 
 
 def test_a_folder_without_a_recording_that_can_be_used_is_refused(train, tmp_path):

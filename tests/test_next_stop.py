@@ -1,6 +1,7 @@
 """The next experiment: criteria against closed forms, predictions against what is then recorded."""
 
 import json
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -419,6 +420,37 @@ def test_tolerances_of_recordings_so_far_are_where_they_do_best(undecided):
 def test_rivals_are_read_as_they_were_written(undecided):
     said = json.loads(json.dumps(undecided.rivals.to_dict()))
     assert read_rivals(said).to_dict() == undecided.rivals.to_dict()
+
+
+IMPOSSIBLE = {
+    "infinity": ("prior", "constant", math.inf),
+    "text": ("explained", "much"),
+    "one row": ("prior", "matrix", [[1.0, 2.0, 3.0]]),
+    "negative": (
+        "prior",
+        "matrix",
+        lambda N: (np.array(N) - (1.0 + 2.0 * np.max(N)) * np.eye(len(N))).tolist(),
+    ),
+    "no recording": ("recordings", []),
+    "shorter": ("recordings", 0, "errors", lambda errors: errors[1:]),
+    "nan": ("recordings", 0, "common", lambda rows: [[math.nan] * len(rows[0]), *rows[1:]]),
+    "another's": ("sizes", [["Nobody", "size", 1.0]]),
+    "a number": ("effects", [1]),
+}
+
+
+@pytest.mark.parametrize("case", IMPOSSIBLE)
+def test_a_summary_with_what_cannot_be_is_refused(case, block, undecided, tmp_path, capsys):
+    summary = {**undecided.to_dict(), "provenance": {"system": block.name}}
+    summary = json.loads(json.dumps(summary))
+    *path, key, value = IMPOSSIBLE[case]
+    place = summary["rivals"]["models"][0]
+    for step in path:
+        place = place[step]
+    place[key] = value(place[key]) if callable(value) else value
+    (tmp_path / "summary.json").write_text(json.dumps(summary))
+    assert main(["next", str(tmp_path), "--system", str(block.source)]) == 2
+    assert "no summary of a diagnosis with its rivals" in capsys.readouterr().err
 
 
 def test_the_command_writes_what_it_prints(block, mild, undecided, tmp_path, capsys):

@@ -279,3 +279,38 @@ def test_a_film_of_water_that_lets_the_wheel_slide_raises_no_doubt(system, root)
     slip = system.signal("speed", case.signals) - system.values["rW"] * case["omegaW"]
     assert slip.max() > 2.0  # [m/s]
     assert case.doubts == ()
+
+
+# --- one sample ---
+
+
+def held(table: Table, name: str, value: float, first: int, end: int) -> Table:
+    values = table[name].copy()
+    values[first:end] = value
+    return {**table, name: values}
+
+
+SAMPLES: dict[str, tuple[Callable[[Table], Table], str]] = {
+    "a wheel speed of one sample": (
+        lambda t: held(t, SPEEDS[0], 57.7, 2000, 2001),
+        r"line 2002, column 'omegaW': found 57\.7 rad/s at 10 s, beside .* and 0 more such",
+    ),
+    "a pressure that drops out": (
+        lambda t: held(t, "pB [bar]", 0.0, 1500, 1503),
+        r"line 1502, column 'pB': found .* bar at 7\.5 s, beside .* and \d more such samples",
+    ),
+    "a torque that is stuck": (
+        lambda t: held(t, "tauR [N.m]", 9999.0, 1000, 1462),
+        r"line 1002, column 'tauR': found 9\.999 kN\.m at 5 s, beside .* and 461 more such",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", SAMPLES)
+def test_what_goes_out_and_back_at_once_is_told_with_its_line(name, stop, tmp_path):
+    change, message = SAMPLES[name]
+    system = load_system("wheelset")
+    toml, table = stop
+    assert read_case(write(tmp_path / "whole", toml, table), system).doubts == ()
+    told = read_case(write(tmp_path / "changed", toml, change(table)), system).doubts
+    assert any(re.search(message, doubt) for doubt in told), told

@@ -1,9 +1,13 @@
 """Whatever ends a command, it is said, and nothing is left: no file, no process."""
 
 import fcntl
+import itertools
 import json
 import os
+import re
+import shutil
 import signal
+import subprocess
 import sys
 import tempfile
 import time
@@ -16,7 +20,7 @@ import pytest
 
 from workbench.models.fmu import FMU
 from workbench.runtime import files
-from workbench.runtime.files import TemporaryFolder
+from workbench.runtime.files import TemporaryFolder, own_umask
 
 from .hostile_fmus import own_folder, workbench
 from .processes import LONGEST, ROOT, comes_true, living, needs_compiler, python, running
@@ -60,18 +64,143 @@ def test_a_model_that_ends_its_process_does_not_end_a_command_in_silence(
     assert left(home) == []
 
 
+LATE = {
+    "exit": "status 0",
+    "crash": "SIGSEGV",
+    "scribble_and_leave": "status 0",
+    "split": "status 0",
+    "eat": "SIGSEGV",
+    "beg": "open_loop estimated nothing in any case",
+    "hang_at_exit": "a call did not return for 3 s",
+    "spin": "a call did not return for 3 s",
+    "wait": "a call did not return for 3 s",
+    "go": "a model's own code went to another folder, /",
+}
+
+
 @needs_compiler
-@pytest.mark.parametrize(("attack", "how"), [("exit", "status 0"), ("crash", "SIGSEGV")])
+@pytest.mark.parametrize(("attack", "how"), LATE.items())
 def test_a_model_that_ends_its_process_late_is_told_by_the_process_beside(
     attack, how, hostile_path, home
 ):
-    # Long after the trial, whose calls of this function are few.
-    plan = f"{attack} fmi2SetReal 1000"
+    own = {
+        "HOSTILE": f"{attack} fmi2SetReal 1000",  # after the trial, whose calls of it are few
+        # A busy machine may compile a loop for longer than that, which would be told alike.
+        "WORKBENCH_TRIAL": "memory=768 answer=60" + " call=3" * ("a call did not" in how),
+    }
     command = ("simulate", CASE, "--workers", "1", "--out", "out", "--fmu", hostile_path)
+    run = workbench(home, *command, **own)
+    assert run.returncode == 1
+    assert re.search(how, run.stderr)
+    assert "Traceback" not in run.stderr
+    assert left(home) == []
+
+
+@needs_compiler
+@pytest.mark.parametrize("attack", ["scribble", "scribble_and_leave"])
+def test_what_a_model_writes_to_all_open_files_is_no_answer_of_a_worker(attack, hostile_path, home):
+    cases = (CASE, ROOT / "cases" / "02_dry_100_2.7")
+    command = ("simulate", *cases, "--estimator", "open_loop", "--workers", "2", "--out", "out")
+    plan = f"{attack} fmi2SetReal 1000"
+    run = workbench(home, *command, "--fmu", hostile_path, HOSTILE=plan)
+    assert run.returncode == 1
+    assert "a model's own code wrote into files that are not its own" in run.stderr
+    assert "Traceback" not in run.stderr
+    assert left(home) == []
+
+
+@needs_compiler
+@pytest.mark.parametrize("attack", ["say", "hide"])
+def test_what_a_model_prints_or_sets_is_not_in_the_results(attack, hostile_path, home):
+    command = ("simulate", CASE, "--workers", "1", "--json", "--estimator", "open_loop")
+    plan = f"{attack} fmi2SetReal 1000"
+    run = workbench(home, *command, "--out", "out", "--fmu", hostile_path, HOSTILE=plan)
+    assert run.returncode == 0, run.stderr
+    assert json.loads(run.stdout)["status"] == 0
+    summary = home / "out" / "summary.json"
+    assert summary.stat().st_mode & 0o777 == 0o666 & ~own_umask()
+    assert ('"a": "model"' in run.stderr) == (attack == "say")
+
+
+@needs_compiler
+def test_the_document_of_a_command_that_a_model_ends_says_so(hostile_path, home):
+    plan = "exit fmi2SetReal 1000"
+    command = ("simulate", CASE, "--workers", "1", "--json", "--out", "out", "--fmu", hostile_path)
     run = workbench(home, *command, HOSTILE=plan)
     assert run.returncode == 1
-    assert how in run.stderr
-    assert "before it was done" in run.stderr
+    document = json.loads(run.stdout)
+    assert (document["command"], document["status"]) == ("simulate", 1)
+    assert "before it was done" in document["error"]["message"]
+
+
+@linux_only
+def test_a_recording_that_does_not_fit_is_refused_before_the_work(home):
+    (home / "long").mkdir()
+    shutil.copy(CASE / "case.toml", home / "long")
+    header, *rows = (CASE / "measured.csv").read_text().splitlines()
+    samples = [row.partition(",")[2] for row in rows]
+    with (home / "long" / "measured.csv").open("w") as table:
+        table.write(f"{header}\n")
+        there_and_back = itertools.cycle([*samples, *reversed(samples)])
+        for number, row in zip(range(400_000), there_and_back, strict=False):
+            table.write(f"{number * 0.005:.3f},{row}\n")
+    command = ("simulate", "long", "--estimator", "open_loop", "--out", "out")
+    run = subprocess.run(
+        ["bash", "-c", f"ulimit -d 700000; {sys.executable} -m workbench {' '.join(command)}"],
+        cwd=home,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert run.returncode == 2, run.stderr
+    assert "found 400000 samples, whose run takes about 732 MB; expected what fits" in run.stderr
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a full device")
+@pytest.mark.parametrize("output", [">/dev/full", ">&-", "--json >/dev/full", "--json >&-"])
+def test_results_that_cannot_be_printed_are_told(output, home):
+    run = subprocess.run(
+        f"{sys.executable} -m workbench systems {output}",
+        shell=True,
+        cwd=home,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert run.returncode == 1
+    assert re.fullmatch(r"error: standard output (takes no more|is closed).*\n", run.stderr)
+
+
+# Sources at which the front end overflows; the model is in the second line.
+OVERFLOWS = {
+    "a recursive function": "function f input Real a; output Real b; algorithm b := f(a); end f;\n"
+    "model M Real x(start=1.0); equation der(x) = -f(x); end M;",
+    "functions of one another": "function f input Real a; output Real b; algorithm b := g(a); end "
+    "f; function g input Real a; output Real b; algorithm b := f(a); end g;\n"
+    "model M Real x(start=1.0); equation der(x) = -f(x); end M;",
+    "a long sum": "\nmodel M Real x(start=1.0); equation der(x) = -x"
+    + " + 0.001*x" * 20_000
+    + "; end M;",
+    "a large array": "\nmodel M Real x(start=1.0); Real a[1000000000]; equation der(x) = -x; "
+    "for i in 1:1000000000 loop a[i] = x; end for; end M;",
+    "a constant of itself": "constant Real a = b; constant Real b = a;\n"
+    "model M Real x(start=1.0); equation der(x) = -a*x; end M;",
+}
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="how an overflow ends a process")
+@pytest.mark.parametrize("source", OVERFLOWS)
+def test_a_source_that_the_front_end_cannot_bear_is_named_with_its_line(source, home):
+    pytest.importorskip("rumoca", reason="needs the extra [compiler]")
+    (home / "P.mo").write_text(f"package P {OVERFLOWS[source]}\nend P;\n")
+    run = workbench(home, "fmu", "build", "P.mo", "P.M", "--out", "m.fmu")
+    assert run.returncode != 0
+    overflows = r"P\.M, at which the front end overflows|function 'P\.[fg]', which calls itself"
+    assert re.match(rf"error: P\.mo:[12]: found ({overflows})", run.stderr)
+    assert "a model's own code" not in run.stderr
+    assert not (home / "m.fmu").exists()
     assert left(home) == []
 
 
@@ -274,6 +403,23 @@ def test_an_isolated_model_can_neither_write_elsewhere_nor_reach_a_network(hosti
     assert not place.exists()
     assert json.loads(confined.stdout)["result"]["fit"] is True
     assert left(home) == []
+
+
+@needs_compiler
+@linux_only
+def test_an_isolated_model_changes_no_mode_owner_time_attribute_limit_or_socket(hostile_path, home):
+    place = home / "file"
+    place.touch(0o600)
+    command = ("fmu", "check", hostile_path, "--instantiations", "5", "--isolated")
+    plan = {"HOSTILE": "meddle fmi2Reset 3", "PLACE": str(place)}
+    run = workbench(home, *command, **plan)
+    assert run.returncode == 0, run.stderr
+    deeds = ["chmod", "chown", "utimes", "setxattr", "setflags", "prlimit", "socket"]
+    said = [line for line in run.stderr.splitlines() if line.endswith((" refused", " DEED"))]
+    assert said == [f"{deed} refused" for deed in deeds]
+    assert place.stat().st_mode & 0o777 == 0o600
+    assert ("run as root" in run.stderr) == (os.geteuid() == 0)
+    assert "no change of modes, owners, times or attributes of files" in run.stderr
 
 
 @linux_only

@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import os
 import sys
 import tempfile
 from collections.abc import Sequence
@@ -21,21 +22,28 @@ _CONFINED = "import sys; from workbench.__main__ import run_confined; sys.exit(r
 
 def run() -> int:
     """Run the command line of this process, with one beside it that cleans up; see `main`."""
-    return supervised(main)
+    return supervised(main, _tell)
 
 
 def run_confined() -> int:
     """Run a command line that may write to some folders only, which stand before it, as JSON."""
 
     def work() -> int:
-        folders = [Path(folder) for folder in json.loads(sys.argv[1])]
+        folders = [Path(folder) for folder in json.loads(sys.argv.pop(1))]
         for folder in folders:
             folder.mkdir(parents=True, exist_ok=True)
         # Before anything starts a thread, which would stay as free as it was.
         print(f"isolated: {confine([Path(tempfile.gettempdir()), *folders])}", file=sys.stderr)
-        return main(sys.argv[2:], confined=True)
+        return main(sys.argv[1:], confined=True)
 
-    return supervised(work)
+    return supervised(work, _tell)
+
+
+def _tell(message: str) -> None:
+    """Say why a command did not come to its end."""
+    given = sys.argv[1:]
+    command = next((word for word in given if not word.startswith("-")), "")
+    Output("--json" in given, quiet=False).fail(command, 1, message)
 
 
 def main(arguments: Sequence[str] | None = None, *, confined: bool = False) -> int:
@@ -60,7 +68,13 @@ def main(arguments: Sequence[str] | None = None, *, confined: bool = False) -> i
         module = import_module(options.module)
         if getattr(options, "workers", 1) > 1:
             preload(*getattr(module, "WORKERS_NEED", ()))  # workers import while this process does
+        here = os.getcwd()
         result = module.run(options, output)
+        if os.getcwd() != here or (result.page is not None and not result.page.exists()):
+            raise FMUError(
+                "the results do not stand where they were asked for: a model's own code went to "
+                f"another folder, {os.getcwd()}, or removed them"
+            )
         if printing and result.page is not None:
             output.result(f"printed: {print_page(result.page)}")
         return output.close(command, result)
@@ -69,6 +83,14 @@ def main(arguments: Sequence[str] | None = None, *, confined: bool = False) -> i
     except (FMUError, WorkerError, OSError) as error:
         # OSError: of the machine, such as a full temporary folder.
         return output.fail(command, 1, error)
+    except MemoryError:
+        return output.fail(
+            command,
+            1,
+            "error: out of memory: a model and its recordings need more than this machine has, or "
+            "more than a model may take, 2048 MB unless others are given by "
+            'WORKBENCH_TRIAL="memory=8000"; shorter recordings or less --workers need less',
+        )
     except KeyboardInterrupt:
         return output.fail(command, 130, "interrupted")
 

@@ -2,6 +2,7 @@
 
 import gzip
 import io
+import json
 import re
 import zipfile
 from collections.abc import Iterator
@@ -15,6 +16,9 @@ from tests.case_folders import LINES, TOML
 from tests.fuzz.harness import Target
 from tests.fuzz.mutations import BYTES, SMALL, Files, change_one, mutate, zipped
 from tests.recorder_files import FORMATS, recorded
+from workbench.cli.next import _read_rivals
+from workbench.diagnosis.inference.quadratic import Quadratic, RecordingSystem
+from workbench.diagnosis.inference.rivals import Rival, Rivals
 from workbench.models.description import Description, read_description
 from workbench.models.fmu import FMU
 from workbench.models.modelica import check, read_library
@@ -23,6 +27,8 @@ from workbench.observers.gains_file import read_gains
 from workbench.recordings.case import Case, read_case, read_file
 from workbench.recordings.channels import NamedChannel, RecordingOptions
 from workbench.runtime import resources
+from workbench.studies.monitoring.estimate import RecordingEstimate
+from workbench.studies.monitoring.state import RecordingResult, open_state
 from workbench.studies.power.journal import Journal, SetVerdict
 from workbench.studies.power.planting import Planting
 from workbench.system.reader import read_system
@@ -52,6 +58,8 @@ def targets(folder: Path) -> tuple[Target, ...]:
         _gains(system),
         _checkpoint(folder / "checkpoint.json"),
         _journal(folder / "sets.jsonl"),
+        _state(folder / "state.sqlite"),
+        _summary(),
         _system("system file", tank["system.toml"]),
         _system("wheelset file", _with_fmus(system)),
         Target("Modelica", {"Lib.mo": tank["package.mo"]}, _read_modelica),
@@ -206,6 +214,69 @@ def _journal(path: Path) -> Target:
         "verdicts",
         {"sets.jsonl": path.read_bytes()},
         lambda folder: Journal(folder / "sets.jsonl", identity, resume=True),
+        impossible,
+    )
+
+
+def _state(path: Path) -> Target:
+    estimate = RecordingEstimate(np.array([1.5, 2.5]), np.diag([0.1, 0.2]), np.array([3.0]), 20.0)
+    written = [
+        RecordingResult(name, f"hash of {name}", "2024-03-01T10:00:00", estimate, "")
+        for name in ("01", "02", "03")
+    ]
+    with open_state(path, {"model": "one"}) as state:
+        for result in written:
+            state.add(result)
+
+    def read(folder: Path) -> list[RecordingResult]:
+        with open_state(folder / "state.sqlite", {"model": "one"}) as state:
+            return state.all()
+
+    def impossible(results: list[RecordingResult]) -> str:
+        same = all(
+            np.array_equal(result.estimate.covariance, estimate.covariance)
+            for result in results
+            if result.estimate is not None
+        )
+        told = all(result.estimate is not None or result.refusal for result in results)
+        return "" if same and told else "another estimate than was kept, or none without a reason"
+
+    return Target("monitor state", {"state.sqlite": path.read_bytes()}, read, impossible)
+
+
+def _summary() -> Target:
+    recording = RecordingSystem(
+        np.array([0.5, -0.25, 0.125]),
+        np.array([[1.0, 0.5], [0.5, 2.0], [0.25, 0.0]]),
+        np.array([[1.0], [0.0], [0.5]]),
+        np.array([0.5]),
+        np.array([3.0]),
+        1,
+    )
+    prior = Quadratic(np.diag([1.0, 2.0]), np.array([0.5, 0.25]), 1.5, 0)
+    sizes, levels = {("Fade", "size"): 0.5}, {("muWR", "dry"): 0.25}
+    rival = Rival(("Fade",), sizes, levels, (recording,), prior, 100.0)
+    rivals = Rivals((rival,), ("Fade", "Lag"), {"mu": 0.5}, ("omegaW",), np.array([1.5]))
+    content = {
+        "verdict": "found",
+        "provenance": {"system": "wheelset"},
+        "rivals": rivals.to_dict(),
+    }
+
+    def impossible(found: tuple[str, Rivals]) -> str:
+        whole = [
+            array
+            for model in found[1].models
+            for part in (model.prior, *model.recordings)
+            for array in vars(part).values()
+            if isinstance(array, np.ndarray)
+        ]
+        return "" if all(not np.isnan(array).any() for array in whole) else "no numbers"
+
+    return Target(
+        "summary.json",
+        {"summary.json": json.dumps(content, indent=1).encode()},
+        lambda folder: _read_rivals(folder / "summary.json"),
         impossible,
     )
 

@@ -225,7 +225,7 @@ def _info(options: argparse.Namespace, output: Output) -> CommandResult:
 def _check(options: argparse.Namespace, output: Output) -> CommandResult:
     from workbench.models.checks import check, is_fit, remember_findings, uses
     from workbench.models.description import read_description
-    from workbench.models.trial import usual_limits
+    from workbench.runtime.supervision import usual_limits
 
     description = read_description(options.fmu)
     limits = usual_limits()

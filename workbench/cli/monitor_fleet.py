@@ -14,6 +14,7 @@ from workbench.cli.output import CommandResult, Output
 from workbench.errors import InputError
 from workbench.pages.answer import Answer, Measure, with_answer
 from workbench.pages.provenance import models, run_of, software
+from workbench.recordings.csv import csv_text
 from workbench.recordings.datasets import read_recorded
 from workbench.runtime.engine import Engine
 from workbench.runtime.files import locked_folder, write_json, write_whole
@@ -71,7 +72,7 @@ def run_fleet(options: argparse.Namespace, output: Output) -> CommandResult:
         summary = _summary(machines, provenance, time.perf_counter() - begin, interrupted)
         write_json(options.out / "fleet.json", summary)
         table = pd.DataFrame(summary["machines"])
-        write_whole(options.out / "fleet.csv", table.to_csv(index=False))
+        write_whole(options.out / "fleet.csv", csv_text(table, None))
     output.result(summary["answer"]["sentence"])
     for machine in machines:
         if machine.refusal:

@@ -88,13 +88,15 @@ def _read_rivals(file: Path) -> tuple[str, Rivals]:
     text = read_text(file, remedy)
     try:
         summary = json.loads(text)
-        verdict, system = summary["verdict"], str(summary["provenance"]["system"])
+        verdict, system = summary["verdict"], summary["provenance"]["system"]
+        if not isinstance(system, str) or not isinstance(verdict, str):
+            raise KeyError("provenance")
         if verdict in ("found", "partly explained"):
             remedy = "diagnose the recordings anew with this version"
             return system, read_rivals(summary["rivals"])
         if verdict not in ("nothing", "unexplained"):
             raise KeyError("verdict")
-    except (ValueError, KeyError, TypeError, RecursionError):
+    except (AttributeError, LookupError, OverflowError, RecursionError, TypeError, ValueError):
         raise InputError(
             where=str(file),
             found="no summary of a diagnosis with its rivals",

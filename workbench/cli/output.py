@@ -6,6 +6,7 @@ import os
 import sys
 import time
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -75,12 +76,14 @@ class Output:
 
     def fail(self, command: str, status: int, error: Exception | str) -> int:
         """Print an error to standard error and into the document; returns the status."""
-        print(error if isinstance(error, str) else f"error: {error}", file=sys.stderr)
+        with suppress(OSError, ValueError):  # which is full, or closed
+            print(error if isinstance(error, str) else f"error: {error}", file=sys.stderr)
         if self.json:
             parts = ("where", "found", "expected", "remedy")
             known = isinstance(error, InputError)
             content = {part: getattr(error, part) for part in parts} if known else {}
-            _print(_document(command, status, {"error": {"message": str(error), **content}}))
+            with suppress(OSError):  # that standard output takes no more is told already
+                _print(_document(command, status, {"error": {"message": str(error), **content}}))
         return status
 
 
@@ -95,11 +98,21 @@ def _document(command: str, status: int, content: Mapping[str, Any]) -> str:
 
 
 def _print(text: str) -> None:
-    """Print to whoever reads; one that has gone, as `head` does, costs nothing but the text."""
+    """Print to whoever reads; one that has gone, as `head` does, costs nothing but the text.
+
+    Raises
+    ------
+    OSError
+        If standard output is closed, or what it is led to is full.
+    """
+    if sys.stdout is None:
+        raise OSError("standard output is closed, so that no result can be printed")
     try:
         print(text, flush=True)
-    except BrokenPipeError:
+    except OSError as error:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        if not isinstance(error, BrokenPipeError):
+            raise OSError(f"standard output takes no more ({error.strerror})") from None
 
 
 def read_result(path: Path) -> dict[str, Any]:

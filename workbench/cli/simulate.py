@@ -15,6 +15,7 @@ from workbench.cli import arguments
 from workbench.cli.output import CommandResult, Output, warn
 from workbench.errors import InputError
 from workbench.runtime.files import locked_folder, write_json
+from workbench.runtime.supervision import memory_limit
 
 if TYPE_CHECKING:
     from workbench.observers.live import LiveWindow
@@ -23,6 +24,9 @@ if TYPE_CHECKING:
     from workbench.system.system import System
 
 WORKERS_NEED = ("workbench.observers.simulation", "workbench.observers.report")
+
+# That a run holds at its peak for each number of the recording: measured, EKF of the wheelset.
+_NUMBERS = 40
 
 
 def add(commands: arguments.Commands, text: str) -> argparse.ArgumentParser:
@@ -80,9 +84,26 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
     from workbench.observers.live import LiveWindow
 
     system, cases = chosen_system(options)
+    _require_memory(cases)
     window = LiveWindow(system) if options.live else None
     with locked_folder(options.out):
         return _run(options, output, system, cases, window)
+
+
+def _require_memory(cases: Sequence[Case]) -> None:
+    """Refuse recordings whose runs do not fit into the memory of a process, before the work."""
+    limit = memory_limit()
+    if limit is None:
+        return
+    for case in cases:
+        needed = _NUMBERS * 8 * case.time.size * (1 + len(case.signals))
+        if needed > limit:
+            raise InputError(
+                where=str(case.source),
+                found=f"{case.time.size} samples, whose run takes about {needed >> 20} MB",
+                expected=f"what fits into {limit >> 20} MB of memory",
+                remedy="cut the recording into parts",
+            )
 
 
 def _warn_of_findings(system: System) -> None:

@@ -25,6 +25,7 @@ from workbench.diagnosis.page import write_diagnosis_page
 from workbench.observers.report import write_estimates, write_numbers
 from workbench.pages.answer import Answer, Measure, percentage, with_answer
 from workbench.pages.figures import draw_case
+from workbench.recordings.csv import csv_text
 from workbench.runtime.files import write_json, write_whole
 from workbench.runtime.pool import Pool
 
@@ -117,8 +118,8 @@ def _write_tables(summary: Mapping[str, Any], out: Path) -> None:
         {**candidate, **{k: json.dumps(candidate[k]) for k in nested}}
         for candidate in summary["candidates"]
     ]
-    write_whole(out / "candidates.csv", _csv(pd.DataFrame(rows)))
-    write_whole(out / "dependences.csv", _csv(pd.DataFrame(summary["dependences"])))
+    write_whole(out / "candidates.csv", csv_text(pd.DataFrame(rows)))
+    write_whole(out / "dependences.csv", csv_text(pd.DataFrame(summary["dependences"])))
     errors = [
         {
             **{key: error[key] for key in ("recording", "channel", "unit", "held_out", "samples")},
@@ -132,21 +133,17 @@ def _write_tables(summary: Mapping[str, Any], out: Path) -> None:
         }
         for error in summary["errors"]
     ]
-    write_whole(out / "errors.csv", _csv(pd.DataFrame(errors)))
+    write_whole(out / "errors.csv", csv_text(pd.DataFrame(errors)))
     names, cosines = summary["confusability"]["effects"], summary["confusability"]["cosines"]
     cells = {"effect": names, **dict(zip(names, np.transpose(cosines), strict=True))}
-    write_whole(out / "confusability.csv", _csv(pd.DataFrame(cells)))
+    write_whole(out / "confusability.csv", csv_text(pd.DataFrame(cells)))
     if (gain := summary["gain"]) is not None:
         rows = [{"recording": name, **recording} for name, recording in gain["recordings"].items()]
         total = {key: gain[key] for key in ("before", "after", "low", "high")}
         write_whole(
-            out / "gain.csv", _csv(pd.DataFrame([*rows, {"recording": "all recordings", **total}]))
+            out / "gain.csv",
+            csv_text(pd.DataFrame([*rows, {"recording": "all recordings", **total}])),
         )
-
-
-def _csv(table: pd.DataFrame) -> str:
-    text: str = table.to_csv(index=False, float_format="%.6g")
-    return text
 
 
 def diagnosed(summary: Mapping[str, Any]) -> Answer:

@@ -89,6 +89,10 @@ def _check(path: Path, entries: list[zipfile.ZipInfo]) -> None:
         if name == DESCRIPTION and entry.file_size > _MOST_OF_DESCRIPTION:
             found = f"a model description of {entry.file_size >> 20} MB"
             raise _refusal(path, found, f"{_MOST_OF_DESCRIPTION >> 20} MB at most")
+    size, packed = (sum(getattr(e, key) for e in entries) for key in ("file_size", "compress_size"))
+    if size > max(_LITTLE, _HIGHEST_RATIO * packed):
+        found = f"{size >> 20} MB, which is {size // max(packed, 1)} times its size"
+        raise _refusal(path, found, f"{_HIGHEST_RATIO} times at most")
     files = {entry.filename for entry in entries if not entry.is_dir()}
     for name in seen:
         if inside := next((str(p) for p in PurePosixPath(name).parents if str(p) in files), None):

@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 from xml.etree import ElementTree
 from xml.parsers import expat
@@ -126,6 +127,8 @@ class Description:
         InputError
             If the FMU has no variable of a name.
         """
+        if not names:
+            return self
         own = {variable.name for variable in self.variables}
         for ours, theirs in names.items():
             if theirs not in own:
@@ -232,6 +235,14 @@ def read_description(path: Path) -> Description:
             remedy="give the path of one with --fmu"
             + ("" if CHECKOUT is None else ", or build the project's with 'make fmus'"),
         )
+    # A name may get another content; times of change are good to some milliseconds.
+    status = path.stat()
+    return _read(path, (status.st_mtime_ns, status.st_ctime_ns, status.st_size, status.st_ino))
+
+
+@lru_cache(maxsize=4)
+def _read(path: Path, state: tuple[int, ...]) -> Description:
+    """Read a file in the state that it has: of 100 000 variables that takes seconds."""
     with opened(path) as archive:
         files = {entry.filename: entry.file_size for entry in archive.infolist()}
         if DESCRIPTION not in files:
@@ -260,6 +271,9 @@ def read_description(path: Path) -> Description:
             expected="a description as FMI asks for",
             remedy="export the model again, or report it to the exporter's makers",
         ) from None
+
+
+_MOST_ELEMENTS = 1_000_000  # of arrays; the variables of the largest models are 100 000
 
 
 class _WrongError(ValueError):
@@ -292,6 +306,7 @@ def _description(
         for key in ("index", "derivative"):
             if (element.get(key) or "1").startswith(("0", "-")) and description.fmiVersion == "2.0":
                 raise _WrongError(f"{key} = '{element.get(key)}' of an element <{element.tag}>")
+    _refuse_impossible(description, root)
     elements = {v.name: _elements(v) for v in description.modelVariables if v.dimensions}
     variables = tuple(
         variable
@@ -335,6 +350,45 @@ def _description(
         step=_number(experiment.stepSize, "the step size") if experiment else None,
         stop=_number(experiment.stopTime, "the stop time") if experiment else None,
     )
+
+
+def _refuse_impossible(
+    description: "fmpy.model_description.ModelDescription", root: ElementTree.Element
+) -> None:
+    """Refuse counts, factors and roles that no model has."""
+    if description.numberOfEventIndicators < 0:
+        raise _WrongError(f"{description.numberOfEventIndicators} event indicators")
+    for tag in ("BaseUnit", "DisplayUnit"):
+        for unit in root.iter(tag):
+            factor = _number(unit.get("factor"), f"the factor of a <{tag}>")
+            _number(unit.get("offset"), f"the offset of a <{tag}>")
+            if factor == 0.0:
+                raise _WrongError(f"the factor 0 of a <{tag}>, a unit without size")
+    count = sum(
+        math.prod(max(length, 0) for length in v.shape)
+        for v in description.modelVariables
+        if v.dimensions
+    )
+    if count > _MOST_ELEMENTS:
+        raise _WrongError(f"arrays with {count} elements, where {_MOST_ELEMENTS} can be read,")
+    for variable in description.modelVariables:
+        if any(length < 1 for length in variable.shape or ()):
+            raise _WrongError(f"an array '{variable.name}' of the shape {variable.shape}")
+    for unknown in description.outputs:
+        if unknown.variable.causality != "output":
+            raise _WrongError(
+                f"a {unknown.variable.causality} '{unknown.variable.name}' among the outputs of "
+                "the model structure"
+            )
+    experiment = description.defaultExperiment
+    if experiment is not None:
+        step = _number(experiment.stepSize, "the step size")
+        start = _number(experiment.startTime, "the start time") or 0.0
+        stop = _number(experiment.stopTime, "the stop time")
+        if step is not None and step <= 0.0:
+            raise _WrongError(f"the step size {step:g} s")
+        if stop is not None and stop < start:
+            raise _WrongError(f"the stop time {stop:g} s before the start time {start:g} s")
 
 
 def _refuse_twice(names: Iterable[str]) -> None:

@@ -32,7 +32,7 @@ from workbench.models.description import (
     read_description,
 )
 from workbench.models.trial import require_trial
-from workbench.runtime.files import TemporaryFolder
+from workbench.runtime.files import TemporaryFolder, own_umask
 
 _FUNCTIONS = {
     "time": {"2.0": "fmi2SetTime", "3.0": "fmi3SetTime"},
@@ -143,6 +143,7 @@ class FMUInstance:
         self._description = description
         self._interface = interface
         self._log: list[str] = []
+        own_umask()  # before a model can change it
         self._scratch = TemporaryFolder()
         try:
             library = description.library(interface)

@@ -1,5 +1,8 @@
 """Built FMUs, and what is known of others, kept between runs in the user's cache folder.
 
+A folder that others may write is not used, and what is kept bears a code that takes a key of this
+user's, which lies elsewhere: none but this user's processes can have written it.
+
 The name of a kept file is the hash of all that goes into it, so that it needs no renewal and any
 process may use it. What is known are hashes of FMUs that were built here, or tried and found sound:
 a kept file that is not among them was damaged, and is built anew. Nothing depends on the folder:
@@ -8,9 +11,13 @@ where it cannot be written, FMUs are built and tried anew.
 
 import contextlib
 import hashlib
+import hmac
+import multiprocessing
 import os
 import platform
+import secrets
 import shutil
+import sys
 import tempfile
 from collections.abc import Callable
 from functools import cache
@@ -19,13 +26,16 @@ from pathlib import Path
 
 import platformdirs
 
+from workbench.errors import InputError
 from workbench.models.modelica import files, packages
-from workbench.runtime.files import TemporaryFolder
+from workbench.runtime.files import TemporaryFolder, write_whole
 
+_PROGRAM = "wheelset-workbench"
+_KEY_SIZE = 32  # [byte], of SHA-256
 _COMPILER = Path(__file__).parent / "compiler"
 _CODE = (".py", ".c", ".h")
-_TOOLS = ("wheelset-workbench", "rumoca", "casadi", "ziglang", "fmpy")
-_MOST_KNOWN = 4096  # empty files; a diagnosis builds some, a user has some
+_TOOLS = (_PROGRAM, "rumoca", "casadi", "ziglang", "fmpy")
+_MOST_KNOWN = 4096  # files of 32 bytes; a diagnosis builds some, a user has some
 # Files, of 0.1 MB: more than a run of all tests asks for, which is some hundreds. As the least used
 # are dropped, of a round that is longer than the cache nothing would ever be found again.
 _MOST = 1024
@@ -33,10 +43,65 @@ _MOST = 1024
 
 def cache_folder() -> Path:
     """Folder of what is kept between runs and can be made anew; it may be out of reach."""
+    nowhere = Path(os.devnull) / "cache"
     try:
-        return Path(platformdirs.user_cache_dir("wheelset-workbench"))
+        place = Path(platformdirs.user_cache_dir(_PROGRAM))
     except RuntimeError:  # a user without a home, as in some containers: nothing is kept
-        return Path(os.devnull) / "cache"
+        return nowhere
+    return place if _is_own(place) else nowhere
+
+
+@cache
+def _is_own(place: Path) -> bool:
+    """Whether a folder is this user's, and nobody else may write there; made if it is not there."""
+    if not hasattr(os, "getuid"):  # Windows: folders of users are theirs
+        return True
+    with contextlib.suppress(OSError):
+        place.mkdir(mode=0o700, parents=True, exist_ok=True)
+    try:
+        status = place.stat()
+    except OSError:
+        return True  # there is none
+    if status.st_uid == os.getuid() and not status.st_mode & 0o022:
+        return True
+    if multiprocessing.parent_process() is None:
+        print(
+            f"warning: the cache folder {place} is not used, because others may write there; "
+            f"chmod go-w {place}, or remove it",
+            file=sys.stderr,
+        )
+    return False
+
+
+def seal(*content: bytes) -> bytes:
+    """Code of a content, (32) bytes, that only processes of this user can tell."""
+    return hmac.digest(_key(), b"\0".join(content), "sha256")
+
+
+@cache
+def _key() -> bytes:
+    """Key of this user, made as needed; one of this process alone where it cannot be kept."""
+    made = secrets.token_bytes(_KEY_SIZE)
+    with contextlib.suppress(OSError, RuntimeError):
+        path = Path(platformdirs.user_data_dir(_PROGRAM)) / "key"
+        if not path.exists():
+            path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+            handle, part = tempfile.mkstemp(dir=path.parent, suffix=".part")  # of mode 600
+            try:
+                with os.fdopen(handle, "wb") as stream:
+                    stream.write(made)
+                with contextlib.suppress(FileExistsError):  # another process was faster
+                    os.link(part, path)
+            finally:
+                os.unlink(part)
+        with path.open("rb") as stream:
+            status, kept = os.fstat(stream.fileno()), stream.read()
+        own = not hasattr(os, "getuid") or (
+            status.st_uid == os.getuid() and not status.st_mode & 0o077
+        )
+        if own and len(kept) == _KEY_SIZE:
+            return kept
+    return made
 
 
 def folder() -> Path:
@@ -46,15 +111,22 @@ def folder() -> Path:
 
 def is_known(*names: str) -> bool:
     """Whether one of the names was remembered, by any process."""
-    return any(name in _remembered() or (_known() / name).is_file() for name in names)
+    return any(name in _remembered() or _is_kept(name) for name in names)
+
+
+def _is_kept(name: str) -> bool:
+    try:
+        return (_known() / name).read_bytes() == seal(name.encode())
+    except OSError:
+        return False
 
 
 def remember(name: str) -> None:
     """Remember that an FMU is sound, by its hash."""
     _remembered().add(name)
-    with contextlib.suppress(OSError):
+    with contextlib.suppress(OSError, InputError):
         _known().mkdir(parents=True, exist_ok=True)
-        (_known() / name).touch()
+        write_whole(_known() / name, seal(name.encode()))
         _drop(_known(), _MOST_KNOWN)
 
 

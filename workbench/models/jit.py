@@ -41,7 +41,7 @@ from numba.extending import (
     register_model,
 )
 
-from workbench.models.fmu_cache import cache_folder
+from workbench.models.fmu_cache import cache_folder, seal
 
 try:
     import fcntl
@@ -136,7 +136,7 @@ class _CodeFile:
         return entries
 
     def _digest(self, content: bytes) -> bytes:
-        return hashlib.sha256(self._state + b"\0" + content).digest()
+        return seal(self._state, content)
 
 
 @cache

@@ -6,14 +6,16 @@ here is taken as it is; any other is tried before it is loaded, and remembered b
 
 import json
 import os
+import re
+import secrets
 import signal
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass
+from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path, PurePosixPath
+from tempfile import TemporaryFile
 from typing import Any
 
 from workbench.errors import FMUError, InputError
@@ -22,6 +24,7 @@ from workbench.models.archive import unpack
 from workbench.models.description import CO_SIMULATION, MODEL_EXCHANGE, Description
 from workbench.runtime.files import temporary_folder
 from workbench.runtime.resources import fmus
+from workbench.runtime.supervision import Limits, limit_memory, usual_limits
 
 
 class ContainedError(FMUError):
@@ -32,65 +35,8 @@ class NoAnswerError(FMUError):
     """An FMU did not answer in time, while it used little of the processor: nothing is known."""
 
 
+_MOST_REPORTED = 16 << 20  # [byte]; the records of a trial take some 0.1 MB
 _GRACE = 5.0  # [s] beyond the limit, for the process that watches it to say so
-
-
-@dataclass(frozen=True)
-class Limits:
-    """What an FMU may use while it is tried.
-
-    Attributes
-    ----------
-    processor : time of the processor in one call [s]. Calls take microseconds, a start seconds.
-    answer : time until the end of all [s], long enough for a machine that has other work to do.
-    memory : that can be written [bytes]; models hold kilobytes, runtimes that they bring megabytes.
-    file : the largest file that is written [bytes].
-    """
-
-    processor: float = 3.0
-    answer: float = 10.0
-    memory: int = 2 << 30
-    file: int = 100 << 20
-
-    def __str__(self) -> str:
-        return (
-            f"{self.processor:g} s of processor time in one call, {self.answer:g} s in all, "
-            f"{self.memory >> 20} MB of memory, files of {self.file >> 20} MB"
-        )
-
-
-_NAMES = {"processor": 1, "answer": 1, "memory": 1 << 20, "file": 1 << 20}  # and their units
-
-
-def usual_limits() -> Limits:
-    """Limits that hold unless others are given: WORKBENCH_TRIAL="processor=20 answer=60".
-
-    The variable of the environment names times in seconds and sizes in MB.
-
-    Raises
-    ------
-    InputError
-        If it cannot be read.
-    """
-    # WORKBENCH_PROOF is its name before version 0.2.
-    text = os.environ.get("WORKBENCH_TRIAL", os.environ.get("WORKBENCH_PROOF", ""))
-    given: dict[str, Any] = {}
-    for word in text.split():
-        name, _, number = word.partition("=")
-        try:
-            unit = _NAMES[name]
-            value = float(number) * unit
-            given[name] = value if unit == 1 else int(value)
-        except (KeyError, ValueError, OverflowError):
-            value = 0.0
-        if not 0.0 < value < 2.0**62:
-            raise InputError(
-                where="environment, WORKBENCH_TRIAL",
-                found=f"'{word[:80]}'",
-                expected=f"some of {', '.join(_NAMES)}, each =NUMBER above 0 (s or MB)",
-                remedy="correct it, for instance to 'processor=20 answer=60'",
-            )
-    return Limits(**given)
 
 
 def require_trial(description: Description, interface: str, folder: Path) -> None:
@@ -110,10 +56,18 @@ def require_trial(description: Description, interface: str, folder: Path) -> Non
         If it ends the process, or does not return from a call.
     NoAnswerError
         If it does not answer.
+    FMUError
+        If it answers a call with an error.
     """
-    if description.sha256 in _packaged() or fmu_cache.is_known(*_marks(description, interface)):
+    built, borne = _marks(description, interface)
+    if description.sha256 in _packaged() or fmu_cache.is_known(built):
         return
-    run_trial(description, interface, folder, usual_limits())
+    limits = usual_limits()
+    if not fmu_cache.is_known(borne) and (
+        refused := run_trial(description, interface, folder, limits)
+    ):
+        raise FMUError(refused)
+    limit_memory(limits.memory)
 
 
 @contextmanager
@@ -144,31 +98,37 @@ def run_trial(description: Description, interface: str, folder: Path, limits: Li
 
     Returns
     -------
-    The call that the FMU refused, which ended the trial; empty if it bore them all.
+    Which call the FMU refused that every observer makes, with what it logged; empty for none.
     """
-    task = json.dumps(_task(description, interface, folder, limits)).encode()
-    with subprocess.Popen(
-        [sys.executable, "-I", "-S", trial_calls.__file__],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        cwd=folder,
-        start_new_session=True,
-    ) as process:
-        try:
-            report, _ = process.communicate(task, limits.answer + _GRACE)
-            late = False
-        except subprocess.TimeoutExpired as error:
-            report, late = error.stdout or b"", True
-        finally:
-            process.kill()
-            process.stdout.close()  # type: ignore[union-attr]  # a pipe, which others may hold, too
-    lines = [json.loads(line) for line in report.splitlines() if line.endswith(b"}")]
+    secret = secrets.token_hex(16)
+    task = json.dumps({"secret": secret, **_task(description, interface, folder, limits)}).encode()
+    with (
+        TemporaryFile() as report,
+        subprocess.Popen(
+            [sys.executable, "-I", "-S", trial_calls.__file__],
+            stdin=subprocess.PIPE,
+            stdout=report,
+            stderr=subprocess.DEVNULL,
+            cwd=folder,
+            start_new_session=True,
+        ) as process,
+    ):
+        with suppress(subprocess.TimeoutExpired):
+            process.communicate(task, limits.answer + _GRACE)
+        late = process.poll() is None
+        process.kill()
+        process.wait()
+        report.seek(0)
+        records, foreign = _records(report.read(_MOST_REPORTED), secret.encode())
     end: dict[str, Any] = {"status": process.returncode, "used": 0.0, "late": late}
-    if lines and "status" in lines[-1]:
-        end = lines.pop()
-    last = lines[-1] if lines else {"call": "the start of its process"}
+    if records and "status" in records[-1]:
+        end = records.pop()
+    last = records[-1] if records else {"call": "the start of its process"}
     where = description.path.name
+    tried = (
+        f"It was tried in a process of its own, with limits of {limits} "
+        "(WORKBENCH_TRIAL changes them)"
+    )
     if end["late"]:
         raise NoAnswerError(
             f"{where}: did not answer from {last['call']} within {limits.answer:g} s, of which it "
@@ -182,15 +142,25 @@ def run_trial(description: Description, interface: str, folder: Path, limits: Li
             expected="one that this machine can load, with the functions of FMI",
             remedy="export the model again for this machine; see 'workbench fmu info'",
         )
-    if last["call"] != "end":
+    if last["call"] != "end" or end["status"]:
         call, used = last["call"], end["used"]
         at = f" in {call} after {used:.2f} s of processor time"
         raise ContainedError(
-            f"{where}: {describe_end(end['status'], call, f'{used:.1f}', at)}. It was tried in a "
-            f"process of its own, with limits of {limits} (WORKBENCH_TRIAL changes them)"
+            f"{where}: {describe_end(end['status'], call, f'{used:.1f}', at)}. {tried}"
         )
-    fmu_cache.remember(_marks(description, interface)[1])
-    return str(last["refused"])
+    if foreign:
+        raise ContainedError(
+            f"{where}: wrote to a file that another had opened, which destroys results. {tried}"
+        )
+    if not last["partly"]:
+        fmu_cache.remember(_marks(description, interface)[1])
+    return f"{where}: {last['refused']}. {tried}" if last["refused"] else ""
+
+
+def _records(report: bytes, secret: bytes) -> tuple[list[dict[str, Any]], bytes]:
+    """What `trial_calls` told, and what else stands in its report."""
+    line = re.compile(re.escape(secret) + rb"(.*)\n")
+    return [json.loads(text) for text in line.findall(report)], line.sub(b"", report)
 
 
 def describe_end(status: int, call: str, seconds: str, at: str = "") -> str:
@@ -240,8 +210,10 @@ def _task(description: Description, interface: str, folder: Path, limits: Limits
         "states": len(description.states),
         "reals": list(references.values()),
         "inputs": inputs,
+        "outputs": outputs,
         "start": begin,
         "time": description.start or 0.0,
+        "step": description.step or 1e-3,
         "directional": [pair for pair in wanted if all(pair)]
         if exchange and offered.directional_derivatives
         else [],

@@ -5,11 +5,13 @@ calls and tells the name of each before it is made; this process says how the ch
 what it started.
 """
 
+import _ctypes
 import ctypes
 import json
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 try:
@@ -19,7 +21,8 @@ except ImportError:  # Windows: the time of an answer is all that is limited
     resource = None  # type: ignore[assignment]
 
 _ROUNDS = 10  # of set and get, as an observer goes through them sample by sample
-_OK, _WARNING, _FATAL = 0, 1, 4
+_OK, _WARNING, _DISCARD, _FATAL = 0, 1, 2, 4
+_STATUS = {_DISCARD: "discard", 3: "error", _FATAL: "fatal", 5: "pending"}
 _DIE_WITH_PARENT, _ADOPT = 1, 36  # PR_SET_PDEATHSIG, PR_SET_CHILD_SUBREAPER
 _SIZE, _DOUBLE, _TEXT, _POINTER = ctypes.c_size_t, ctypes.c_double, ctypes.c_char_p, ctypes.c_void_p
 _LOG2 = ctypes.CFUNCTYPE(None, _POINTER, _TEXT, ctypes.c_int, _TEXT, _TEXT)
@@ -51,7 +54,11 @@ def limit_sizes(file: int, memory: int) -> None:
 
 
 class _RefusedError(Exception):
-    """The FMU answered a call with an error, which is an answer."""
+    """The FMU answered a call with an error."""
+
+    def __init__(self, message: str, status: int) -> None:
+        super().__init__(message)
+        self.status = status
 
 
 class _Callbacks(ctypes.Structure):
@@ -83,17 +90,23 @@ class _Calls:
         os.chdir(os.path.dirname(task["library"]))
         self._library = ctypes.CDLL(task["library"])
         self.component: int | None = None
+        self.refused: list[str] = []  # of what not everybody needs
+        self._log: list[str] = []
         libc = ctypes.CDLL(None) if os.name == "posix" else ctypes.cdll.msvcrt
         self._kept = (
-            _LOG2(lambda *_: None),
-            _LOG3(lambda *_: None),
+            _LOG2(self._note),
+            _LOG3(self._note),
             _ALLOCATE(("calloc", libc)),
             _FREE(("free", libc)),
         )
         self._callbacks = _Callbacks(self._kept[0], *self._kept[2:], None, None)
 
-    def has(self, name: str) -> bool:
-        return hasattr(self._library, self._prefix + name)
+    def _note(self, *arguments: Any) -> None:
+        self._log = [*self._log[-2:], (arguments[-1] or b"")[:400].decode(errors="replace")]
+
+    def _refusal(self, call: str, status: int) -> _RefusedError:
+        logged = "; ".join(self._log) or "the FMU logged nothing"
+        return _RefusedError(f"{call} returned {_STATUS.get(status, status)}: {logged}", status)
 
     def __call__(self, name: str, *arguments: Any) -> None:
         """Call a function with the instance and further arguments."""
@@ -101,7 +114,7 @@ class _Calls:
         if status not in (_OK, _WARNING):
             if status == _FATAL:
                 self.component = None
-            raise _RefusedError(f"{self._prefix}{name} returned {status}")
+            raise self._refusal(f"{self._prefix}{name}", status)
 
     def _raw(self, name: str, result: Any, *arguments: Any) -> Any:
         function = getattr(self._library, name)
@@ -114,10 +127,11 @@ class _Calls:
         task, no, text = self._task, ctypes.c_int(0), str.encode
         identifier, token = text(task["identifier"]), text(task["token"])
         if not self.three:
-            kind = ctypes.c_int(0 if task["exchange"] else 1)
-            arguments = (identifier, kind, token, text(task["resources"]))
+            name = "fmi2Instantiate"
+            interface = ctypes.c_int(0 if task["exchange"] else 1)
+            arguments = (identifier, interface, token, text(task["resources"]))
             callbacks = ctypes.byref(self._callbacks)
-            made = self._raw("fmi2Instantiate", _POINTER, *arguments, callbacks, no, no)
+            made = self._raw(name, _POINTER, *arguments, callbacks, no, no)
         else:
             false = ctypes.c_bool(False)
             common = (identifier, token, text(task["resources"]), false, false)
@@ -129,13 +143,29 @@ class _Calls:
                 rest = [false, false, None, _SIZE(0), None, self._kept[1], None]
             made = self._raw(name, _POINTER, *common, *rest)
         if not made:
-            raise _RefusedError("it would not be instantiated")
+            raise self._refusal(f"{name}, which did not instantiate it,", 3)
         self.component = made
+
+    @contextmanager
+    def optional(self) -> Iterator[None]:
+        """Go on where the FMU refuses what not everybody needs."""
+        try:
+            yield
+        except _RefusedError as error:
+            if self.component is None:
+                raise
+            self.refused.append(str(error))
 
     def free(self) -> None:
         if self.component is not None:
             self._raw(f"{self._prefix}FreeInstance", None, self.component)
         self.component = None
+
+    def unload(self) -> None:
+        """Unload the library, which runs what it has for its end."""
+        self._tell("unloading of its library")
+        limit_processor(self._task["processor"])
+        getattr(_ctypes, "dlclose" if os.name == "posix" else "FreeLibrary")(self._library._handle)
 
     def reals(self, use: str, references: list[int], values: Any) -> None:
         """Set or get real variables."""
@@ -172,6 +202,7 @@ def _go(call: _Calls, task: dict[str, Any]) -> None:
     """Set and get what an observer does, some times."""
     n, inputs = task["states"], task["inputs"]
     states, rates = (_DOUBLE * n)(), (_DOUBLE * n)()
+    outputs = (_DOUBLE * len(task["outputs"]))()
     held, everything = (_DOUBLE * len(inputs))(), (_DOUBLE * len(task["reals"]))()
     indicators, flags = (_DOUBLE * task["indicators"])(), (ctypes.c_int(), ctypes.c_int())
     call.reals("Get", inputs, held)
@@ -189,19 +220,22 @@ def _go(call: _Calls, task: dict[str, Any]) -> None:
             if task["completed"]:
                 call("CompletedIntegratorStep", ctypes.c_int(0), *map(ctypes.byref, flags))
         else:
-            _step(call, task["time"] + 1e-3 * k)
-        call.reals("Get", task["reals"], everything)
+            _step(call, task["time"] + task["step"] * k, task["step"])
+        call.reals("Get", task["outputs"], outputs)
+        if not call.refused:
+            with call.optional():
+                call.reals("Get", task["reals"], everything)
         for unknowns, knowns in task["directional"]:
             _differentiate(call, unknowns, knowns[k % len(knowns)])
 
 
-def _step(call: _Calls, t: float) -> None:
+def _step(call: _Calls, t: float, h: float) -> None:
     if not call.three:
-        call("DoStep", _DOUBLE(t), _DOUBLE(1e-3), ctypes.c_int(0))
+        call("DoStep", _DOUBLE(t), _DOUBLE(h), ctypes.c_int(0))
         return
     flags = [ctypes.byref(ctypes.c_bool()) for _ in range(3)]
     last = ctypes.byref(_DOUBLE())
-    call("DoStep", _DOUBLE(t), _DOUBLE(1e-3), ctypes.c_bool(False), *flags, last)
+    call("DoStep", _DOUBLE(t), _DOUBLE(h), ctypes.c_bool(False), *flags, last)
 
 
 def _differentiate(call: _Calls, unknowns: list[int], known: int) -> None:
@@ -225,26 +259,43 @@ def _roll_back(call: _Calls) -> None:
     call(f"Free{name}", ctypes.byref(saved))
 
 
-def _try(task: dict[str, Any], tell: Callable[[str], None]) -> None:
+def _try(task: dict[str, Any], tell: Callable[[str], None]) -> str:
+    """Make the calls; returns what the FMU refused that not everybody needs.
+
+    Raises
+    ------
+    _RefusedError
+        If it refuses another call.
+    """
     call = _Calls(task, tell)
     try:
         call.instantiate()
         _initialise(call, task)
         _go(call, task)
-        if task["saves"]:
-            _roll_back(call)
-        call("Reset")
-        _initialise(call, task)
-        _go(call, task)
+        with call.optional():
+            if task["saves"]:
+                _roll_back(call)
+        with call.optional():  # who runs it once does not reset it
+            call("Reset")
+            _initialise(call, task)
+            _go(call, task)
+    except _RefusedError as error:
+        if call.component is None or error.status != _DISCARD or task["exchange"]:
+            raise
+        call.refused.append(str(error))  # of a step whose size its solver does not take
     finally:
         call.free()
+    call.unload()
+    return "; ".join(call.refused)
 
 
 def _work(task: dict[str, Any], report: int) -> None:
     """Try the FMU, and end this process."""
+    own = os.getpid()
 
     def tell(what: str, **rest: str) -> None:
-        os.write(report, json.dumps({"call": what, **rest}).encode() + b"\n")
+        if os.getpid() == own:  # not another that the FMU made of this process
+            write_record(report, task["secret"], {"call": what, **rest})
 
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # what an FMU prints is nobody's concern
     os.dup2(1, 2)
@@ -253,14 +304,19 @@ def _work(task: dict[str, Any], report: int) -> None:
     limit_sizes(task["file"], task["memory"])
     refused = ""
     try:
-        _try(task, tell)
-    except _RefusedError as error:  # an answer; the log that explains it is for who calls it next
-        refused = str(error)
+        partly = _try(task, tell)
+    except _RefusedError as error:
+        partly = refused = str(error)
     except (OSError, AttributeError) as error:
         tell("not loaded", error=str(error))
         os._exit(0)
-    tell("end", refused=refused)
+    tell("end", refused=refused, partly=partly)
     os._exit(0)
+
+
+def write_record(file: int, secret: str, content: dict[str, Any]) -> None:
+    """Write a line that begins with a secret, by which it is told from what an FMU writes there."""
+    os.write(file, f"{secret}{json.dumps(content)}\n".encode())
 
 
 def _watch(child: int, answer: float) -> dict[str, Any]:
@@ -305,7 +361,7 @@ def main() -> None:
     if child == 0:
         control(_DIE_WITH_PARENT, signal.SIGKILL, 0, 0, 0)
         _work(task, report)
-    os.write(report, json.dumps(_watch(child, task["answer"])).encode() + b"\n")
+    write_record(report, task["secret"], _watch(child, task["answer"]))
 
 
 if __name__ == "__main__":

@@ -27,6 +27,7 @@ from workbench.pages.answer import (
 from workbench.pages.figures import CaseFigure, Curve, Panel, draw_case
 from workbench.pages.parts import Definitions, Numbers, Page, Part, Table, number, zoomable
 from workbench.pages.views import called, capital, named, per_shown, shown_unit
+from workbench.recordings.csv import csv_text
 from workbench.runtime.files import write_json, write_whole
 from workbench.system.system import System
 
@@ -54,7 +55,7 @@ def write_windows(observability: CaseObservability, path: Path) -> None:
             ]
         for j, name in enumerate(test.states):
             columns[f"{test.model}.remaining_{name} [1]"] = test.remaining[:, j]
-    write_whole(path, pd.DataFrame(columns).to_csv(index=False, float_format="%.6g"))
+    write_whole(path, csv_text(pd.DataFrame(columns)))
 
 
 def write_observability(

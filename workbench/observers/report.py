@@ -31,7 +31,8 @@ from workbench.pages.parts import (
 )
 from workbench.pages.templates import anchor
 from workbench.pages.views import below, called, capital, inverse, percent, rounded, window
-from workbench.runtime.files import write_whole
+from workbench.recordings.csv import csv_text
+from workbench.runtime.files import replacing
 from workbench.system.system import System
 
 
@@ -43,8 +44,13 @@ def write_estimates(result: CaseResult, path: Path) -> None:
 def write_numbers(frame: pd.DataFrame, path: Path, digits: int) -> None:
     """Write a table as pandas does, in a quarter of the time: a row at once, not a number."""
     row = ",".join([f"%.{digits}g"] * frame.shape[1]) + "\n"
-    rows = "".join(row % tuple(values) for values in frame.to_numpy(float).tolist())
-    write_whole(path, frame.head(0).to_csv(index=False) + rows.replace("nan", ""))
+    with replacing(path) as stream:
+        stream.write(csv_text(frame.head(0)).encode())
+        for first in range(0, len(frame), _ROWS):
+            part = frame.iloc[first : first + _ROWS].to_numpy(float).tolist()
+            stream.write(
+                "".join(row % tuple(values) for values in part).replace("nan", "").encode()
+            )
 
 
 def summarise_runs(
@@ -265,6 +271,7 @@ def write_page(
     page.write(summary, path)
 
 
+_ROWS = 20_000  # of a table that become text at once
 _Z = Numbers("objective z", "mean weighed error over the whole recording; of several, the largest")
 
 

@@ -6,6 +6,7 @@ import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,10 +14,14 @@ from workbench.arrays import Vector
 from workbench.errors import InputError, closest
 from workbench.runtime.files import read_text
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 _HEADER_CELL = re.compile(r"(?P<name>[^\[]*?)\s*(?:\[\s*(?P<unit>[^\]]*?)\s*\])?")
 _NUMBER_CHARACTERS = frozenset("0123456789+-eE., ")
 _NUMBER = re.compile(r" *[+-]?[0-9.,]*[0-9][0-9.,]*([eE][+-]?[0-9]+)? *")
 _THOUSANDS = re.compile(r" *[+-]?[1-9][0-9]{0,2}[.,][0-9]{3} *")
+_TOGETHER = 20_000  # lines that are taken apart at once
 _STAND_IN = "0"  # in empty fields that may be, while numbers are read
 _LARGEST = 1e100  # no measurement comes near; leaves room for the factors of units
 
@@ -44,6 +49,26 @@ def header(cell: str) -> tuple[str, str | None]:
     """
     match = _HEADER_CELL.fullmatch(cell.strip())
     return (match["name"], match["unit"] or None) if match else (cell, None)
+
+
+def csv_text(table: "pd.DataFrame", digits: int | None = 6) -> str:
+    """A table as CSV, in which no name is a formula of a spreadsheet.
+
+    A quotation mark stands before what begins with a sign of one: OWASP, CSV Injection.
+
+    Parameters
+    ----------
+    digits : of numbers; None for all that they have.
+    """
+
+    def escape(value: Any) -> Any:
+        formula = isinstance(value, str) and value.startswith(("=", "+", "-", "@", "\t", "\r"))
+        return f"'{value}" if formula else value
+
+    plain = table.rename(columns=escape)
+    for name in plain.select_dtypes(exclude="number"):
+        plain[name] = plain[name].map(escape)
+    return plain.to_csv(index=False, float_format=None if digits is None else f"%.{digits}g")
 
 
 def table_text(columns: Mapping[str, Vector]) -> str:
@@ -90,7 +115,42 @@ def read_columns(
     """
     text = read_text(path, "correct 'file' in the table [measurement] of case.toml")
     lines = text.rstrip("\n").split("\n")
+    del text
     _refuse_long(path, lines)
+    separator = _separator(path, lines[0])
+    if separator == "," and len(lines) > _TOGETHER:
+        # A part at a time: the cells of all as text take twenty times what they hold.
+        try:
+            return _by_parts(path, lines, required, optional, with_gaps)
+        except InputError:
+            pass  # found again below, with the line of the file
+    return _columns(path, lines, required, optional, with_gaps)
+
+
+def _by_parts(
+    path: Path,
+    lines: list[str],
+    required: Sequence[str],
+    optional: Sequence[str],
+    with_gaps: Collection[str],
+) -> dict[str, Column]:
+    parts = [
+        _columns(path, [lines[0], *lines[first : first + _TOGETHER]], required, optional, with_gaps)
+        for first in range(1, len(lines), _TOGETHER)
+    ]
+    return {
+        name: Column(column.unit, np.concatenate([part[name].values for part in parts]))
+        for name, column in parts[0].items()
+    }
+
+
+def _columns(
+    path: Path,
+    lines: list[str],
+    required: Sequence[str],
+    optional: Sequence[str],
+    with_gaps: Collection[str],
+) -> dict[str, Column]:
     separator = _separator(path, lines[0])
     first, *rows = _split(path, lines, separator)
     columns = _find(path, first, required, optional)

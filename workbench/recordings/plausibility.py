@@ -19,6 +19,11 @@ from workbench.system.system import OBSERVER, System
 from workbench.system.units import si_factor
 
 _FEW = 5  # samples that tell a value, whatever one or two of them read
+_REPEATED = 0.2  # share of repeated samples from which on a signal is not noisy enough to tell
+_BY_CHANCE = 1e-3  # runs that noise alone makes in a recording
+_JUDGED = 50  # samples that say how a signal moves
+# Standard deviations that no noise reaches out and back, see `Soundness.spike` of a diagnosis.
+_BEYOND = 8.0
 _CONTRADICTS = 300.0  # times the usual step: the unit of the time is another one
 _OTHER_UNITS = 60.0, 3600.0  # minutes and hours that are taken for seconds
 _CELSIUS = 273.15  # K
@@ -100,7 +105,11 @@ def doubts(
             findings += check
     _refuse(findings)
     # What contradicts a redundancy or a range is asked about once.
-    findings = findings or list(_sizes(signals, system, origin))
+    findings = (
+        findings
+        or list(_jumps(time, signals, system, origin))
+        or list(_sizes(signals, system, origin))
+    )
     return (*origin.doubts, *(str(finding.refusal()) for finding in findings))
 
 
@@ -231,6 +240,51 @@ def _still(signals: Mapping[str, Vector], system: System, origin: Origin) -> Ite
             f"readings that scatter by {_value_text(signal, signal.deviation(values[0]))}, as the "
             "sensor's noise does",
             "check the sensor, and what its column holds",
+        )
+
+
+def _jumps(
+    time: Vector, signals: Mapping[str, Vector], system: System, origin: Origin
+) -> Iterator[_Finding]:
+    """Samples, and runs of equal ones, that leave what is beside them and come back at once.
+
+    Motion that does so again and again is the machine's: against what 99 of 100 samples do. A run
+    of a noisy signal that is too long for chance is told, too, but for a sensor at rest.
+    """
+    for name, values in signals.items():
+        signal = system.signals[name]
+        known = np.flatnonzero(np.isfinite(values))
+        if signal.exact or known.size < _JUDGED:
+            continue
+        starts = np.flatnonzero(np.diff(values[known], prepend=np.inf))
+        if starts.size < _JUDGED:
+            continue
+        read, lengths = values[known[starts]], np.diff(starts, append=known.size)
+        before, after = read[1:-1] - read[:-2], read[1:-1] - read[2:]
+        away = np.where(before * after > 0.0, np.minimum(np.abs(before), np.abs(after)), 0.0)
+        noise = float(signal.deviation(np.median(np.abs(read))))
+        limit = _BEYOND * max(noise, float(np.quantile(away, 0.99)))
+        wrong = np.zeros(read.size, np.bool_)
+        wrong[1:-1] = away > limit
+        # Of n samples that repeat with a chance p, n p^(k - 1) runs of k are expected.
+        repeats = known.size - read.size - (lengths.max() - 1)
+        chance = max(repeats, 1) / known.size
+        if chance < _REPEATED and signal.resolution <= signal.noise:
+            shortest = 1.0 + np.log(_BY_CHANCE / known.size) / np.log(chance)
+            wrong |= (lengths > max(shortest, _FEW)) & (read != 0.0)
+        if not wrong.any():
+            continue
+        first = int(np.flatnonzero(wrong)[0])
+        sample = int(known[starts[first]])
+        yield _Finding(
+            False,
+            origin.at(sample, name),
+            f"{_value_text(signal, read[first])} at {time[sample]:.9g} s, beside "
+            f"{_value_text(signal, read[first - 1 if first else 1])}, and "
+            f"{int(lengths[wrong].sum()) - 1} more such samples",
+            f"what noise and motion do, {_value_text(signal, limit)} out and back at most, and "
+            f"no {_FEW} equal samples",
+            "check the sensor; a diagnosis sets such samples aside, estimators do not",
         )
 
 

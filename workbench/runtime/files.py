@@ -164,7 +164,8 @@ def append_line(path: Path, line: str) -> None:
 
 @contextmanager
 def _told(path: Path) -> Iterator[None]:
-    """Say in words why a place takes no files."""
+    """Say in words why a place takes no files; modes are as the user has them."""
+    before = os.umask(own_umask())
     try:
         yield
     except OSError as error:
@@ -174,6 +175,16 @@ def _told(path: Path) -> Iterator[None]:
             expected="a folder where files can be made, and room on the disk",
             remedy="choose another place, or make room; what was there before is kept",
         ) from None
+    finally:
+        os.umask(before)
+
+
+@cache
+def own_umask() -> int:
+    """Modes that files of this process do not get, as at the first call; a model may change it."""
+    mask = os.umask(0o077)
+    os.umask(mask)
+    return mask
 
 
 def _cut(path: Path) -> str:

@@ -10,7 +10,9 @@ import math
 import multiprocessing
 import os
 import pickle
+import secrets
 import signal
+import socket
 import sys
 import tempfile
 import threading
@@ -19,7 +21,8 @@ import traceback
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, as_completed, wait
 from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
-from multiprocessing import forkserver
+from functools import cache
+from multiprocessing import forkserver, resource_tracker
 from multiprocessing.connection import Connection
 from multiprocessing.context import ForkServerContext, SpawnContext
 from multiprocessing.process import BaseProcess
@@ -32,6 +35,7 @@ from threadpoolctl import threadpool_limits
 
 from workbench.errors import WorkerError
 from workbench.runtime.files import temporary_folder
+from workbench.runtime.supervision import Watch, beat, usual_limits
 
 Given = TypeVar("Given")
 
@@ -56,12 +60,20 @@ _END = 5.0  # [s] from the end of a pipe to that of its process, on a busy machi
 _GIVEN = "given.pickle"  # in the folder of a pool
 
 
-_SERVED = "forkserver" in multiprocessing.get_all_start_methods()
+_SECRET_SIZE = 16  # [byte]
 
 
-_CONTEXT: ForkServerContext | SpawnContext = (
-    multiprocessing.get_context("forkserver") if _SERVED else multiprocessing.get_context("spawn")
-)
+@cache
+def _served() -> bool:
+    """Whether a server can start workers: it listens to a socket, which isolation refuses."""
+    if "forkserver" not in multiprocessing.get_all_start_methods():
+        return False
+    try:
+        socket.socket(socket.AF_UNIX).close()
+    except PermissionError:
+        return False
+    return True
+
 
 _starting = threading.Lock()
 
@@ -71,9 +83,10 @@ class Pool(Generic[State]):
 
     A task is a function of what a worker was prepared with. One whose worker dies is tried again by
     a new worker, which no other task disturbs; if that dies too, its future raises WorkerError, and
-    so does one that takes longer than the limit. Other tasks never notice. Workers leave Ctrl-C to
-    this process and do not outlive it. They, and it beside them, use one BLAS thread: threads of
-    BLAS wait for one another, and matrices are small. Leaving the pool ends them.
+    so does one that takes longer than the limit, or does not return from a call. Other tasks never
+    notice. Workers leave Ctrl-C to this process and do not outlive it. They, and it beside them,
+    use one BLAS thread: threads of BLAS wait for one another, and matrices are small. Leaving the
+    pool ends them.
 
     One worker with no limit, not isolated, is this process: `submit` returns when the task is done.
 
@@ -116,8 +129,11 @@ class Pool(Generic[State]):
             return
         self._folder = self._stack.enter_context(temporary_folder())
         self._stack.enter_context(threadpool_limits(1))
+        self._secret = secrets.token_bytes(_SECRET_SIZE)
+        self._call = usual_limits().call
         # In a file, because handing so much to a process that dies as it starts waits for ever.
-        Path(self._folder, _GIVEN).write_bytes(pickle.dumps((dict(os.environ), begin, given)))
+        content = (dict(os.environ), self._call, begin, given)
+        Path(self._folder, _GIVEN).write_bytes(pickle.dumps(content))
         preload(begin.__module__, type(given).__module__)
         for number in range(workers):
             thread = threading.Thread(target=self._attend, args=(number,), daemon=True)
@@ -223,9 +239,12 @@ class Pool(Generic[State]):
                     worker.ask(message, self._limit)
                 )
                 return answer
-            except TimeoutError:
+            except TimeoutError as error:
                 self._drop(number, kill=True)
-                return None, WorkerError(f"a task took longer than {self._limit:g} s")
+                return None, WorkerError(str(error))
+            except ForeignDataError as error:
+                self._drop(number, kill=True)
+                return None, WorkerError(f"a task failed: {error}")
             except (EOFError, OSError):
                 if self._closed:
                     return None, WorkerError("the pool was closed")
@@ -237,7 +256,7 @@ class Pool(Generic[State]):
         with _starting:
             if self._closed:
                 raise EOFError
-            self._running[number] = _Worker(self._folder)
+            self._running[number] = _Worker(self._folder, self._secret, self._call)
             return self._running[number]
 
     def _drop(self, number: int, *, kill: bool = False) -> str:
@@ -251,14 +270,48 @@ class Pool(Generic[State]):
         return worker.end()
 
 
+class ForeignDataError(RuntimeError):
+    """Foreign code wrote into a pipe that another process listens to."""
+
+
+def send_marked(connection: "Connection[bytes, bytes]", secret: bytes, content: bytes) -> None:
+    """Send what `receive_marked` takes."""
+    connection.send_bytes(secret)
+    connection.send_bytes(content)
+
+
+def receive_marked(connection: "Connection[bytes, bytes]", secret: bytes) -> bytes:
+    """Receive what was sent with a secret, so that it may be unpickled.
+
+    Raises
+    ------
+    ForeignDataError
+        If something else was written into the pipe.
+    EOFError, OSError
+        If the other end was closed.
+    """
+    try:
+        mark = connection.recv_bytes(len(secret))
+    except ConnectionError:
+        raise
+    except OSError:  # another length than that of the secret
+        mark = b""
+    if mark != secret:
+        raise ForeignDataError("a model's own code wrote into files that are not its own")
+    return connection.recv_bytes()
+
+
 class _Worker:
     """A process, and this end of its pipe."""
 
-    def __init__(self, folder: str) -> None:
+    def __init__(self, folder: str, secret: bytes, call: float) -> None:
         self._connection, theirs = multiprocessing.Pipe()
         self._ready = False
+        self._secret, self._call = secret, call
+        heart = Path(folder, f"heart-{secrets.token_hex(8)}")
+        self._watch = Watch(heart, call)
         with theirs:
-            self._process = _start(_serve, (theirs, folder))
+            self._process = _start(_serve, (theirs, folder, secret, heart))
 
     def ask(self, message: bytes, limit: float) -> bytes:
         """Answer to a task, or why the process could not be prepared for it.
@@ -266,7 +319,9 @@ class _Worker:
         Raises
         ------
         TimeoutError
-            If there is none in time.
+            If there is none in time; the message says which limit was passed.
+        ForeignDataError
+            If it sent something else.
         EOFError, OSError
             If the process died.
         """
@@ -291,27 +346,34 @@ class _Worker:
         return f"by {signal.Signals(-code).name}" if code < 0 else f"with exit status {code}"
 
     def _receive(self, limit: float) -> bytes:
-        if not self._connection.poll(None if limit == math.inf else limit):
-            raise TimeoutError
-        return self._connection.recv_bytes()
+        end = time.monotonic() + limit
+        while not self._connection.poll(min(self._watch.period, max(end - time.monotonic(), 0.0))):
+            if self._watch.is_stuck():
+                raise TimeoutError(f"a call did not return for {self._call:g} s, and was ended")
+            if time.monotonic() >= end:
+                raise TimeoutError(f"a task took longer than {limit:g} s")
+        return receive_marked(self._connection, self._secret)
 
 
-def _serve(connection: "Connection[bytes, bytes]", folder: str) -> None:
+def _serve(connection: "Connection[bytes, bytes]", folder: str, secret: bytes, heart: Path) -> None:
     """Work on tasks, in a process of its own."""
+    own = os.getpid()
+    close_servers()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_master, daemon=True).start()
     tempfile.tempdir = folder
     with ExitStack() as stack:
         try:
-            environment, begin, given = pickle.loads(Path(folder, _GIVEN).read_bytes())
+            environment, call, begin, given = pickle.loads(Path(folder, _GIVEN).read_bytes())
             os.environ.clear()
             os.environ.update(environment)
+            beat(heart, call)
             threadpool_limits(1)
             state = stack.enter_context(begin(given))
         except Exception as error:
-            connection.send_bytes(_packed(None, error))
+            send_marked(connection, secret, _packed(None, error))
             return
-        connection.send_bytes(b"")
+        send_marked(connection, secret, b"")
         while True:
             message = connection.recv_bytes()
             try:
@@ -319,7 +381,21 @@ def _serve(connection: "Connection[bytes, bytes]", folder: str) -> None:
                 answer = _packed(function(state, *arguments), None)
             except Exception as error:
                 answer = _packed(None, error)
-            connection.send_bytes(answer)
+            if os.getpid() != own:  # another that a model made of this process
+                os._exit(1)
+            send_marked(connection, secret, answer)
+
+
+def close_servers() -> None:
+    """Close pipes to servers of `multiprocessing`, to which foreign code might write."""
+    for holder, name in (
+        (forkserver._forkserver, "_forkserver_alive_fd"),
+        (resource_tracker._resource_tracker, "_fd"),
+    ):
+        descriptor = getattr(holder, name, None)
+        if descriptor is not None:
+            os.close(descriptor)
+            setattr(holder, name, None)
 
 
 def _packed(result: Any, error: BaseException | None) -> bytes:
@@ -343,7 +419,7 @@ def preload(*modules: str) -> None:
 
     The first call in a process decides; see `multiprocessing.set_forkserver_preload`.
     """
-    if not _SERVED:
+    if not _served():
         return
     # The server is to find modules where this process does.
     paths = os.pathsep.join(path or os.getcwd() for path in sys.path)
@@ -367,9 +443,14 @@ def start(target: Callable[..., None], arguments: tuple[Any, ...]) -> BaseProces
 
 
 def _start(target: Callable[..., None], arguments: tuple[Any, ...]) -> BaseProcess:
+    context: ForkServerContext | SpawnContext = (
+        multiprocessing.get_context("forkserver")
+        if _served()
+        else multiprocessing.get_context("spawn")
+    )
     until = time.monotonic() + _END
     while True:
-        process: BaseProcess = _CONTEXT.Process(target=target, args=arguments, daemon=True)
+        process: BaseProcess = context.Process(target=target, args=arguments, daemon=True)
         try:
             with _hidden_program():
                 process.start()
@@ -402,12 +483,12 @@ def _hidden_program() -> Iterator[None]:
     """
     program = sys.modules["__main__"]
     sys.modules["__main__"] = _Nameless(program)
-    blocked = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT]) if _SERVED else set()
+    blocked = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT]) if _served() else set()
     try:
         yield
     finally:
         sys.modules["__main__"] = program
-        if _SERVED:
+        if _served():
             signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
 
 

@@ -9,17 +9,28 @@ import errno
 import gc
 import os
 import platform
+import secrets
 import signal
 import struct
 import subprocess
 import sys
+import tempfile
+import threading
 import traceback
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
+from typing import Any
 
+from workbench.errors import InputError
 from workbench.runtime.files import own_temporary_files
+
+try:
+    import resource
+except ImportError:  # Windows: there memory is not limited
+    resource = None  # type: ignore[assignment]
 
 _DIE_WITH_PARENT, _ADOPT = 1, 36  # PR_SET_PDEATHSIG, PR_SET_CHILD_SUBREAPER of <sys/prctl.h>
 
@@ -34,48 +45,266 @@ _REQUESTS = tuple(
 _PATIENCE = 10  # [s] from a request to end until the end; results are written in less
 
 
-def supervised(work: Callable[[], int]) -> int:
+@dataclass(frozen=True)
+class Limits:
+    """What foreign code may use: while it is tried, and for memory and `call` in a command, too.
+
+    Attributes
+    ----------
+    processor : time of the processor in one call [s]. Calls take microseconds, a start seconds.
+    answer : time until the end of all [s], long enough for a machine that has other work to do.
+    memory : that can be written [bytes]; models hold kilobytes, runtimes that they bring megabytes.
+    file : the largest file that is written [bytes].
+    call : time in which a call must return while a command runs [s]. The longest of them is a
+        compiled loop over a recording, of minutes for a million samples.
+    """
+
+    processor: float = 3.0
+    answer: float = 10.0
+    memory: int = 2 << 30
+    file: int = 100 << 20
+    call: float = 900.0
+
+    def __str__(self) -> str:
+        return (
+            f"{self.processor:g} s of processor time in one call, {self.answer:g} s in all, "
+            f"{self.memory >> 20} MB of memory, files of {self.file >> 20} MB"
+        )
+
+
+_NAMES = {
+    "processor": 1,
+    "answer": 1,
+    "memory": 1 << 20,
+    "file": 1 << 20,
+    "call": 1,
+}  # and their units
+
+
+def usual_limits() -> Limits:
+    """Limits that hold unless others are given: WORKBENCH_TRIAL="processor=20 answer=60".
+
+    The variable of the environment names times in seconds and sizes in MB.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read.
+    """
+    # WORKBENCH_PROOF is its name before version 0.2.
+    text = os.environ.get("WORKBENCH_TRIAL", os.environ.get("WORKBENCH_PROOF", ""))
+    given: dict[str, Any] = {}
+    for word in text.split():
+        name, _, number = word.partition("=")
+        try:
+            unit = _NAMES[name]
+            value = float(number) * unit
+            given[name] = value if unit == 1 else int(value)
+        except (KeyError, ValueError, OverflowError):
+            value = 0.0
+        if not 0.0 < value < 2.0**62:
+            raise InputError(
+                where="environment, WORKBENCH_TRIAL",
+                found=f"'{word[:80]}'",
+                expected=f"some of {', '.join(_NAMES)}, each =NUMBER above 0 (s or MB)",
+                remedy="correct it, for instance to 'processor=20 answer=60'",
+            )
+    return Limits(**given)
+
+
+_HEART, _NOTE = "heart", "blamed"  # files of a command, in its temporary folder
+_TICKS = 20  # in the time that a call may take
+
+
+def beat(heart: Path, limit: float) -> None:
+    """Have this process show that its calls return: a file's time changes as long as they do.
+
+    Python runs the handler of a signal between calls of foreign code, and while it waits itself.
+    """
+    if not hasattr(signal, "setitimer"):  # Windows
+        return
+
+    def touch(*_: object) -> None:
+        with suppress(OSError):
+            heart.write_bytes(b"1")  # not os.utime, which isolation refuses
+
+    touch()
+    signal.signal(signal.SIGALRM, touch)
+    signal.siginterrupt(signal.SIGALRM, False)
+    signal.setitimer(signal.ITIMER_REAL, limit / _TICKS, limit / _TICKS)
+
+
+class Watch:
+    """Sees whether the calls of another process return; see `beat`.
+
+    It counts its own looks, so that who is stopped together with it has not missed any.
+
+    Attributes
+    ----------
+    period : at which it looks [s].
+    """
+
+    def __init__(self, heart: Path, limit: float) -> None:
+        self.period = limit / _TICKS
+        self._heart, self._last, self._silent = heart, 0, 0
+
+    def is_stuck(self) -> bool:
+        """Look; returns whether a call did not return for as long as it may take."""
+        try:
+            now = self._heart.stat().st_mtime_ns
+        except OSError:  # it has not begun
+            return False
+        self._silent = self._silent + 1 if now == self._last else 0
+        self._last = now
+        return self._silent > _TICKS
+
+
+def memory_limit() -> int | None:
+    """Memory that a process may have at most [bytes]; None where the system does not say."""
+    if resource is None or sys.platform != "linux":
+        return None
+    machine = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    _, hard = resource.getrlimit(resource.RLIMIT_DATA)
+    return machine if hard == resource.RLIM_INFINITY else min(machine, hard)
+
+
+def limit_memory(size: int) -> None:
+    """Limit what this process takes from now on [bytes], if it belongs to a command.
+
+    Raises
+    ------
+    OSError
+        If the system does not say what the process has.
+    """
+    if resource is None or sys.platform != "linux":
+        return
+    soft, hard = resource.getrlimit(resource.RLIMIT_DATA)
+    if hard == resource.RLIM_INFINITY or soft != hard:  # of a notebook, or done before
+        return
+    status = Path("/proc/self/status").read_text()
+    held = int(status.partition("VmData:")[2].split()[0]) << 10
+    resource.setrlimit(resource.RLIMIT_DATA, (min(held + size, hard), hard))
+
+
+def supervised(
+    work: Callable[[], int],
+    tell: Callable[[str], object] = lambda message: print(message, file=sys.stderr),
+) -> int:
     """Do work in a child process; returns its status, or 1 if it did not come to its end.
 
-    Signals that ask this process to end or to pause are passed on; when the work is over they are
-    left blocked, for a process that ends. Where processes cannot be forked (Windows) the work is
-    done in this one.
+    The status comes with a secret, which no foreign code writes by accident. The child, and what it
+    starts, has no more memory than the machine. Signals that ask this process to end or to pause
+    are passed on; when the work is over they are left blocked, for a process that ends. Where
+    processes cannot be forked (Windows) the work is done in this one.
+
+    Parameters
+    ----------
+    work : returns a status.
+    tell : takes why the work did not come to its end.
     """
     if not hasattr(os, "fork"):
         with own_temporary_files():
             return work()
-    status = b""
+    try:
+        limit = usual_limits().call
+    except InputError as error:
+        tell(f"error: {error}")
+        return 2
+    content, stuck, blamed = b"", False, ""
+    secret = secrets.token_bytes()
     # They wait but for while they are passed on: who ended before or after would leave files.
     signal.pthread_sigmask(signal.SIG_BLOCK, _REQUESTS)
-    with own_temporary_files():
-        done, tell = os.pipe()
-        sys.stdout.flush()
-        sys.stderr.flush()
+    with own_temporary_files() as folder:
+        heart = folder / _HEART
+        done, status_pipe = os.pipe()
+        for stream in (sys.stdout, sys.stderr):
+            if stream is not None:  # closed by who started this
+                stream.flush()
         parent = os.getpid()
         child = os.fork()
         if child == 0:
             os.close(done)
             _begin(parent)
             signal.pthread_sigmask(signal.SIG_UNBLOCK, _REQUESTS)
-            return _worked(work, tell)
-        os.close(tell)
+            os.set_blocking(status_pipe, False)  # who fills it does not stop us
+            beat(heart, limit)
+            return _worked(work, status_pipe, secret)
+        os.close(status_pipe)
         _control(_ADOPT, 1)
-        with _passing_on(child):
+        with _passing_on(child), _watching(child, Watch(heart, limit)) as ended:
             _, ending = os.waitpid(child, 0)
+        stuck = ended.is_set()
         _end_the_rest(child)
         os.set_blocking(done, False)  # a model may have left someone who holds the other end
         with suppress(BlockingIOError):
-            status = os.read(done, 1)
+            while piece := os.read(done, 1 << 16):
+                content += piece
         os.close(done)
-    if status:
+        with suppress(OSError):
+            blamed = (folder / _NOTE).read_text(encoding="utf-8")
+    _, ours, status = content.rpartition(secret)
+    if ours and len(status) == 1:
         return status[0]
-    print(f"error: {_told(os.waitstatus_to_exitcode(ending))}", file=sys.stderr)
+    how = (
+        f'stuck: a call did not return for {limit:g} s (WORKBENCH_TRIAL="call={10 * limit:g}" '
+        "allows more), and the command was ended"
+        if stuck
+        else blamed or _told(os.waitstatus_to_exitcode(ending))
+    )
+    tell(f"error: {how}")
     return 1
+
+
+@contextmanager
+def blaming(error: InputError) -> Iterator[None]:
+    """Say what is told if foreign code ends this process meanwhile, where a command is supervised.
+
+    Parameters
+    ----------
+    error : of what that code reads; it is written as text.
+    """
+    folder = Path(tempfile.gettempdir())
+    note = folder / _NOTE
+    if not (folder / _HEART).exists():  # not in a command
+        yield
+        return
+    note.write_text(str(error), encoding="utf-8")
+    try:
+        yield
+    finally:
+        note.unlink(missing_ok=True)
+
+
+@contextmanager
+def _watching(child: int, watch: Watch) -> Iterator[threading.Event]:
+    """Kill a child whose calls do not return; the event says whether that was so."""
+    over, ended = threading.Event(), threading.Event()
+
+    def look() -> None:
+        while not over.wait(watch.period):
+            if watch.is_stuck():
+                ended.set()
+                with suppress(ProcessLookupError):
+                    os.kill(child, signal.SIGKILL)
+                return
+
+    thread = threading.Thread(target=look, daemon=True)
+    thread.start()
+    try:
+        yield ended
+    finally:
+        over.set()
+        thread.join()
 
 
 def run_program(command: Sequence[str]) -> int:
     """Run a program until it ends, which is asked to when this one is; returns its status."""
-    with subprocess.Popen(command, process_group=0 if os.name == "posix" else None) as program:
+    try:
+        shown = sys.stdout.fileno()
+    except (AttributeError, OSError):  # closed, or not of the system
+        shown = None
+    group = 0 if os.name == "posix" else None
+    with subprocess.Popen(command, stdout=shown, process_group=group) as program:
         while True:
             try:
                 return program.wait()
@@ -89,9 +318,12 @@ def run_program(command: Sequence[str]) -> int:
 def _begin(parent: int) -> None:
     """Prepare the child: a group of its own, so that a terminal's Ctrl-C reaches it once."""
     os.setpgid(0, 0)
+    _set_results_apart()
     _control(_DIE_WITH_PARENT, signal.SIGKILL)
     if os.getppid() != parent:
         os._exit(1)
+    if (most := memory_limit()) is not None:
+        resource.setrlimit(resource.RLIMIT_DATA, (most, most))
 
     def leave(number: int, frame: FrameType | None) -> None:
         raise SystemExit(128 + number)
@@ -101,15 +333,35 @@ def _begin(parent: int) -> None:
             signal.signal(request, leave)
 
 
-def _worked(work: Callable[[], int], tell: int) -> int:
+def _set_results_apart() -> None:
+    """Lead what foreign code prints to standard error, and what Python prints where it went."""
+    if sys.stdout is None or sys.stderr is None:
+        return
+    shown = os.dup(1)
+    os.dup2(2, 1)
+    buffering = 1 if os.isatty(shown) else -1
+    sys.stdout = open(  # noqa: SIM115  # for as long as the process runs
+        shown, "w", buffering, encoding=sys.stdout.encoding, errors=sys.stdout.errors
+    )
+
+
+def _worked(work: Callable[[], int], status_pipe: int, secret: bytes) -> int:
     """Status of the work, told to the parent, too."""
+    own = os.getpid()
     try:
         status = work()
     except BaseException as error:
         status = _status(error)
-    with suppress(OSError, ValueError):  # whoever read it has gone
+    if os.getpid() != own:  # another that a model made of this process
+        os._exit(1)
+    with suppress(AttributeError, OSError, ValueError):  # it is closed, or its reader has gone
         sys.stdout.flush()
-    os.write(tell, bytes([status & 0xFF]))
+    with suppress(OSError):  # a model has filled it; the parent says that no status came
+        os.write(status_pipe, secret + bytes([status & 0xFF]))
+    if hasattr(signal, "alarm"):  # what a model does at the end of a process ends, too
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, signal.SIG_DFL)
+        signal.alarm(_PATIENCE)
     gc.freeze()  # all that is left goes with the process: a last search for garbage takes 0.2 s
     return status
 
@@ -215,16 +467,27 @@ _LINK_ELSEWHERE, _TRUNCATE = 1 << 13, 1 << 14  # since versions 2 and 3
 _TCP = 3  # bind and connect, since version 4
 
 
+_DEVICES = 1 << 15  # ioctl of devices, since version 5
+
+
 _OUTSIDE = 3  # abstract sockets and signals, since version 6
 
 
 _NO_NEW_PRIVILEGES, _SECCOMP, _FILTER = 38, 22, 2  # of prctl
 
-# Architecture as audit names it, and its system call `socket`.
-_SOCKET = {"x86_64": (0xC000003E, 41), "aarch64": (0xC00000B7, 198)}
+# Numbers of system calls: sockets, modes, owners, times and attributes of files, memory of others.
+# Sources: Linux 6.17, arch/x86/entry/syscalls/syscall_64.tbl and scripts/syscall.tbl.
+_SINCE_2019 = {425, 438, 452, 463, 466, 469}  # io_uring_setup, pidfd_getfd, fchmodat2, xattrs, attr
+_X86_64 = {41, 90, 91, 92, 93, 94, 101, 132, 188, 189, 190, 197, 198, 199, 235, 260, 261, 268, 280}
+_ARM64 = {5, 6, 7, 14, 15, 16, 52, 53, 54, 55, 88, 117, 198, 271}
+# Architecture as audit names it, calls that are refused, prlimit64, ioctl.
+_CALLS = {
+    "x86_64": (0xC000003E, _X86_64 | {311} | _SINCE_2019, 302, 16),
+    "aarch64": (0xC00000B7, _ARM64 | _SINCE_2019, 261, 29),
+}
 
 
-_IO_URING, _TAKE_DESCRIPTOR = 425, 438  # other ways to a socket: io_uring_setup, pidfd_getfd
+_SET_ATTRIBUTES = (0x40086602, 0x401C5820)  # FS_IOC_SETFLAGS, FS_IOC_FSSETXATTR
 
 
 _LOAD, _EQUAL, _AT_LEAST, _RETURN = 0x20, 0x15, 0x35, 0x06
@@ -251,20 +514,28 @@ def confine(folders: Sequence[Path]) -> str:
         return "in a process of its own; this system has no means to confine it further"
     libc = ctypes.CDLL(None, use_errno=True)
     writing = _confine_files(libc, folders)
-    network = _confine_sockets(libc)
+    calls = _confine_calls(libc)
     places = ", ".join(map(str, folders))
-    return (
-        f"writing only below {places}" if writing else "writing NOT confined (no Landlock here)"
-    ) + ("; no network" if network else "; network NOT confined (no seccomp filter here)")
+    holds = [
+        f"writing only below {places}" if writing else "writing NOT confined (no Landlock here)",
+        "no network; no sockets; no change of modes, owners, times or attributes of files, nor of "
+        "limits or memory of other processes"
+        if calls
+        else "network, sockets and modes of files NOT confined (no seccomp filter here)",
+        "reading is not confined",
+    ]
+    if os.geteuid() == 0:
+        holds.append("run as root: prefer a user of its own")
+    return "; ".join(holds)
 
 
 def _confine_files(libc: ctypes.CDLL, folders: Sequence[Path]) -> bool:
     version = libc.syscall(_CREATE_RULESET, None, ctypes.c_size_t(0), _VERSION)
     if version < 1:
         return False
-    rights = (
-        _WRITING | (_LINK_ELSEWHERE if version >= 2 else 0) | (_TRUNCATE if version >= 3 else 0)
-    )
+    rights = _WRITING
+    for since, right in ((2, _LINK_ELSEWHERE), (3, _TRUNCATE), (5, _DEVICES)):
+        rights |= right if version >= since else 0
     fields = [rights, *([_TCP] if version >= 4 else []), *([_OUTSIDE] if version >= 6 else [])]
     attributes = struct.pack(f"{len(fields)}Q", *fields)
     ruleset = libc.syscall(_CREATE_RULESET, attributes, ctypes.c_size_t(len(attributes)), 0)
@@ -284,30 +555,43 @@ def _confine_files(libc: ctypes.CDLL, folders: Sequence[Path]) -> bool:
     return not failed
 
 
-def _confine_sockets(libc: ctypes.CDLL) -> bool:
-    """Refuse sockets but those between processes of this machine."""
-    if platform.machine() not in _SOCKET:
+def _confine_calls(libc: ctypes.CDLL) -> bool:
+    """Refuse system calls that Landlock does not know."""
+    if platform.machine() not in _CALLS:
         return False
-    architecture, make = _SOCKET[platform.machine()]
-    refuse = _REFUSE | errno.EACCES
-    # Code, jumps if true and if false, constant. The data: number, architecture, ..., arguments.
-    program = [
-        (_LOAD, 0, 0, 4),
-        (_EQUAL, 0, 8, architecture),
-        (_LOAD, 0, 0, 0),
-        (_AT_LEAST, 6, 0, _X32),
-        (_EQUAL, 5, 0, _IO_URING),
-        (_EQUAL, 4, 0, _TAKE_DESCRIPTOR),
-        (_EQUAL, 0, 2, make),
-        (_LOAD, 0, 0, 16),
-        (_EQUAL, 0, 1, 1),  # AF_UNIX
-        (_RETURN, 0, 0, _ALLOW),
-        (_RETURN, 0, 0, refuse),
+    architecture, refused, limits, control = _CALLS[platform.machine()]
+    # Code, constant, and where to jump if true and if false; None: on. The data of a call: number,
+    # architecture, ..., arguments.
+    steps: list[tuple[int, int, str | None, str | None]] = [
+        (_LOAD, 4, None, None),
+        (_EQUAL, architecture, None, "refuse"),
+        (_LOAD, 0, None, None),
+        (_AT_LEAST, _X32, "refuse", None),
+        *((_EQUAL, number, "refuse", None) for number in sorted(refused)),
+        (_EQUAL, limits, "of whom", None),
+        (_EQUAL, control, None, "allow"),
+        (_LOAD, 24, None, None),
+        *((_EQUAL, request, "refuse", None) for request in _SET_ATTRIBUTES),
+        (_RETURN, _ALLOW, None, None),
+        (_LOAD, 16, None, None),
+        (_EQUAL, 0, None, "refuse"),  # of this process itself
+        (_RETURN, _ALLOW, None, None),
+        (_RETURN, _REFUSE | errno.EACCES, None, None),
     ]
+    end = len(steps) - 1
+    places = {"refuse": end, "allow": end - 1, "of whom": end - 3}
     code = ctypes.create_string_buffer(
-        b"".join(struct.pack("HBBI", *instruction) for instruction in program)
+        b"".join(
+            struct.pack(
+                "HBBI",
+                operation,
+                *(places[to] - at - 1 if to else 0 for to in (if_true, if_false)),
+                constant,
+            )
+            for at, (operation, constant, if_true, if_false) in enumerate(steps)
+        )
     )
-    header = struct.pack("HxxxxxxP", len(program), ctypes.addressof(code))
+    header = struct.pack("HxxxxxxP", len(steps), ctypes.addressof(code))
     libc.prctl(_NO_NEW_PRIVILEGES, 1, 0, 0, 0)
     failed = libc.prctl(_SECCOMP, _FILTER, header, 0, 0)
     return not failed

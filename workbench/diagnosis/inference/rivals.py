@@ -114,7 +114,7 @@ class Rivals:
     effects : names of all that were considered.
     given : parameters of the diagnosed model that differ from the library's defaults, SI.
     signals : that were compared.
-    inflation : (m,) variance of slow errors over that of white noise, by channel.
+    variance_factors : (m,) variance of slow errors over that of white noise, by channel.
     """
 
     models: tuple[Rival, ...]
@@ -181,21 +181,79 @@ def _told(system: RecordingSystem) -> dict[str, Any]:
     }
 
 
-def _system(said: Mapping[str, Any]) -> RecordingSystem:
-    """What `_told` told."""
+def _numbers(entry: Any, *shape: int | None, endless: bool = False) -> Vector | Matrix:
+    """Numbers of a shape, whose None is any length.
+
+    Raises
+    ------
+    ValueError
+        If they are others, or not finite where they must be.
+    """
+    flat = np.array(entry, object)
+    if not all(isinstance(value, int | float) and value is not True for value in flat.flat):
+        raise ValueError("no numbers")
+    values = np.array(entry, float)
+    if not values.size:
+        values = values.reshape([0 if length is None else length for length in shape])
+    same = len(shape) == values.ndim and all(
+        wanted in (None, length) for wanted, length in zip(shape, values.shape, strict=True)
+    )
+    if not same or np.isnan(values).any() or (np.isinf(values).any() and not endless):
+        raise ValueError("another shape, or numbers that are not finite")
+    return values
+
+
+def _system(said: Mapping[str, Any], unknowns: int) -> RecordingSystem:
+    """What `_told` told, of a number of common unknowns."""
+    errors = _numbers(said["errors"], None)
+    furthest = _numbers(said["furthest"], None, endless=True)
+    deviations = _numbers(said["deviations"], None)
+    if deviations.size > furthest.size or (furthest < 0.0).any():
+        raise ValueError("deviations that no unknown has")
     return RecordingSystem(
-        r=np.array(said["errors"], float),
-        J=np.array(said["common"], float),
-        P=np.array(said["own"], float),
-        deviations=np.array(said["deviations"], float),
-        furthest=np.array(said["furthest"], float),
+        r=errors,
+        J=_numbers(said["common"], errors.size, unknowns),
+        P=_numbers(said["own"], errors.size, furthest.size),
+        deviations=deviations,
+        furthest=furthest,
         channels=1,
     )
 
 
-def _prior(said: Mapping[str, Any]) -> Quadratic:
-    matrix, gradient = (np.array(said[name], float) for name in ("matrix", "gradient"))
-    return Quadratic(matrix, gradient, float(said["constant"]), 0)
+def _prior(said: Mapping[str, Any], unknowns: int) -> Quadratic:
+    matrix = _numbers(said["matrix"], unknowns, unknowns)
+    if (np.diag(matrix) < 0.0).any() or not np.allclose(matrix, matrix.T):
+        raise ValueError("no matrix of information")
+    return Quadratic(matrix, _numbers(said["gradient"], unknowns), _number(said["constant"]), 0)
+
+
+def _number(entry: Any) -> float:
+    return float(_numbers([entry], 1)[0])
+
+
+def _rival_of(said: Mapping[str, Any]) -> Rival:
+    def keyed(rows: Sequence[Sequence[Any]]) -> dict[Key, float]:
+        return {(_text(owner), _text(name)): _number(value) for owner, name, value in rows}
+
+    sizes, levels = keyed(said["sizes"]), keyed(said["levels"])
+    unknowns = len(sizes) + len(levels)
+    effects = tuple(map(_text, said["effects"]))
+    if not effects or not said["recordings"] or {effect for effect, _ in sizes} - set(effects):
+        raise ValueError("no cause, no recording, or sizes of another cause")
+    return Rival(
+        effects=effects,
+        sizes=sizes,
+        levels=levels,
+        recordings=tuple(_system(recording, unknowns) for recording in said["recordings"]),
+        prior=_prior(said["prior"], unknowns),
+        explained=_number(said["explained"]),
+    )
+
+
+def _text(entry: Any) -> str:
+    if not isinstance(entry, str):
+        raise ValueError("no name")
+    return entry
 
 
 def read_rivals(said: Mapping[str, Any]) -> Rivals:
@@ -203,27 +261,20 @@ def read_rivals(said: Mapping[str, Any]) -> Rivals:
 
     Raises
     ------
-    KeyError, TypeError, ValueError
-        If it is something else.
+    AttributeError, KeyError, TypeError, ValueError, OverflowError
+        If it is something else, or holds what cannot be.
     """
-
-    def keyed(rows: Sequence[Sequence[Any]]) -> dict[Key, float]:
-        return {(str(effect), str(name)): float(value) for effect, name, value in rows}
-
+    models = tuple(map(_rival_of, said["models"]))
+    factors = _numbers(said["inflation"], None)
+    effects, signals = (tuple(map(_text, said[name])) for name in ("effects", "signals"))
+    if not models or not signals or (factors <= 0.0).any():
+        raise ValueError("no model, no signal, or no variance")
+    if {effect for model in models for effect in model.effects} - set(effects):
+        raise ValueError("a cause that was not considered")
     return Rivals(
-        models=tuple(
-            Rival(
-                effects=tuple(map(str, model["effects"])),
-                sizes=keyed(model["sizes"]),
-                levels=keyed(model["levels"]),
-                recordings=tuple(_system(recording) for recording in model["recordings"]),
-                prior=_prior(model["prior"]),
-                explained=float(model["explained"]),
-            )
-            for model in said["models"]
-        ),
-        effects=tuple(map(str, said["effects"])),
-        given={str(name): float(value) for name, value in said["given"].items()},
-        signals=tuple(map(str, said["signals"])),
-        variance_factors=np.array(said["inflation"], float),
+        models=models,
+        effects=effects,
+        given={name: _number(value) for name, value in said["given"].items()},
+        signals=signals,
+        variance_factors=factors,
     )

@@ -8,6 +8,7 @@ from workbench.diagnosis import Outcome
 from workbench.diagnosis.laws import Proposal
 from workbench.diagnosis.report import relate_diagnosis, write_diagnosis
 from workbench.pages.figures import LIGHT, save_figure, styled
+from workbench.recordings.csv import csv_text
 from workbench.runtime.files import write_json, write_whole
 
 if TYPE_CHECKING:
@@ -36,10 +37,10 @@ def write_proposal(
     """
     out = diagnosis / PROPOSED
     write_json(out / "proposal.json", {**proposal.to_dict(), "provenance": provenance})
-    write_whole(out / "laws.csv", proposal.to_frame().to_csv(index=False, float_format="%.6g"))
+    write_whole(out / "laws.csv", csv_text(proposal.to_frame()))
     if proposal.estimates:
         functions = proposal.functions()
-        write_whole(out / "functions.csv", functions.to_csv(index=False, float_format="%.6g"))
+        write_whole(out / "functions.csv", csv_text(functions))
         save_figure(functions_figure(proposal), [out / "functions.png", out / "functions.svg"])
     if not proposal.laws or proposal.outcome is None:
         written, text = out / "proposal.json", "No law that was proposed holds: what was tried"

@@ -25,6 +25,7 @@ from workbench.pages.answer import Answer, Measure, with_answer
 from workbench.pages.figures import ESTIMATORS
 from workbench.pages.parts import Definitions, Dot, Dots, Numbers, Page, Part, Table, number
 from workbench.pages.views import percent
+from workbench.recordings.csv import csv_text
 from workbench.runtime.files import write_json, write_whole
 from workbench.system.system import System
 
@@ -46,7 +47,7 @@ def write_accuracies(stops: Sequence[StopAccuracy], path: Path) -> None:
         for stop in stops
         for name, result in stop.estimators.items()
     ]
-    write_whole(path, pd.DataFrame(lines).to_csv(index=False, float_format="%.6g"))
+    write_whole(path, csv_text(pd.DataFrame(lines)))
 
 
 def write_accuracy(

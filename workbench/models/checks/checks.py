@@ -52,12 +52,11 @@ from workbench.models.description import (
 from workbench.models.fmu import FMU, CoSimulation, central_differences
 from workbench.models.trial import (
     ContainedError,
-    Limits,
     NoAnswerError,
     run_trial,
     unpacked,
-    usual_limits,
 )
+from workbench.runtime.supervision import Limits, usual_limits
 
 
 def check(

@@ -2,6 +2,8 @@
 
 import multiprocessing
 import os
+import pickle
+import secrets
 import signal
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -11,10 +13,17 @@ from types import FrameType
 
 from workbench.errors import FMUError
 from workbench.models.checks.result import CheckResult
-from workbench.models.trial import Limits, NoAnswerError, describe_end
+from workbench.models.trial import NoAnswerError, describe_end
 from workbench.models.trial_calls import limit_processor, limit_sizes
 from workbench.runtime.files import temporary_folder
-from workbench.runtime.pool import start
+from workbench.runtime.pool import (
+    ForeignDataError,
+    close_servers,
+    receive_marked,
+    send_marked,
+    start,
+)
+from workbench.runtime.supervision import Limits
 
 # A check yields findings, and numbers that say how far it is.
 Task = Callable[[], Iterator[int | CheckResult]]
@@ -35,11 +44,12 @@ def isolated(task: Task, questions: Sequence[CheckResult], limits: Limits) -> li
     limits : of processor time in one call of the FMU, of memory and of files.
     """
     reports, to_parent = multiprocessing.Pipe(duplex=False)
+    secret = secrets.token_bytes(16)
     wait = max(limits.answer, _SHARE * limits.processor)
     with temporary_folder() as scratch:
-        process = start(_work, (task, to_parent, scratch, limits, dict(os.environ)))
+        process = start(_work, (task, (to_parent, secret), scratch, limits, dict(os.environ)))
         to_parent.close()
-        answers, reached, reason = _listen(reports, wait)
+        answers, reached, reason = _listen(reports, secret, wait)
         process.join(1.0 if reason else wait)
         unknown = isinstance(reason, NoAnswerError)
         if process.exitcode is None:
@@ -68,15 +78,17 @@ def isolated(task: Task, questions: Sequence[CheckResult], limits: Limits) -> li
 
 
 def _listen(
-    reports: "Connection[None, _Report]", timeout: float
+    reports: "Connection[bytes, bytes]", secret: bytes, timeout: float
 ) -> tuple[dict[str, CheckResult], int | None, str | NoAnswerError]:
     """Collect reports to the end: findings, progress since the last, and what went wrong."""
     answers: dict[str, CheckResult] = {}
     reached: int | None = None
     while reports.poll(timeout):
         try:
-            report = reports.recv()
-        except EOFError:
+            report: _Report = pickle.loads(receive_marked(reports, secret))
+        except ForeignDataError as error:
+            return answers, reached, str(error)
+        except (EOFError, OSError):
             return answers, reached, ""
         if isinstance(report, str | NoAnswerError):
             return answers, reached, report
@@ -90,26 +102,31 @@ def _listen(
 
 def _work(
     task: Task,
-    reports: "Connection[_Report, None]",
+    reports: "tuple[Connection[bytes, bytes], bytes]",
     scratch: str,
     limits: Limits,
     environment: Mapping[str, str],
 ) -> None:
     """Run a check in this process and report."""
+    close_servers()
     os.environ.clear()
     os.environ.update(environment)
     _limit(limits)
     tempfile.tempdir = scratch  # a crash leaves unpacked files, which go with the folder
     # What an FMU prints must not get between the lines of the caller's table.
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+
+    def send(report: _Report) -> None:
+        send_marked(*reports, pickle.dumps(report))
+
     try:
         for report in task():
-            reports.send(report)
+            send(report)
     except Exception as error:  # whatever a foreign library brings about is a finding
         known = isinstance(error, FMUError) and not isinstance(error, NoAnswerError)
-        reports.send(
-            error if isinstance(error, NoAnswerError) else str(error) if known else repr(error)
-        )
+        send(error if isinstance(error, NoAnswerError) else str(error) if known else repr(error))
+    if os.name == "posix":  # Python's handler goes before this process does
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
 
 
 def _limit(limits: Limits) -> None:

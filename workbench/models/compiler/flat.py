@@ -32,6 +32,7 @@ from workbench.models.compiler.expressions import (
 )
 from workbench.models.modelica import Library, check, files, packages, read_library
 from workbench.models.modelica.classes import Class
+from workbench.runtime.supervision import blaming
 
 SCHEMA = 43
 
@@ -155,8 +156,15 @@ def flatten(package: Path, model: str) -> FlatModel:
             expected="a model or block that is complete",
             remedy="choose a model that extends or uses it",
         )
+    refusal = InputError(
+        where=source.where,
+        found=f"{model}, at which the front end overflows",
+        expected="expressions of some thousand terms at most, arrays of as many elements, and "
+        "functions and constants that do not need themselves",
+        remedy="make it smaller, or leave out what needs itself",
+    )
     try:
-        with _quiet_panic():
+        with _quiet_panic(), blaming(refusal):
             roots = [str(used.parent) for used in packages(package)[1:]]
             dae = rumoca.Session(roots=roots).load(str(package), model=model).to_dict("dae")
     except rumoca.RumocaError as error:

@@ -151,6 +151,7 @@ class _Checker:
 
     def _predefined(self, type_name: str) -> str:
         """Predefined type that a class extends in the end; empty if none."""
+        self._lineage(type_name)  # refuses a type that is its own
         while (cls := self.library.classes.get(type_name)) is not None:
             if not cls.extends:
                 return "enumeration" if cls.kind == "type" else ""

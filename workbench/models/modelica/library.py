@@ -161,23 +161,24 @@ class Library:
         Raises
         ------
         InputError
-            If a class extends itself.
+            If a class extends itself, or one of them does.
         """
-        bases: list[str] = []
-        waiting = list(self.bases(name))
-        while waiting:
-            current = waiting.pop(0)
-            if current == name:
+        return tuple(dict.fromkeys(self._ancestors(name, (name,))))
+
+    def _ancestors(self, name: str, below: tuple[str, ...]) -> Iterator[str]:
+        for base in self.bases(name):
+            if base in below:
+                way = below[below.index(base) + 1 :]
+                by = f", by {', '.join(way)}" if way else ""
                 raise InputError(
-                    where=self.classes[name].where,
-                    found=f"{name} extends itself",
+                    where=self.classes[base].where,
+                    found=f"{base} extends itself{by}",
                     expected="a class that ends in one without 'extends'",
                     remedy="correct what it extends",
                 )
-            if current in self.classes and current not in bases:
-                bases.append(current)
-                waiting += self.bases(current)
-        return tuple(bases)
+            if base in self.classes:
+                yield base
+                yield from self._ancestors(base, (*below, base))
 
     def components(self, name: str) -> dict[str, Component]:
         """Components of a class, inherited ones first, with the types and values it gives them."""

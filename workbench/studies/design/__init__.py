@@ -12,6 +12,7 @@ from pathlib import Path
 
 from workbench.diagnosis import build_everything, catalogue, choose
 from workbench.diagnosis.data.samples import channels
+from workbench.diagnosis.effects.extension import variables
 from workbench.diagnosis.inference.rivals import Rivals
 from workbench.errors import InputError
 from workbench.models.modelica import read_library
@@ -132,6 +133,16 @@ def _open(
         )
     library = read_library(system.library)
     effects = {effect.name: effect for effect in choose(rivals.effects, catalogue(system, library))}
+    for model in rivals.models:
+        for effect, parameter in model.sizes:
+            part = "cosine" if parameter == "amplitude" else parameter
+            if not effects[effect].late and not variables(effects[effect], part):
+                raise InputError(
+                    where=f"the diagnosis, rivals, {effect}",
+                    found=f"a size '{parameter}'",
+                    expected="one that the effect has",
+                    remedy="give the summary that 'workbench diagnose' wrote, as it wrote it",
+                )
     with tempfile.TemporaryDirectory() as folder:
         everything = Path(folder) / "AllEffects.fmu"
         engine.report(f"compiling {len(effects)} effects")

@@ -18,6 +18,7 @@ from workbench.pages.figures import (
 )
 from workbench.pages.parts import Definitions, Numbers, Page, Part, Table, number, zoomable
 from workbench.pages.views import capital
+from workbench.recordings.csv import csv_text
 from workbench.runtime.files import write_json, write_whole
 from workbench.studies.design import NextStop, RankedExperiment
 from workbench.system.units import si_factor
@@ -40,8 +41,7 @@ def write_next_stop(proposal: NextStop, provenance: Mapping[str, Any], out: Path
     content = {**proposal.to_dict(), "provenance": provenance}
     summary = with_answer(design_answer(content), content)
     write_json(out / "next.json", summary)
-    table = proposal.to_frame().to_csv(index=False, float_format="%.6g")
-    write_whole(out / "experiments.csv", table)
+    write_whole(out / "experiments.csv", csv_text(proposal.to_frame()))
     save_figure(responses_figure(proposal), [out / "responses.png", out / "responses.svg"])
     return write_next_stop_page(proposal, summary, out)
 

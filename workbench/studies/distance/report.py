@@ -21,6 +21,7 @@ from workbench.pages.parts import (
     number,
     zoomable,
 )
+from workbench.recordings.csv import csv_text
 from workbench.runtime.files import write_json, write_whole
 from workbench.studies.distance import Distance
 from workbench.studies.distance.outcome import PastStop, distance_figure
@@ -57,7 +58,7 @@ def write_distance(result: Distance, provenance: Mapping[str, Any], out: Path) -
     if result.plain is not None:
         tables["plain"] = pd.DataFrame(map(asdict, result.plain.levels))
     for name, table in tables.items():
-        write_whole(out / f"{name}.csv", table.to_csv(index=False, float_format="%.6g"))
+        write_whole(out / f"{name}.csv", csv_text(table))
     save_figure(distance_figure(result), [out / "distance.png", out / "distance.svg"])
     return write_distance_page(result, summary, out)
 

@@ -21,6 +21,7 @@ from workbench.pages.parts import (
     zoomable,
 )
 from workbench.pages.views import capital
+from workbench.recordings.csv import csv_text
 from workbench.runtime.files import write_json, write_whole
 from workbench.studies.monitoring import MonitoringResult, Track
 from workbench.system.units import BAND
@@ -222,7 +223,7 @@ def write_monitoring(result: MonitoringResult, provenance: Mapping[str, Any], ou
         ("alarms", result.alarms()),
         ("work", result.worked()),
     ):
-        write_whole(out / f"{name}.csv", frame.to_csv(index=False, float_format="%.8g"))
+        write_whole(out / f"{name}.csv", csv_text(frame, 8))
     save_figure(history_figure(result), [out / "history.png", out / "history.svg"])
     return write_monitoring_page(result, summary, out)
 

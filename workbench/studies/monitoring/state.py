@@ -10,12 +10,15 @@ import sqlite3
 from collections.abc import Iterator, Mapping
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
+from datetime import datetime
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from workbench.errors import InputError
+from workbench.runtime.files import check_checksum, with_checksum
 from workbench.studies.monitoring.estimate import RecordingEstimate
 
 
@@ -69,11 +72,12 @@ def _hash_of_files(folder: Path) -> str:
     return digest.hexdigest()
 
 
+# A result is JSON with a checksum.
 _TABLES = """
 CREATE TABLE IF NOT EXISTS identity (said TEXT NOT NULL);
-CREATE TABLE IF NOT EXISTS deliveries (
-    number INTEGER PRIMARY KEY, name TEXT NOT NULL, content TEXT NOT NULL, date TEXT NOT NULL,
-    estimate TEXT, refusal TEXT, UNIQUE (name, content)
+CREATE TABLE IF NOT EXISTS results (
+    number INTEGER PRIMARY KEY, name TEXT NOT NULL, content TEXT NOT NULL, result TEXT NOT NULL,
+    UNIQUE (name, content)
 );
 """
 
@@ -96,41 +100,75 @@ class State:
         self._connection = connection
 
     def missing(self, folders: list[RecordingFolder]) -> list[RecordingFolder]:
-        """Those that are not known by name and content."""
-        known = set(self._connection.execute("SELECT name, content FROM deliveries"))
+        """Those whose result is not known by name and content, or damaged."""
+        known = {(result.name, result.content) for result in self.all()}
         return [folder for folder in folders if (folder.name, folder.content) not in known]
 
     def add(self, result: RecordingResult) -> None:
         """Keep the result of a recording; it is on the disk when this returns."""
-        estimate = None
-        if result.estimate is not None:
-            estimate = json.dumps(vars(result.estimate), default=np.ndarray.tolist)
+        content = {**vars(result), "estimate": result.estimate and vars(result.estimate)}
+        plain = json.loads(json.dumps(content, default=np.ndarray.tolist))
         with self._connection:
             self._connection.execute(
-                "INSERT OR IGNORE INTO deliveries (name, content, date, estimate, refusal) "
-                "VALUES (?, ?, ?, ?, ?)",
-                (result.name, result.content, result.date, estimate, result.refusal),
+                "INSERT OR REPLACE INTO results (name, content, result) VALUES (?, ?, ?)",
+                (result.name, result.content, with_checksum(plain)),
             )
 
     def all(self) -> list[RecordingResult]:
-        """Results of all recordings, as they came."""
-        rows = self._connection.execute(
-            "SELECT name, content, date, estimate, refusal FROM deliveries ORDER BY number"
-        )
+        """Results of all recordings, as they came; of one that is damaged, a refusal."""
+        rows = self._connection.execute("SELECT name, content, result FROM results ORDER BY number")
         results = []
-        for name, sha256, date, text, refusal in rows:
-            estimate = None
-            if text:
-                content = json.loads(text)
-                q = len(content["values"])
-                estimate = RecordingEstimate(
-                    values=np.array(content["values"]),
-                    covariance=np.reshape(content["covariance"], (q, q)),
-                    work=np.array(content["work"]),
-                    counted=content["counted"],
+        for name, content, text in rows:
+            try:
+                result = _read_result(str(text))
+                if (result.name, result.content) != (name, content):
+                    raise ValueError("the result of another recording")
+            except (AttributeError, LookupError, OverflowError, TypeError, ValueError) as error:
+                refusal = (
+                    f"its result in the state is damaged ({error}); it is estimated anew when its "
+                    "recording is there"
                 )
-            results.append(RecordingResult(name, sha256, date, estimate, refusal))
+                result = RecordingResult(str(name), "", "", None, refusal)
+            results.append(result)
         return results
+
+
+def _read_result(text: str) -> RecordingResult:
+    """What `State.add` wrote.
+
+    Raises
+    ------
+    AttributeError, LookupError, OverflowError, TypeError, ValueError
+        If it was changed, or says what cannot be.
+    """
+    content = check_checksum(text)
+    said = content.pop("estimate")
+    if not all(isinstance(value, str) for value in content.values()):
+        raise ValueError("other than texts")
+    if content["date"]:
+        datetime.fromisoformat(content["date"])
+    if said is None and not content["refusal"]:
+        raise ValueError("neither an estimate nor a refusal")
+    if said is None:
+        return RecordingResult(estimate=None, **content)
+    estimate = RecordingEstimate(
+        values=np.array(said["values"], float),
+        covariance=np.array(said["covariance"], float),
+        work=np.array(said["work"], float).reshape(-1),
+        counted=float(said["counted"]),
+    )
+    q = estimate.values.size
+    finite = all(np.isfinite(value).all() for value in vars(estimate).values())
+    if not finite or estimate.covariance.shape != (q, q) or estimate.values.shape != (q,):
+        raise ValueError("estimates that are not finite, or of another shape")
+    # Rounding leaves a covariance some digits less than symmetric.
+    variances = np.diag(estimate.covariance)
+    scale = np.sqrt(np.outer(variances, variances)) if (variances > 0.0).all() else None
+    if scale is None or (np.abs(estimate.covariance) > scale * (1.0 + 1e-6)).any():
+        raise ValueError("variances that cannot be")
+    if estimate.counted <= 0.0:
+        raise ValueError("a time that cannot be")
+    return RecordingResult(estimate=estimate, **content)
 
 
 @contextmanager
@@ -149,6 +187,7 @@ def open_state(path: Path, identity: Mapping[str, Any]) -> Iterator[State]:
     asked = json.dumps(identity, sort_keys=True)
     try:
         with closing(sqlite3.connect(path)) as connection:
+            connection.text_factory = partial(str, encoding="utf-8", errors="replace")
             with connection:
                 connection.executescript(_TABLES)
             with connection:
