@@ -266,9 +266,12 @@ def write_power_page(summary: Mapping[str, Any], out: Path) -> Path:
     if summary["failed"]:
         warnings.append(f"{len(summary['failed'])} diagnoses failed; they count as not right.")
     machine = f"Recordings are made by {provenance.get('machine', 'a virtual rig')}."
-    shown = [machine, _INTERVAL, _share_dots(summary["answer"])]
     parts = [
-        Part("shown", "How often it is right", shown),
+        Part(
+            "shown",
+            "How often it is right",
+            [machine, _INTERVAL, _share_dots(summary["answer"])],
+        ),
         Part("definitions", "Definitions", [Definitions(_TERMS)]),
     ]
     if summary["effects"]:
