@@ -10,7 +10,6 @@ import math
 import multiprocessing
 import os
 import pickle
-import secrets
 import signal
 import socket
 import sys
@@ -129,7 +128,7 @@ class Pool(Generic[State]):
             return
         self._folder = self._stack.enter_context(temporary_folder())
         self._stack.enter_context(threadpool_limits(1))
-        self._secret = secrets.token_bytes(_SECRET_SIZE)
+        self._secret = os.urandom(_SECRET_SIZE)
         self._call = usual_limits().call
         # In a file, because handing so much to a process that dies as it starts waits for ever.
         content = (dict(os.environ), self._call, begin, given)
@@ -308,7 +307,7 @@ class _Worker:
         self._connection, theirs = multiprocessing.Pipe()
         self._ready = False
         self._secret, self._call = secret, call
-        heart = Path(folder, f"heart-{secrets.token_hex(8)}")
+        heart = Path(folder, f"heart-{os.urandom(8).hex()}")
         self._watch = Watch(heart, call)
         with theirs:
             self._process = _start(_serve, (theirs, folder, secret, heart))

@@ -9,7 +9,6 @@ import errno
 import gc
 import os
 import platform
-import secrets
 import signal
 import struct
 import subprocess
@@ -211,7 +210,7 @@ def supervised(
         tell(f"error: {error}")
         return 2
     content, stuck, blamed = b"", False, ""
-    secret = secrets.token_bytes()
+    secret = os.urandom(32)
     # They wait but for while they are passed on: who ended before or after would leave files.
     signal.pthread_sigmask(signal.SIG_BLOCK, _REQUESTS)
     with own_temporary_files() as folder:
