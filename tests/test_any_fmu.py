@@ -3,7 +3,7 @@
 import re
 import subprocess
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,7 +13,8 @@ import pytest
 
 from workbench.__main__ import main
 from workbench.errors import FMUError, InputError
-from workbench.models.fmu import FMU, EventError
+from workbench.models.fmu import FMU, CoSimulation, EventError
+from workbench.models.simulation import Drive, Simulation
 from workbench.observers import estimators_of
 from workbench.observers.contract import Estimator
 from workbench.observers.fmpy_comparison import RIGHT, compare_with_fmpy
@@ -69,13 +70,17 @@ def build(tmp_path) -> Build:
     """Builds the room in a folder with its system file; returns the FMU."""
 
     def make(
-        what: str, start: float = 0.0, correction: str = "dG", variables: str = VARIABLES
+        what: str,
+        start: float = 0.0,
+        correction: str = "dG",
+        variables: str = VARIABLES,
+        flags: Sequence[str] = (),
     ) -> Path:
         library = tmp_path / f"Room{fmpy.sharedLibraryExtension}"
         headers = Path(fmpy.__file__).parent / "c-code"
         source = Path(__file__).with_name("events.c")
-        flags = ["-shared", "-fPIC", "-w", f"-DWHAT={what}", "-I", headers]
-        subprocess.run([str(COMPILER), *flags, source, "-o", library, "-lm"], check=True)
+        given = ["-shared", "-fPIC", "-w", f"-DWHAT={what}", "-I", headers, *flags]
+        subprocess.run([str(COMPILER), *given, source, "-o", library, "-lm"], check=True)
         description = DESCRIPTION.format(
             count=int(what == "THERMOSTAT"), start=start, variables=variables
         )
@@ -116,27 +121,27 @@ def test_discrete_states_are_iterated_until_they_are_stable(build):
         assert run(fmu, "open_loop", 600.0)[-1] == pytest.approx(exact(1500.0, 600.0), abs=0.03)
 
 
-def along(what: str, times: np.ndarray) -> np.ndarray:
+def along(what: str, times: np.ndarray, G: float = 50.0, T: float = 291.0) -> np.ndarray:
     """Temperature of the room at 280 K outside, by the closed form from event to event."""
-    values, t, T, power = [], 0.0, 291.0, 1500.0
+    values, t, power, slowness = [], 0.0, 1500.0, 1e5 / G
     for sample in times:
         while True:
-            steady = 280.0 + power / 50.0
+            steady = 280.0 + power / G
             if what == "TIMETABLE":
                 event = 600.0 * (np.floor(t / 600.0 + 1e-9) + 1.0)
             elif what == "FUSE" and power == 0.0:
                 event = np.inf
             else:
                 edge = 295.0 if power else 293.0
-                event = t + 2000.0 * np.log((T - steady) / (edge - steady))
+                event = t + slowness * np.log((T - steady) / (edge - steady))
             if event > sample:
                 break
             T, t, power = (
-                steady + (T - steady) * np.exp(-(event - t) / 2000.0),
+                steady + (T - steady) * np.exp(-(event - t) / slowness),
                 event,
                 1500.0 - power,
             )
-        T, t = steady + (T - steady) * np.exp(-(sample - t) / 2000.0), sample
+        T, t = steady + (T - steady) * np.exp(-(sample - t) / slowness), sample
         values.append(T)
     return np.array(values)
 
@@ -164,6 +169,48 @@ def test_a_jump_of_an_input_is_an_event_where_it_happens(build):
     at_jump = exact(1500.0, 100.0)
     after = 300.0 + (at_jump - 300.0) * np.exp(-100.0 / 2000.0)
     assert estimated[[10, 20]] == pytest.approx([at_jump, after], abs=1e-4)
+
+
+def test_whole_simulations_say_derivatives_through_events(build):
+    """Of a thermostat, whose switching moves with the heat loss, against the closed form.
+
+    The limit is that of their disagreement; single samples are on corners of T.
+    """
+    time = 10.0 * np.arange(361.0)
+    with FMU(build("THERMOSTAT")) as fmu:
+        simulation = Simulation(fmu, ["Ta"], ["T"], [False])
+        drive, values = Drive(time, np.full((time.size, 1), 280.0)), {"G": 52.0, "T": 290.5}
+        simulated = simulation.run(drive, values)[:, 0]
+        by = simulation.derivatives(drive, values, [("G",), ("T",)], {"T": 1.0})
+    assert simulated == pytest.approx(along("THERMOSTAT", time, 52.0, 290.5), abs=1e-4)
+    for q, (G, T) in enumerate([(1e-3, 0.0), (0.0, 1e-3)]):
+        up, down = (along("THERMOSTAT", time, 52.0 + s * G, 290.5 + s * T) for s in (1.0, -1.0))
+        exact = (up - down) / 2e-3
+        assert np.linalg.norm(by.values[:, 0, q] - exact) < 0.01 * np.linalg.norm(exact)
+    assert (by.unsure == 0.0).all()
+
+
+def test_derivatives_stop_at_limits_and_say_where_steps_disagree(build):
+    """G may not fall below 50; a heating that jumps has no derivative by a start."""
+    limited = VARIABLES.replace('<Real start="50"/>', '<Real start="50" min="50"/>')
+    time = 10.0 * np.arange(361.0)
+    drive = Drive(time, np.full((time.size, 1), 280.0))
+    with FMU(build("THERMOSTAT", variables=limited)) as fmu:
+        by = Simulation(fmu, ["Ta"], ["T"], [False]).derivatives(drive, {}, [("G",)])
+        exact = (along("THERMOSTAT", time, 50.001) - along("THERMOSTAT", time)) / 1e-3
+        assert np.linalg.norm(by.values[:, 0, 0] - exact) < 0.01 * np.linalg.norm(exact)
+        heating = Simulation(fmu, ["Ta"], ["P"], [False]).derivatives(drive, {}, [("T",)])
+        assert heating.unsure[0] > 0.5
+
+
+def test_an_fmu_that_a_reset_does_not_reset_is_made_anew_for_each_run(build):
+    time = 10.0 * np.arange(61.0)
+    drive = Drive(time, np.full((time.size, 1), 280.0))
+    with FMU(build("TIMETABLE", flags=["-DKEEPS"])) as fmu:
+        simulation = Simulation(fmu, ["Ta"], ["T"], [False])
+        for values in ({}, {"G": 60.0}, {}):
+            expected = along("TIMETABLE", time, values.get("G", 50.0))
+            assert simulation.run(drive, values)[:, 0] == pytest.approx(expected, abs=1e-4)
 
 
 def test_the_open_loop_agrees_with_fmpy_through_events(build, capsys):
@@ -420,6 +467,16 @@ def test_the_open_loop_runs_on_co_simulation_alone(integrator):
         estimate = loop(fmu, system, usual_gains(loop, fmu, system)).run(time, u, u + np.nan)
     np.testing.assert_allclose(np.asarray(estimate.values)[:, 0], [1, 2, 3, 4, 4, 4, 4])
     assert compare_with_fmpy(integrator / "Alone.fmu").verdict == RIGHT
+
+
+def test_whole_simulations_of_co_simulation_alone_have_derivatives(integrator):
+    """x = x0 + 3 s of an input of 1: each output moves as its start does."""
+    drive = Drive(np.arange(4.0), np.ones((4, 1)))
+    with CoSimulation(integrator / "Alone.fmu") as fmu:
+        simulation = Simulation(fmu, ["u"], ["x"], [True])
+        np.testing.assert_allclose(simulation.run(drive, {"x": 2.0})[:, 0], [2, 3, 4, 5])
+        by = simulation.derivatives(drive, {"x": 2.0}, [("x",)])
+    np.testing.assert_allclose(by.values[:, 0, 0], 1.0)
 
 
 @pytest.mark.parametrize("name", ["ekf", "mhe", "smoother"])

@@ -15,7 +15,7 @@ from workbench.errors import FMUError
 from workbench.models.fmu import FMU, CoSimulation, TypedVariables, central_differences
 
 # Of a step, relative to the state and to its nominal value: far below what a sensor resolves.
-_TOLERANCE = 1e-8
+TOLERANCE = 1e-8
 # Points within a step at which indicators are read, so that one that changes twice is found.
 _LOOKS = 4
 # Between two samples; a model that needs more comes to rest by ever more events (Zeno).
@@ -118,8 +118,8 @@ class HybridSimulation:
                 self._t,
                 self._x,
                 end,
-                rtol=_TOLERANCE,
-                atol=_TOLERANCE * self._nominal,  # type: ignore[arg-type]  # SciPy takes vectors
+                rtol=TOLERANCE,
+                atol=TOLERANCE * self._nominal,  # type: ignore[arg-type]  # SciPy takes vectors
                 jac=self._jacobian,
                 first_step=first,
             )
