@@ -9,8 +9,10 @@ from pathlib import Path
 
 import fmpy
 import numpy as np
+import pandas as pd
 import pytest
 
+import workbench as wb
 from workbench.__main__ import main
 from workbench.errors import FMUError, InputError
 from workbench.models.fmu import FMU, CoSimulation, EventError
@@ -188,6 +190,27 @@ def test_whole_simulations_say_derivatives_through_events(build):
         exact = (up - down) / 2e-3
         assert np.linalg.norm(by.values[:, 0, q] - exact) < 0.01 * np.linalg.norm(exact)
     assert (by.unsure == 0.0).all()
+
+
+def test_a_parameter_is_fitted_through_events(build: Build) -> None:
+    """The heat loss of a room whose thermostat switches, from the closed form with noise."""
+    folder = build("THERMOSTAT").parent
+    noisy = 'Ta = {{ unit = "K", noise = "0.05 K"'
+    exactly_known = SYSTEM.replace(noisy, noisy.replace("0.05", "0"))
+    (folder / "system.toml").write_text(exactly_known.format(correction="dG"))
+    system = load_system(folder)
+    time = 20.0 * np.arange(60.0)
+    noise = 0.05 * np.random.default_rng(1).standard_normal(time.size)
+    columns = {"time [s]": time, "Ta [K]": np.full(time.size, 280.0)}
+    columns["T [K]"] = along("THERMOSTAT", time, 60.0) + noise
+    case = wb.case_from_frame(system, pd.DataFrame(columns))
+    settings = wb.FitSettings(starts=1, profiles=False)
+    outcome = wb.fit(system, [case], ["G"], settings=settings, workers=1, report=lambda line: None)
+    low, high = outcome["G"].low, outcome["G"].high
+    assert low is not None
+    assert high is not None
+    assert low < 60.0 < high
+    assert high - low < 2.0
 
 
 def test_derivatives_stop_at_limits_and_say_where_steps_disagree(build):

@@ -13,6 +13,7 @@ if TYPE_CHECKING:  # The public names. Each is imported from here when it is fir
     from workbench.api import case_from_frame as case_from_frame
     from workbench.api import diagnose as diagnose
     from workbench.api import distance as distance
+    from workbench.api import fit as fit
     from workbench.api import monitor as monitor
     from workbench.api import next_stop as next_stop
     from workbench.api import observe as observe
@@ -31,7 +32,10 @@ if TYPE_CHECKING:  # The public names. Each is imported from here when it is fir
     from workbench.studies.design import NextStop as NextStop
     from workbench.studies.distance import Distance as Distance
     from workbench.studies.distance import Effort as Effort
+    from workbench.studies.fit import FitSettings as FitSettings
+    from workbench.studies.fit.outcome import FitOutcome as FitOutcome
     from workbench.studies.monitoring import MonitoringResult as MonitoringResult
+    from workbench.system.parts import FittedParameter as FittedParameter
     from workbench.system.plugins import Plugin as Plugin
     from workbench.system.registry import load_system as load_system
     from workbench.system.system import System as System

@@ -33,8 +33,12 @@ from workbench.runtime.files import locked_folder
 from workbench.studies import design, monitoring
 from workbench.studies.design import NextStop
 from workbench.studies.distance import Distance, Effort, distance_of_stop
+from workbench.studies.fit import FitSettings
+from workbench.studies.fit import fit as fit_parameters
+from workbench.studies.fit.outcome import FitOutcome
 from workbench.studies.monitoring import RATE, MonitoringResult
 from workbench.system.installed import usual_system
+from workbench.system.parts import FittedParameter
 from workbench.system.registry import load_system
 from workbench.system.system import System
 from workbench.system.tables import Table
@@ -326,6 +330,37 @@ def monitor(
                 rate=false_alarms,
                 read=read_recorded,
             )
+
+
+def fit(
+    system: System,
+    cases: Sequence[Case],
+    parameters: Sequence[str | FittedParameter] = (),
+    *,
+    held_out: Sequence[Case] = (),
+    settings: FitSettings | None = None,
+    workers: int | None = None,
+    report: Callable[[str], None] = print,
+) -> FitOutcome:
+    """Fit parameters of the system's FMU to recordings; see `workbench.studies.fit.fit`.
+
+    Parameters
+    ----------
+    parameters : names or patterns of parameters, and of states whose starts are fitted; those of
+        `[fit]` of the system file unless some are given.
+    held_out : recordings on which only errors are measured.
+    settings : starts, loss, seed; the usual ones unless they are given.
+    workers : processes, one per processor unless another number is given.
+    report : takes a line on what is being done.
+
+    Raises
+    ------
+    InputError
+        If there is no such parameter, or the model cannot be simulated with its own values.
+    """
+    engine = Engine(_number(workers), report)
+    chosen = settings or FitSettings()
+    return fit_parameters(system, cases, parameters, engine, held_out=held_out, settings=chosen)
 
 
 def next_stop(

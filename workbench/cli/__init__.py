@@ -10,6 +10,7 @@ COMMANDS = {
     "simulate": "run all estimators on recordings",
     "tune": "find the gains whose worst case is best",
     "diagnose": "find what the simulation gets wrong, name the cause, extend the model",
+    "fit": "fit parameters of an FMU to recordings, say how sure they are",
     "next": "say which recording would tell apart what a diagnosis could not",
     "distance": "predict the distance of a stop from past ones, with its safety level",
     "monitor": "watch a machine over many recordings, say what has changed and since when",

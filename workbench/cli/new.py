@@ -33,7 +33,8 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         "  python -m workbench new my_machine\n"
         "  python -m workbench simulate --system my_machine\n"
         "  python -m workbench diagnose --system my_machine\n"
-        "  python -m workbench new my_plant --fmu plant.fmu --recordings monday.csv tuesday.csv",
+        "  python -m workbench new my_plant --fmu plant.fmu --recordings monday.csv tuesday.csv\n"
+        "  python -m workbench fit --system my_plant",
     )
     parser.add_argument("folder", type=Path, metavar="DIR", help="where to write; made as needed")
     parser.add_argument("--fmu", type=Path, metavar="FILE", help="model of the machine, an FMU")
@@ -105,6 +106,7 @@ def _from_fmu(options: argparse.Namespace, output: Output) -> CommandResult:
         + (f", {len(draft.questions)} of them questions" if draft.questions else "")
     )
     output.result(f"next: python -m workbench simulate --system {folder}{which}")
+    output.result(f"      python -m workbench fit --system {folder}")
     result = {
         "written": [nearby(path), nearby(fmu)],
         "signals": {signal.name: signal.channel.channel for signal in draft.signals},

@@ -21,6 +21,7 @@ from workbench.pages.answer import Measure
 from workbench.recordings.case import UNKNOWN
 from workbench.studies.distance.outcome import SafetyLevel
 from workbench.studies.distance.plain import PlainLevel
+from workbench.studies.fit.outcome import LOSSES, FittedValue
 from workbench.studies.power import following, left_out
 from workbench.studies.power.campaign import EffectChance, EffectLimit
 from workbench.studies.power.sensitivity import VerdictChange
@@ -291,6 +292,7 @@ def summaries() -> dict[str, Schema]:
         "next": _next(),
         "distance": _distance(),
         "monitor": _monitor(),
+        "fit": _fit(),
         "fleet": _fleet(),
         "bench": _bench(),
     }
@@ -573,6 +575,28 @@ def _distance() -> Schema:
     }
     provenance = {"run": RUN, **VERSIONS, "system": TEXT, "models": by_name(FMU), "seed": WHOLE}
     return summary("distance", closed(provenance), entries)
+
+
+def _fit() -> Schema:
+    errors = closed({"nominal": ERROR, "fitted": ERROR})
+    recording = {"held_out": FLAG, "rms": by_name(errors), "over_noise": errors}
+    direction = {"text": NAMED, "parts": by_name(NUMBER), "spread": NUMBER}
+    entries = {
+        "sentence": NAMED,
+        "reliable": FLAG,
+        "doubts": listed(NAMED),
+        "values": by_name(declared(FittedValue)),
+        "correlation": listed(listed(NUMBER)),
+        "not_identified": listed(closed(direction)),
+        "recordings": by_name(closed(recording)),
+        "loss": {"enum": list(LOSSES)},
+        "costs": listed(NUMBER),
+        "differential_evolution": TEXT,
+        "interrupted": FLAG,
+        "notes": listed(NAMED),
+    }
+    provenance = {"run": RUN, **VERSIONS, "system": TEXT, "fmu": FMU, "seed": WHOLE}
+    return summary("fit", closed(provenance), entries)
 
 
 def _monitor() -> Schema:

@@ -523,7 +523,7 @@ def _candidates(model: Description) -> list[str]:
         return []
     return [
         "",
-        "# --- candidates of a fit: remove the tables of what you know ---",
+        "# --- what 'workbench fit' fits: remove the tables of what you know ---",
         "",
         *lines,
     ]

@@ -12,6 +12,7 @@ from workbench.system.parts import (
     OUTPUT_OR_DERIVED,
     OUTPUT_THAT_IS_A_STATE,
     PARAMETER,
+    PARAMETER_OR_STATE,
     QUANTITY,
     SCORED,
     SHOWN,
@@ -180,6 +181,7 @@ def known_names(system: System, model: Description | None) -> dict[str, Collecti
     settings = asked.settings if asked else {}
     return known | {
         PARAMETER: system.values,
+        PARAMETER_OR_STATE: {*system.values, *states},
         STATE: states,
         VARIABLE: variables,
         FORMULA: {*system.signals, *derived, *system.values},

@@ -20,6 +20,7 @@ FORMULA = "a measured or derived signal, or a parameter of the model"
 OUTPUT = "a measured output of this system"
 OUTPUT_OR_DERIVED = "a measured output, or a derived signal"
 OUTPUT_THAT_IS_A_STATE = "a measured output that is a continuous state of the model"
+PARAMETER_OR_STATE = f"{PARAMETER}, or {STATE}"
 SCORED = "a measured output, or a reference signal"
 SHOWN = f"{STATE}, or a measured output"
 CONDITION = "a condition of this system"
@@ -417,14 +418,19 @@ def unit_in_model(scope: Scope, name: str) -> str:
     return (scope.units or {}).get(name, "1")
 
 
+def _unit_of_variable(scope: Scope, _: str) -> str | None:
+    """Unit of the variable that the table names, None where there is no such variable."""
+    return (scope.units or {}).get(scope.own["name"])
+
+
 @declared
 class FittedParameter:
-    """A parameter of the model, or a state whose start is, that a fit changes."""
+    """A parameter of the model, or a state whose start is, that `workbench fit` fits."""
 
     name: str = table_name()
     range: tuple[float, float] = key(
         "in which it is sought",
-        unit=lambda scope, _: unit_in_model(scope, scope.own["name"]),
+        unit=_unit_of_variable,
         absent=_ALL,
         otherwise="any value",
         ordered=True,

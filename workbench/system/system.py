@@ -19,6 +19,7 @@ from workbench.system.expression import Expression
 from workbench.system.parts import (
     AT_REST,
     ENDLESS,
+    PARAMETER_OR_STATE,
     Candidates,
     Condition,
     DerivedSignal,
@@ -226,9 +227,10 @@ class System:
         "what is known of states of the model", name="states", absent=(), of_model=True
     )
     fitted: tuple[FittedParameter, ...] = key(
-        "parameters of the model, and states by their starts, that a fit may change",
+        "parameters of the model, and states by their starts, that `workbench fit` fits",
         name="fit",
         absent=(),
+        keys=PARAMETER_OR_STATE,
         of_model=True,
     )
     settles: float = key("time in which the model comes to rest", "s", 10.0, name="points.settles")

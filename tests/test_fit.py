@@ -1,0 +1,237 @@
+"""Parameters of an FMU are fitted to recordings, by data of a closed form and known parameters."""
+
+import json
+import zipfile
+from collections.abc import Sequence
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from scipy.optimize import curve_fit
+
+import workbench as wb
+from workbench.__main__ import main
+from workbench.errors import InputError
+from workbench.models.description import read_description
+from workbench.recordings.case import Case
+from workbench.studies.fit.files import write_fmu
+from workbench.system.system import System
+
+from .schemas import check
+
+pytest.importorskip("casadi", reason="needs the extra [compiler]")
+pytest.importorskip("rumoca", reason="needs the extra [compiler]")
+pytest.importorskip("ziglang", reason="needs the extra [compiler]")
+
+from .built import build_text, write_case
+
+BLOCK = """
+model Block "A heated block"
+  parameter Real C(unit="J/K", min=1.0, max=1000.0) = 80.0 "Heat capacity";
+  parameter Real G(unit="W/K", min=0.1, max=20.0) = 1.5 "To the surroundings";
+  parameter Real a = 1.0 "Gain of the amplifier";
+  parameter Real b = 1.0 "Efficiency";
+  parameter Real idle = 3.0 "Moves nothing";
+  input Real P(unit="W") "Heating power";
+  output Real T(unit="K", start=0.0, fixed=true, nominal=20.0) "Above the surroundings";
+equation
+  C*der(T) = a*b*P - G*T;
+end Block;
+"""
+SYSTEM = """
+title = "A heated block"
+sample_time = "4 s"
+models.observer = { fmu = "Block.fmu" }
+inputs.P = { unit = "W", noise = "0 W", scale = "40 W", held = true }
+outputs.T = { unit = "K", noise = "0.05 K", scale = "20 K" }
+fit.C = { range = ["20 J/K", "500 J/K"] }
+fit.G = { range = ["0.5 W/K", "8 W/K"] }
+"""
+C, G, NOISE, STEP = 100.0, 2.0, 0.05, 4.0  # J/K, W/K, K, s
+TIME = STEP * np.arange(16)
+
+
+def power(seed: int) -> np.ndarray:
+    """Heating power [W], set anew every four samples."""
+    return np.repeat(np.random.default_rng(seed).uniform(5.0, 60.0, 4), 4)
+
+
+def exact(P: np.ndarray, C: float, G: float, T: float) -> np.ndarray:
+    """Temperatures by the closed form of each step."""
+    values = []
+    for p in P:
+        values.append(T)
+        T = p / G + (T - p / G) * np.exp(-G * STEP / C)
+    return np.array(values)
+
+
+def measured(seed: int, T: float = 4.0) -> np.ndarray:
+    noise = NOISE * np.random.default_rng(100 + seed).standard_normal(TIME.size)
+    return exact(power(seed), C, G, T) + noise
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("block")
+    build_text(folder, BLOCK)
+    (folder / "system.toml").write_text(SYSTEM)
+    for seed in (1, 3):
+        columns = {"time [s]": TIME, "P [W]": power(seed), "T [K]": measured(seed)}
+        write_case(folder / "cases" / f"day{seed}", columns, f"Day {seed}")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def system(folder: Path) -> System:
+    return wb.load_system(folder)
+
+
+@pytest.fixture(scope="module")
+def cases(folder: Path, system: System) -> list[Case]:
+    return wb.read_cases(folder / "cases", system)
+
+
+def fitted(
+    system: System,
+    cases: Sequence[Case],
+    *parameters: str | wb.FittedParameter,
+    starts: int = 1,
+    profiles: bool = False,
+) -> wb.FitOutcome:
+    settings = wb.FitSettings(starts=starts, profiles=profiles)
+    return wb.fit(system, cases, parameters, settings=settings, workers=1, report=lambda line: None)
+
+
+def test_values_and_deviations_are_those_of_curve_fit_on_the_closed_form(
+    system: System, cases: list[Case]
+) -> None:
+    """Both minimise the same sum of squares; the simulation is right to 1e-8 of 60 K."""
+    outcome = fitted(system, cases[:1], "C", "G")
+
+    def model(_: np.ndarray, C: float, G: float, T: float) -> np.ndarray:
+        return exact(power(1), C, G, T)
+
+    best, covariance = curve_fit(
+        model, TIME, measured(1), (80.0, 1.5, 4.0), np.full(TIME.size, NOISE), absolute_sigma=True
+    )
+    for value, other, deviation in zip(
+        outcome.values, best, np.sqrt(np.diag(covariance)), strict=True
+    ):
+        assert value.value == pytest.approx(other, abs=0.01 * deviation)
+        assert value.deviation == pytest.approx(deviation, rel=0.01)  # as differences are right
+    assert outcome.correlation[0, 1] == pytest.approx(
+        covariance[0, 1] / np.sqrt(covariance[0, 0] * covariance[1, 1]), abs=0.01
+    )
+
+
+def test_intervals_hold_the_truth_and_nothing_speaks_against_a_right_model(
+    system: System, cases: list[Case]
+) -> None:
+    outcome = fitted(system, cases[:1], "C", "G", profiles=True)
+    assert outcome.reliable, outcome.doubts
+    for name, truth in (("C", C), ("G", G)):
+        value = outcome[name]
+        assert value.low is not None
+        assert value.high is not None
+        assert value.low < truth < value.high
+        assert value.method == "profile"
+        # Far from bounds the likelihood is nearly a normal one: both intervals agree.
+        assert value.high - value.low == pytest.approx(3.92 * (value.deviation or 0.0), rel=0.05)
+    for recording in outcome.recordings:
+        assert recording.error(recording.nominal) > 10.0
+        # Of 16 samples the root mean square scatters by 18 %.
+        assert 0.4 < recording.error(recording.fitted) < 1.5
+
+
+def test_a_product_that_alone_is_told_is_named_with_its_direction(
+    system: System, cases: list[Case]
+) -> None:
+    given = wb.FittedParameter(name="C", range=(99.0, 101.0), prior=(C, 1.0), by_recording=None)
+    outcome = fitted(system, cases[:1], "a", "b", given)
+    assert not outcome.reliable
+    (direction,) = outcome.directions
+    assert set(direction.parts) == {"a", "b"}
+    assert sorted(direction.parts.values()) == pytest.approx([-1.0, 1.0], abs=0.05)
+    assert "only their product" in str(direction)
+    assert not outcome["a"].identified
+    assert outcome["a"].low is None
+    assert outcome["C"].identified
+
+
+def test_a_parameter_that_no_output_shows_is_named(system: System, cases: list[Case]) -> None:
+    outcome = fitted(system, cases[:1], "C", "G", "idle")
+    assert [str(direction) for direction in outcome.directions] == ["idle: no output shows it"]
+    assert outcome["C"].identified
+
+
+def test_residuals_that_a_wrong_model_leaves_are_told(system: System, cases: list[Case]) -> None:
+    """With the heat capacity alone, the loss stays wrong by a quarter."""
+    outcome = fitted(system, cases[:1], "C")
+    assert not outcome.reliable
+    assert any("residuals" in doubt and "times the variance" in doubt for doubt in outcome.doubts)
+
+
+def test_ctrl_c_keeps_the_best_values(system: System, cases: list[Case]) -> None:
+    def interrupt(line: str) -> None:
+        if "start 1" in line:
+            raise KeyboardInterrupt
+
+    outcome = wb.fit(system, cases[:1], ["C", "G"], workers=1, report=interrupt)
+    assert outcome.interrupted
+    assert not outcome.reliable
+    assert outcome["C"].value == pytest.approx(C, rel=0.05)
+    assert outcome["C"].low is None
+    assert outcome.recordings[0].error(outcome.recordings[0].fitted) < 2.0
+
+
+def test_a_name_that_cannot_be_fitted_is_refused(system: System, cases: list[Case]) -> None:
+    with pytest.raises(InputError, match="expected names or patterns"):
+        fitted(system, cases[:1], "K")
+
+
+def test_a_table_of_no_parameter_is_refused(folder: Path) -> None:
+    path = folder / "wrong.toml"
+    path.write_text(SYSTEM.replace("fit.G", "fit.g"))
+    with pytest.raises(InputError, match=r"'g' \(closest: 'G'\)"):
+        wb.load_system(path)
+
+
+def test_the_command_writes_what_other_tools_read(folder: Path, tmp_path: Path) -> None:
+    days = [str(folder / "cases" / f"day{k}") for k in (1, 3)]
+    command = ["fit", days[0], "--system", str(folder), "--held-out", days[1]]
+    command += ["--starts", "1", "--intervals", "covariance", "--workers", "1"]
+    assert main([*command, "--out", str(tmp_path)]) == 0
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    check("fit", summary)
+    held_out = summary["recordings"]["day3"]
+    assert held_out["held_out"]
+    assert held_out["over_noise"]["nominal"] > 10.0
+    assert held_out["over_noise"]["fitted"] < 2.0
+    values = {name: summary["values"][name]["value"] for name in ("C", "G")}
+    ssv = ElementTree.parse(tmp_path / "parameters.ssv").getroot()
+    name = "{http://ssp-standard.org/SSP1/SystemStructureParameterValues}"
+    told = {
+        parameter.get("name"): float(parameter.find(f"{name}Real").get("value"))  # type: ignore[union-attr,arg-type]
+        for parameter in ssv.iter(f"{name}Parameter")
+    }
+    assert told == values
+    fmu = tmp_path / "Block_fitted.fmu"
+    starts = {v.name: v.start for v in read_description(fmu).variables}
+    assert float(starts["C"] or 0.0) == values["C"]
+    assert starts["a"] == "1.0"
+    assert any("parameters.ssv" in note for note in summary["notes"])  # compiled-in defaults
+    page = (tmp_path / "index.html").read_text()
+    assert "Fitted values" in page
+
+
+def test_a_fitted_fmu_differs_in_start_values_alone(folder: Path, tmp_path: Path) -> None:
+    write_fmu(folder / "Block.fmu", {"C": 123.0}, tmp_path / "new.fmu")
+    with zipfile.ZipFile(folder / "Block.fmu") as old, zipfile.ZipFile(tmp_path / "new.fmu") as new:
+        assert old.namelist() == new.namelist()
+        changed = [name for name in old.namelist() if old.read(name) != new.read(name)]
+        assert changed == ["modelDescription.xml"]
+        before, after = (zip_.read(changed[0]).decode() for zip_ in (old, new))
+    lines = zip(before.splitlines(), after.splitlines(), strict=True)
+    (pair,) = [pair for pair in lines if pair[0] != pair[1]]
+    assert 'start="123.0"' in pair[1]
