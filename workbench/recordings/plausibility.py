@@ -20,6 +20,8 @@ from workbench.system.units import si_factor
 
 _FEW = 5  # samples that tell a value, whatever one or two of them read
 _REPEATED = 0.2  # share of repeated samples from which on a signal is not noisy enough to tell
+_FINE = 4.0  # steps of a signal in the standard deviation of its noise
+_BESIDE, _ALONE = 10, 3.0  # samples on each side, and times those that one among them stands out
 _BY_CHANCE = 1e-3  # runs that noise alone makes in a recording
 _JUDGED = 50  # samples that say how a signal moves
 # Standard deviations that no noise reaches out and back, see `Soundness.spike` of a diagnosis.
@@ -264,12 +266,18 @@ def _jumps(
         away = np.where(before * after > 0.0, np.minimum(np.abs(before), np.abs(after)), 0.0)
         noise = float(signal.deviation(np.median(np.abs(read))))
         limit = _BEYOND * max(noise, float(np.quantile(away, 0.99)))
+        # A structure that rings at the end of a stop does so in several samples on end.
+        padded, others = np.pad(away, _BESIDE), np.zeros(away.size)
+        for shift in (*range(_BESIDE), *range(_BESIDE + 1, 2 * _BESIDE + 1)):
+            np.maximum(others, padded[shift : shift + away.size], out=others)
         wrong = np.zeros(read.size, np.bool_)
-        wrong[1:-1] = away > limit
+        wrong[1:-1] = (away > limit) & (away > _ALONE * others)
         # Of n samples that repeat with a chance p, n p^(k - 1) runs of k are expected.
         repeats = known.size - read.size - (lengths.max() - 1)
         chance = max(repeats, 1) / known.size
-        if chance < _REPEATED and signal.resolution <= signal.noise:
+        step = np.abs(np.diff(read)).min()
+        # Where steps are coarse, samples repeat as soon as the noise is less for a while.
+        if chance < _REPEATED and max(signal.resolution, step) < noise / _FINE:
             shortest = 1.0 + np.log(_BY_CHANCE / known.size) / np.log(chance)
             wrong |= (lengths > max(shortest, _FEW)) & (read != 0.0)
         if not wrong.any():
