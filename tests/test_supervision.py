@@ -197,8 +197,9 @@ def test_a_source_that_the_front_end_cannot_bear_is_named_with_its_line(source, 
     (home / "P.mo").write_text(f"package P {OVERFLOWS[source]}\nend P;\n")
     run = workbench(home, "fmu", "build", "P.mo", "P.M", "--out", "m.fmu")
     assert run.returncode != 0
-    overflows = r"P\.M, at which the front end overflows|function 'P\.[fg]', which calls itself"
-    assert re.match(rf"error: P\.mo:[12]: found ({overflows})", run.stderr)
+    # What the front end can tell before it overflows depends on the order in which it looks.
+    own = r"P\.M, at which the front end overflows|function 'P\.[fg]', which calls itself"
+    assert re.match(rf"error: P\.mo:[12]: found ({own}|P\.M .*cyclic dependency)", run.stderr)
     assert "a model's own code" not in run.stderr
     assert not (home / "m.fmu").exists()
     assert left(home) == []
