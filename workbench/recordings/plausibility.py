@@ -21,8 +21,8 @@ from workbench.system.units import si_factor
 _FEW = 5  # samples that tell a value, whatever one or two of them read
 _REPEATED = 0.2  # share of repeated samples from which on a signal is not noisy enough to tell
 _FINE = 4.0  # steps of a signal in the standard deviation of its noise
-_BESIDE, _ALONE = 10, 3.0  # samples on each side, and times those that one among them stands out
 _BY_CHANCE = 1e-3  # runs that noise alone makes in a recording
+_BESIDE, _ALONE = 10, 3.0  # samples on each side, and times those that one among them stands out
 _JUDGED = 50  # samples that say how a signal moves
 # Standard deviations that no noise reaches out and back, see `Soundness.spike` of a diagnosis.
 _BEYOND = 8.0
@@ -251,7 +251,8 @@ def _jumps(
     """Samples, and runs of equal ones, that leave what is beside them and come back at once.
 
     Motion that does so again and again is the machine's: against what 99 of 100 samples do. A run
-    of a noisy signal that is too long for chance is told, too, but for a sensor at rest.
+    of a noisy signal that is too long for chance is told, too, but for a sensor at rest or at an
+    end of its range.
     """
     for name, values in signals.items():
         signal = system.signals[name]
@@ -279,7 +280,8 @@ def _jumps(
         # Where steps are coarse, samples repeat as soon as the noise is less for a while.
         if chance < _REPEATED and max(signal.resolution, step) < noise / _FINE:
             shortest = 1.0 + np.log(_BY_CHANCE / known.size) / np.log(chance)
-            wrong |= (lengths > max(shortest, _FEW)) & (read != 0.0)
+            inside = (read > read.min()) & (read < read.max()) & (read != 0.0)
+            wrong |= (lengths > max(shortest, _JUDGED)) & inside
         if not wrong.any():
             continue
         first = int(np.flatnonzero(wrong)[0])
@@ -291,7 +293,7 @@ def _jumps(
             f"{_value_text(signal, read[first - 1 if first else 1])}, and "
             f"{int(lengths[wrong].sum()) - 1} more such samples",
             f"what noise and motion do, {_value_text(signal, limit)} out and back at most, and "
-            f"no {_FEW} equal samples",
+            f"no {_JUDGED} equal samples",
             "check the sensor; a diagnosis sets such samples aside, estimators do not",
         )
 
