@@ -296,7 +296,7 @@ def test_force_on_the_standard_recordings(estimators, name, pattern, limit):
     assert largest_error(estimators[name], folder, pattern) < limit
 
 
-DRY, SLIDE = "02_dry_100_2.7", "09_wet_160_4.2_wsp"
+WITHOUT_SLIDE = "02_dry_100_2.7"
 RW, RR = 0.46, 0.70  # [m]
 
 # --- definitions, on a stop in reverse from 30 m/s, with a slide from 10 to 11.5 s ---
@@ -486,7 +486,7 @@ def test_bands_that_are_multiplied_by_what_they_need_hold_95_percent(scale):
 def test_command_writes_every_stop_and_the_worst(system, root, tmp_path, monkeypatch, capsys):
     """On cases that keep the truth of every fourth sample."""
     monkeypatch.chdir(root)
-    cases = [f"cases/{name}" for name in (DRY, SLIDE)]
+    cases = [f"cases/{name}" for name in (WITHOUT_SLIDE, SLIDE)]
     options = ["--estimator", "ekf", "--estimator", "open_loop", "--out", str(tmp_path)]
     assert main(["accuracy", *cases, *options]) == 0
     printed = capsys.readouterr().out
@@ -520,10 +520,10 @@ def test_command_writes_every_stop_and_the_worst(system, root, tmp_path, monkeyp
 
     assert set(table.index.get_level_values("estimator")) == {"open_loop", "ekf"}
     assert summary["stops"][SLIDE]["slides"]
-    assert not summary["stops"][DRY]["slides"]
-    assert "force_in_slide" not in summary["stops"][DRY]["estimators"]["ekf"]
+    assert not summary["stops"][WITHOUT_SLIDE]["slides"]
+    assert "force_in_slide" not in summary["stops"][WITHOUT_SLIDE]["estimators"]["ekf"]
     last = summary["worst"]["ekf"]
-    assert last["force, dry discs"]["stop"] == DRY
+    assert last["force, dry discs"]["stop"] == WITHOUT_SLIDE
     inside = slide_error(stops[SLIDE], "ekf")
     assert last["force, inside the slide"] == {
         "quantity": "force_in_slide",
@@ -536,7 +536,7 @@ def test_command_writes_every_stop_and_the_worst(system, root, tmp_path, monkeyp
 
 def test_command_refuses_recordings_without_truth(root, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(root)
-    shutil.copytree(root / "cases" / DRY, tmp_path / "measured")
+    shutil.copytree(root / "cases" / WITHOUT_SLIDE, tmp_path / "measured")
     (tmp_path / "measured" / "truth.csv").unlink()
     out = tmp_path / "out"
     assert main(["accuracy", str(tmp_path / "measured"), "--out", str(out)]) == 2
@@ -549,7 +549,7 @@ def test_command_refuses_recordings_without_truth(root, tmp_path, monkeypatch, c
 def test_command_refuses_a_truth_in_other_units(root, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(root)
     folder = tmp_path / "case"
-    shutil.copytree(root / "cases" / DRY, folder)
+    shutil.copytree(root / "cases" / WITHOUT_SLIDE, folder)
     truth = folder / "truth.csv"
     truth.write_text(truth.read_text().replace("pads [Pa]", "pads [bar]", 1))
     assert main(["accuracy", str(folder), "--out", str(tmp_path / "out")]) == 2
@@ -559,7 +559,7 @@ def test_command_refuses_a_truth_in_other_units(root, tmp_path, monkeypatch, cap
 def test_command_refuses_a_stop_in_which_no_force_is_built_up(root, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(root)
     folder = tmp_path / "coasting"
-    shutil.copytree(root / "cases" / DRY, folder)
+    shutil.copytree(root / "cases" / WITHOUT_SLIDE, folder)
     for file in ("measured.csv", "truth.csv"):
         lines = (folder / file).read_text().splitlines()
         kept = [lines[0], *(line for line in lines[1:] if float(line.split(",")[0]) < 3.0)]
@@ -573,16 +573,16 @@ def test_command_refuses_a_stop_in_which_no_force_is_built_up(root, tmp_path, mo
 
 def test_stops_of_several_rigs_are_told_apart_by_their_folders(root, tmp_path, capsys):
     for rig in ("one", "two"):
-        shutil.copytree(root / "cases" / DRY, tmp_path / rig / DRY)
+        shutil.copytree(root / "cases" / WITHOUT_SLIDE, tmp_path / rig / WITHOUT_SLIDE)
     rigs = [str(tmp_path / rig) for rig in ("one", "two")]
     options = ["--estimator", "ekf", "--out", str(tmp_path / "out")]
     assert main(["accuracy", *rigs, *options]) == 0
     summary = json.loads((tmp_path / "out" / "accuracy.json").read_text())
-    assert set(summary["stops"]) == {f"one/{DRY}", f"two/{DRY}"}
+    assert set(summary["stops"]) == {f"one/{WITHOUT_SLIDE}", f"two/{WITHOUT_SLIDE}"}
     # Of the same stop twice, what bands need is what they need of it once: not the system's own.
     assert main(["accuracy", rigs[0], *options]) == 0
     once = json.loads((tmp_path / "out" / "accuracy.json").read_text())
     assert summary["bands"]["ekf"] == pytest.approx(once["bands"]["ekf"], rel=0.01)
     capsys.readouterr()
     assert main(["accuracy", rigs[0], rigs[0], *options]) == 2
-    assert f"found a second stop 'one/{DRY}'" in capsys.readouterr().err
+    assert f"found a second stop 'one/{WITHOUT_SLIDE}'" in capsys.readouterr().err

@@ -90,7 +90,7 @@ def test_stick_and_slip_agree_with_an_error_controlled_integrator(amplitude, blo
     assert np.abs(result - reference)[:, 0].max() < 5e-3 * np.abs(reference[:, 0]).max()
 
 
-H, NOISE, FADES = 2e-3, 1e-2, 3.0  # [s], [m], [1/s]
+SAMPLE, NOISE, FADES = 2e-3, 1e-2, 3.0  # [s], [m], [1/s]
 LIBRARY = """package Swing "A mass on a spring"
   model Mass "Mass, spring and damper"
     parameter Real w(unit="rad/s") = 1.0;
@@ -105,7 +105,7 @@ LIBRARY = """package Swing "A mass on a spring"
 end Swing;
 """
 SYSTEM = f"""title = "A mass on a spring"
-sample_time = "{H} s"
+sample_time = "{SAMPLE} s"
 [models]
 observer = {{ class = "Mass" }}
 [parameters]
@@ -124,11 +124,11 @@ scale = "1 m"
 
 @pytest.mark.parametrize(("samples", "fine"), [(9, True), (400, False)])
 def test_a_fading_swing_leaves_noise_alone(samples, fine, tmp_path):
-    damped = 2.0 * np.pi / (samples * H)
+    damped = 2.0 * np.pi / (samples * SAMPLE)
     (tmp_path / "package.mo").write_text(LIBRARY)
     omega = float(np.hypot(damped, FADES))
     (tmp_path / "system.toml").write_text(SYSTEM.replace("OMEGA", repr(omega)))
-    time = H * np.arange(1000)
+    time = SAMPLE * np.arange(1000)
     swing = np.exp(-FADES * time) * (np.cos(damped * time) + FADES / damped * np.sin(damped * time))
     read = swing + NOISE * np.random.default_rng(1).standard_normal(time.size)
     read[0] = swing[0]
