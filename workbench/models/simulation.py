@@ -12,6 +12,7 @@ a model is integrated at a tolerance of 1e-8 and goes through its events; see `h
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -29,6 +30,7 @@ _SHARE = TOLERANCE ** (1 / 3)
 _FACTORS = (1.0, 1.0 / 16.0, 1.0 / 256.0, 16.0)
 # Of a derivative, by which it may be wrong: Gauss-Newton steps and intervals are, by as much.
 _AGREES = 0.01
+_AS_GOOD = 2.0  # times the disagreement of before, at another point
 # Of an output's size, below which no sensor shows what a step does.
 _SHOWN = 1e-6
 
@@ -83,6 +85,9 @@ class Simulation:
         self._held = np.array(held, np.bool_)
         self._variables = {v.name: v for v in fmu.description.variables}
         self._resets: bool | None = None  # not known before the first run
+        self._set: set[str] = set()
+        # By column: over the usual step, that which was best, and its disagreement.
+        self._best: dict[tuple[str, ...], tuple[float, float]] = {}
 
     def run(self, drive: Drive, values: Mapping[str, float]) -> Matrix:
         """Outputs at the samples, (n, l).
@@ -137,8 +142,12 @@ class Simulation:
         if self._resets is False:
             fmu.renew(reload=False)
         fmu.begin_at(drive.model_time)
+        # What a run has set stays set in an FMU whose reset forgets to take it back.
+        before = {name: fmu.defaults[name] for name in self._set if name in fmu.defaults}
+        self._set |= values.keys()
         # What a model calculates at its start may depend on inputs.
-        fmu.start({**dict(zip(self._inputs.names, drive.u[0], strict=True)), **values})
+        inputs = dict(zip(self._inputs.names, drive.u[0], strict=True))
+        fmu.start({**inputs, **before, **values})
 
     def derivatives(
         self,
@@ -160,42 +169,83 @@ class Simulation:
         InputError, FMUError
             As of `run`; if what is varied can neither grow nor fall.
         """
+        names = [name for column in columns for name in column]
+        at = {**self.values(drive, values, names), **values}
         base = self.run(drive, values)
-        self._start(drive, values)
-        varied = [name for names in columns for name in names]
-        at = {**dict(zip(varied, self._fmu.get_typed(self._fmu.typed(varied)), strict=True))}
-        at |= {name: value for name, value in values.items() if name in at}
         scale = np.abs(base).max(axis=0, initial=0.0)
         scale[scale == 0.0] = 1.0
         derivatives, unsure = np.empty((*base.shape, len(columns))), np.zeros(len(columns))
-        for q, names in enumerate(columns):
-            size = (sizes or {}).get(names[0]) or abs(at[names[0]])
-            size = size or abs(self._variables[names[0]].nominal or 1.0)
+        for q, column in enumerate(columns):
+            size = (sizes or {}).get(column[0]) or self.size(column[0], at[column[0]])
 
-            def moved(step: float, names: Sequence[str] = names) -> Matrix | FMUError:
+            def moved(step: float, column: Sequence[str] = column) -> Matrix | FMUError:
                 """Outputs after a step of this column, less the base; or why there are none."""
-                after = {name: at[name] + step for name in names}
+                after = {name: at[name] + step for name in column}
                 for name, value in after.items():
-                    variable = self._variables[name]
-                    if (variable.minimum is not None and value < variable.minimum) or (
-                        variable.maximum is not None and value > variable.maximum
-                    ):
-                        return FMUError(f"{self._fmu.place}: '{name}' is at its limit, {value:g}")
+                    low, high = self.limits[name]
+                    if not low <= value <= high:
+                        return FMUError(f"'{name}' can neither grow nor fall within its limits")
                 try:
                     return self.run(drive, {**values, **after}) - base
                 except FMUError as error:
                     return error
 
-            trials = []
-            for factor in _FACTORS:
-                trials.append(_difference(moved, factor * _SHARE * size, scale))
-                if trials[-1].unsure <= _AGREES:
-                    break
-            best = min(trials, key=lambda trial: trial.unsure)
+            best, moves = self._best_difference(tuple(column), moved, size, scale)
             derivatives[:, :, q] = best.slope
-            shown = max(trial.moved for trial in trials) > _SHOWN
-            unsure[q] = best.unsure if shown and best.unsure > _AGREES else 0.0
+            unsure[q] = best.unsure if moves and best.unsure > _AGREES else 0.0
         return Derivatives(derivatives, unsure)
+
+    def _best_difference(
+        self,
+        column: tuple[str, ...],
+        moved: Callable[[float], Matrix | FMUError],
+        size: float,
+        scale: Vector,
+    ) -> tuple["_Difference", bool]:
+        """The slope whose halves agree best, and whether any step moves an output.
+
+        The step that was best before is tried first, and is good enough if it is as good again.
+        """
+        first, least = self._best.get(column, (1.0, 0.0))
+        enough = max(_AGREES, _AS_GOOD * least)
+        trials: dict[float, _Difference] = {}
+        refused = FMUError("")
+        for factor in dict.fromkeys((first, *_FACTORS)):
+            try:
+                trials[factor] = _difference(moved, factor * _SHARE * size, scale)
+            except FMUError as error:
+                refused = error
+                continue
+            if trials[factor].unsure <= enough:
+                break
+        if not trials:
+            raise refused
+        factor, best = min(trials.items(), key=lambda trial: trial[1].unsure)
+        self._best[column] = factor, best.unsure
+        return best, max(trial.moved for trial in trials.values()) > _SHOWN
+
+    def values(
+        self, drive: Drive, values: Mapping[str, float], names: Sequence[str]
+    ) -> dict[str, float]:
+        """Values of variables at the start of a run."""
+        self._start(drive, values)
+        read = self._fmu.get_typed(self._fmu.typed(names))
+        return dict(zip(names, map(float, read), strict=True))
+
+    def size(self, name: str, value: float) -> float:
+        """Of what size a variable is: as its value, or where that is zero its nominal value."""
+        return abs(value) or abs(self._variables[name].nominal or 1.0)
+
+    @cached_property
+    def limits(self) -> dict[str, tuple[float, float]]:
+        """Least and greatest value of each variable, infinite where it has none."""
+        return {
+            name: (
+                -np.inf if variable.minimum is None else variable.minimum,
+                np.inf if variable.maximum is None else variable.maximum,
+            )
+            for name, variable in self._variables.items()
+        }
 
 
 class _Difference(NamedTuple):
@@ -231,5 +281,6 @@ def _difference(
     else:
         slope, apart = (up - down) / (2.0 * h), 0.5 * (up + down)
     whole = float(np.linalg.norm(h * slope / scale))
-    share = float(np.linalg.norm(apart / scale)) / whole if whole else 0.0
+    # What does not move at all says nothing: a larger step may.
+    share = float(np.linalg.norm(apart / scale)) / whole if whole else 1.0
     return _Difference(slope, share, float(np.abs(up / scale).max(initial=0.0)))
