@@ -194,7 +194,7 @@ def test_a_table_of_no_parameter_is_refused(folder: Path) -> None:
 
 def test_the_command_writes_what_other_tools_read(folder: Path, tmp_path: Path) -> None:
     days = [str(folder / "cases" / f"day{k}") for k in (1, 3)]
-    command = ["fit", days[0], "--system", str(folder), "--held-out", days[1]]
+    command = ["fit", *days, "--system", str(folder), "--held-out", "day3"]
     command += ["--starts", "1", "--intervals", "covariance", "--workers", "1"]
     assert main([*command, "--out", str(tmp_path)]) == 0
     summary = json.loads((tmp_path / "summary.json").read_text())

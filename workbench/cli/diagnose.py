@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
-from fnmatch import fnmatchcase
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 from workbench.cli import arguments
 from workbench.cli.extras import require_compiler
 from workbench.cli.output import CommandResult, Output, read_result
-from workbench.errors import unknown_name
 from workbench.runtime.engine import Engine
 from workbench.runtime.files import locked_folder
 
 if TYPE_CHECKING:
     from workbench.diagnosis import Outcome, Problem
-    from workbench.recordings.case import Case
 
 WORKERS_NEED = ("workbench.diagnosis", "workbench.diagnosis.laws")
 
@@ -75,31 +72,9 @@ def add(commands: arguments.Commands, text: str) -> argparse.ArgumentParser:
     return parser
 
 
-def _split_held_out(
-    cases: Sequence[Case], patterns: Sequence[str]
-) -> tuple[list[Case], list[Case]]:
-    """Recordings that are fitted, and those that are held out."""
-    names = [case.name for case in cases]
-    for pattern in patterns:
-        if not any(fnmatchcase(name, pattern) for name in names):
-            raise unknown_name(
-                pattern,
-                names,
-                where=f"--held-out {pattern}",
-                found="no recording of this name",
-                expected=f"some of {', '.join(names)}",
-            )
-    fitted: list[Case] = []
-    held_out: list[Case] = []
-    for case in cases:
-        out = any(fnmatchcase(case.name, pattern) for pattern in patterns)
-        (held_out if out else fitted).append(case)
-    return fitted, held_out
-
-
 def run(options: argparse.Namespace, output: Output) -> CommandResult:
     """Diagnose the recordings, or list the effects."""
-    from workbench.cli.inputs import given_cases
+    from workbench.cli.inputs import given_cases, split_held_out
     from workbench.diagnosis import Problem, catalogue, choose, library_of
     from workbench.diagnosis.effects.candidates import COEFFICIENT
     from workbench.models.modelica import read_library
@@ -121,7 +96,7 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
         )
     if library is not None or any(effect.size == COEFFICIENT for effect in effects):
         require_compiler()
-    cases, held_out = _split_held_out(given_cases(options, system), options.held_out)
+    cases, held_out = split_held_out(given_cases(options, system), options.held_out)
     with locked_folder(options.out):
         return _run(options, output, Problem(system, cases, library, effects, held_out))
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from workbench.cli.arguments import (
@@ -43,7 +42,7 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         "  python -m workbench fit --system my_plant --parameter 'motor.*' --parameter J\n"
         "  python -m workbench fit day1 day2 --system my_plant --parameter R "
         "--range 'R=0.1 Ohm to 5 Ohm'\n"
-        "  python -m workbench fit day1 --system my_plant --held-out day2 --loss soft_l1",
+        "  python -m workbench fit day1 day2 --system my_plant --held-out day2 --loss soft_l1",
     )
     add_recordings(parser, out="results/fit")
     add_system(parser)
@@ -81,10 +80,9 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
     parser.add_argument(
         "--held-out",
         nargs="+",
-        type=Path,
         default=[],
         metavar="CASE",
-        help="recordings that are not fitted, on which errors are measured",
+        help="recordings by name (* is any letters), on which only errors are measured",
     )
     parser.add_argument(
         "--loss",
@@ -119,9 +117,8 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
 
 def run(options: argparse.Namespace, output: Output) -> CommandResult:
     """Fit the parameters, and write what was found."""
-    from workbench.cli.inputs import given_cases, recording_options
+    from workbench.cli.inputs import given_cases, split_held_out
     from workbench.pages.provenance import models, run_of, software, sources
-    from workbench.recordings.case import read_cases
     from workbench.studies.fit import FitSettings, fit
     from workbench.studies.fit.report import format_fit, write_fit
     from workbench.system.reader import with_model
@@ -132,11 +129,7 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
     if options.fmu is not None:
         system = with_model(system, OBSERVER, options.fmu)
     parameters = _parameters(options, system)
-    held_out = []
-    if options.held_out:
-        held_out = read_cases(options.held_out, system, recording_options(options, system))
-    names = {case.name for case in held_out}
-    cases = [case for case in given_cases(options, system) if case.name not in names]
+    cases, held_out = split_held_out(given_cases(options, system), options.held_out)
     if not cases:
         raise InputError(
             where="command line, --held-out",

@@ -2,6 +2,7 @@
 
 import argparse
 from collections.abc import Sequence
+from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
@@ -181,3 +182,29 @@ def model_names(
                     remedy=f"run these cases apart, or decide with --map {ours}=NAME",
                 )
     return check_names(names | typed, "--map and [model.names]", system)
+
+
+def split_held_out(cases: Sequence[Case], patterns: Sequence[str]) -> tuple[list[Case], list[Case]]:
+    """Recordings that are fitted, and those that are held out: by name, * is any letters.
+
+    Raises
+    ------
+    InputError
+        If a pattern fits no recording.
+    """
+    names = [case.name for case in cases]
+    for pattern in patterns:
+        if not any(fnmatchcase(name, pattern) for name in names):
+            raise unknown_name(
+                pattern,
+                names,
+                where=f"--held-out {pattern}",
+                found="no recording of this name",
+                expected=f"some of {', '.join(names)}",
+            )
+    fitted: list[Case] = []
+    held_out: list[Case] = []
+    for case in cases:
+        out = any(fnmatchcase(case.name, pattern) for pattern in patterns)
+        (held_out if out else fitted).append(case)
+    return fitted, held_out
