@@ -163,7 +163,9 @@ def test_candidates_are_parameters_and_sensors_of_a_stated_size(tank):
     assert names[3:7] == [
         f"Sensor{size}[{signal}]" for signal in ("inflow", "level") for size in ("Gain", "Offset")
     ]
-    assert names[7:] == [f"{form}Term[x]" for form in ("Dry", "Viscous", "Quadratic", "Constant")]
+    assert names[7:] == [
+        f"{form}Term[x]" for form in ("Coulomb", "Viscous", "Quadratic", "Constant")
+    ]
 
 
 def test_candidates_are_chosen_in_the_system_file(tank, tmp_path, capsys):
@@ -242,7 +244,7 @@ noise = "1 mm"
 scale = "0.5 m"
 """
 LAWS = {
-    "Dry": lambda v: 0.4 * np.tanh(v / 1e-3),
+    "Coulomb": lambda v: 0.4 * np.tanh(v / 1e-3),
     "Viscous": lambda v: 0.3 * v,
     "Quadratic": lambda v: 0.5 * v * abs(v),
 }
@@ -269,7 +271,7 @@ def swung(law, start: float, time) -> np.ndarray:
     ).y[0]
 
 
-@pytest.mark.parametrize(("form", "size"), [("Dry", 0.4), ("Viscous", 0.3), ("Quadratic", 0.5)])
+@pytest.mark.parametrize(("form", "size"), [("Coulomb", 0.4), ("Viscous", 0.3), ("Quadratic", 0.5)])
 def test_a_missing_friction_is_named_with_its_size(swing, tmp_path, form, size):
     """And the FMU around the one that lacks it is right in another tool."""
     rng, time = np.random.default_rng(7), np.arange(0.0, 4.005, 0.01)
@@ -305,7 +307,7 @@ def test_an_fmu_around_another_has_its_rates_and_derivatives_with_terms(swing, t
         terms = rate_terms(model)
     # The rate of the position is the speed itself: what moves it acts on the speed.
     assert [term.name for term in terms] == [
-        f"added.{form}.v" for form in ("dry", "viscous", "quadratic", "constant")
+        f"added.{form}.v" for form in ("coulomb", "viscous", "quadratic", "constant")
     ]
     path = tmp_path / "Extended.fmu"
     write_extended(inner, path, terms, {"added.viscous.v": 0.3}, {"c": 20.0})

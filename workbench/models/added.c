@@ -36,10 +36,10 @@ typedef struct {
     double coefficient[TERMS];
 } Saved;
 
-/* Value of a form at x, and its derivative. A dry term is smooth within `width` of rest. */
+/* Value of a form at x, and its derivative. A Coulomb term is smooth within `width` of rest. */
 static double form(const Term *term, double x, double *slope) {
     switch (term->form) {
-        case DRY: {
+        case COULOMB: {
             double t = tanh(x / term->width);
             *slope = -(1.0 - t * t) / term->width;
             return -t;

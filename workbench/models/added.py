@@ -19,7 +19,7 @@ from workbench.models import fmu_cache
 from workbench.models.archive import DESCRIPTION
 from workbench.models.description import MODEL_EXCHANGE, Description, read_description
 
-DRY, VISCOUS, QUADRATIC, CONSTANT = "dry", "viscous", "quadratic", "constant"
+COULOMB, VISCOUS, QUADRATIC, CONSTANT = "coulomb", "viscous", "quadratic", "constant"
 _IDENTIFIER, _INNER = "Extended", "inner"
 _HEADERS = Path(fmpy.__file__).parent / "c-code"
 _MOST_KNOWNS = 4096  # of one directional derivative
@@ -35,10 +35,10 @@ class RateTerm:
     ----------
     name : of its coefficient, a parameter of the FMU.
     state : place in the FMU's continuous states.
-    form : DRY, VISCOUS, QUADRATIC or CONSTANT.
+    form : COULOMB, VISCOUS, QUADRATIC or CONSTANT.
     typical : size of the coefficient, in its unit; bounds are 1000 times that.
     unit : of the coefficient, empty for none.
-    width : of the state within which a dry term is smooth.
+    width : of the state within which a Coulomb term is smooth.
     text : what it is, for people.
     """
 
@@ -139,7 +139,7 @@ def _header(
     """What `added.c` must know."""
     references = {v.name: v.reference for v in description.variables}
     first = max(references.values()) + 1
-    forms = {DRY: "DRY", VISCOUS: "VISCOUS", QUADRATIC: "QUADRATIC", CONSTANT: "CONSTANT"}
+    forms = {COULOMB: "COULOMB", VISCOUS: "VISCOUS", QUADRATIC: "QUADRATIC", CONSTANT: "CONSTANT"}
     rows = [
         f"{{{t.state}, {forms[t.form]}, {coefficients.get(t.name, 0.0)!r}, {t.width!r}}}"
         for t in terms
@@ -155,7 +155,7 @@ def _header(
 #define STATES {len(description.states)}u
 #define CHANGED {len(parameters)}u
 #define KNOWNS {_MOST_KNOWNS}
-enum {{ DRY, VISCOUS, QUADRATIC, CONSTANT }};
+enum {{ COULOMB, VISCOUS, QUADRATIC, CONSTANT }};
 typedef struct {{ size_t state; int form; double start, width; }} Term;
 static const Term terms[] = {{{", ".join([*rows, "{0, CONSTANT, 0.0, 1.0}"])}}};
 static const fmi2ValueReference states[] = {_array(references, description.states)};

@@ -15,7 +15,7 @@ import numpy as np
 from workbench.arrays import Vector
 from workbench.diagnosis.effects.catalogue import Effect
 from workbench.errors import unknown_name
-from workbench.models.added import CONSTANT, DRY, QUADRATIC, VISCOUS, RateTerm
+from workbench.models.added import CONSTANT, COULOMB, QUADRATIC, VISCOUS, RateTerm
 from workbench.models.description import Variable
 from workbench.models.fmu import FMU
 from workbench.observers.operating import start_spreads
@@ -25,12 +25,12 @@ from workbench.system.units import with_unit
 
 CHANGE, GAIN, OFFSET, COEFFICIENT = "change", "gain", "offset", "coefficient"
 _FORMS = {
-    DRY: "a dry term, as of friction, in the rate of {state}",
+    COULOMB: "a term of constant size against {state} in its rate, as of Coulomb friction",
     VISCOUS: "a term in proportion to {state} in its rate, as of viscous friction or a leak",
     QUADRATIC: "a quadratic term, as of drag, in the rate of {state}",
     CONSTANT: "a constant term in the rate of {state}",
 }
-_SMOOTH = 1e-3  # of a state's size, within which a dry term is smooth
+_SMOOTH = 1e-3  # of a state's size, within which a Coulomb term is smooth
 _CHANGEABLE = ("fixed", "tunable")
 _FACTOR = 10.0  # by which a parameter is larger or smaller at most, if the FMU has no bounds
 
