@@ -314,3 +314,22 @@ def test_what_goes_out_and_back_at_once_is_told_with_its_line(name, stop, tmp_pa
     assert read_case(write(tmp_path / "whole", toml, table), system).doubts == ()
     told = read_case(write(tmp_path / "changed", toml, change(table)), system).doubts
     assert any(re.search(message, doubt) for doubt in told), told
+
+
+def test_a_machine_that_turns_within_a_sample_raises_no_doubt(tmp_path):
+    """A compressor fills a reservoir until it is switched off, and air is lost from then on.
+
+    The highest sample stands out on both sides by tens of deviations, as a wrong one does.
+    """
+    system = load_system("air_supply")
+    time = 10.0 * np.arange(150.0)
+    filled = np.minimum(time, 300.0)
+    pressure = 7e5 + 900.0 * filled - 500.0 * (time - filled)
+    pressure += 200.0 * np.random.default_rng(1).standard_normal(time.size)
+    flag = np.where(time < 300.0, 0.0, 1.0)
+    table = {"time [s]": time, "COMP [1]": flag, "reservoir [Pa]": pressure}
+    toml = 'title = "Cycle"\n[measurement]\nfile = "measured.csv"\n'
+    assert read_case(write(tmp_path / "turning", toml, table), system).doubts == ()
+    table = cell(table, 50, "reservoir [Pa]", 9.4e5)
+    wrong = read_case(write(tmp_path / "wrong", toml, table), system)
+    assert any("line 52, column 'reservoir': found 9.4 bar" in doubt for doubt in wrong.doubts)

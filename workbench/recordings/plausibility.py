@@ -273,6 +273,10 @@ def _jumps(
             np.maximum(others, padded[shift : shift + away.size], out=others)
         wrong = np.zeros(read.size, np.bool_)
         wrong[1:-1] = (away > limit) & (away > _ALONE * others)
+        # Where a machine turns, its slopes lead to a peak; a wrong sample is off them as well.
+        outwards = np.sign(before)
+        wrong[2:-1] &= outwards[1:] * (before[1:] - before[:-1]) > limit
+        wrong[1:-2] &= outwards[:-1] * (after[:-1] - after[1:]) > limit
         # Of n samples that repeat with a chance p, n p^(k - 1) runs of k are expected.
         repeats = known.size - read.size - (lengths.max() - 1)
         chance = max(repeats, 1) / known.size
