@@ -243,9 +243,11 @@ def conclude(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnos
             _cause(fit, chosen, effect, noise_alone=noise_alone)
             for effect in _strongest_first(fit, chosen, catalogue)
         ]
-        # A part that explains less than remains may only stand for a piece of what is missing.
+        # A part that explains less than remains may only stand for a piece of what is missing, if
+        # as many causes of another form would remove as much.
         minor = [cause.effect.name for cause in causes if cause.explained < _PART]
-        if verdict == "partly explained" and len(causes) > 1 and minor:
+        whole = gain is not None and _removed(gain) > _removed_by_another_form(len(causes))
+        if verdict == "partly explained" and len(causes) > 1 and minor and not whole:
             objections.append(f"{' and '.join(minor)} would explain less than what remains")
             verdict, causes, gain = "unexplained", [], None
     if causes:
@@ -363,6 +365,18 @@ def _removed(gain: Gain) -> float:
     """Share of the explainable that is gone on held-out recordings."""
     before, after = gain.before**2 - 1.0, gain.after**2 - 1.0
     return float(np.clip((before - after) / max(before, 1e-9), 0.0, 1.0))
+
+
+def _removed_by_another_form(count: int) -> float:
+    """Share of squares that laws of `count` coefficients remove of one that is none of them.
+
+    Of x^(n+1) over (0, 1), the powers x to x^n leave prod_p ((n+1-p) / (n+p+2))^2 (Muentz, 1914).
+
+    >>> [round(_removed_by_another_form(count), 4) for count in (1, 2, 3)]
+    [0.9375, 0.9956, 0.9997]
+    """
+    powers = np.arange(1, count + 1)
+    return float(1.0 - np.prod((count + 1 - powers) / (count + powers + 2)) ** 2)
 
 
 def _objections(
