@@ -175,14 +175,37 @@ def limit_memory(size: int) -> None:
     OSError
         If the system does not say what the process has.
     """
+    _limit(size)
+
+
+@contextmanager
+def limited_memory(size: int) -> Iterator[None]:
+    """Limit what this process takes meanwhile [bytes], if it belongs to a command.
+
+    Raises
+    ------
+    OSError
+        If the system does not say what the process has.
+    """
+    before = _limit(size)
+    try:
+        yield
+    finally:
+        if before is not None:
+            resource.setrlimit(resource.RLIMIT_DATA, before)
+
+
+def _limit(size: int) -> tuple[int, int] | None:
+    """Limit what this process takes from now on; the limits before, None where none is set."""
     if resource is None or sys.platform != "linux":
-        return
+        return None
     soft, hard = resource.getrlimit(resource.RLIMIT_DATA)
     if hard == resource.RLIM_INFINITY or soft != hard:  # of a notebook, or done before
-        return
+        return None
     status = Path("/proc/self/status").read_text()
     held = int(status.partition("VmData:")[2].split()[0]) << 10
     resource.setrlimit(resource.RLIMIT_DATA, (min(held + size, hard), hard))
+    return soft, hard
 
 
 def supervised(

@@ -32,9 +32,11 @@ from workbench.models.compiler.expressions import (
 )
 from workbench.models.modelica import Library, check, files, packages, read_library
 from workbench.models.modelica.classes import Class
-from workbench.runtime.supervision import blaming
+from workbench.runtime.supervision import blaming, limited_memory
 
 SCHEMA = 43
+# Bytes beyond which the front end overflows; 65 MB do for the reference model.
+_MEMORY = 2 << 30
 
 # What the front end says, and what to do about it; the first that fits.
 _REMEDIES = (
@@ -164,7 +166,7 @@ def flatten(package: Path, model: str) -> FlatModel:
         remedy="make it smaller, or leave out what needs itself",
     )
     try:
-        with _quiet_panic(), blaming(refusal):
+        with _quiet_panic(), blaming(refusal), limited_memory(_MEMORY):
             roots = [str(used.parent) for used in packages(package)[1:]]
             dae = rumoca.Session(roots=roots).load(str(package), model=model).to_dict("dae")
     except rumoca.RumocaError as error:
