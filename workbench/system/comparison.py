@@ -73,7 +73,7 @@ class LeadingOutput:
         otherwise="`output`",
     )
     ripple: float = key(
-        "standard deviation of what moves it, over that of the noise of the inputs", absent=1.0
+        "standard deviation of the disturbance, over that of the noise of the inputs", absent=1.0
     )
 
 
@@ -90,13 +90,15 @@ class Rest:
 class Level:
     """A parameter that differs by nature from recording to recording, and needs no cause."""
 
-    by: str = key("condition whose choices have a level each", of=CONDITION, absent="")
+    by: str = key(
+        "test condition; each of its choices has a nuisance parameter", of=CONDITION, absent=""
+    )
     spread: float = key(
-        "relative standard deviation of the common level", absent=ENDLESS, otherwise="any"
+        "relative standard deviation of the common value", absent=ENDLESS, otherwise="any"
     )
     deviation: float = key(
-        "standard deviation of the common level in the parameter's SI unit, in place of `spread` "
-        "where the sheet's value is zero",
+        "standard deviation of the common value in the parameter's SI unit, instead of `spread` if "
+        "the data sheet's value is zero",
         absent=ENDLESS,
         otherwise="any",
     )
@@ -128,23 +130,23 @@ class Exclusion:
     reason: str = key("why, for people")
     formula: Expression = key("of measured signals and parameters", name="is", of=FORMULA)
     above: float = key(
-        "level of its absolute value, SI, above which samples do not count",
+        "absolute value, SI, above which samples are excluded",
         absent=ENDLESS,
         otherwise="`below` instead",
     )
     below: float = key(
-        "level of its absolute value, SI, below which samples do not count",
+        "absolute value, SI, below which samples are excluded",
         absent=-ENDLESS,
         otherwise="`above` instead",
     )
     from_rest: bool = key("it counts from its median before the input is applied", absent=False)
     smoothed: float = key("over which it is averaged", "s", 0.0)
-    within: float = key("around such samples that do not count either", "s", 0.0)
+    within: float = key("time around such samples that is excluded too", "s", 0.0)
     only_while: Threshold | None = key("it counts", absent=None, otherwise="always")
-    to_the_end: bool = key("nothing after it counts", absent=False)
+    to_the_end: bool = key("everything after it is excluded", absent=False)
     restarted: tuple[str, ...] = key(
-        "measured outputs that are states: each block begins with these as measured, and such "
-        "samples do count, unless errors last there whatever is found",
+        "measured outputs that are states: each block begins with their measured values, and the "
+        "samples count, unless systematic errors remain there with every model",
         absent=(),
         of=OUTPUT_THAT_IS_A_STATE,
     )
@@ -164,7 +166,7 @@ class Influence:
     formula: Expression = key("of measured signals and parameters", name="is", of=FORMULA)
     unit: Unit = key("of the formula")
     way: str = key(
-        "what of the formula: an angle, whose phase belongs to one recording, is a `turn`",
+        "what of the formula; an angle with a phase of its own in each recording is a `turn`",
         choices=WAYS,
         absent="value",
     )
@@ -180,69 +182,68 @@ class Comparison:
     """How the diagnosis compares recordings with the model."""
 
     block: float = key(
-        "time whose mean errors are the unit of all statistics; short against all that the machine "
-        "does, of what swings a fifth of a period at most",
+        "time over which errors are averaged for all statistics; short against the machine's "
+        "motions, at most a fifth of a period of an oscillation",
         "s",
         lambda scope: _BLOCK * scope.whole["sample_time"],
         otherwise=f"{_BLOCK} samples",
     )
     lasting: float = key(
-        "from which on an error is no noise; of what swings, half a period",
+        "duration from which an error is systematic; of an oscillation, half a period",
         "s",
         lambda scope: _LASTING * scope.own["block"],
         otherwise=f"{_LASTING} blocks",
     )
     least: float = key(
-        "of a recording that must count",
+        "least compared length of a recording",
         "s",
         lambda scope: 2.0 * scope.own["lasting"],
         otherwise="2 `lasting`",
     )
-    settling: float = key("at the start, in which the simulation finds its states", "s", 0.0)
+    settling: float = key("warm-up at the start", "s", 0.0)
     left: float = key(
-        f"share of lasting errors that right causes may leave: {_LEFT} for a detailed model, more "
-        "for one that simplifies",
+        f"fraction of the systematic error that correct effects may leave: {_LEFT} for a detailed "
+        "model, more for a simple one",
         absent=_LEFT,
     )
     false_alarms: float = key(
-        "share of sets of a sound machine that may be called something else; thresholds follow "
-        "from it",
+        "fraction of data sets of a healthy machine with a false alarm; thresholds follow from it",
         absent=RATE,
         above=0.0,
         below=1.0,
         expected="a share between 0 and 1",
     )
     least_skew: float = key(
-        "by which a signal is late at least, to be late",
+        "least time offset that is reported",
         "s",
         # Within it, a clock is a matter of how inputs are held between samples.
         lambda scope: _LEAST_SKEW * scope.whole["sample_time"],
         otherwise=f"{_LEAST_SKEW} samples",
     )
-    begins: Threshold | None = key("input that is applied, by how much above its rest", absent=None)
-    rests: tuple[Rest, ...] = key("readings before that", name="rest", absent=())
+    begins: Threshold | None = key(
+        "input whose application starts the test, and how far above its rest", absent=None
+    )
+    rests: tuple[Rest, ...] = key("zero readings before that", name="rest", absent=())
     leading: LeadingOutput | None = key(
-        "an output that leads a slow motion, which integrates the noise of inputs",
+        "output that corrects a slow motion, which integrates the noise of inputs",
         name="leads",
         absent=None,
     )
     channels: tuple[Channel, ...] = key(
-        "what is compared", absent=_measured, otherwise="outputs and reference signals"
+        "compared signals", absent=_measured, otherwise="outputs and reference signals"
     )
     tolerances: Mapping[str, float] = key(
         "relative standard deviation of parameters from recording to recording",
         absent={},
         keys=PARAMETER,
     )
-    levels: Mapping[str, Level] = key(
-        "parameters that differ by nature and are calibrated", absent={}, keys=PARAMETER
-    )
+    levels: Mapping[str, Level] = key("nuisance parameters", absent={}, keys=PARAMETER)
     wander: Mapping[str, Wander] = key(
         "parameters that differ along a recording, for each channel by itself",
         absent={},
         keys=PARAMETER,
     )
-    exclusions: tuple[Exclusion, ...] = key("samples that do not count", name="excluded", absent=())
+    exclusions: tuple[Exclusion, ...] = key("excluded samples", name="excluded", absent=())
     influences: tuple[Influence, ...] = key(
-        "what errors may go with, besides the measured signals, for the page", absent=()
+        "further operating variables for the correlation of errors on the page", absent=()
     )

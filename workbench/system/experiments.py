@@ -33,20 +33,20 @@ class VariedInput:
     name: str = table_name()
     range: tuple[float, float] = key("least and largest demand", unit=_unit_of_input, ordered=True)
     profiles: tuple[str, ...] = key(
-        f"kinds that are tried; `{RELEASE}` is a demand that is zero again, whatever the range",
+        f"kinds to try; `{RELEASE}` is a demand that returns to zero, whatever the range",
         choices=_PROFILES,
         absent=_USUAL,
         otherwise=f"all but `{RELEASE}`",
     )
-    begins: float = key("before which the demand is zero", "s", 0.0)
+    begins: float = key("time before which the demand is zero", "s", 0.0)
     every: float = key(
-        "that a stair lasts, and a demand before its release, and the period of a sine; another "
-        "sine has twice that",
+        "duration of a step, or of a demand before its release, and period of a sine; a second "
+        "sine has twice that period",
         "s",
         above=0.0,
     )
     lags: tuple[float, ...] = key(
-        'of first order, one after the other, from the demand to the input, `["0.5 s"]`', "s", ()
+        'first-order lags in series from the demand to the input, `["0.5 s"]`', "s", ()
     )
 
     @property
@@ -173,7 +173,9 @@ class Experiments:
     """All that may be run."""
 
     lasts: float = key("longest recording", "s")
-    ends: EndsBelow | None = key("when it ends before", absent=None, otherwise="at its longest")
+    ends: EndsBelow | None = key(
+        "condition that ends it earlier", absent=None, otherwise="at its longest"
+    )
     conditions: Mapping[str, tuple[Setting, ...]] = key(
         'values of a condition that may be set, `speed = ["10 m/s", "20 m/s"]`; of others that are '
         "quantities, `agrees` tells",
@@ -183,7 +185,7 @@ class Experiments:
         schema={"type": "object", "additionalProperties": {"type": "array", "minItems": 1}},
     )
     further: tuple[FurtherSetting, ...] = key(
-        "what is set besides, and only the inputs tell, by formulas in its name",
+        "further settings that act through the inputs; formulas use their names",
         name="settings",
         absent=(),
         check=_refuse_taken,
@@ -202,7 +204,7 @@ class Experiments:
     )
     cost: Cost = key("of a recording")
     sensors: tuple[Signal, ...] = key(
-        "what could be measured besides, as a reference signal",
+        "validation sensors that could be added",
         absent=(),
         check=refuse_without_noise,
     )

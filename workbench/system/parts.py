@@ -26,7 +26,7 @@ SHOWN = f"{STATE}, or a measured output"
 CONDITION = "a condition of this system"
 QUANTITY = "an estimated quantity of this system"
 
-_VARIABLE = "name of the FMU's variable, where it has another one there"
+_VARIABLE = "name of the variable in the FMU, if different"
 
 ENDLESS = float("inf")
 _ALL = (-ENDLESS, ENDLESS)
@@ -146,7 +146,7 @@ class Mode:
     frequency: float = key("of the mode", "Hz")
     damping: float = key("ratio")
     late: float = key(
-        "standard deviation of a delay beyond that of the mode, by filters of an amplifier", "s"
+        "standard deviation of an additional delay, such as an amplifier's filter", "s"
     )
 
 
@@ -173,7 +173,7 @@ class Signal:
     variable: str = key(_VARIABLE, absent="{name}")
     unit: Unit = key("of the model's variable")
     noise: float = key(
-        "standard deviation of one sample; 0 of an input that is exactly known, as a command is",
+        "standard deviation of one sample; 0 for an exactly known input, such as a command",
         "{unit}",
         least=0.0,
         expected=_NOISY,
@@ -181,20 +181,18 @@ class Signal:
     scale: float = key("typical size", "{unit}", above=0.0, expected="a size above 0")
     shown: Unit = key("unit in figures", absent="{unit}", like="unit")
     label: str = key("what it is, for people", absent="{name}")
-    relative_noise: float = key("more noise, as a share of the signal's size", absent=0.0)
+    relative_noise: float = key("additional noise, as a fraction of the signal", absent=0.0)
     relative_error: float = key(
-        "share of its size by which filters let it be wrong, beyond noise",
+        "systematic error that filters allow for, as a fraction of the signal",
         absent="{relative_noise}",
     )
-    scale_error: float = key(
-        "share by which its scale may be wrong, which tuned gains must bear", absent=0.0
-    )
+    scale_error: float = key("error of its scale that tuned gains must tolerate", absent=0.0)
     reading: str = key(
-        "output of the model that says what the sensor reads, imperfections included",
+        "output of the model that simulates the sensor reading",
         absent="{name}",
         of=VARIABLE,
     )
-    mode: Mode | None = key("structure before the sensor", absent=None)
+    mode: Mode | None = key("vibration mode between machine and sensor", absent=None)
     smoothed: tuple[float, float] | tuple[()] = key(
         '`["0.15 s", "2 s"]`: windows of a parabola and of a line that take the noise from an '
         "input where it allows that, before it drives a simulation",
@@ -202,19 +200,18 @@ class Signal:
         (),
     )
     held: bool = key(
-        "an input stays as sampled until the next sample, in simulations and in every estimator; "
-        "else it goes there in a straight line, which takes 4 % from a swing of nine samples a "
-        "period",
+        "true: an input is constant between samples. false: it is interpolated linearly, which "
+        "attenuates an oscillation of nine samples a period by 4 %",
         absent=False,
     )
     resolution: float = key(
-        "step in which it is read: it may repeat itself, and rests up to half a step off",
+        "quantisation step of the reading",
         "{unit}",
         0.0,
         otherwise="unknown",
     )
     limits: tuple[float, float] = key(
-        '`["0 V", "10 V"]`: samples at these limits of the sensor do not count',
+        '`["0 V", "10 V"]`: limits of the sensor; samples at them are excluded',
         "{unit}",
         name="saturates",
         otherwise="never",
@@ -223,7 +220,7 @@ class Signal:
         expected=_LIMITS,
     )
     plausible: tuple[float, float] = key(
-        '`["-1 bar", "20 bar"]`: recordings with samples beyond it are warned of',
+        '`["-1 bar", "20 bar"]`: samples outside give a warning',
         "{unit}",
         otherwise="all",
         absent=_ALL,
@@ -231,7 +228,7 @@ class Signal:
         expected=_LIMITS,
     )
     possible: tuple[float, float] = key(
-        "recordings with samples beyond it are refused",
+        "a recording with samples outside is refused",
         "{unit}",
         otherwise="all",
         absent=_ALL,
@@ -239,12 +236,11 @@ class Signal:
         expected=_LIMITS,
     )
     called: tuple[str, ...] = key(
-        '`["Bremsdruck", "pC"]`: names that recorders give it, beside its own and its label; see '
-        "[import](import.md)",
+        '`["Bremsdruck", "pC"]`: other names in log files; see [import](import.md)',
         absent=(),
     )
     recorded_as: RecordedAs | None = key(
-        "what recorders have in its place, a formula of it alone and of parameters", absent=None
+        "what log files hold instead: a formula of this signal and parameters", absent=None
     )
 
     def deviation(self, values: Any) -> Any:
@@ -308,7 +304,7 @@ class Candidates:
         absent=(),
         otherwise="all",
     )
-    without: tuple[str, ...] = key("of those, what is not considered", absent=())
+    without: tuple[str, ...] = key("candidates to leave out", absent=())
     matters: float = key(
         "least change worth reporting: over a parameter's value, of a gain, over a signal's scale",
         absent=0.01,
@@ -329,26 +325,23 @@ class EstimatedQuantity:
     variable: str = key(_VARIABLE, absent="{name}")
     unit: Unit = key("of the parameter", absent="1")
     correction: str = key("input of the model that is added to the parameter")
-    range: tuple[float, float] = key("in which estimates are kept", "{unit}", ordered=True)
-    walk: float = key(
-        "how far it may move in a second (random walk, per square root of a second)", "{unit}"
-    )
+    range: tuple[float, float] = key("limits of the estimate", "{unit}", ordered=True)
+    walk: float = key("random walk, per square root of a second", "{unit}")
     label: str = key("what it is, for people", absent="{name}")
-    prior: tuple[float, float] = key(
-        "between which any value is as likely before a measurement", "{unit}", "{range}"
-    )
-    start: float = key("where filters begin", "{unit}", float("nan"), otherwise="nominal")
+    prior: tuple[float, float] = key("uniform prior", "{unit}", "{range}")
+    start: float = key("start value of filters", "{unit}", float("nan"), otherwise="nominal")
     spread: float = key(
-        "standard deviation of what is known of it at the start",
+        "standard deviation at the start",
         "{unit}",
         _reach,
         otherwise="that of the range, uniform",
     )
     relative_error: float = key(
-        "share of it by which the model lets an estimate be wrong; part of its band", absent=0.0
+        "systematic error of the estimate due to the model, as a fraction; part of its band",
+        absent=0.0,
     )
     scatter: float = key(
-        "standard deviation from one recording to the next, of a sound machine; see "
+        "recording-to-recording standard deviation of a healthy machine; see "
         "[monitoring](monitor.md)",
         "{unit}",
         0.0,
@@ -357,8 +350,8 @@ class EstimatedQuantity:
         "time in which a deviation is forgotten", "s", ENDLESS, otherwise="for ever"
     )
     useful: float = key(
-        "standard deviation from which on an estimate serves; where it is claimed by a rule, this "
-        "must be met for `(useful/walk)^2` seconds",
+        "largest standard deviation of a useful estimate; if `claimed` has a rule, it must be met "
+        "for `(useful/walk)^2` seconds",
         "{unit}",
         lambda scope: 0.1 * _reach(scope),
         otherwise="a tenth of the range's spread",
@@ -370,15 +363,15 @@ class EstimatedQuantity:
         of=SHOWN,
     )
     claimed: Mapping[str, str] = key(
-        'conditions in which it may be claimed, `{ phase = "charge" }`; elsewhere it stands in for '
-        "something that the model has not",
+        'test conditions in which the estimate is valid, `{ phase = "charge" }`; elsewhere it '
+        "absorbs errors of the model",
         absent={},
         otherwise="always",
         keys=CONDITION,
     )
     watched: bool = key(
-        "false: it is of a recording, which tells it only together with what is known before; "
-        "[monitoring](monitor.md) leaves it out",
+        "false: [monitoring](monitor.md) leaves it out, since a recording shows it only together "
+        "with its prior",
         absent=True,
     )
 
@@ -400,7 +393,7 @@ class StateNoise:
     name: str = table_name()
     variable: str = key(_VARIABLE, absent="{name}")
     walk: float | None = key(
-        "how far it moves in a second beyond what the model says",
+        "random walk beyond the model, per square root of a second",
         unit=lambda scope, _: unit_in_model(scope, scope.own["name"]),
         absent=None,
         otherwise="2e-4 of its nominal value",
@@ -429,7 +422,7 @@ class FittedParameter:
 
     name: str = table_name()
     range: tuple[float, float] = key(
-        "in which it is sought",
+        "bounds of the fit",
         unit=_unit_of_variable,
         absent=_ALL,
         otherwise="any value",
@@ -437,13 +430,13 @@ class FittedParameter:
         expected=_LIMITS,
     )
     prior: tuple[float, float] | tuple[()] = key(
-        '`["2 Ohm", "0.1 Ohm"]`: what is known of it, and the standard deviation of that',
+        '`["2 Ohm", "0.1 Ohm"]`: expected value and its standard deviation',
         unit=lambda scope, _: unit_in_model(scope, scope.own["name"]),
         absent=(),
         otherwise="nothing",
     )
     by_recording: bool | None = key(
-        "whether each recording has a value of its own",
+        "true: each recording has a value of its own",
         absent=None,
         otherwise="a parameter is the same in all, the start of a state is not",
     )
@@ -469,16 +462,15 @@ class Tolerance:
     """By how much two values that tell the same may differ."""
 
     within: tuple[float, float] = key(
-        "`[0.05, 0.3]`: largest difference that is likely, and that is possible, as a share of the "
-        "larger one, in the median of all samples; two values differ by 2 at most, which is never "
-        "refused",
+        "`[0.05, 0.3]`: largest likely and possible difference, as a fraction of the larger value, "
+        "in the median of all samples; the most is 2, which is never refused",
         least=0.0,
         ordered=True,
         equal=True,
         expected="the largest likely share before the largest possible one",
     )
     slack: float = key(
-        "difference that means nothing, and size of both below which they are not compared",
+        "difference that is ignored, and least size of both for a comparison",
         unit_above,
         0.0,
     )
@@ -501,8 +493,7 @@ class RecordingSplit:
     begins: Threshold = key("a part begins where the size of a signal rises above a level")
     ends: BelowThreshold = key("and ends where that of another falls below one, which it was above")
     released: float = key(
-        "for which the first may be below its level within a part; longer, and the part is "
-        "left out",
+        "longest time below the level within a part; a part with a longer one is left out",
         "s",
         0.0,
     )
@@ -515,7 +506,7 @@ class Store:
     """What a flow in and a flow out differ by is stored."""
 
     formula: Expression = key(
-        'of a balance: what the difference of both is stored in [`unit` times s], such as `"J*w"`',
+        'of a balance: the storage [`unit` times s], such as `"J*w"`',
         name="stores",
         of=FORMULA,
     )
@@ -554,15 +545,13 @@ class Sampling:
     """Times between samples [s]."""
 
     slowest: float = key(
-        "time between two samples up to which estimates are what they are at usual rates; a "
-        "recording with longer ones is warned of",
+        "longest time between samples at which estimates stay valid; longer ones give a warning",
         "s",
         ENDLESS,
         otherwise="any",
     )
     gaps: tuple[float, float] = key(
-        '`["0.1 s", "2 s"]`: longest time without a sample that is likely, and that is possible in '
-        "one recording",
+        '`["0.1 s", "2 s"]`: longest likely and longest possible gap in a recording',
         "s",
         (ENDLESS, ENDLESS),
         otherwise="any",
@@ -644,14 +633,16 @@ class Objective:
         },
         otherwise="1 over `scale` of each",
     )
-    bandwidth: float = key("below which deviations count", "Hz", ENDLESS, otherwise="all")
+    bandwidth: float = key(
+        "highest frequency of deviations that count", "Hz", ENDLESS, otherwise="all"
+    )
     begins: Threshold | None = key(
-        "of the time that is scored: from the first sample above", absent=None, otherwise="at once"
+        "start of the scored time: first sample above", absent=None, otherwise="at once"
     )
     ends: Threshold | None = key(
-        "of that time: to the last sample above", absent=None, otherwise="at the end"
+        "end of the scored time: last sample above", absent=None, otherwise="at the end"
     )
-    when: str = key("what that time is, for people", absent="")
+    when: str = key("name of the scored time, for people", absent="")
 
 
 @declared
@@ -659,8 +650,8 @@ class StepTracking:
     """What tuned gains must do: find a step of a quantity within a time, but for a share."""
 
     quantity: str = key("that steps", of=QUANTITY)
-    within: float = key("time in which it must be found", "s")
-    left: float = key("share of the step that may be left")
+    within: float = key("time in which the step must be found", "s")
+    left: float = key("fraction of the step that may remain")
 
 
 @declared
@@ -684,11 +675,11 @@ class Export:
     """Estimators as FMUs that run without Python, and their package."""
 
     classes: Mapping[str, str] = key(
-        "names of FMUs in the library, by estimator; all others have that of their Python class",
+        "names of FMUs in the library, by estimator; the default is that of the Python class",
         absent={},
     )
     start: OperatingPoint = key(
-        "at which a package starts the reference model", absent=AT_REST, otherwise="at rest"
+        "point at which a package starts the reference model", absent=AT_REST, otherwise="at rest"
     )
 
 
@@ -703,7 +694,7 @@ class Agreement:
         "of measured signals, in the unit of the condition", name="is", of=FORMULA
     )
     place: str = key(
-        "which of its values along the recording shows the condition",
+        "which value along the recording is compared",
         name="at",
         choices=(FIRST, LARGEST),
         absent=FIRST,
@@ -729,7 +720,7 @@ class Condition:
     )
     above: float = key("what it must be above", absent=-ENDLESS, otherwise="none")
     choices: tuple[str | int, ...] = key("words or whole numbers", absent=())
-    count: int = key("number of entries, where it is a list", absent=0, otherwise="no list")
+    count: int = key("number of entries, where it is a list", absent=0, otherwise="not a list")
     sets: str = key(
         "parameter of the model that a quantity is, such as a load; nobody needs to say it: it is "
         "then as in the model",
@@ -738,24 +729,27 @@ class Condition:
         of=PARAMETER,
     )
     parameters: Mapping[str, Mapping[str, float]] = key(
-        "of the model, that a choice means: `hot = { k = 0.28 }`, SI; `imm` has a filter for each",
+        "parameters of the model for each choice, SI: `hot = { k = 0.28 }`; `imm` runs a filter "
+        "for each",
         absent={},
         keys=PARAMETER,
     )
     told: bool = key(
-        "true: estimators whose model has these parameters run with what was said, but for `imm`, "
-        "which finds out; quantities that are estimated start there",
+        "true: estimators use the stated choice, except `imm`, which finds it itself; estimated "
+        "quantities start there",
         absent=False,
     )
     lasts: float = key(
-        "mean time until another choice takes its place under way",
+        "mean time until the choice changes during a recording",
         "s",
         ENDLESS,
         otherwise="for ever",
         above=0.0,
     )
     sign: bool = key("whether it is the sign of the recording's signals", absent=False)
-    agrees: Agreement | None = key("what the recording says of it", absent=None)
+    agrees: Agreement | None = key(
+        "formula that checks the condition against the recording", absent=None
+    )
 
     def check(self, table: Table, scope: Scope) -> None:
         """Refuse what does not go together."""

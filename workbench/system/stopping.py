@@ -29,15 +29,15 @@ class AskedQuantity:
     unit: Unit = key("of the quantity")
     shown: Unit = key("unit in figures", absent="{unit}", like="unit")
     formula: Expression = key(
-        "of measured signals, that tells it of a recorded stop", name="is", of=FORMULA
+        "formula of measured signals: its value in a recorded stop", name="is", of=FORMULA
     )
     place: str = key(
-        "where a recorded stop tells it: at its `command`, or at its `end`, when all has risen",
+        "where a recorded stop shows it: at its `command`, or at its `end`, after all build-up",
         name="at",
         choices=(COMMAND, END),
         absent=COMMAND,
     )
-    usual: float = key("unless it is said", "{unit}")
+    usual: float = key("default value", "{unit}")
 
 
 @declared
@@ -45,10 +45,10 @@ class DrivenInput:
     """An input of the model in a stop."""
 
     name: str = table_name()
-    formula: Expression = key("of asked quantities: where it goes", name="is", of=ASKED)
+    formula: Expression = key("formula of demands: its final value", name="is", of=ASKED)
     delay: float = key("after the command", "s", 0.0)
     lag: float = key("of first order, then", "s", 0.0)
-    along: bool = key("a recorded stop has it by the place, as the way has it", absent=False)
+    along: bool = key("it depends on the position, not on time", absent=False)
 
     @property
     def rises(self) -> bool:
@@ -99,13 +99,15 @@ class Outside(Exclusion):
 class Nominal:
     """Formulas of asked quantities that standards correct measured distances by."""
 
-    mass: Expression = key("formula of what is asked: mass that is weighed [kg]", of=ASKED)
-    rotating: Expression = key("mass that what turns adds [kg], of parameters", of=FORMULA)
+    mass: Expression = key("formula of demands: weighed mass [kg]", of=ASKED)
+    rotating: Expression = key(
+        "formula of parameters: equivalent mass of rotating parts [kg]", of=FORMULA
+    )
     reference: float = key("nominal mass", "kg")
     resistance: Expression = key(
-        "along a recording, of gradients and curves, over weight", of=FORMULA
+        "resistance of gradients and curves along a recording, over weight", of=FORMULA
     )
-    within: float = key("share of the nominal speed by which a measured one may differ")
+    within: float = key("allowed deviation of a measured speed, as a fraction of the nominal one")
     speeds: tuple[float, ...] = key("nominal ones", "m/s")
 
 
@@ -143,34 +145,36 @@ class Stopping:
     """How a machine stops."""
 
     speed: Expression = key("formula of measured signals: the speed over ground [m/s]", of=FORMULA)
-    state: str = key("of the model, whose integral is the way [m/s]", of=STATE)
+    state: str = key("state of the model whose integral is the distance [m/s]", of=STATE)
     rest: float = key("speed below which a constant rate leads to rest", "m/s")
-    longest: float = key("that a stop may last", "s")
+    longest: float = key("longest time of a stop", "s")
     timed_by: str = key(
-        "input with `delay` or `lag` that tells when the command of a recording was given",
+        "input with `delay` or `lag` that shows when the command was given",
         of=RISING,
     )
     asked: tuple[AskedQuantity, ...] = key(
-        f"what a stop is asked for; `{SPEED}` must be one", schema={"required": [SPEED]}
+        f"demands of a stop; `{SPEED}` is required", schema={"required": [SPEED]}
     )
     driven: tuple[DrivenInput, ...] = key(
         "each input of the model", name="inputs", keys=names_of("inputs"), every=True
     )
     start: Mapping[str, Expression] = key(
-        "formulas of states at the command, of what is asked",
+        "formulas of demands: states at the command",
         keys=STATE,
         of=ASKED,
         absent={},
         otherwise="nominal",
     )
     differences: tuple[Difference, ...] = key(
-        "what differs from stop to stop beside `tolerances`, one sigma", name="differs", absent=()
+        "recording-to-recording variation beside `tolerances`, one sigma", name="differs", absent=()
     )
     outside: tuple[Outside, ...] = key(
-        "when the model claims no stop, as `diagnosis.excluded`", absent=(), otherwise="never"
+        "stops outside the validity range of the model, as `diagnosis.excluded`",
+        absent=(),
+        otherwise="never",
     )
     nominal: Nominal | None = key("how standards correct measured distances", absent=None)
-    rating: Rating | None = key("percentage that stands for a distance", absent=None)
+    rating: Rating | None = key("brake percentage that corresponds to a distance", absent=None)
 
     def check(self, table: Table, scope: Scope) -> None:
         """Refuse stops that are not asked for a speed."""

@@ -135,30 +135,30 @@ class System:
     states: tuple[str, ...] | None
 
     names: Mapping[str, str] = key(
-        "names of the FMU's variables by yours, of those that have no table with `variable`: "
-        "corrections, parameters, what formulas name",
+        "your names of variables of the FMU that have no table with `variable`: corrections, "
+        "parameters, names in formulas",
         name="variables",
         absent={},
     )
     title: str = key("what the machine is, for people")
     name: str = key(
-        "by which it is asked for",
+        "name for `--system`",
         absent=lambda scope: scope.file.resolve().parent.name,
         otherwise="the folder's",
     )
-    sample_time: float = key("between two samples of usual recordings", "s")
-    shortest: float = key("that a recording must last", "s", 0.0)
+    sample_time: float = key("usual time between two samples", "s")
+    shortest: float = key("least length of a recording", "s", 0.0)
     fewest: int = key(
-        "samples that a recording must have: where a machine moves by far more than noise, fewer "
-        "tell enough",
+        "least number of samples of a recording; fewer are enough if the machine moves by far more "
+        "than noise",
         absent=20,
         read=_samples,
         schema={"type": "number"},
     )
-    cases: Path | None = key("folder of recordings that come with the system", absent=None)
+    cases: Path | None = key("folder of the system's own recordings", absent=None)
     plugin: str = key(
-        "what Python adds for this machine alone, such as a virtual rig, estimators, published "
-        "recordings: the name of an entry point of the group `workbench.machines`, or the place of "
+        "Python code for this machine, such as a simulated rig, estimators, published recordings: "
+        "the name of an entry point of the group `workbench.machines`, or the place of "
         'a [`Plugin`](own-machine.md#a-plugin), `"package.module:NAME"`',
         aliases=("companion",),
         absent="",
@@ -166,14 +166,14 @@ class System:
         schema={"type": "string", "minLength": 1},
     )
     models: Mapping[str, Model] = key(
-        f"by role. `{OBSERVER}` must be there: estimators run on it. `{FULL}` is a larger one, "
-        f"`{REFERENCE}` the most detailed one, which makes recordings and is connected to exported "
-        "observers",
+        f"models by role: `{OBSERVER}` (required) for estimators, `{FULL}` for a larger model, "
+        f"`{REFERENCE}` for the most detailed one, which makes simulated recordings",
         check=_refuse_no_observer,
     )
     given: Mapping[str, float] = key(
-        'parameters of this very machine that differ from the model\'s, `A = "0.52 m2"`; they are '
-        "set in the FMU, no compiler is needed",
+        'parameters of this machine that differ from the model\'s, `A = "0.52 m2"`; they are set '
+        "in "
+        "the FMU, without a compiler",
         unit_in_model,
         {},
         name="parameters",
@@ -184,22 +184,21 @@ class System:
         "measured signals that correct estimates", check=_refuse_no_outputs
     )
     reference_signals: tuple[Signal, ...] = key(
-        "measured signals that no estimator uses: estimates are scored by them",
+        "validation sensors: they score estimates, and no estimator uses them",
         name="judged",
         aliases=("reference_signals",),
         absent=(),
         check=refuse_without_noise,
     )
     intermittent: tuple[Signal, ...] = key(
-        "outputs that are measured at times, and missing in other samples: they correct Kalman "
-        "filters alone",
+        "outputs that are measured at times; they correct Kalman filters only",
         name="aids",
         aliases=("intermittent",),
         absent=(),
         check=refuse_without_noise,
     )
     derived: tuple[DerivedSignal, ...] = key(
-        "signals made of measured ones and of parameters", absent=()
+        "signals computed from measured ones and parameters", absent=()
     )
     estimated: tuple[EstimatedQuantity, ...] = key(
         "parameters of the model that observers estimate", absent=()
@@ -211,11 +210,12 @@ class System:
         schema={"type": "array", "items": {"type": "string", "minLength": 1}},
     )
     work: tuple[FrictionPower, ...] = key(
-        "powers of friction by what they wear; [monitoring](monitor.md) sums them over recordings",
+        "friction powers by the part that they wear; [monitoring](monitor.md) sums them over "
+        "recordings",
         absent=(),
     )
     conditions: tuple[Condition, ...] = key(
-        "what was set before a recording; asked for in each `case.toml`", absent=()
+        "test conditions, set before a recording and stated in each `case.toml`", absent=()
     )
     sampling: Sampling = key("which times between samples are likely")
     loggers: Mapping[str, tuple[str, ...]] = key(
@@ -224,7 +224,7 @@ class System:
         check=_refuse_wrong_loggers,
     )
     state_noise: tuple[StateNoise, ...] = key(
-        "what is known of states of the model", name="states", absent=(), of_model=True
+        "noise and start of the model's states", name="states", absent=(), of_model=True
     )
     fitted: tuple[FittedParameter, ...] = key(
         "parameters of the model, and states by their starts, that `workbench fit` fits",
@@ -243,10 +243,10 @@ class System:
     tested: OperatingPoint = key(
         "where observability is tested", name="points.tested", absent="{design}"
     )
-    objective: Objective = key("by what estimators are scored and tuned")
+    objective: Objective = key("score of estimators, and objective of tuning")
     comparison: Comparison = key("how recordings are compared with the model", name="diagnosis")
     fading: FeedbackFading | None = key(
-        "feedback fades out where a signal is small",
+        "feedback fades out while a signal is small",
         name="feedback.fades",
         absent=None,
         otherwise="never",
@@ -266,8 +266,8 @@ class System:
         above=0.0,
     )
     bands: Mapping[str, Mapping[str, float]] = key(
-        "by estimator and quantity, reach of its 95 % bands over that by its own standard "
-        "deviations, where recordings whose truth is known say so",
+        "factor on an estimator's standard deviations, by estimator and quantity, from recordings "
+        "with known truth",
         absent={},
         otherwise="1 each",
         keys=lambda scope: columns_of(scope.whole),
@@ -282,16 +282,16 @@ class System:
         absent=(),
         otherwise="by signal",
     )
-    candidates: Candidates = key("what a diagnosis of an FMU alone considers")
+    candidates: Candidates = key("candidates of a diagnosis of an FMU alone")
     export: Export = key("estimators as FMUs")
     redundancies: tuple[Redundancy, ...] = key(
-        "pairs of formulas that tell the same in a recording", absent=()
+        "pairs of formulas that must agree in a recording", absent=()
     )
     experiments: Experiments | None = key(
         "what may be varied in the next recording", name="next", absent=None
     )
     cutting: RecordingSplit | None = key(
-        "how `workbench import` splits a long recording; without it, only at a gap that is not "
+        "how `workbench import` splits a long recording; the default is at gaps that are not "
         "`possible`",
         absent=None,
     )
