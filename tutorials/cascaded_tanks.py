@@ -1,10 +1,12 @@
 # %% [markdown]
 # # Two tanks that overflow
 #
-# A pump fills a tank, which runs out into a second one. The voltage of the pump and that of the
-# second tank's level were recorded, and published by Schoukens et al. (2016); `workbench prepare
-# cascaded_tanks` says where. Run `python tutorials/cascaded_tanks.py DATA [OUT]`, or open this as
-# a notebook and write the folder with `dataBenchmark.mat` into the first cell.
+# A pump fills a tank, which drains into a second one. The pump voltage and the level of the
+# second tank were recorded and published by Schoukens et al. (2016). `workbench prepare
+# cascaded_tanks` says where to get the data.
+#
+# Run `python tutorials/cascaded_tanks.py DATA [OUT]`. Or open this file as a notebook, and write
+# the folder of `dataBenchmark.mat` into the first cell.
 
 # %%
 import sys
@@ -20,34 +22,35 @@ DATA, OUT = Path(sys.argv[1]), Path((sys.argv[2:] or ["results/tutorials/cascade
 
 # %%
 # The nominal model is Torricelli's law in both tanks (modelica/CascadedTanks/Tanks.mo). Its three
-# coefficients and the levels at the start are not known: they are fitted along with all else.
-# There are two records, one to fit to and one to try the result on.
+# coefficients and the initial levels are unknown: they are fitted together with all effects.
+# There are two recordings: one is fitted, one is held out.
 system = wb.load_system("cascaded_tanks")
 fitted, held_out = wb.prepare_cases("cascaded_tanks", DATA, OUT / "cases")
 found = wb.diagnose(system, fitted, held_out=held_out, out=OUT)
 
 # %%
-# Where the simulation is wrong: the error of the nominal model at its best (red) reaches 2 V,
-# most of all when and after the pump runs high. The grey band is the noise: this is none.
+# Where is the simulation wrong? The error of the best nominal model (red) reaches 2 V, most of
+# all during and after high pump voltage. The grey band is the noise, and the error is far
+# outside.
 found.plot().savefig(OUT / "errors.png")
 
 # %%
-# The diagnosis: each cause, its size with an interval of 95 %, what it cannot be told from in
-# these data if there is any such twin, and what would tell. The upper tank overflows, in part
-# into the lower one: the benchmark is known for that. The data speak for more, which nobody has
-# checked at the tanks: the lower one overflows, too, the sensor's characteristic is bent, and the
-# pump needs a volt before it delivers. What remains is far above the noise: tubes, waves and
-# spray are no effects of the library.
+# The diagnosis lists each effect, its size with a 95 % interval, and the indistinguishable
+# effects, if there are any. The upper tank overflows, in part into the lower one; the benchmark
+# is known for that. The data suggest more, which nobody has checked at the tanks. The lower tank
+# overflows too, the characteristic of the sensor is curved, and the pump needs a volt before it
+# delivers. The remaining error is far above the noise: the library has no effects for tubes,
+# waves and spray.
 print(found.summary())
 
 # %%
-# The extended model is Modelica as one would write it: the nominal one with its coefficients, and
-# with classes of the library in its slots.
+# The extended model is Modelica as one would write it: the nominal model with its coefficients,
+# and classes of the library in its slots.
 print(found.extension.modelica.read_text())
 
 # %%
-# The gain, on the record to which nothing was fitted but the levels at its start: less than a
-# third is left.
+# The gain on the held-out recording: less than a third of the error is left. Only its initial
+# levels were fitted.
 for one in found.errors:
     fate = "held out" if one.held_out else "fitted"
     print(
@@ -55,9 +58,8 @@ for one in found.errors:
     )
 
 # %%
-# The extended FMU runs in any tool, here in FMPy, and needs nothing but the pump's voltage and
-# the levels at the start. FMPy holds inputs over a step, as the pump's converter does over a
-# sample.
+# The extended FMU runs in any tool, here in FMPy. It needs only the pump voltage and the initial
+# levels. FMPy holds inputs over a step, as the converter of the pump does over a sample.
 case = held_out[0]
 result = simulate_fmu(
     str(found.extension.fmu),

@@ -2,9 +2,11 @@
 # # Seals that rub, and a chamber that leaks
 #
 # Zillen, Vallery and Smit (2021) printed pneumatic cylinders. They measured the force on a
-# cylinder with either of two seals at four pressures, and the pressure of closed chambers;
-# `workbench prepare seal_friction` says where. Run `python tutorials/pneumatic_cylinder.py DATA
-# [OUT]`, or open this as a notebook and write the folder of the data into the first cell.
+# cylinder with two different seals at four pressures, and the pressure of closed chambers.
+# `workbench prepare seal_friction` says where to get the data.
+#
+# Run `python tutorials/pneumatic_cylinder.py DATA [OUT]`. Or open this file as a notebook, and
+# write the folder of the data into the first cell.
 
 # %%
 import sys
@@ -20,8 +22,8 @@ DATA, OUT = Path(sys.argv[1]), Path((sys.argv[2:] or ["results/tutorials/pneumat
 
 # %%
 # The nominal model says force = pressure x area (modelica/SealFriction/Cylinder.mo), with an area
-# that is known to some per cent. A machine is one seal: each has a diagnosis of its own, from its
-# records at 1, 3 and 7 bar, and that at 5 bar is there to try the result on.
+# that is known to some per cent. Each seal is a machine with a diagnosis of its own. Its
+# recordings at 1, 3 and 7 bar are fitted, and that at 5 bar is held out.
 system = wb.load_system("seal_friction")
 fitted, held_out = wb.prepare_cases("seal_friction", DATA, OUT / "cases")
 found = {}
@@ -30,24 +32,25 @@ for seal in ("O-ring", "NAPN"):
     found[seal] = wb.diagnose(system, own, held_out=other, out=OUT / seal)
 
 # %%
-# Where the simulation is wrong: with the direction of the stroke. The diagnosis, for both seals:
-# friction, a part of which grows with the pressure, and a seal that is sheared before it slides.
-# The size of each has an interval of 95 %. The load cell or the pressure sensor of the second has
-# a wrong zero, and these data cannot tell which. What remains, about a tenth of the friction, is
-# above the noise: grease, and seals that are not round.
+# Where is the simulation wrong? The error changes with the direction of the stroke. For both
+# seals the diagnosis names friction, a part that grows with the pressure, and a seal that is
+# sheared before it slides. The size of each has a 95 % interval. For the second seal, the load
+# cell or the pressure sensor has a wrong zero; these data cannot tell which. The remaining error,
+# about a tenth of the friction, is above the noise. Grease and seals that are not round are not
+# modelled.
 for seal, one in found.items():
     one.plot().savefig(OUT / f"errors_{seal}.png")
     print(f"\n{seal}\n{one.summary()}")
 
 # %%
-# The extended model of the O-ring is Modelica: what several effects resist adds up in the slot.
+# The extended model of the O-ring is Modelica. The forces of several effects add up in the slot.
 print(found["O-ring"].extension.modelica.read_text())
 
 # %%
-# The gain, on the record at 5 bar, to which nothing was fitted: from 6.6 and 9.0 N to 0.9 N. The
-# extended FMU in FMPy shows it, too, beside the measured force. The start values hold the area of
-# the piston. Between two samples inputs are lines, which FMPy holds over a step: so steps are
-# short.
+# The gain on the held-out recording at 5 bar: the error falls from 6.6 and 9.0 N to 0.9 N. The
+# extended FMU in FMPy shows it too, beside the measured force. The start values include the area
+# of the piston. Between two samples inputs are interpolated, and FMPy holds them over a step. So
+# the steps are short.
 figure, plots = plt.subplots(2, layout="constrained")
 errors = {}
 for axes, (seal, one) in zip(plots, found.items(), strict=True):
@@ -77,9 +80,9 @@ figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", nco
 figure.savefig(OUT / "fmpy.png")
 
 # %%
-# The chambers, in a few lines: one that was printed leaks in proportion to its pressure, or by a
-# law that these data cannot tell from that; one of aluminium is tight. What a chamber shows above
-# 2 bar is fitted, what it shows below is held out.
+# The chambers need only a few lines. A printed chamber leaks in proportion to its pressure, or by
+# a law that these data cannot tell from that. An aluminium chamber is tight. Data above 2 bar are
+# fitted, data below are held out.
 chamber = wb.load_system("leaking_chamber")
 fitted, held_out = wb.prepare_cases("leaking_chamber", DATA, OUT / "chambers")
 for name in ("Ultimaker_020", "Aluminium"):
