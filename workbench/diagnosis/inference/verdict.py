@@ -47,7 +47,6 @@ _DRAWS = 2000  # of the bootstrap over stops
 # Share from which on a part has the right place, if not the right form: of squares, an offset in
 # place of a ramp takes 75 %, a line in place of a parabola 94 %.
 _MOST = 0.9
-_PART = 0.5  # share of what others leave that a part explains beside them: as much as remains
 _NEAREST = 3  # candidates that are told where none is accepted
 
 
@@ -243,12 +242,9 @@ def conclude(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnos
             _cause(fit, chosen, effect, noise_alone=noise_alone)
             for effect in _strongest_first(fit, chosen, catalogue)
         ]
-        # A part that explains less than remains may only stand for a piece of what is missing, if
-        # as many causes of another form would remove as much.
-        minor = [cause.effect.name for cause in causes if cause.explained < _PART]
-        whole = gain is not None and _removed(gain) > _removed_by_another_form(len(causes))
-        if verdict == "partly explained" and len(causes) > 1 and minor and not whole:
-            objections.append(f"{' and '.join(minor)} would explain less than what remains")
+        # Beside others, a part that bends as far as its effect allows stands for another law.
+        if verdict == "partly explained" and len(causes) > 1 and (bent := _at_bounds(causes)):
+            objections += bent
             verdict, causes, gain = "unexplained", [], None
     if causes:
         twins = [fits.values() for fits in chosen.twins.values()]
@@ -367,16 +363,14 @@ def _removed(gain: Gain) -> float:
     return float(np.clip((before - after) / max(before, 1e-9), 0.0, 1.0))
 
 
-def _removed_by_another_form(count: int) -> float:
-    """Share of squares that laws of `count` coefficients remove of one that is none of them.
-
-    Of x^(n+1) over (0, 1), the powers x to x^n leave prod_p ((n+1-p) / (n+p+2))^2 (Muentz, 1914).
-
-    >>> [round(_removed_by_another_form(count), 4) for count in (1, 2, 3)]
-    [0.9375, 0.9956, 0.9997]
-    """
-    powers = np.arange(1, count + 1)
-    return float(1.0 - np.prod((count + 1 - powers) / (count + powers + 2)) ** 2)
+def _at_bounds(causes: Sequence[Cause]) -> list[str]:
+    """Parameters of causes beyond whose bounds there may be values, in words."""
+    return [
+        f"{name} of {cause.effect.name} is at its bound"
+        for cause in causes
+        for name, interval in cause.parameters.items()
+        if interval.limit and interval.open
+    ]
 
 
 def _objections(
