@@ -44,14 +44,18 @@ HASH: Schema = {"type": "string", "pattern": "^[0-9a-f]{64}$"}
 
 
 def closed(entries: Mapping[str, Schema], *, optional: str = "") -> Schema:
-    """An object with these entries and no others; those named in `optional` may be missing."""
-    missing = optional.split() if optional != "*" else list(entries)
-    unknown = set(missing) - set(entries)
+    """An object with these entries and no others; those named in `optional` may be missing.
+
+    Entries of one schema may stand in one key, with spaces between their names.
+    """
+    properties = {name: schema for names, schema in entries.items() for name in names.split()}
+    missing = optional.split() if optional != "*" else list(properties)
+    unknown = set(missing) - set(properties)
     assert not unknown, unknown
     return {
         "type": "object",
-        "required": [name for name in entries if name not in missing],
-        "properties": dict(entries),
+        "required": [name for name in properties if name not in missing],
+        "properties": properties,
         "additionalProperties": False,
     }
 
@@ -101,25 +105,25 @@ def _schema_of(hint: Any) -> Schema:
 
 # --- what summaries share ---
 
-VERSIONS = {"workbench": TEXT, "commit": or_null(TEXT), "python": TEXT, "packages": by_name(TEXT)}
-FMU = closed({"file": TEXT, "model": TEXT, "sha256": HASH})
+VERSIONS = {"workbench python": TEXT, "commit": or_null(TEXT), "packages": by_name(TEXT)}
+FMU = closed({"file model": TEXT, "sha256": HASH})
 RUN = closed(
     {
-        "command": TEXT,
+        "command workbench system title": TEXT,
         "date": {"type": "string", "format": "date-time"},
-        "workbench": TEXT,
         "commit": or_null(TEXT),
-        "system": TEXT,
-        "title": TEXT,
         "data": by_name(or_null(HASH)),
     }
 )
 MEASURES = by_name(declared(Measure))
-ANSWER = closed({"sentence": NAMED, "headline": MEASURES, "details": MEASURES})
+ANSWER = closed({"sentence": NAMED, "headline details": MEASURES})
 ERROR = or_null(NUMBER)
-BOTH = closed({"before": NUMBER, "after": NUMBER})
+TEXTS, NUMBERS = listed(TEXT), listed(NUMBER)
+MATRIX = listed(NUMBERS)
+BOTH = closed({"before after": NUMBER})
 VALUE = closed({"value": NUMBER, "unit": TEXT})
-SHARE = closed({"hits": WHOLE, "of": WHOLE, "share": ERROR, "low": NUMBER, "high": NUMBER})
+SHARE = closed({"hits of": WHOLE, "share": ERROR, "low high": NUMBER})
+MODEL_RUN = {"run": RUN, **VERSIONS, "system": TEXT, "fmu": FMU}
 
 
 def summary(command: str, provenance: Schema, entries: Mapping[str, Schema]) -> Schema:
@@ -211,74 +215,40 @@ def system_schema() -> Schema:
 
 def power_summaries() -> dict[str, Schema]:
     """Schema of each, by what was asked."""
-    return {
-        "power": _power(),
-        "thresholds": _thresholds(),
-        "sheet_error": _sheet_error(),
-        "left_out": _left_out(),
-        "plan": _plan(),
-        "oracle": summary("power --oracle", _SETS, {"effects": listed(declared(EffectLimit))}),
-        "followed": _following(),
-    }
+    provenance = {"run": RUN, "workbench machine": TEXT, "seed": WHOLE, "stops": TEXTS}
+    sets = closed({**provenance, "interrupted": FLAG}, optional="machine")
 
+    def asked(option: str, entries: Mapping[str, Schema]) -> Schema:
+        return summary(f"power --{option}", sets, entries)
 
-_SETS = closed(
-    {
-        "run": RUN,
-        "workbench": TEXT,
-        "seed": WHOLE,
-        "stops": listed(TEXT),
-        "machine": TEXT,
-        "interrupted": FLAG,
-    },
-    optional="machine",
-)
-
-
-def _power() -> Schema:
-    shares = ("false_alarms", "right_first", "right_first_above_noise", "right_alone")
-    effect = {"rig": TEXT, "size": NUMBER, "unit": TEXT, "hidden": FLAG}
+    varied = {"rig kind": TEXT, "planted said": TEXTS, "changed": listed(declared(VerdictChange))}
+    wrong = {"rig verdict error": TEXT, "wrong": by_name(NUMBER), "causes": listed(TEXTS)}
+    effect = {"rig unit": TEXT, "size": NUMBER, "hidden": FLAG, "right_first": by_name(SHARE)}
     outside = {"size": NUMBER, "unit": TEXT, "verdicts": by_name(by_name(WHOLE))}
-    entries = {
+    power = {
         "sets": WHOLE,
-        "failed": listed(closed({"rig": TEXT, "error": TEXT})),
-        **{name: SHARE for name in (*shares, "unexplained", "coverage")},
-        "pairs": closed({"both": SHARE, "both_seen_alone": SHARE}),
-        "effects": by_name(closed({**effect, "right_first": by_name(SHARE), "coverage": SHARE})),
+        "failed": listed(closed({"rig error": TEXT})),
+        "false_alarms right_first right_first_above_noise right_alone unexplained coverage": SHARE,
+        "pairs": closed({"both both_seen_alone": SHARE}),
+        "effects": by_name(closed({**effect, "coverage": SHARE})),
         "outside": by_name(closed(outside)),
         "confusion": by_name(by_name(WHOLE)),
-        "wrong": listed(closed({"rig": TEXT, "said": listed(TEXT)})),
+        "wrong": listed(closed({"rig": TEXT, "said": TEXTS})),
     }
-    return summary("power", _SETS, entries)
-
-
-def _thresholds() -> Schema:
-    row = {"rig": TEXT, "kind": TEXT, "planted": listed(TEXT), "said": listed(TEXT)}
-    sets = listed(closed({**row, "changed": listed(declared(VerdictChange))}))
-    return summary("power --thresholds", _SETS, {"usual": by_name(NUMBER), "sets": sets})
-
-
-def _sheet_error() -> Schema:
-    row = {"rig": TEXT, "wrong": by_name(NUMBER), "verdict": TEXT, "error": TEXT}
-    row |= {"causes": listed(listed(TEXT)), "wrong_name": FLAG}
-    return summary("power --sheet-error", _SETS, {"sets": listed(closed(row))})
-
-
-def _left_out() -> Schema:
-    shares = {name: SHARE for name in left_out.SHARES}
-    rows = listed(declared(left_out.LeftOutRow))
-    return summary("power --leave-out-effect", _SETS, {**shares, "sets": rows})
-
-
-def _following() -> Schema:
-    shares = {name: SHARE for name in following.SHARES}
-    rows = listed(declared(following.FollowingRow))
-    return summary("power --follow", _SETS, {**shares, "sets": rows})
-
-
-def _plan() -> Schema:
-    entries = {"sizes": listed(NUMBER), "effects": listed(declared(EffectChance))}
-    return summary("power --plan", _SETS, entries)
+    sheet = listed(closed({**wrong, "wrong_name": FLAG}))
+    proposed = {" ".join(left_out.SHARES): SHARE, "sets": listed(declared(left_out.LeftOutRow))}
+    followed = {" ".join(following.SHARES): SHARE, "sets": listed(declared(following.FollowingRow))}
+    return {
+        "power": summary("power", sets, power),
+        "thresholds": asked(
+            "thresholds", {"usual": by_name(NUMBER), "sets": listed(closed(varied))}
+        ),
+        "sheet_error": asked("sheet-error", {"sets": sheet}),
+        "left_out": asked("leave-out-effect", proposed),
+        "plan": asked("plan", {"sizes": NUMBERS, "effects": listed(declared(EffectChance))}),
+        "oracle": asked("oracle", {"effects": listed(declared(EffectLimit))}),
+        "followed": asked("follow", followed),
+    }
 
 
 def summaries() -> dict[str, Schema]:
@@ -302,275 +272,201 @@ def summaries() -> dict[str, Schema]:
 
 
 def _simulate() -> Schema:
-    score = {
-        "type": "object",
-        "required": ["z", "outcome", "reason", "seconds"],
-        "properties": {
-            "z": ERROR,
-            "outcome": TEXT,
-            "reason": TEXT,
-            "seconds": {"type": "number", "minimum": 0},
-        },
-        # Of the judged signal, whatever its name.
-        "patternProperties": {r"_rms_|_nrmse$": ERROR},
-        "additionalProperties": False,
-    }
-    texts = {"title": TEXT, "doubts": listed(TEXT), "reference": or_null(TEXT)}
-    trust = {
-        "warnings": listed(TEXT),
-        "guesses": listed(TEXT),
-        "inseparable": listed(closed({"names": listed(TEXT), "correlation": NUMBER})),
+    score = {"z": ERROR, "outcome reason": TEXT, "seconds": {"type": "number", "minimum": 0}}
+    # Of the judged signal, whatever its name.
+    scores = closed(score) | {"patternProperties": {r"_rms_|_nrmse$": ERROR}}
+    case = {
+        "title": TEXT,
+        "doubts warnings guesses": TEXTS,
+        "reference": or_null(TEXT),
+        "inseparable": listed(closed({"names": TEXTS, "correlation": NUMBER})),
         "contradicted": by_name(NUMBER),
         "contradictions": by_name(listed(declared(Contradiction))),
+        "estimators": by_name(scores),
     }
-    case = closed({**texts, **trust, "estimators": by_name(score)})
-    meanings = by_name(by_name(closed({"text": TEXT, "unit": TEXT})))
+    meanings = by_name(by_name(closed({"text unit": TEXT})))
     provenance = {
         **closed({"run": RUN, **VERSIONS, "fmu": FMU, "meanings": meanings}),
         "additionalProperties": {"type": "object"},  # other models, settings of each estimator
     }
-    entries = {"weights": by_name(NUMBER), "cases": by_name(case)}
+    entries = {"weights": by_name(NUMBER), "cases": by_name(closed(case))}
     return summary("simulate", provenance, entries)
 
 
 def _tune() -> Schema:
-    of_gain = {name: NUMBER for name in ("value", "reasoned", "lower", "upper")}
-    gain = closed(
-        {"meaning": TEXT, "unit": TEXT, **of_gain, "at_bound": FLAG, "as_good": listed(NUMBER)}
-    )
-    changes = {name: ERROR for name in ("less", "more", "without")}
-    counts = ("generations", "candidates", "crashed", "folds", "as_good", "last")
-    work = {name: WHOLE for name in counts}
-    work |= {"seconds": NUMBER, "saved": NUMBER, "interrupted": FLAG, "converged": FLAG}
-    provenance = closed(
-        {
-            "run": RUN,
-            **{name: version for name, version in VERSIONS.items() if name != "commit"},
-            "system": TEXT,
-            "fmu": FMU,
-            "cases": listed(TEXT),
-            "scale_errors": by_name(NUMBER),
-            "weights": by_name(NUMBER),
-            "judged_by": TEXT,
-            "seed": WHOLE,
-            "population": WHOLE,
-        }
-    )
+    gain = {"meaning unit": TEXT, "value reasoned lower upper": NUMBER, "at_bound": FLAG}
+    work = {
+        "generations candidates crashed folds as_good last": WHOLE,
+        "seconds saved": NUMBER,
+        "interrupted converged": FLAG,
+    }
+    provenance = {
+        "run": RUN,
+        "workbench python system judged_by": TEXT,
+        "packages": by_name(TEXT),
+        "fmu": FMU,
+        "cases": TEXTS,
+        "scale_errors weights": by_name(NUMBER),
+        "seed population": WHOLE,
+    }
     entries = {
-        "estimator": TEXT,
-        "label": TEXT,
-        "judged": TEXT,
+        "estimator label judged": TEXT,
         "bandwidth": ERROR,
         "follows": or_null(declared(StepTracking)),
-        "z": NUMBER,
-        "z_reasoned": NUMBER,
-        "cases": by_name(closed({"z_k": NUMBER, "z_k_reasoned": NUMBER, "unstable": WHOLE})),
-        "gains": by_name(gain),
-        "sensitivity": by_name(closed({**changes, "matters": FLAG})),
+        "z z_reasoned": NUMBER,
+        "cases": by_name(closed({"z_k z_k_reasoned": NUMBER, "unstable": WHOLE})),
+        "gains": by_name(closed({**gain, "as_good": NUMBERS})),
+        "sensitivity": by_name(closed({"less more without": ERROR, "matters": FLAG})),
         "folds": listed(declared(Fold, nullable=True)),
-        "beside": by_name(closed({"label": TEXT, "z": ERROR, "worst": TEXT})),
+        "beside": by_name(closed({"label worst": TEXT, "z": ERROR})),
         "work": closed(work),
-        "convergence": listed(NUMBER),
+        "convergence": NUMBERS,
     }
-    return summary("tune", provenance, entries)
+    return summary("tune", closed(provenance), entries)
 
 
 def _diagnose() -> Schema:
-    limit = {"enum": ["", "least", "greatest"]}
-    numbers = {"value": NUMBER, "low": ERROR, "high": ERROR, "beyond": ERROR}
-    size = {**numbers, "unit": TEXT, "limit": limit, "text": TEXT}
-    cause = closed(
-        {
-            "effect": TEXT,
-            "text": TEXT,
-            "parameters": by_name(closed(size)),
-            "phases": or_null(listed(NUMBER)),
-            "confusable_with": listed(TEXT),
-            "explained": NUMBER,
-            "separation": TEXT,
-        }
-    )
-    of_band = {name: NUMBER for name in ("value", "low", "high")}
-    estimate = closed({**of_band, "unit": TEXT, "inside": ERROR})
-    ends = {name: NUMBER for name in ("before", "after")}
-    gain = {"measure": TEXT, **ends, "low": NUMBER, "high": NUMBER, "recordings": by_name(BOTH)}
+    size = {
+        "value": NUMBER,
+        "low high beyond": ERROR,
+        "unit text": TEXT,
+        "limit": {"enum": ["", "least", "greatest"]},
+    }
+    cause = {
+        "effect text separation": TEXT,
+        "parameters": by_name(closed(size)),
+        "phases": or_null(NUMBERS),
+        "confusable_with": TEXTS,
+        "explained": NUMBER,
+    }
+    estimate = closed({"value low high": NUMBER, "unit": TEXT, "inside": ERROR})
+    gain = {"measure": TEXT, "before after low high": NUMBER, "recordings": by_name(BOTH)}
     candidate = {
-        "effect": TEXT,
+        "effect unit": TEXT,
         "shape": by_name(NUMBER),
-        "size": NUMBER,
+        "size gain held_out": NUMBER,
         "sigma": ERROR,
-        "unit": TEXT,
         "shape_units": by_name(TEXT),
-        "gain": NUMBER,
-        "held_out": NUMBER,
     }
     step = {"before": NUMBER, "rivals": listed(closed({"effect": TEXT, "misfit": NUMBER}))}
-    matrix = listed(listed(NUMBER))
-    model = {
-        "partial": FLAG,
-        "modelica": or_null(TEXT),
-        "fmu": or_null(TEXT),
-        "difference_from_fit": ERROR,
-    }
-    entries = {
-        "verdict": {"enum": ["nothing", "found", "partly explained", "unexplained"]},
-        "sentence": NAMED,
-        "interrupted": FLAG,
-        "warnings": listed(TEXT),
-        "doubts": by_name(listed(TEXT)),
-        "causes": listed(cause),
-        "gain": or_null(closed(gain)),
-        "model": closed(model),
-        "partial": listed(TEXT),
-        "noise_alone": FLAG,
-        "nearest": listed(declared(NearestCandidate)),
-        "next_steps": listed(TEXT),
-        "late": or_null(declared(LateSignals)),
-        "lasting_errors": by_name(BOTH),
-        "dependences": listed(declared(Dependence)),
-        "confusability": closed({"effects": listed(TEXT), "cosines": matrix}),
-        "candidates": listed(closed(candidate)),
-        "steps": listed(closed(step)),
-        "not_visible": by_name(TEXT),
-        "shifted_levels": listed(declared(ShiftedLevel)),
-        "levels": by_name(VALUE),
-        "deviations": by_name(by_name(NUMBER)),
-        "set_aside": by_name(by_name(WHOLE)),
-        "channels": by_name(TEXT),
-        "errors": listed(declared(Errors)),
-        "start_values": by_name(by_name(NUMBER)),
-        "observers": by_name(by_name(closed({"before": ERROR, "after": ERROR}))),
-        "smoothed": or_null(closed({"recording": TEXT, "models": by_name(by_name(estimate))})),
-        "rivals": or_null(_rivals(matrix)),
-        "certainty": or_null(_certainty(matrix)),
-        "cases": listed(TEXT),
-    }
-    provenance = {"run": RUN, "workbench": TEXT, "system": TEXT, "model": FMU}
-    return summary("diagnose", closed({**provenance, "effects": listed(TEXT)}), entries)
-
-
-def _certainty(matrix: Schema) -> Schema:
-    starts = {"behind": listed(ERROR), "same": WHOLE, "lower": NUMBER, "sentence": TEXT}
+    model = {"partial": FLAG, "modelica fmu": or_null(TEXT), "difference_from_fit": ERROR}
     certainty = {
-        "unknowns": listed(TEXT),
-        "correlations": matrix,
-        "likelihood": by_name(closed({"low": ERROR, "high": ERROR})),
-        "starts": closed(starts),
+        "unknowns": TEXTS,
+        "correlations": MATRIX,
+        "likelihood": by_name(closed({"low high": ERROR})),
+        "starts": closed(
+            {"behind": listed(ERROR), "same": WHOLE, "lower": NUMBER, "sentence": TEXT}
+        ),
     }
-    return closed(certainty)
-
-
-def _rivals(matrix: Schema) -> Schema:
-    numbers = listed(NUMBER)
-    recording = {
-        "errors": numbers,
-        "common": matrix,
-        "own": matrix,
-        "deviations": numbers,
-        "furthest": numbers,
-    }
+    recording = {"errors deviations furthest": NUMBERS, "common own": MATRIX}
     rival = {
-        "effects": listed(TEXT),
-        "sizes": listed({"type": "array"}),
-        "levels": listed({"type": "array"}),
+        "effects": TEXTS,
+        "sizes levels": listed({"type": "array"}),
         "recordings": listed(closed(recording)),
-        "prior": closed({"matrix": matrix, "gradient": numbers, "constant": NUMBER}),
+        "prior": closed({"matrix": MATRIX, "gradient": NUMBERS, "constant": NUMBER}),
         "explained": NUMBER,
     }
     rivals = {
         "models": listed(closed(rival)),
-        "effects": listed(TEXT),
+        "effects signals": TEXTS,
         "given": by_name(NUMBER),
-        "signals": listed(TEXT),
-        "inflation": numbers,
+        "inflation": NUMBERS,
     }
-    return closed(rivals)
+    entries = {
+        "verdict": {"enum": ["nothing", "found", "partly explained", "unexplained"]},
+        "sentence": NAMED,
+        "interrupted noise_alone": FLAG,
+        "warnings partial next_steps cases": TEXTS,
+        "doubts": by_name(TEXTS),
+        "causes": listed(closed(cause)),
+        "gain": or_null(closed(gain)),
+        "model": closed(model),
+        "nearest": listed(declared(NearestCandidate)),
+        "late": or_null(declared(LateSignals)),
+        "lasting_errors": by_name(BOTH),
+        "dependences": listed(declared(Dependence)),
+        "confusability": closed({"effects": TEXTS, "cosines": MATRIX}),
+        "candidates": listed(closed(candidate)),
+        "steps": listed(closed(step)),
+        "not_visible channels": by_name(TEXT),
+        "shifted_levels": listed(declared(ShiftedLevel)),
+        "levels": by_name(VALUE),
+        "deviations start_values": by_name(by_name(NUMBER)),
+        "set_aside": by_name(by_name(WHOLE)),
+        "errors": listed(declared(Errors)),
+        "observers": by_name(by_name(closed({"before after": ERROR}))),
+        "smoothed": or_null(closed({"recording": TEXT, "models": by_name(by_name(estimate))})),
+        "rivals": or_null(closed(rivals)),
+        "certainty": or_null(closed(certainty)),
+    }
+    provenance = {"run": RUN, "workbench system": TEXT, "model": FMU, "effects": TEXTS}
+    return summary("diagnose", closed(provenance), entries)
 
 
 def _observability() -> Schema:
     numbers = by_name(NUMBER)
-    model = {name: or_null(numbers) for name in ("useful", "median_bound", "states_observable")}
     case = {
-        **closed(
-            {
-                "title": TEXT,
-                "judged_windows": WHOLE,
-                "models": by_name(closed(model)),
-                "warnings": listed(TEXT),
-            }
-        ),
-        "patternProperties": {"^median_": ERROR},
+        "title": TEXT,
+        "judged_windows": WHOLE,
+        "models": by_name(closed({"useful median_bound states_observable": or_null(numbers)})),
+        "warnings": TEXTS,
     }
-    state = closed({"at": NUMBER, "scale": NUMBER, "remaining": NUMBER})
     linear = {
         "observable": FLAG,
         "rank": WHOLE,
-        "states": by_name(state),
-        "information": listed(NUMBER),
-        "unobservable": listed(TEXT),
-        "invisible": listed(TEXT),
+        "states": by_name(closed({"at scale remaining": NUMBER})),
+        "information": NUMBERS,
+        "unobservable invisible": TEXTS,
     }
     entries = {
-        "operating_point": closed(
-            {"inputs": numbers, "held": by_name(TEXT), "quantities": numbers}
-        ),
-        "noise": by_name(closed({"absolute": NUMBER, "relative": NUMBER})),
-        "window_s": NUMBER,
-        "stride_s": NUMBER,
-        "linear_s": NUMBER,
-        "prior": numbers,
-        "useful": numbers,
+        "operating_point": closed({"inputs quantities": numbers, "held": by_name(TEXT)}),
+        "noise": by_name(closed({"absolute relative": NUMBER})),
+        "window_s stride_s linear_s": NUMBER,
+        "prior useful": numbers,
         "linear": by_name(closed(linear)),
-        "cases": by_name(case),
+        "cases": by_name({**closed(case), "patternProperties": {"^median_": ERROR}}),
     }
     provenance = closed({"run": RUN, **VERSIONS, "fmus": listed(FMU)})
     return summary("observability", provenance, entries)
 
 
 def _next() -> Schema:
-    profile = closed({"profile": TEXT, "levels": listed(NUMBER), "every": NUMBER})
     tried = closed(
         {
             "experiment": TEXT,
             "groups": listed(listed(WHOLE)),
-            "separation": NUMBER,
-            "chance": NUMBER,
-            "separations": listed(listed(NUMBER)),
+            "separation chance duration": NUMBER,
+            "separations": MATRIX,
             "deviation": BOTH,
             "cost": VALUE,
-            "duration": NUMBER,
-            "inputs": by_name(profile),
-            "conditions": by_name(ANY),
-            "settings": by_name(ANY),
+            "inputs": by_name(closed({"profile": TEXT, "levels": NUMBERS, "every": NUMBER})),
+            "conditions settings": by_name(ANY),
         }
     )
     entries = {
         "sentence": NAMED,
-        "rivals": listed(TEXT),
+        "rivals": TEXTS,
         "parts": FLAG,
         "tried": {**listed(tried), "minItems": 1},
         "sensors": by_name(tried),
     }
-    provenance = {"run": RUN, "workbench": TEXT, "system": TEXT, "diagnosis": TEXT}
+    provenance = {"run": RUN, "workbench system diagnosis": TEXT}
     return summary("next", closed(provenance), entries)
 
 
 def _distance() -> Schema:
     entries = {
         "sentence": NAMED,
-        "asked": by_name(NUMBER),
+        "asked distance": by_name(NUMBER),
         "conditions": by_name(ANY),
-        "distance": by_name(NUMBER),
-        "deceleration": NUMBER,
-        "response": NUMBER,
-        "nominal": closed({"distance": NUMBER, "deceleration": NUMBER}),
+        "deceleration response width": NUMBER,
+        "nominal": closed({"distance deceleration": NUMBER}),
         "outside": ANY,
-        "width": NUMBER,
         "safety": or_null(listed(declared(SafetyLevel))),
         "plain": or_null(closed({"samples": WHOLE, "levels": listed(declared(PlainLevel))})),
         "stops": listed({"type": "object", "required": ["stop", "held"]}),
-        "held": closed({"of": WHOLE, "stops": WHOLE}),
-        "warnings": listed(TEXT),
+        "held": closed({"of stops": WHOLE}),
+        "warnings": TEXTS,
         "interrupted": FLAG,
     }
     provenance = {"run": RUN, **VERSIONS, "system": TEXT, "models": by_name(FMU), "seed": WHOLE}
@@ -578,93 +474,89 @@ def _distance() -> Schema:
 
 
 def _fit() -> Schema:
-    errors = closed({"nominal": ERROR, "fitted": ERROR})
-    recording = {"held_out": FLAG, "rms": by_name(errors), "over_noise": errors}
+    errors = closed({"nominal fitted": ERROR})
     direction = {"text": NAMED, "parts": by_name(NUMBER), "spread": NUMBER}
     entries = {
         "sentence": NAMED,
-        "reliable": FLAG,
-        "doubts": listed(NAMED),
+        "reliable interrupted": FLAG,
+        "doubts notes": listed(NAMED),
         "values": by_name(declared(FittedValue)),
-        "correlation": listed(listed(NUMBER)),
+        "correlation": MATRIX,
         "not_identified": listed(closed(direction)),
-        "recordings": by_name(closed(recording)),
+        "recordings": by_name(
+            closed({"held_out": FLAG, "rms": by_name(errors), "over_noise": errors})
+        ),
         "loss": {"enum": list(LOSSES)},
-        "costs": listed(NUMBER),
+        "costs": NUMBERS,
         "differential_evolution": TEXT,
-        "interrupted": FLAG,
-        "notes": listed(NAMED),
     }
-    provenance = {"run": RUN, **VERSIONS, "system": TEXT, "fmu": FMU, "seed": WHOLE}
-    return summary("fit", closed(provenance), entries)
+    return summary("fit", closed({**MODEL_RUN, "seed": WHOLE}), entries)
 
 
 def _monitor() -> Schema:
-    numbers = ("level", "standard_error", "trend_by_recording", "trend_standard_error", "scatter")
-    quantity = {"label": TEXT, "unit": TEXT, **{name: ERROR for name in numbers}, "told_in": WHOLE}
-    worn = {"label": TEXT, "work": NUMBER, "of_the_mean": NUMBER}
+    quantity = {
+        "label unit": TEXT,
+        "level standard_error trend_by_recording trend_standard_error scatter": ERROR,
+        "told_in": WHOLE,
+    }
     entries = {
         "sentences": listed(NAMED),
         "recordings": WHOLE,
         "order": {"enum": ["dates", "names"]},
-        "first": NAMED,
-        "last": NAMED,
-        "rate": NUMBER,
-        "threshold": NUMBER,
+        "first last": NAMED,
+        "rate threshold": NUMBER,
         "alarms": listed({"type": "object", "required": ["told_at", "quantity", "change"]}),
         "quantities": by_name(closed(quantity)),
-        "work": by_name(closed(worn)),
-        "refused": by_name(TEXT),
-        "again": by_name(TEXT),
+        "work": by_name(closed({"label": TEXT, "work of_the_mean": NUMBER})),
+        "refused again": by_name(TEXT),
         "interrupted": FLAG,
     }
-    provenance = {"run": RUN, **VERSIONS, "system": TEXT, "fmu": FMU}
-    return summary("monitor", closed(provenance), entries)
+    return summary("monitor", closed(MODEL_RUN), entries)
 
 
 def _fleet() -> Schema:
-    machine = {"machine": NAMED, "recordings": WHOLE, "alarms": WHOLE, "refusal": TEXT}
+    machine = {"machine": NAMED, "recordings alarms": WHOLE, "refusal": TEXT}
     entries = {
         "recordings": WHOLE,
         "seconds": NUMBER,
         "machines": listed(closed(machine)),
         "interrupted": FLAG,
     }
-    provenance = {"run": RUN, **VERSIONS, "system": TEXT, "fmu": FMU}
-    return summary("monitor --fleet", closed(provenance), entries)
+    return summary("monitor --fleet", closed(MODEL_RUN), entries)
 
 
 def _bench() -> Schema:
     ratios = {"ratios": by_name(NUMBER)}
-    wholes = dict.fromkeys(("states", "inputs"), WHOLE)
-    spent = ("derivatives", "derivatives_fmi", "nonzeros", "jacobian", "jacobian_fmi", "step")
-    call = {"unit": TEXT, **wholes, **dict.fromkeys((*spent, "steps_per_second"), NUMBER)}
+    call = {
+        "unit": TEXT,
+        "states inputs": WHOLE,
+        "derivatives derivatives_fmi nonzeros jacobian jacobian_fmi step": NUMBER,
+        "steps_per_second": NUMBER,
+    }
     observer = {
         "observer": TEXT,
         "states": WHOLE,
-        **dict.fromkeys(("step", "times_real_time", "long"), NUMBER),
+        "step times_real_time long": NUMBER,
         "by_rate": by_name(NUMBER),
-        **dict.fromkeys(("fmpy", "c"), or_null(NUMBER)),
+        "fmpy c": ERROR,
     }
-    processes = {"cases": WHOLE, "one": NUMBER, "two": NUMBER, "peak_memory": WHOLE}
-    horizon = {"unknowns": WHOLE, "samples": WHOLE, "ours": NUMBER, "ipopt": NUMBER}
     observers = {
         "case": TEXT,
         "steps": listed(closed(observer)),
-        "processes": closed(processes),
+        "processes": closed({"cases peak_memory": WHOLE, "one two": NUMBER}),
         "compilation": by_name(NUMBER),
-        "horizon": closed({**horizon, **ratios}),
+        "horizon": closed({"unknowns samples": WHOLE, "ours ipopt": NUMBER, **ratios}),
     }
-    evaluation = {"estimator": TEXT, "steps": WHOLE, "ours": NUMBER, "fmpy": NUMBER, "z": NUMBER}
-    workers = {"cases": WHOLE, "candidates": WHOLE, "one": NUMBER, "two": NUMBER}
+    evaluation = {"estimator": TEXT, "steps": WHOLE, "ours fmpy z": NUMBER, **ratios}
+    workers = {"cases candidates": WHOLE, "one two": NUMBER, "dask": ERROR, **ratios}
     tuning = {
         "case": TEXT,
-        "evaluations": listed(closed({**evaluation, **ratios})),
-        "workers": closed({**workers, "dask": or_null(NUMBER), **ratios}),
-        "memory": closed(dict.fromkeys(("master", "worker", "total"), WHOLE)),
+        "evaluations": listed(closed(evaluation)),
+        "workers": closed(workers),
+        "memory": closed({"master worker total": WHOLE}),
     }
     entries = {
-        "machine": closed({"processor": TEXT, "system": TEXT}),
+        "machine": closed({"processor system": TEXT}),
         "seed": WHOLE,
         "calls": by_name(closed({**call, **ratios})),
         "observers": closed(observers),
