@@ -6,6 +6,7 @@ A worker of the suite finds what another one has built, and so does the next run
 import re
 from collections.abc import Mapping
 from pathlib import Path
+from string import Template
 
 import pandas as pd
 
@@ -13,6 +14,19 @@ from workbench.arrays import Vector
 from workbench.models import compiler, fmu_cache
 from workbench.system.registry import load_system
 from workbench.system.system import System
+
+MACHINES = Path(__file__).with_name("machines")
+
+
+def machine_file(path: str, **values: object) -> str:
+    """Text of a file of a machine for tests, with a value in place of each `$NAME`."""
+    text = (MACHINES / path).read_text()
+    return Template(text).substitute(values) if values else text
+
+
+def machine(name: str) -> tuple[str, str]:
+    """Modelica library and system file of a machine for tests."""
+    return machine_file(f"{name}/package.mo"), machine_file(f"{name}/system.toml")
 
 
 def build_here(package: Path, model: str, path: Path, fmi: int = 2) -> None:

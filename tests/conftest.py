@@ -32,6 +32,7 @@ from workbench.tuning import Evaluator, Job, Problem, pose, tunable
 pytest.register_assert_rewrite("tests.case_folders", "tests.page_rules", "tests.runtime_instances")
 
 from .hostile_fmus import hostile  # noqa: E402
+from .page_rules import script  # noqa: E402
 from .processes import LONGEST  # noqa: E402
 from .runtime_instances import Fmu, compile_model  # noqa: E402
 
@@ -218,15 +219,7 @@ for (const name of ["error", "securitypolicyviolation"]) {
   addEventListener(name, (event) => errors.push(`${event.message ?? event.violatedDirective}`));
 }
 </script>"""
-ANSWER = """
-await ready; // figures have their samples
-if (then) await then();
-const answer = document.createElement("pre");
-answer.id = "probe";
-answer.textContent = JSON.stringify({ ...told, errors });
-document.body.append(answer);
-})();
-</script>"""
+ANSWER = script("answer")
 
 
 @pytest.fixture(scope="session")
@@ -242,7 +235,7 @@ def probe(tmp_path_factory) -> Callable[..., dict[str, Any]]:
     def opened(page: Path, script: str, width: int = 1200) -> dict[str, Any]:
         folder = tmp_path_factory.mktemp("browser")
         begin = "<script>\n(async () => {\nconst told = {};\nlet then;\n"
-        probing = f"{begin}{script}{ANSWER}</body>"
+        probing = f"{begin}{script}\n{ANSWER}</body>"
         text = page.read_text().replace("<head>", "<head>" + COLLECT).replace("</body>", probing)
         (folder / "index.html").write_text(text)
         run = subprocess.run(
@@ -267,22 +260,7 @@ def probe(tmp_path_factory) -> Callable[..., dict[str, Any]]:
     return opened
 
 
-_NARROW = """
-then = () => {
-  for (const one of document.querySelectorAll("details")) one.open = true;
-  document.body.style.width = "296px";
-  dispatchEvent(new Event("resize"));
-  const sideways = (one) => one.scrollWidth > one.clientWidth;
-  const places = [...document.querySelectorAll(".scroll")];
-  told.sideways = places.filter(sideways).map((one) => one.getAttribute("aria-label"));
-  const drawn = [...document.querySelectorAll("main svg:not(svg svg)")];
-  told.drawn = drawn.map((one) => [one.viewBox.baseVal.width, one.getBoundingClientRect().width]);
-  told.cut = [...document.querySelectorAll("main svg text")].filter((one) => {
-    const [text, page] = [one.getBoundingClientRect(), one.closest("main").getBoundingClientRect()];
-    return text.left < page.left - 1 || text.right > page.right + 1;
-  }).map((one) => one.textContent);
-};
-"""
+_NARROW = script("narrow")
 
 
 @pytest.fixture(scope="session")

@@ -12,6 +12,11 @@ import pandas as pd
 _MOST = 3e6  # [byte] of a page
 
 
+def script(name: str) -> str:
+    """What a probe runs on a page."""
+    return (Path(__file__).with_name("probes") / f"{name}.js").read_text()
+
+
 def check_page(path: Path, summary: dict[str, Any]) -> Any:
     """Refuse a page that breaks a rule; returns it."""
     assert path.stat().st_size < _MOST

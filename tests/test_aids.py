@@ -23,38 +23,9 @@ from workbench.studies.monitoring.estimate import watched
 from workbench.system.registry import load_system, open_model
 from workbench.system.system import System
 
-from .built import declare
+from .built import declare, machine
 
-STILL = """
-package Still
-  model Level "A level that stays unless it is filled"
-    input Real filling(unit="m/s");
-    output Real coarse(unit="m", start=0.0, fixed=true, nominal=1.0);
-    output Real fine(unit="m") = coarse "Of a sensor that is there at times";
-  equation
-    der(coarse) = filling;
-  end Level;
-end Still;
-"""
-STILL_SYSTEM = """
-title = "A level"
-sample_time = "1 s"
-
-[models]
-observer = { class = "Level", fmu = "Level.fmu" }
-
-[inputs]
-filling = { unit = "m/s", noise = "0 m/s", scale = "1 m/s" }
-
-[outputs]
-coarse = { unit = "m", noise = "0.2 m", scale = "1 m" }
-
-[aids]
-fine = { unit = "m", noise = "0.05 m", scale = "1 m" }
-
-[states]
-coarse = { walk = "0 m" }
-"""
+STILL, STILL_SYSTEM = machine("still")
 TRAIN = load_system("train")
 
 

@@ -25,44 +25,12 @@ from workbench.observers.replay import replay
 from workbench.recordings.case import read_case
 from workbench.system.registry import load_system, open_model
 
+from .built import machine_file
 from .processes import COMPILER, needs_compiler
 
 pytestmark = needs_compiler
 
-VARIABLES = """
-<ScalarVariable name="T" valueReference="0" causality="output" initial="exact"><Real start="291"/></ScalarVariable>
-<ScalarVariable name="der(T)" valueReference="1"><Real derivative="1"/></ScalarVariable>
-<ScalarVariable name="Ta" valueReference="2" causality="input"><Real start="280"/></ScalarVariable>
-<ScalarVariable name="G" valueReference="3" causality="parameter" variability="tunable"><Real start="50"/></ScalarVariable>
-<ScalarVariable name="dG" valueReference="4" causality="input"><Real start="0"/></ScalarVariable>
-<ScalarVariable name="C" valueReference="5" causality="parameter" variability="fixed"><Real start="1e5"/></ScalarVariable>
-<ScalarVariable name="P" valueReference="6" causality="output" variability="discrete"><Real/></ScalarVariable>
-<ScalarVariable name="mode" valueReference="0" causality="parameter" variability="fixed"><Integer start="0"/></ScalarVariable>
-<ScalarVariable name="flag" valueReference="1" causality="parameter" variability="fixed"><Boolean start="false"/></ScalarVariable>
-"""  # noqa: E501
-DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
-<fmiModelDescription fmiVersion="2.0" modelName="Room" guid="{{room}}" numberOfEventIndicators="{count}">
-<ModelExchange modelIdentifier="Room"/>
-<DefaultExperiment startTime="{start}" stopTime="3600"/>
-<ModelVariables>{variables}</ModelVariables>
-<ModelStructure><Outputs><Unknown index="1"/><Unknown index="7"/></Outputs>
-<Derivatives><Unknown index="2"/></Derivatives></ModelStructure>
-</fmiModelDescription>
-"""  # noqa: E501
-SYSTEM = """
-title = "Room"
-sample_time = "10 s"
-models.observer = {{ class = "Room", fmu = "Room.fmu" }}
-inputs.Ta = {{ unit = "K", noise = "0.05 K", scale = "10 K" }}
-outputs.T = {{ unit = "K", noise = "0.05 K", scale = "10 K" }}
-[estimated.G]
-correction = "{correction}"
-unit = "W/K"
-range = ["10 W/K", "200 W/K"]
-walk = "0.1 W/K"
-spread = "10 W/K"
-acts_on = "T"
-"""
+VARIABLES = machine_file("room_fmu/variables.xml")
 
 Build = Callable[..., Path]
 
@@ -83,13 +51,18 @@ def build(tmp_path) -> Build:
         source = Path(__file__).with_name("events.c")
         given = ["-shared", "-fPIC", "-w", f"-DWHAT={what}", "-I", headers, *flags]
         subprocess.run([str(COMPILER), *given, source, "-o", library, "-lm"], check=True)
-        description = DESCRIPTION.format(
-            count=int(what == "THERMOSTAT"), start=start, variables=variables
+        description = machine_file(
+            "room_fmu/modelDescription.xml",
+            count=int(what == "THERMOSTAT"),
+            start=start,
+            variables=variables,
         )
         with zipfile.ZipFile(tmp_path / "Room.fmu", "w") as archive:
             archive.writestr("modelDescription.xml", description)
             archive.write(library, f"binaries/{fmpy.platform}/{library.name}")
-        (tmp_path / "system.toml").write_text(SYSTEM.format(correction=correction))
+        (tmp_path / "system.toml").write_text(
+            machine_file("room_fmu/system.toml", correction=correction)
+        )
         return tmp_path / "Room.fmu"
 
     return make
@@ -195,9 +168,9 @@ def test_whole_simulations_say_derivatives_through_events(build):
 def test_a_parameter_is_fitted_through_events(build: Build) -> None:
     """The heat loss of a room whose thermostat switches, from the closed form with noise."""
     folder = build("THERMOSTAT").parent
-    noisy = 'Ta = {{ unit = "K", noise = "0.05 K"'
-    exactly_known = SYSTEM.replace(noisy, noisy.replace("0.05", "0"))
-    (folder / "system.toml").write_text(exactly_known.format(correction="dG"))
+    text = machine_file("room_fmu/system.toml", correction="dG")
+    noisy = 'Ta = { unit = "K", noise = "0.05 K"'
+    (folder / "system.toml").write_text(text.replace(noisy, noisy.replace("0.05", "0")))
     system = load_system(folder)
     time = 20.0 * np.arange(60.0)
     noise = 0.05 * np.random.default_rng(1).standard_normal(time.size)
@@ -372,7 +345,7 @@ def recorded(folder: Path, outside: str = "Ta", inside: str = "T") -> Path:
 def renamed_system(path: Path) -> Path:
     """The system of the room with names of its own, no class; returns the file."""
     file = path.parent / "system.toml"
-    text = SYSTEM.format(correction="more").replace('class = "Room", ', "")
+    text = machine_file("room_fmu/system.toml", correction="more").replace('class = "Room", ', "")
     text = text.replace("inputs.Ta = {", 'inputs.outside = { variable = "Ta",')
     text = text.replace("outputs.T = {", "outputs.inside = { variable = 'T',")
     text = text.replace(
@@ -466,7 +439,9 @@ def integrator(tmp_path) -> Path:
     headers = Path(fmpy.__file__).parent / "c-code"
     flags = ["-shared", "-fPIC", "-w", "-I", headers]
     subprocess.run([str(COMPILER), *flags, source, "-o", library], check=True)
-    description = DESCRIPTION.format(count=0, start=0.0, variables=COASTING)
+    description = machine_file(
+        "room_fmu/modelDescription.xml", count=0, start=0.0, variables=COASTING
+    )
     description = description.replace('ModelExchange modelIdentifier="Room"', ALONE)
     structure = description[description.index("<Outputs>") : description.index("</ModelStruct")]
     description = description.replace(structure, "<Outputs><Unknown index='1'/></Outputs>")
@@ -515,19 +490,7 @@ def test_what_co_simulation_alone_cannot_do_is_said_with_what_would_make_it_poss
             fmu.state_jacobian()
 
 
-ARRAYS = """<?xml version="1.0" encoding="UTF-8"?>
-<fmiModelDescription fmiVersion="3.0" modelName="Arrays" instantiationToken="arrays">
-<ModelExchange modelIdentifier="Arrays"/><DefaultExperiment stopTime="2"/>
-<ModelVariables>
-<Float64 name="time" valueReference="9" causality="independent"/>
-<Float64 name="x" valueReference="0" causality="local" initial="exact" start="1 2"><Dimension start="2"/></Float64>
-<Float64 name="der(x)" valueReference="1" causality="local" derivative="0"><Dimension start="2"/></Float64>
-<Float64 name="k" valueReference="2" causality="parameter" variability="fixed" start="1 2"><Dimension start="2"/></Float64>
-<Float64 name="y" valueReference="3" causality="output"><Dimension start="2"/></Float64>
-</ModelVariables>
-<ModelStructure><Output valueReference="3"/><ContinuousStateDerivative valueReference="1"/></ModelStructure>
-</fmiModelDescription>
-"""  # noqa: E501
+ARRAYS = machine_file("arrays_fmu/modelDescription.xml")
 
 
 def test_the_open_loop_reads_and_sets_elements_of_arrays(tmp_path):

@@ -24,67 +24,17 @@ from workbench.system.registry import load_system, open_model
 from workbench.system.system import System
 
 from . import growth
-from .built import declare
+from .built import declare, machine_file
 
 COUNT = 5
-LIBRARY = """
-package Water
-  model Vessels "Vessels that fill from one header, and leak"
-    parameter Real leak[5](each unit="m3/s") = fill(1e-4, 5);
-    parameter Real offset(unit="V") = 0.0;
-    input Real pump(unit="m3/s");
-    {inputs}
-    input Real doffset(unit="V") "Correction of offset";
-    {outputs}
-    output Real header(unit="m", start=1.0, fixed=true, nominal=1.0);
-    output Real level(unit="V") = 3.0*header + offset + doffset;
-    output Real spilt(unit="m3/s") = 5e-4 - {leaks};
-  equation
-    {equations}
-    0.1*der(header) = pump - {flows};
-  end Vessels;
-end Water;
-"""
 EVERY = range(1, COUNT + 1)
-SYSTEM = """
-title = "Vessels"
-reported = ["spilt"]
-sample_time = "5 s"
-
-[models]
-observer = {{ class = "Vessels", fmu = "Vessels.fmu" }}
-
-[inputs.pump]
-unit = "m3/s"
-noise = "0 m3/s"
-scale = "1e-3 m3/s"
-
-{outputs}
-[outputs]
-level = {{ unit = "V", noise = "0.01 V", scale = "3 V" }}
-
-[states.header]
-walk = "2e-3 m"
-spread = "0.3 m"
-
-{estimated}
-[estimated.offset]
-correction = "doffset"
-unit = "V"
-range = ["-1 V", "1 V"]
-walk = "0.01 V"
-spread = "0.05 V"
-
-[points]
-settles = "1 h"
-design.inputs = {{ pump = "1e-3 m3/s" }}
-"""
 
 
 def library() -> str:
     """Modelica of the vessels: the level of each is measured as a voltage, which is no state."""
     flow = "2e-3*(header - h{i})"
-    return LIBRARY.format(
+    return machine_file(
+        "vessels/package.mo",
         inputs="\n".join(f'input Real dleak{i}(unit="m3/s");' for i in EVERY),
         outputs="\n".join(
             f'output Real h{i}(unit="m", start=0.8, fixed=true, nominal=1.0);'
@@ -109,7 +59,7 @@ def vessels(tmp_path_factory) -> System:
         'range = ["-1e-2 m3/s", "1e-2 m3/s"]\nwalk = "3e-6 m3/s"\nspread = "5e-5 m3/s"\n'
         for i in EVERY
     )
-    system = SYSTEM.format(outputs=outputs, estimated=estimated)
+    system = machine_file("vessels/system.toml", outputs=outputs, estimated=estimated)
     return declare(tmp_path_factory.mktemp("vessels"), library(), system, Vessels="Water.Vessels")
 
 

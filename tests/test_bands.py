@@ -13,7 +13,7 @@ from workbench.observers.simulation import CaseResult, prepare
 from workbench.observers.trust import likely_reason, residual_tests
 from workbench.system.system import System
 
-from .built import declare
+from .built import declare, machine_file
 from .test_held_inputs import SYSTEM, VESSEL
 
 NAMES = ["open_loop", "ekf", "mhe"]
@@ -123,40 +123,14 @@ def test_a_mean_shows_though_it_is_far_below_the_noise():
     assert test.value == pytest.approx(0.2 / deviations["y"][-1], rel=0.2)
 
 
-COIL = """
-package Coil "A coil in which a switched voltage drives a current"
-  model Observer "Its current"
-    parameter Real r(unit="V") = 0.0 "What is lost";
-    input Real u(unit="V") "Voltage";
-    input Real dr(unit="V") "Correction of r";
-    output Real i(unit="A", start=0.0, fixed=true, nominal=5.0) "Current";
-  equation
-    0.006*der(i) = u - 2.0*i - (r + dr);
-  end Observer;
-end Coil;
-"""
-COIL_FILE = """
-title = "A coil"
-sample_time = "{step} s"
-models.observer = {{ class = "Observer" }}
-inputs.u = {{ unit = "V", noise = "0 V", scale = "12 V", held = true }}
-outputs.i = {{ unit = "A", noise = "0.02 A", scale = "5 A" }}
-
-[estimated.r]
-correction = "dr"
-unit = "V"
-range = ["-2 V", "2 V"]
-walk = "0.01 V"
-spread = "0.1 V"
-acts_on = "i"
-"""
+COIL = machine_file("coil/package.mo")
 
 
 @pytest.mark.parametrize("step", [1e-4, 1e-3, 5e-3])
 @pytest.mark.parametrize("name", ["ekf", "ukf", "mhe"])
 def test_bands_hold_or_what_is_said_is_that_samples_are_too_far_apart(tmp_path, name, step):
     """A sound coil, from a thirtieth to twice its time constant of 3 ms; nothing is lost in it."""
-    system = declare(tmp_path / "coil", COIL, COIL_FILE.format(step=step))
+    system = declare(tmp_path / "coil", COIL, machine_file("coil/system.toml", step=step))
     rng, count = np.random.default_rng(4), 2000
     u = np.repeat(rng.uniform(-12.0, 12.0, count // 40), 40)
     current = [0.0]
@@ -179,48 +153,13 @@ def test_bands_hold_or_what_is_said_is_that_samples_are_too_far_apart(tmp_path, 
         assert any("do not resolve the model" in text for text in result.warnings())
 
 
-SWING = """
-package Swing "A mass on a spring"
-  model Observer "Its place"
-    parameter Real w(unit="rad/s") = 6.283185307179586 "Angular frequency";
-    input Real f(unit="m/s2") "Force over mass";
-    input Real db(unit="m/s2") "Correction of b";
-    parameter Real b(unit="m/s2") = 0.0 "Force that is not measured";
-    output Real s(unit="m", start=0.5, fixed=true, nominal=0.5) "Place";
-    output Real v(unit="m/s", start=0.0, fixed=true, nominal=3.0) "Speed";
-  equation
-    der(s) = v;
-    der(v) = f + b + db - w^2*s;
-  end Observer;
-end Swing;
-"""
-SWING_FILE = """
-title = "A swing"
-sample_time = "{step} s"
-
-[models]
-observer = {{ class = "Observer" }}
-
-[inputs]
-f = {{ unit = "m/s2", noise = "0 m/s2", scale = "1 m/s2" }}
-
-[outputs]
-s = {{ unit = "m", noise = "1e-3 m", scale = "0.5 m" }}
-
-[estimated.b]
-correction = "db"
-unit = "m/s2"
-range = ["-1 m/s2", "1 m/s2"]
-walk = "1e-3 m/s2"
-spread = "1e-2 m/s2"
-acts_on = "v"
-"""
+SWING = machine_file("swing/package.mo")
 
 
 def swing(folder: Path, samples: int, mistuned: float = 1.0) -> CaseResult:
     """Ten undamped periods by their closed form, with so many samples a period."""
     step = 1.0 / samples
-    system = declare(folder, SWING, SWING_FILE.format(step=step))
+    system = declare(folder, SWING, machine_file("swing/system.toml", step=step))
     time = step * np.arange(10 * samples + 1)
     noise = 1e-3 * np.random.default_rng(5).standard_normal(time.size)
     place = 0.5 * np.cos(2.0 * np.pi * mistuned * time) + noise

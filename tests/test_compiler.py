@@ -19,6 +19,8 @@ from workbench.models.compiler.explicit import StateSpace, make_explicit
 from workbench.models.compiler.flat import flatten
 from workbench.models.fmu import FMU
 
+from .built import machine_file
+
 
 def library(folder: Path, text: str) -> Path:
     """Write a library `Lib` and return its package.mo."""
@@ -44,37 +46,7 @@ def evaluate(
 
 def test_expressions_mean_what_modelica_says(tmp_path):
     """Reference: numpy, for arrays, matrices, functions with branches and loops, and builtins."""
-    model = state_space(
-        tmp_path,
-        """
-  function branchy
-    input Real e[3]; input Real k; output Real f[3]; output Real n;
-  protected
-    Real s;
-  algorithm
-    s := 0.0;
-    for i in 1:3 loop s := s + e[i]^2; end for;
-    n := sqrt(s);
-    if k > 1.0 then f := k*e/n; elseif k < -1.0 then f := -e; else f := e; end if;
-  end branchy;
-  model M
-    final parameter Integer n = 3;
-    parameter Real k = 2.0;
-    parameter Real twice = 2*k;
-    input Real u;
-    Real r[3](start={1.0, 2.0, 3.0}*k, each fixed=true);
-    Real A[3,3] = identity(3)*1.0 + [1.0,2.0,3.0; 4.0,5.0,6.0; 7.0,8.0,9.0];
-    Real z[3]; Real length;
-    output Real y1 = A[1,:]*r + sum(r[2:n]) + time + r*r;
-    output Real y2 = min(r) + max(r[1], u) + twice + atan2(r[1], 2.0) + noEvent(abs(u));
-    output Real y3[3] = cross(r, {1.0, 0.0, u}) + transpose(A)*r
-      + (if noEvent(u > 0) then r else -r);
-    output Real y4 = z[2] + length;
-  equation
-    (z, length) = branchy(r, k);
-    for i in 1:3 loop der(r[i]) = -i*r[i] + u; end for;
-  end M;""",
-    )
+    model = state_space(tmp_path, machine_file("expressions/Expressions.mo"))
     assert [v.start for v in model.states] == [2.0, 4.0, 6.0]
     r, u, t = np.array([1.5, -2.0, 0.5]), -0.7, 3.0
     f, w = evaluate(model, list(r), [u], t)
@@ -90,34 +62,7 @@ def test_expressions_mean_what_modelica_says(tmp_path):
     assert_allclose(w, expected, rtol=1e-14)
 
 
-CHAIN = """
-  connector Flange
-    Real s(unit="m"); flow Real f(unit="N");
-  end Flange;
-  model Mass
-    Flange flange; parameter Real m = 2.0;
-    Real s(start=0.1, fixed=true, unit="m"); Real v(start=0.0, fixed=true, unit="m/s");
-  equation
-    flange.s = s; der(s) = v; m*der(v) = flange.f;
-  end Mass;
-  model Damper
-    Flange a; Flange b; parameter Real k = 50.0; parameter Real c = 3.0;
-    Real e; Real de;
-  equation
-    e = b.s - a.s; de = der(e); b.f = k*e + c*de; a.f = -b.f;
-  end Damper;
-  model Wall
-    Flange flange;
-  equation
-    flange.s = 0.0;
-  end Wall;
-  model M
-    Wall wall; Damper d[2](k={50.0, 70.0}); Mass m[2](m={2.0, 5.0});
-    output Real force = d[1].b.f;
-  equation
-    connect(wall.flange, d[1].a); connect(d[1].b, m[1].flange);
-    connect(m[1].flange, d[2].a); connect(d[2].b, m[2].flange);
-  end M;"""
+CHAIN = machine_file("chain/Chain.mo")
 
 
 def test_spring_dampers_between_connectors_become_an_explicit_ode(tmp_path):
@@ -266,29 +211,7 @@ def test_the_archive_holds_sources_and_no_paths_of_the_building_machine(minimal_
             assert folder.encode() not in archive.read(name), f"{folder} in {name}"
 
 
-TWO_OF_ONE_NAME = """
-  package Old
-    model Pump "the old pump"
-      output Real x(start=0, fixed=true);
-    equation
-      der(x) = -x;
-      annotation(experiment(StopTime=1, Tolerance=1e-2));
-    end Pump;
-  end Old;
-  package New
-    model Pump "the new pump"
-      output Real x(start=0, fixed=true);
-    equation
-      der(x) = -100*x;
-      annotation(experiment(StartTime=50, StopTime=500, Tolerance=1e-9));
-    end Pump;
-    model Plain
-      output Real x(start=0, fixed=true);
-    equation
-      der(x) = -x;
-    end Plain;
-  end New;
-"""
+TWO_OF_ONE_NAME = machine_file("two_of_one_name/Pumps.mo")
 
 
 def test_a_model_has_its_own_experiment_not_that_of_a_namesake(tmp_path):

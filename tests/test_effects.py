@@ -20,87 +20,13 @@ from workbench.models.fmu import FMU
 from workbench.models.modelica import Library, packages, read_library
 from workbench.runtime import resources
 
+from .built import machine_file
+
 ROOT = Path(__file__).parent.parent
 WHEELSET = read_library(ROOT / "modelica" / "WheelsetRig" / "package.mo")
 EFFECTS = read_effects(WHEELSET, "MinimalObserver")
 
-TANK = """package Tank "A tank that runs out"
-  partial model PartialOutflow "Slot: from level to flow"
-    input Real h(unit="m") "Level";
-    output Real q(unit="m3/s") "Flow";
-    output Real P(unit="W") "Power of the flow";
-  equation
-    P = 9810.0*q*h;
-  end PartialOutflow;
-
-  model Orifice "Null version: Torricelli's law"
-    extends PartialOutflow;
-    parameter Real a(unit="m2") = 1e-3 "Area";
-  equation
-    q = a*sqrt(2.0*9.81*h);
-  end Orifice;
-
-  model Clogging "An orifice that is narrower than drawn"
-    extends PartialOutflow;
-    parameter Real share(unit="1", min=0.0, max=0.9) = 0.0 "Of the area";
-    Orifice drawn(h=h) "As drawn";
-  equation
-    q = (1.0 - share)*drawn.q;
-    annotation (__Workbench(effect(
-      size="share", matters=0.02, separation="a look into the orifice")));
-  end Clogging;
-
-  model Leak "A leak at the bottom"
-    extends PartialOutflow;
-    parameter Real area(unit="m2", min=0.0, max=1e-3) = 0.0 "Of the leak";
-    Orifice drawn(h=h) "As drawn";
-  equation
-    q = drawn.q + area*sqrt(2.0*9.81*h);
-    annotation (__Workbench(effect(
-      size="area", matters=2e-5, separation="a dry floor")));
-  end Leak;
-
-  partial model PartialGauge "Slot: from level to reading"
-    input Real level(unit="m") "True level";
-    output Real reading(unit="m") "What the gauge reads";
-  end PartialGauge;
-
-  model TrueGauge "Null version: the gauge reads the truth"
-    extends PartialGauge;
-  equation
-    reading = level;
-  end TrueGauge;
-
-  model GaugeOffset "A gauge whose zero is wrong"
-    extends PartialGauge;
-    parameter Real offset(unit="m", min=-1.0, max=1.0) = 0.0 "Reading when empty";
-  equation
-    reading = level + offset;
-    annotation (__Workbench(effect(
-      size="offset", matters=0.01, separation="an empty tank")));
-  end GaugeOffset;
-
-  model GaugeGain "A gauge with a wrong gain"
-    extends PartialGauge;
-    parameter Real gain(unit="1", min=-0.5, max=0.5) = 0.0 "Relative change";
-  equation
-    reading = (1.0 + gain)*level;
-    annotation (__Workbench(effect(
-      size="gain", matters=0.01, separation="two levels", after="GaugeOffset")));
-  end GaugeGain;
-
-  model Base "A tank"
-    parameter Real A(unit="m2", min=0.1) = 2.0 "Area";
-    input Real inflow(unit="m3/s") "Flow in";
-    output Real h(unit="m", start=1.0, fixed=true) "Level";
-    output Real reading(unit="m") = gauge.reading "Reading of the gauge";
-    replaceable Orifice orifice(h=h) constrainedby PartialOutflow(h=h) "Outflow";
-    replaceable TrueGauge gauge(level=h) constrainedby PartialGauge(level=h) "Gauge";
-  equation
-    A*der(h) = inflow - orifice.q;
-  end Base;
-end Tank;
-"""
+TANK = machine_file("tank_that_runs_out/package.mo")
 
 
 def tank(folder: Path, *changes: tuple[str, str]) -> Library:
@@ -347,50 +273,7 @@ def test_a_base_model_that_is_not_there_is_refused(tmp_path):
         read_effects(tank(tmp_path), "Bas")
 
 
-ORCHARD = """package Orchard "Three trees that drink from one pipe"
-  partial model PartialValves "Slot: from openings to flows"
-    parameter Integer n = 3 "Valves";
-    input Real u[n](each unit="1") "Opening";
-    output Real y[n](each unit="1") "Opening that acts";
-  end PartialValves;
-
-  model Valves "Null version"
-    extends PartialValves;
-  equation
-    y = u;
-  end Valves;
-
-  model Clogging "a valve that is clogged"
-    extends PartialValves;
-    parameter Real share(unit="1") = 1.0 "Of the water, that it is clogged for";
-    parameter Real lost[n](each unit="1", each min=0.0, each max=1.0) = zeros(n) "Of the opening";
-  equation
-    for i in 1:n loop
-      y[i] = u[i]*(1.0 - share*lost[i]);
-    end for;
-    annotation (__Workbench(effect(size="lost", matters=0.02, separation="a look")));
-  end Clogging;
-
-  model Drought "less water in all valves"
-    extends PartialValves;
-    parameter Real dry(unit="1", min=0.0, max=1.0) = 0.0 "Of the water";
-  equation
-    y = u*(1.0 - dry);
-    annotation (__Workbench(effect(
-      size="dry", matters=0.02, after="Clogging", separation="a look at the well")));
-  end Drought;
-
-  model Base "Water in the ground"
-    parameter Real opening[3](each unit="1") = fill(0.3, 3) "Of the valves";
-    output Real water[3](each unit="m3", each start=0.0, each fixed=true) "Of the trees";
-    replaceable Valves valves(u=opening) constrainedby PartialValves(u=opening) "Valves";
-  equation
-    for i in 1:3 loop
-      der(water[i]) = valves.y[i];
-    end for;
-  end Base;
-end Orchard;
-"""
+ORCHARD = machine_file("orchard/Orchard.mo")
 
 
 def orchard(folder: Path, change: tuple[str, str] = ("", "")) -> Library:
@@ -448,51 +331,7 @@ def test_places_that_cannot_be_counted_or_told_apart_are_refused(old, new, messa
         read_effects(orchard(tmp_path, (old, new)), "Base")
 
 
-STAGE = """package Stage "A stage on rails"
-  import Common = Effects;
-
-  package Effects "What the model leaves out; hides the library of this name"
-    model BearingFriction "dry friction in the bearing"
-      extends Common.Friction.Dry(coulomb(max=5.0));
-      annotation (__Workbench(effect(
-        size="coulomb", matters=0.2, separation="a slow run-down")));
-    end BearingFriction;
-
-    model Grease "stiff grease"
-      extends Common.Friction.Viscous;
-      annotation (__Workbench(effect(
-        size="damping", matters=0.2, separation="a run-down from two velocities")));
-    end Grease;
-
-    model TachoOffset "a tacho whose zero is wrong"
-      extends Common.Signals.Offset(offset(unit="m/s", min=-0.1, max=0.1));
-      annotation (__Workbench(effect(
-        size="offset", matters=1e-3, separation="its reading at standstill")));
-    end TachoOffset;
-
-    model TachoGain "a tacho whose gain is wrong"
-      extends Common.Signals.Gain(gain(max=0.2));
-      annotation (__Workbench(effect(
-        size="gain", matters=1e-3, separation="a ruler and a clock")));
-    end TachoGain;
-  end Effects;
-
-  model Base "What moves"
-    parameter Real m(unit="kg") = 2.0 "Mass";
-    input Real F(unit="N") "Force";
-    output Real v(unit="m/s", start=0.0, fixed=true) "Velocity";
-    output Real reading(unit="m/s") = tacho.y "Of the tacho";
-    replaceable Common.Friction.Frictionless friction(v=v, load=9.81*m)
-      constrainedby Common.Interfaces.Friction(v=v, load=9.81*m) "Rails";
-    replaceable Common.Signals.Unchanged tacho(u=v)
-      constrainedby Common.Interfaces.Signal(u=v) "Tacho";
-  equation
-    m*der(v) = F - friction.f;
-  end Base;
-
-  annotation (uses(Effects(version="1.0")));
-end Stage;
-"""
+STAGE = machine_file("stage/package.mo")
 
 
 def stage(folder: Path, *changes: tuple[str, str]) -> Path:

@@ -18,31 +18,11 @@ from workbench.recordings.case import Case
 from workbench.studies.fit.files import write_fmu
 from workbench.system.system import System
 
-from .built import build_text, write_case
+from .built import build_text, machine_file, write_case
 from .schemas import check
 
-BLOCK = """
-model Block "A heated block"
-  parameter Real C(unit="J/K", min=1.0, max=1000.0) = 80.0 "Heat capacity";
-  parameter Real G(unit="W/K", min=0.1, max=20.0) = 1.5 "To the surroundings";
-  parameter Real a = 1.0 "Gain of the amplifier";
-  parameter Real b = 1.0 "Efficiency";
-  parameter Real idle = 3.0 "Moves nothing";
-  input Real P(unit="W") "Heating power";
-  output Real T(unit="K", start=0.0, fixed=true, nominal=20.0) "Above the surroundings";
-equation
-  C*der(T) = a*b*P - G*T;
-end Block;
-"""
-SYSTEM = """
-title = "A heated block"
-sample_time = "4 s"
-models.observer = { fmu = "Block.fmu" }
-inputs.P = { unit = "W", noise = "0 W", scale = "40 W", held = true }
-outputs.T = { unit = "K", noise = "0.05 K", scale = "20 K" }
-fit.C = { range = ["20 J/K", "500 J/K"] }
-fit.G = { range = ["0.5 W/K", "8 W/K"] }
-"""
+BLOCK = machine_file("heated_block/Block.mo")
+SYSTEM = machine_file("heated_block/system.toml")
 C, G, NOISE, STEP = 100.0, 2.0, 0.05, 4.0  # J/K, W/K, K, s
 TIME = STEP * np.arange(24)
 

@@ -25,52 +25,11 @@ from workbench.runtime.engine import Engine
 from workbench.system.registry import load_system
 from workbench.system.system import System
 
-from .built import build_text, write_case
+from .built import build_text, machine_file, write_case
 
 # The level has another name than the output, so that no output's name tells where it begins.
-MODEL = """
-model Tank "A tank that empties through an outlet"
-  parameter Real A(unit="m2", min=0.01) = 0.5 "area of the tank";
-  parameter Real c(unit="m2", min=1e-5) = 1e-3 "effective area of the outlet";
-  parameter Real g(unit="m/s2") = 9.81 "gravity";
-  parameter Real leak(unit="m3/s") = 0.0 "steady leak";
-  input Real inflow(unit="m3/s");
-  Real x(unit="m", start=1.0, fixed=true, min=0.0, max=3.0) "level";
-  output Real h(unit="m") = x;
-equation
-  A*der(x) = inflow - c*sqrt(2.0*g*sqrt(x^2 + 1e-6)) - leak;
-end Tank;
-"""
-SYSTEM = """
-title = "A tank as an FMU alone"
-sample_time = "0.5 s"
-
-[models]
-observer = { fmu = "Tank.fmu" }
-
-[inputs.inflow]
-unit = "m3/s"
-label = "inflow"
-noise = "5e-5 m3/s"
-scale = "5e-3 m3/s"
-held = true
-
-[outputs.level]
-variable = "h"
-unit = "m"
-label = "level"
-noise = "2 mm"
-scale = "1 m"
-
-[points]
-settles = "1000 s"
-
-[points.design]
-inputs = { inflow = "5e-3 m3/s" }
-
-[objective]
-judged = "level"
-"""
+MODEL = machine_file("tank_alone/Tank.mo")
+SYSTEM = machine_file("tank_alone/system.toml")
 
 
 def record(folder: Path, seed: int, area=0.5, outlet=1e-3, gain=0.0, zero=0.0) -> Path:
@@ -219,30 +178,8 @@ def test_what_needs_the_equations_says_so(tank, tmp_path):
 
 # --- terms beside rates ---
 
-SWING = """
-model Swing "A mass on a spring"
-  parameter Real m(unit="kg") = 1.0 "mass";
-  parameter Real c(unit="N/m") = 10.0 "stiffness";
-  output Real s(unit="m", start=0.5, fixed=true) "position";
-  Real v(unit="m/s", start=0.0, fixed=true) "speed";
-equation
-  der(s) = v;
-  m*der(v) = -c*s;
-end Swing;
-"""
-SWING_SYSTEM = """
-title = "A swing as an FMU alone"
-sample_time = "10 ms"
-
-[models]
-observer = { fmu = "Swing.fmu" }
-
-[outputs.s]
-unit = "m"
-label = "position"
-noise = "1 mm"
-scale = "0.5 m"
-"""
+SWING = machine_file("swing_alone/Swing.mo")
+SWING_SYSTEM = machine_file("swing_alone/system.toml")
 LAWS = {
     "Coulomb": lambda v: 0.4 * np.tanh(v / 1e-3),
     "Viscous": lambda v: 0.3 * v,

@@ -28,53 +28,9 @@ from workbench.recordings.case import Case, read_case
 from workbench.system.registry import open_model
 from workbench.system.system import System
 
-from .built import declare
+from .built import declare, machine
 
-LIBRARY = """
-package Water
-  model Tanks "A pump fills the first of two tanks, the second one drains and leaks"
-    parameter Real area(unit="m2") = 0.5;
-    parameter Real pipe(unit="m2/s") = 2e-3 "Flow per difference of levels";
-    parameter Real drain(unit="m2/s") = 1e-3 "Flow per level";
-    parameter Real leak(unit="m3/s") = 1e-4;
-    parameter Real gain(unit="V/m") = 2.0;
-    parameter Real offset(unit="V") = 0.4;
-    input Real pump(unit="m3/s");
-    input Real dleak(unit="m3/s") "Correction of leak";
-    output Real h1(unit="m", start=1.0, fixed=true, nominal=1.0);
-    output Real h2(unit="m", start=0.8, fixed=true, nominal=1.0);
-    output Real reading(unit="V") = gain*h2 + offset;
-    output Real outflow(unit="m3/s") = drain*h2;
-  equation
-    area*der(h1) = pump - pipe*(h1 - h2);
-    area*der(h2) = pipe*(h1 - h2) - outflow - leak - dleak;
-  end Tanks;
-end Water;
-"""
-SYSTEM = """
-title = "Two tanks"
-reported = ["outflow"]
-sample_time = "2 s"
-shortest = "1 min"
-models.observer = { class = "Tanks", fmu = "Tanks.fmu" }
-inputs.pump = { unit = "m3/s", noise = "1e-5 m3/s", scale = "1e-3 m3/s", label = "inflow" }
-outputs.reading = { unit = "V", noise = "0.005 V", scale = "2 V", label = "level" }
-judged.outflow = { unit = "m3/s", noise = "1e-5 m3/s", scale = "1e-3 m3/s" }
-states.h1 = { walk = "1e-5 m", spread = "0.1 m" }
-states.h2 = { walk = "1e-5 m", spread = "0.1 m" }
-
-[estimated.leak]
-correction = "dleak"
-unit = "m3/s"
-range = ["0 m3/s", "1e-3 m3/s"]
-walk = "3e-6 m3/s"
-spread = "5e-5 m3/s"
-useful = "1e-5 m3/s"
-
-[points]
-settles = "1 h"
-design.inputs = { pump = "1e-3 m3/s" }
-"""
+LIBRARY, SYSTEM = machine("two_tanks")
 CASE = 'title = "Pump on and off"\nmeasurement.file = "measured.csv"\n'
 
 AREA, PIPE, DRAIN = 0.5, 2e-3, 1e-3  # as in the model

@@ -18,43 +18,9 @@ from workbench.recordings.case import Case
 from workbench.system.registry import open_model
 from workbench.system.system import System
 
-from .built import declare
+from .built import declare, machine
 
-VESSEL = """
-package Vessel "A vessel that a pump fills"
-  model Observer "Its volume"
-    parameter Real leak(unit="m3/s") = 0.0 "What is lost";
-    input Real q(unit="m3/s") "Flow of the pump";
-    input Real dl(unit="m3/s") "Correction of leak";
-    output Real V(unit="m3", start=0.0, fixed=true, nominal=0.01) "Volume";
-    output Real through(unit="m3/s") = q "Flow that a meter sees, too";
-  equation
-    der(V) = q - (leak + dl);
-  end Observer;
-end Vessel;
-"""
-SYSTEM = """
-title = "A vessel"
-sample_time = "1 s"
-
-[models]
-observer = { class = "Observer" }
-
-[inputs]
-q = { unit = "m3/s", noise = "0 m3/s", scale = "1e-3 m3/s", held = true }
-
-[outputs]
-V = { unit = "m3", noise = "1e-5 m3", scale = "0.01 m3" }
-through = { unit = "m3/s", noise = "1e-6 m3/s", scale = "1e-3 m3/s" }
-
-[estimated.leak]
-correction = "dl"
-unit = "m3/s"
-range = ["-5e-4 m3/s", "5e-4 m3/s"]
-walk = "1e-6 m3/s"
-spread = "1e-5 m3/s"
-acts_on = "V"
-"""
+VESSEL, SYSTEM = machine("vessel")
 ESTIMATORS = [
     "open_loop",
     "disturbance_observer",

@@ -22,49 +22,14 @@ from workbench.recordings.case import Case, read_case, read_cases
 from workbench.system.registry import load_system, open_model
 from workbench.system.system import System
 
-from .built import declare
+from .built import declare, machine
 
 ROOT = Path(__file__).parent.parent
 WHEELSET = load_system("wheelset")
 
 # --- on a linear model: a vessel that cools, insulated or bare, heated by a source and the sun ---
 
-LIBRARY = """
-package Heat
-  model Vessel
-    parameter Real rate(unit="1/s") = 0.02;
-    parameter Real sun(unit="K/s") = 0.1;
-    input Real heater(unit="K/s");
-    input Real dsun(unit="K/s");
-    output Real warm(unit="K", start=10.0, fixed=true, nominal=10.0);
-  equation
-    der(warm) = heater + sun + dsun - rate*warm;
-  end Vessel;
-end Heat;
-"""
-SYSTEM = """
-title = "Vessel"
-sample_time = "1 s"
-models.observer = { class = "Vessel", fmu = "Vessel.fmu" }
-inputs.heater = { unit = "K/s", noise = "0 K/s", scale = "1 K/s" }
-outputs.warm = { unit = "K", noise = "0.2 K", scale = "10 K" }
-states.warm = { walk = "0.01 K" }
-
-[estimated.sun]
-correction = "dsun"
-unit = "K/s"
-range = ["-1 K/s", "1 K/s"]
-walk = "0.002 K/s"
-spread = "0.05 K/s"
-
-[points]
-design.inputs = { heater = "0.3 K/s" }
-
-[conditions.cover]
-choices = ["on", "off"]
-lasts = "100 s"
-parameters = { on = { rate = 0.02 }, off = { rate = 0.05 } }
-"""
+LIBRARY, SYSTEM = machine("heated_vessel")
 RATES, STEP, NOISE, WALK = (0.02, 0.05), 1.0, 0.2, np.array([0.01, 0.002])
 
 

@@ -15,38 +15,10 @@ from workbench.observers.report import format_table
 from workbench.observers.simulation import CaseResult, prepare
 from workbench.system.registry import open_model
 
-from .built import declare
+from .built import declare, machine, machine_file
 from .schemas import check
 
-TRAM = """
-package Tram "A tram of which power and speed are measured"
-  model Observer "Its speed"
-    parameter Real m(unit="kg") = 35e3 "Mass";
-    parameter Real e(unit="1") = 0.8 "Efficiency";
-    parameter Real A(unit="m/s2") = 0.02 "Resistance";
-    input Real P(unit="W") "Electric power";
-    input Real dm(unit="kg") "Correction of m";
-    input Real de(unit="1") "Correction of e";
-    input Real dA(unit="m/s2") "Correction of A";
-    output Real v(unit="m/s", start=5.0, fixed=true, nominal=10.0) "Speed";
-  equation
-    der(v) = (e + de)*P/((m + dm)*sqrt(v^2 + 1.0)) - (A + dA)*v;
-  end Observer;
-end Tram;
-"""
-SYSTEM = """
-title = "A tram"
-sample_time = "1 s"
-
-[models]
-observer = { class = "Observer" }
-
-[inputs]
-P = { unit = "W", noise = "500 W", scale = "2e5 W" }
-
-[outputs]
-v = { unit = "m/s", noise = "0.05 m/s", scale = "10 m/s" }
-"""
+TRAM, SYSTEM = machine("tram")
 QUANTITIES = {
     "m": 'correction = "dm"\nunit = "kg"\nrange = ["20000 kg", "70000 kg"]\n'
     'walk = "1 kg"\nspread = "8000 kg"\n',
@@ -129,43 +101,15 @@ def test_estimates_that_no_recording_tells_end_with_a_status(tmp_path, capsys):
     assert "found m and e, which the outputs do not show" in capsys.readouterr().err
 
 
-CELL = """
-package Cell "A cell whose current is drawn"
-  model Observer "Its charge and the polarisation of its electrodes"
-    parameter Real R(unit="Ohm") = 0.02 "Resistance";
-    input Real I(unit="A") "Current";
-    input Real dR(unit="Ohm") "Correction of R";
-    output Real v(unit="V") = 3.0 + charge - (R + dR)*I - polarisation "Voltage";
-    Real charge(unit="1", start=0.9, fixed=true) "State of charge";
-    Real polarisation(unit="V", start=0.0, fixed=true, nominal=0.05) "Of the electrodes";
-  equation
-    9000.0*der(charge) = -I;
-    20.0*der(polarisation) = 0.01*I - polarisation;
-  end Observer;
-end Cell;
-"""
-CELL_FILE = """
-title = "A cell"
-sample_time = "{step} s"
-models.observer = {{ class = "Observer" }}
-inputs.I = {{ unit = "A", noise = "0.01 A", scale = "5 A" }}
-outputs.v = {{ unit = "V", noise = "0.002 V", scale = "0.1 V" }}
-points.settles = "1000 s"
-{point}
-[estimated.R]
-correction = "dR"
-unit = "Ohm"
-range = ["0.005 Ohm", "0.06 Ohm"]
-walk = "2e-4 Ohm"
-spread = "0.005 Ohm"
-acts_on = "v"
-"""
+CELL = machine_file("cell/package.mo")
 
 
 @pytest.mark.parametrize("step", [0.1, 1.0, 10.0])
 def test_states_that_no_quantity_moves_are_observable_where_outputs_show_them(tmp_path, step):
     point = 'points.design.inputs = { I = "2 A" }\n'
-    system = declare(tmp_path / "cell", CELL, CELL_FILE.format(step=step, point=point))
+    system = declare(
+        tmp_path / "cell", CELL, machine_file("cell/system.toml", step=step, point=point)
+    )
     with open_model(system) as fmu:
         test = linear_test(fmu, system)
     assert test.rank == 2

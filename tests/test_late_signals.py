@@ -21,6 +21,7 @@ from workbench.models.modelica import read_library
 from workbench.runtime.engine import Engine
 from workbench.system.registry import load_system
 
+from .built import machine
 from .heater import cases
 
 SAMPLE = 1e-3  # [s]
@@ -97,81 +98,7 @@ def test_clocks_that_are_right_are_no_cause(monkeypatch):
 
 # --- a motor, written from its equations and simulated by SciPy ---
 
-MOTOR = """within ;
-package Motor "A motor that turns an inertia"
-  import Effects;
-
-  model LateSpeed "a speed that is read late"
-    extends Effects.Signals.Delay(window=2e-3, delay(min=-0.1, max=0.1));
-    annotation (__Workbench(effect(
-      size="delay", matters=5e-4, slots={"speedSensor"}, separation="a second sensor")));
-  end LateSpeed;
-
-  model Rubbing "viscous friction"
-    extends Effects.RotationalFriction.Viscous(damping(max=1e-2));
-    annotation (__Workbench(effect(
-      size="damping", matters=3e-6, slots={"friction"}, separation="coasting")));
-  end Rubbing;
-
-  model Observer "Motor and inertia"
-    parameter Real R(unit="Ohm", min=0.1) = 1.5 "Resistance";
-    parameter Real L(unit="H") = 8e-3 "Inductance";
-    parameter Real k(unit="V.s/rad") = 0.08 "Motor constant";
-    parameter Real J(unit="kg.m2") = 2e-4 "Inertia";
-    parameter Real tau(unit="N.m") = 0.0 "Load";
-    input Real u(unit="V") "Voltage";
-    input Real dtau(unit="N.m") "Correction of tau";
-    output Real i(unit="A", start=0.0, fixed=true, nominal=5.0) "Current";
-    output Real w(unit="rad/s", start=0.0, fixed=true, nominal=100.0) "Speed";
-    output Real wRead(unit="rad/s") = speedSensor.y "Speed as read";
-    replaceable Effects.Friction.Frictionless friction(v=w, load=0.0)
-      constrainedby Effects.Interfaces.Friction(v=w, load=0.0) "Bearings";
-    replaceable Effects.Signals.Unchanged speedSensor(u=w)
-      constrainedby Effects.Interfaces.Signal(u=w) "From the speed to what is read";
-  equation
-    L*der(i) = u - R*i - k*w;
-    J*der(w) = k*i - friction.f - (tau + dtau);
-  end Observer;
-  annotation (uses(Effects(version="1.0")));
-end Motor;
-"""
-MOTOR_FILE = """
-title = "A motor that turns an inertia"
-sample_time = "1 ms"
-
-[models]
-observer = { class = "Observer" }
-
-[inputs.u]
-unit = "V"
-noise = "0 V"
-scale = "10 V"
-held = true
-
-[outputs.i]
-unit = "A"
-noise = "0.02 A"
-scale = "5 A"
-
-[outputs.w]
-unit = "rad/s"
-noise = "0.4 rad/s"
-scale = "100 rad/s"
-reading = "wRead"
-
-[estimated.tau]
-correction = "dtau"
-unit = "N.m"
-range = ["-0.1 N.m", "0.1 N.m"]
-walk = "2e-3 N.m"
-
-[diagnosis]
-block = "10 ms"
-lasting = "0.2 s"
-
-[diagnosis.tolerances]
-R = 0.005
-"""
+MOTOR, MOTOR_FILE = machine("motor")
 
 
 @cache

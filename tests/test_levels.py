@@ -24,8 +24,8 @@ from workbench.studies.power.diagnosing import build_everything, library_effects
 from workbench.system.parts import StateNoise
 from workbench.system.system import System
 
-from .built import declare
-from .heater import LIBRARY, NOISE, SYSTEM, cases, diagnosed
+from .built import declare, machine_file
+from .heater import LIBRARY, NOISE, cases, diagnosed
 
 G, SPREAD = 0.3, 0.015  # of both of the block's own conductances together [W/K]
 HALVES = "".join(f"{one} = {{ spread = {SPREAD / 2**0.5 / (0.5 * G)} }}\n" for one in ("Ga", "Gb"))
@@ -37,7 +37,7 @@ def block(folder: Path, more: str) -> System:
     own = f'  parameter Real Ga(unit="W/K") = {G / 2}, Gb(unit="W/K") = {G / 2};\n'
     library = LIBRARY.replace("  input Real P(", own + "  input Real P(")
     library = library.replace("- loss.Q;", "- (Ga + Gb)*T - loss.Q;")
-    return declare(folder, library, SYSTEM.format(sensor="") + more)
+    return declare(folder, library, machine_file("heater/system.toml", sensor="") + more)
 
 
 def recorded(conductance: float, seed: int, share: float = 1.0) -> pd.DataFrame:
@@ -151,7 +151,9 @@ def test_a_free_run_is_free_whatever_noise_an_input_declares(tmp_path):
     free, corrected = [], []
     for name, noise in (("exact", "0 W"), ("noisy", "5 W")):
         folder = tmp_path / name
-        file = SYSTEM.format(sensor="").replace('noise = "0 W"', f'noise = "{noise}"')
+        file = machine_file("heater/system.toml", sensor="").replace(
+            'noise = "0 W"', f'noise = "{noise}"'
+        )
         file = file.replace('[states]\nTc = { spread = "30 K" }\n', "")
         of = declare(folder, LIBRARY, file)
         outcome = diagnosed(of, cases(of, frames[:1]), folder, cases(of, frames)[1:])

@@ -24,62 +24,9 @@ from workbench.observers.estimators.smoother import Smoother
 from workbench.system.registry import load_system, open_model
 from workbench.system.system import System
 
-from .built import build_here
+from .built import build_here, machine_file
 
-LIBRARY = """
-package Water
-  partial model Tanks
-    parameter Real area(unit="m2") = 0.5;
-    parameter Real pipe(unit="m2/s") = 2e-3;
-    parameter Real drain(unit="m2/s") = 1e-3;
-    parameter Real leak(unit="m3/s") = 1e-4;
-    input Real pump(unit="m3/s");
-    input Real dleak(unit="m3/s");
-    output Real h1(unit="m", start=1.0, fixed=true, nominal=1.0);
-    output Real h2(unit="m", start=0.8, fixed=true, nominal=1.0);
-    output Real reading(unit="V");
-    output Real lost(unit="m3/s");
-  equation
-    area*der(h1) = pump - pipe*(h1 - h2);
-    area*der(h2) = pipe*(h1 - h2) - drain*h2 - lost;
-  end Tanks;
-  model Linear
-    extends Tanks;
-  equation
-    reading = 2.0*h2 + 0.4;
-    lost = leak + dleak;
-  end Linear;
-  model Bent
-    extends Tanks;
-  equation
-    reading = 3.0*sqrt(h2);
-    lost = 5e3*(leak + dleak)^2;
-  end Bent;
-end Water;
-"""
-SYSTEM = """
-title = "Two tanks"
-reported = ["lost"]
-sample_time = "2 s"
-models.observer = {{ class = "{model}", fmu = "{model}.fmu" }}
-inputs.pump = {{ unit = "m3/s", noise = "1e-5 m3/s", scale = "1e-3 m3/s" }}
-outputs.reading = {{ unit = "V", noise = "0.005 V", scale = "2 V" }}
-outputs.h1 = {{ unit = "m", noise = "0.01 m", scale = "1 m" }}
-states.h1 = {{ walk = "1e-4 m", spread = "0.1 m" }}
-states.h2 = {{ walk = "2e-4 m", spread = "0.1 m" }}
-
-[estimated.leak]
-correction = "dleak"
-unit = "m3/s"
-range = ["{low} m3/s", "{high} m3/s"]
-walk = "3e-6 m3/s"
-spread = "5e-5 m3/s"
-useful = "1e-5 m3/s"
-
-[points]
-settles = "1 h"
-design.inputs = {{ pump = "1e-3 m3/s" }}
-"""
+LIBRARY = machine_file("leaking_tanks/package.mo")
 STEP = 2.0  # [s]
 
 
@@ -94,7 +41,7 @@ def folder(tmp_path_factory) -> Path:
 
 def system(folder: Path, model: str, low: float = -1e-2, high: float = 1e-2) -> System:
     path = folder / "system.toml"
-    path.write_text(SYSTEM.format(model=model, low=low, high=high))
+    path.write_text(machine_file("leaking_tanks/system.toml", model=model, low=low, high=high))
     return load_system(path)
 
 

@@ -31,7 +31,7 @@ from workbench.studies.monitoring.watch import Track, watch
 from workbench.system.registry import load_system
 from workbench.system.system import System
 
-from .page_rules import check_page
+from .page_rules import check_page, script
 from .schemas import check
 from .train_stops import write_stop
 
@@ -352,13 +352,7 @@ def test_a_condition_that_the_model_needs_and_nobody_knows_is_told(history, trai
     assert "found rail: unknown" in found.refused["02"]
 
 
-READ = """
-then = () => {
-  const place = document.querySelector(".reading");
-  place.dispatchEvent(new KeyboardEvent("keydown", { key: ".", bubbles: true }));
-  told.read = document.querySelector(".readout b").textContent;
-};
-"""
+READ = script("monitoring")
 
 
 def test_the_page_shows_what_has_changed_and_where(usual, tmp_path, probe):

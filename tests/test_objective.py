@@ -21,6 +21,7 @@ from workbench.tuning.recipe import pose
 from workbench.tuning.validation import evaluate_gains
 
 from . import heater
+from .built import machine_file
 
 
 def stop(Fx: np.ndarray | None, step: float = 0.005) -> Case:
@@ -145,8 +146,8 @@ def test_a_sensor_that_rectifies_is_scored_by_its_reading(tmp_path):
     output = '  output Real reading(unit="K") = abs(T) "As read";\n'
     library = heater.LIBRARY.replace("    Real Tc(", f"  {output}    Real Tc(")
     (folder / "package.mo").write_text(library)
-    file = heater.SYSTEM.format(sensor='reading = "reading"') + '\n[objective]\njudged = "T"\n'
-    (folder / "system.toml").write_text(file)
+    file = machine_file("heater/system.toml", sensor='reading = "reading"')
+    (folder / "system.toml").write_text(f'{file}\n[objective]\njudged = "T"\n')
     block = load_system(folder)
     time = np.arange(600.0)
     power = 60.0 * np.sign(np.sin(2.0 * np.pi * time / 200.0 + 0.1))

@@ -25,58 +25,9 @@ from workbench.recordings.case import Case, read_case
 from workbench.system.registry import open_model
 from workbench.system.system import System
 
-from .built import declare, write_case
+from .built import declare, machine, write_case
 
-MODEL = """
-within ;
-package Boiler
-  model Vessel "Water that is heated through its wall, above the temperature of the room"
-    parameter Real C(unit = "J/K") = 2000 "Heat capacity of the water";
-    parameter Real CWall(unit = "J/K") = 500 "Heat capacity of the wall";
-    parameter Real GWall(unit = "W/K") = 100 "From the wall to the water";
-    parameter Real G(unit = "W/K") = 10 "From the water to the room";
-    input Real P(unit = "W") "Heat into the wall";
-    input Real dG(unit = "W/K") "Correction of G";
-    Real T(unit = "K", start = 0.0, fixed = true, nominal = 50) "Water";
-    Real TWall(unit = "K", start = 0.0, fixed = true, nominal = 50) "Wall";
-    output Real TSkin(unit = "K") "Skin, between wall and water";
-  equation
-    CWall*der(TWall) = P - GWall*(TWall - T);
-    C*der(T) = GWall*(TWall - T) - (G + dG)*T;
-    TSkin = 0.7*TWall + 0.3*T;
-  end Vessel;
-end Boiler;
-"""
-SYSTEM = """
-name = "boiler"
-title = "Water in a vessel"
-sample_time = "0.5 s"
-
-[models]
-observer = { class = "Vessel", fmu = "Vessel.fmu" }
-
-[inputs]
-P = { unit = "W", shown = "kW", label = "heating power", noise = "1 W", scale = "1 kW" }
-
-[outputs]
-TSkin = { unit = "K", label = "temperature of the skin", noise = "0.02 K", scale = "50 K" }
-T = { unit = "K", label = "temperature of the water", noise = "0.02 K", scale = "50 K" }
-
-[estimated.G]
-correction = "dG"
-label = "loss"
-unit = "W/K"
-range = ["1 W/K", "40 W/K"]
-walk = "0.1 W/K"
-acts_on = "T"
-
-[points]
-settles = "2000 s"
-design = { inputs = { P = "500 W" } }
-
-[objective]
-judged = "T"
-"""
+MODEL, SYSTEM = machine("boiler")
 TRUE_LOSS = 14.0  # [W/K], nominal is 10
 
 

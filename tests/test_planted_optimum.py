@@ -34,63 +34,9 @@ from workbench.tuning import (
     search,
 )
 
-from .built import declare
+from .built import declare, machine
 
-MODEL = """
-package Lib
-  model RollingWheelset "Wheelset without inertia or slip; linear at constant pressure"
-    parameter Real rW(unit="m") = 0.46;
-    parameter Real rR(unit="m") = 0.70;
-    parameter Real JR(unit="kg.m2") = 1500.0;
-    parameter Real muWR(unit="1") = 0.15;
-    parameter Real muDC(unit="1") = 0.275;
-    parameter Real pads(unit="m3") = 0.09 "Brake torque per pressure and friction";
-    input Real pB(unit="Pa");
-    input Real tauR(unit="N.m");
-    input Real dmuWR(unit="1");
-    input Real dmuDC(unit="1");
-    output Real omegaW(unit="rad/s", start=0.0, fixed=true);
-    output Real omegaR(unit="rad/s", start=0.0, fixed=true);
-    output Real Fx(unit="N") = (muDC + dmuDC)*pads*pB/rW;
-    output Real slip(unit="m/s") = rR*omegaR - rW*omegaW;
-  equation
-    JR*der(omegaR) = tauR - rR*Fx;
-    rW*der(omegaW) = rR*der(omegaR);
-  end RollingWheelset;
-end Lib;
-"""
-SYSTEM = """
-title = "Wheelset without slip"
-reported = ["Fx", "slip"]
-sample_time = "20 ms"
-models.observer = { class = "RollingWheelset", fmu = "RollingWheelset.fmu" }
-
-[inputs]
-pB = { unit = "Pa", noise = "5 mbar", scale = "3 bar" }
-tauR = { unit = "N.m", noise = "40 N.m", scale = "10 kN.m" }
-
-[outputs]
-omegaW = { unit = "rad/s", noise = "0.05 rad/s", scale = "90 rad/s" }
-omegaR = { unit = "rad/s", noise = "0.003 rad/s", scale = "60 rad/s" }
-
-[judged]
-Fx = { unit = "N", noise = "80 N", scale = "20 kN" }
-
-[derived]
-speed = { is = "rR*omegaR", unit = "m/s" }
-
-[estimated]
-muWR = { correction = "dmuWR", range = [0.03, 0.55], walk = 0.05 }
-muDC = { correction = "dmuDC", range = [0.10, 0.45], walk = 0.05, acts_on = "omegaW" }
-
-[feedback]
-fades = { signal = "speed", half = "0.5 m/s" }
-
-[objective]
-judged = "Fx"
-weights = { omegaW = 1.0, omegaR = 1.0, Fx = 1e-3 }
-bandwidth = "5 Hz"
-"""
+MODEL, SYSTEM = machine("rolling_wheelset")
 RW, RR, JR, MU_DC, PADS = 0.46, 0.70, 1500.0, 0.275, 0.09  # as in the model
 PRESSURE = 2e5  # [Pa]
 VELOCITY = 1.0  # [m/s], so slow that a fifth of the feedback has faded out

@@ -11,41 +11,10 @@ from workbench.errors import InputError
 from workbench.recordings.datasets import published
 from workbench.system.plugins import Plugin, find_plugin
 
+from .built import machine_file
 from .processes import python
 
-PROJECT = """
-[build-system]
-requires = ["hatchling"]
-build-backend = "hatchling.build"
-
-[project]
-name = "spinning-machine"
-version = "1.0"
-
-[project.entry-points."workbench.machines"]
-spinning = "spinning:PLUGIN"
-
-[tool.hatch.build.targets]
-wheel = { only-include = ["spinning"] }
-"""
-SYSTEM = """
-name = "spinning"
-title = "A roller that spins down"
-plugin = "spinning"
-sample_time = "5 ms"
-[models]
-observer = {{ class = "MinimalObserver", fmu = "{fmu}" }}
-[inputs]
-pB = {{ unit = "Pa", noise = "5 mbar", scale = "4 bar" }}
-tauR = {{ unit = "N.m", noise = "40 N.m", scale = "10 kN.m" }}
-
-[outputs]
-omegaW = {{ unit = "rad/s", noise = "0.002 rad/s", scale = "60 rad/s" }}
-omegaR = {{ unit = "rad/s", noise = "0.003 rad/s", scale = "60 rad/s" }}
-
-[objective]
-weights = {{ omegaW = 1.0 }}
-"""
+PROJECT = machine_file("spinning/pyproject.toml")
 PLUGIN = """
 from pathlib import Path
 from workbench import Plugin
@@ -85,7 +54,7 @@ def installed(root, tmp_path_factory) -> Path:
     for name, text in {
         "pyproject.toml": PROJECT,
         "spinning/__init__.py": PLUGIN,
-        "spinning/system.toml": SYSTEM.format(fmu=fmu),
+        "spinning/system.toml": machine_file("spinning/system.toml", fmu=fmu),
         "spinning/spin.py": COMMAND,
         "spinning/estimators/__init__.py": "",
         "spinning/estimators/coasting.py": ESTIMATOR,

@@ -34,6 +34,7 @@ from workbench.system.registry import load_system
 from workbench.system.system import OBSERVER
 from workbench.system.template import AREA, OUTLET, write_system
 
+from .built import MACHINES
 from .page_rules import check_page
 
 THRESHOLD, RATE = 1.2, 3e-3  # [m], [m2/s] of a leak that begins at a level
@@ -430,42 +431,14 @@ def test_a_form_whose_bounds_bind_is_fitted_with_wider_ones(tmp_path):
     assert not any(size["limit"] for size in sizes.values())
 
 
-def test_an_input_without_a_unit_has_that_of_what_it_is_bound_to(tmp_path):
+def test_an_input_without_a_unit_has_that_of_what_it_is_bound_to():
     """So that what turns once per turn of a shaft is looked for in the slot of any friction."""
-    (tmp_path / "package.mo").write_text(
-        """
-        package Drive "A shaft that turns"
-          type Speed = Real "m/s or rad/s";
-
-          partial model PartialFriction "Slot: what resists a motion"
-            input Speed v "Velocity or angular velocity";
-            input Speed other "Another one";
-            output Real f(unit="N.m") "Resistance";
-          end PartialFriction;
-
-          model Frictionless "Null version"
-            extends PartialFriction;
-          equation
-            f = 0.0;
-          end Frictionless;
-
-          model Motor "What drives"
-            Real w(unit="rad/s") "Speed";
-          end Motor;
-
-          model Observer "A shaft"
-            Motor motor "Drive";
-            replaceable Frictionless friction(v=motor.w, other=2*motor.w)
-              constrainedby PartialFriction(v=motor.w, other=2*motor.w) "Bearings";
-          equation
-            der(motor.w) = -friction.f;
-          end Observer;
-        end Drive;
-        """
-    )
-    library = read_library(tmp_path / "package.mo")
+    library = read_library(MACHINES / "drive" / "package.mo")
     (bearings,) = places(library, "Drive.Observer", read_slots(library, "Drive.Observer"))
-    assert [(one.name, one.unit) for one in bearings.inputs] == [("v", "rad/s"), ("other", "")]
+    assert [(quantity.name, quantity.unit) for quantity in bearings.inputs] == [
+        ("v", "rad/s"),
+        ("other", ""),
+    ]
     turns = [influence.factors for influence in turning(bearings)]
     assert turns == [(), (bearings.inputs[0],)]
 

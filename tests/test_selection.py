@@ -10,18 +10,10 @@ import pandas as pd
 import pytest
 from scipy.integrate import solve_ivp
 
+from .built import machine_file
 from .heater import NOISE, cases, diagnosed, system
 
-CONVECTION = """  model Convection "air that rises from the block"
-    extends PartialLoss;
-    parameter Real c(unit="W/K", min=0.0, max=5.0) = 0.0 "Conductance at 10 K";
-  equation
-    Q = c*T*sqrt(abs(T)/10.0 + 1e-6);
-    annotation (__Workbench(effect(
-      size="c", matters=0.02, separation="the block on its side")));
-  end Convection;
-
-"""
+CONVECTION = machine_file("heater/Convection.mo")
 G, S = 0.3, 0.006  # planted [W/K], [W/K2]
 HELD, COUNT = 60, 20  # [s] and number of powers
 

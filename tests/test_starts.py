@@ -13,45 +13,9 @@ from workbench.observers.run import Run
 from workbench.observers.simulation import CaseResult, prepare
 from workbench.system.registry import load_system
 
-from .built import declare
+from .built import declare, machine, machine_file
 
-KETTLE = """
-package Kettle "Water that a body heats"
-  model Observer "Heat of a body and of the water about it"
-    parameter Real loss(unit="W/K") = 5.0 "Of the water to the room";
-    input Real P(unit="W") "Heating";
-    input Real dloss(unit="W/K") "Correction of loss";
-    output Real reading(unit="K") = water + 40.0 "What the sensor says";
-    Real body(unit="K", start=0.0, fixed=true, nominal=50.0) "Over the room";
-    Real water(unit="K", start=10.0, fixed=true, nominal=50.0) "Over the room";
-  equation
-    200.0*der(body) = P - 20.0*(body - water);
-    2000.0*der(water) = 20.0*(body - water) - (loss + dloss)*water;
-  end Observer;
-end Kettle;
-"""
-SYSTEM = """
-title = "A kettle"
-sample_time = "{step} s"
-reported = ["body", "water"]
-
-[models]
-observer = {{ class = "Observer" }}
-
-[inputs]
-P = {{ unit = "W", noise = "1 W", scale = "1000 W" }}
-
-[outputs]
-reading = {{ unit = "K", noise = "0.1 K", scale = "50 K" }}
-
-[estimated.loss]
-correction = "dloss"
-unit = "W/K"
-range = ["1 W/K", "20 W/K"]
-walk = "1e-3 W/K"
-spread = "2 W/K"
-{more}
-"""
+KETTLE = machine_file("kettle/package.mo")
 BODY, WATER = 60.0, 35.0  # K, where the recordings begin
 
 
@@ -59,7 +23,7 @@ def ran(folder: Path, name: str, step: float, more: str = "") -> tuple[CaseResul
     """A filter on the kettle, which begins elsewhere than its model; and the truth of the body."""
     folder.mkdir()
     (folder / "package.mo").write_text(KETTLE)
-    (folder / "system.toml").write_text(SYSTEM.format(step=step, more=more))
+    (folder / "system.toml").write_text(machine_file("kettle/system.toml", step=step, more=more))
     system = load_system(folder)
     time, rng, fine = np.arange(0.0, 200.0, step), np.random.default_rng(5), 100
     truth = [np.array([BODY, WATER])]
@@ -106,35 +70,7 @@ def test_a_start_of_which_the_system_says_how_sure_it_is_stays(tmp_path):
     assert run.signal("water")[0] == 10.0
 
 
-ROOM = """
-package Room "A room that a heater warms"
-  model Observer "Its temperature and the pressure of its air"
-    parameter Real G(unit="W/K") = 50.0 "To the outside";
-    input Real P(unit="W") "Heating";
-    input Real dG(unit="W/K") "Correction of G";
-    output Real T(unit="K", start=293.15, fixed=true, nominal=300.0, min=200.0) "Temperature";
-    output Real p(unit="Pa") = 101325.0*T/293.15 "Pressure";
-  equation
-    1e5*der(T) = P - (G + dG)*(T - 273.15);
-  end Observer;
-end Room;
-"""
-ROOM_FILE = """
-title = "A room"
-sample_time = "10 s"
-models.observer = { class = "Observer" }
-inputs.P = { unit = "W", noise = "5 W", scale = "1 kW" }
-outputs.T = { unit = "K", noise = "0.05 K", scale = "300 K" }
-outputs.p = { unit = "Pa", noise = "50 Pa", scale = "1e5 Pa" }
-
-[estimated.G]
-correction = "dG"
-unit = "W/K"
-range = ["10 W/K", "200 W/K"]
-walk = "1e-2 W/K"
-spread = "10 W/K"
-acts_on = "T"
-"""
+ROOM, ROOM_FILE = machine("room")
 
 
 def recorded_room(step: float = 10.0, **factors: float) -> pd.DataFrame:

@@ -15,22 +15,9 @@ from workbench.models.native import instance
 from workbench.recordings.case import read_cases
 from workbench.system.registry import load_system
 
-from .built import build_here, build_text, write_case
+from .built import build_here, build_text, machine_file, write_case
 
-MODEL = """
-within ;
-model Block "A block on a table"
-  parameter Real m(unit = "kg") = 2.0;
-  parameter Real coulomb(unit = "N") = 3.0;
-  parameter Real v0(unit = "m/s") = 1e-5;
-  input Real F(unit = "N");
-  Real x(unit = "m", start = 0.0, fixed = true);
-  Real v(unit = "m/s", start = 1.0, fixed = true);
-equation
-  der(x) = v;
-  m*der(v) = F - coulomb*tanh(v/v0);
-end Block;
-"""
+MODEL = machine_file("block/Block.mo")
 H = 0.005
 
 
@@ -91,19 +78,7 @@ def test_stick_and_slip_agree_with_an_error_controlled_integrator(amplitude, blo
 
 
 SAMPLE, NOISE, FADES = 2e-3, 1e-2, 3.0  # [s], [m], [1/s]
-LIBRARY = """package Swing "A mass on a spring"
-  model Mass "Mass, spring and damper"
-    parameter Real w(unit="rad/s") = 1.0;
-    parameter Real a(unit="1/s") = 1.0;
-    input Real f(unit="m/s2");
-    output Real y(unit="m", start=1.0, fixed=true);
-    Real v(unit="m/s", start=0.0, fixed=true);
-  equation
-    der(y) = v;
-    der(v) = f - w^2*y - 2.0*a*v;
-  end Mass;
-end Swing;
-"""
+LIBRARY = machine_file("fading_swing/package.mo")
 SYSTEM = f"""title = "A mass on a spring"
 sample_time = "{SAMPLE} s"
 [models]

@@ -11,24 +11,9 @@ from workbench.diagnosis.simulation.tangent import advance, renew, tangent, tell
 from workbench.models.fmu import FMU
 from workbench.models.native import instance
 
-from .built import build_text
+from .built import build_text, machine_file
 
-MODEL = """
-within ;
-model Tank "A tank that drains, whose level is read late"
-  parameter Real k(unit = "1/s") = 0.8 "Rate of the outlet";
-  parameter Real c(unit = "1") = 1.5 "Gain of the sensor";
-  parameter Real T(unit = "s") = 1e-4 "Time constant of the sensor, far below a step";
-  input Real q(unit = "m/s");
-  output Real y(unit = "m");
-  Real h(unit = "m", start = 2.0, fixed = true);
-  Real s(unit = "m", start = 2.0, fixed = true);
-equation
-  der(h) = q - k*h;
-  T*der(s) = h - s;
-  y = c*s;
-end Tank;
-"""
+MODEL = machine_file("draining_tank/Tank.mo")
 END = 2.0  # [s]
 
 

@@ -17,7 +17,7 @@ from workbench.system.registry import load_system, open_model
 from workbench.system.system import System
 from workbench.tuning.report import write_tuning_page
 
-from .page_rules import check_page, data, text
+from .page_rules import check_page, data, script, text
 from .processes import LONGEST, comes_true, python, running
 from .recordings import write_beginnings
 from .schemas import check
@@ -111,18 +111,7 @@ def test_a_hostile_name_of_a_case_stays_text(page):
     assert not page.xpath("//img|//@onerror")
 
 
-NARROW = """
-const dots = document.querySelector(".dots");
-then = () => {
-  document.body.style.width = "376px";
-  dispatchEvent(new Event("resize"));
-  told.room = dots.parentElement.clientWidth;
-  told.drawn = dots.viewBox.baseVal.width;
-  told.dots = [...dots.querySelectorAll("circle")].map((one) => one.cx.baseVal.value);
-  told.names = [...dots.querySelectorAll("text[text-anchor=start]")].map((one) => one.getBBox().x)
-    .map(Math.round);
-};
-"""
+NARROW = script("tuning_narrow")
 
 
 def test_page_opens_without_errors_and_draws_its_curve(results, probe):
