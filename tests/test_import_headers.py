@@ -1,6 +1,7 @@
 """Names and units as recorders write them above samples, and cells that are no numbers."""
 
 import datetime
+import tomllib
 import zipfile
 from pathlib import Path
 
@@ -28,165 +29,15 @@ def channels(path: Path) -> list[tuple[str, str]]:
     return [(channel.name, channel.unit) for channel in group.channels]
 
 
-TOA5 = ['"TOA5","Station","CR6","1234","CR6.Std.09","CPU:prog.CR6","5678","Fast"']
+# What recorders write above samples, a row of these, and names and units of the channels.
+HEADERS = tomllib.loads(Path(__file__).with_name("recorders").joinpath("headers.toml").read_text())
 
 
-@pytest.mark.parametrize(
-    ("head", "row", "expected"),
-    [
-        (
-            [
-                *TOA5,
-                '"TIMESTAMP","RECORD","inflow","h"',
-                '"TS","RN","l/s","mm"',
-                '"","","Avg","Smp"',
-            ],
-            '"2025-06-06 08:00:{0:02d}",{0},4.1,950.{0}',
-            [("TIMESTAMP", "s"), ("RECORD", ""), ("inflow", "l/s"), ("h", "mm")],
-        ),
-        (
-            ["Vendor,X", "Number,Date&Time,ms,CH1,CH2", "NO.,Time,ms,l/s,mm"],
-            "{0},2025/06/06 08:00:{0:02d},500,+ 4.1,+ 950.{0}",
-            [("Date&Time ms", "s"), ("Number", ""), ("CH1", "l/s"), ("CH2", "mm")],
-        ),
-        (
-            ["time [s];flow (1);flow (2)", ";l/s;mm"],
-            "{0};1.{0};2.{0}",
-            [("time", "s"), ("flow (1)", "l/s"), ("flow (2)", "mm")],
-        ),
-        (
-            ["t;Zulauf;;Pegel;", ";roh;gefiltert;roh;gefiltert", "s;l/s;l/s;mm;mm"],
-            "{0};1.{0};2.{0};3.{0};4.{0}",
-            [
-                ("t", "s"),
-                ("Zulauf roh", "l/s"),
-                ("Zulauf gefiltert", "l/s"),
-                ("Pegel roh", "mm"),
-                ("Pegel gefiltert", "mm"),
-            ],
-        ),
-        (
-            ["Title;of;the file", "# recorded by hand", "Zeit;Druck", "ch 1;ch 2", "s;bar"],
-            "{0};1.{0}",
-            [("ch 1", "s"), ("ch 2", "bar")],
-        ),
-        (
-            [
-                "Sampling interval,500ms",
-                "CH,Signal name,Span",
-                "CH1,inflow,10,-10,l/s",
-                "Number,Date&Time,ms,CH1,CH2,Alarm1-10,AlarmOut",
-                "NO.,Time,ms,l/s,mm,A1234567890,A1234",
-            ],
-            "{0},2025/06/06 08:00:{0:02d},500,+ 4.10,+ 950.{0},LLLLLLLLLL,LLLL",
-            [("Date&Time ms", "s"), ("Number", ""), ("CH1", "l/s"), ("CH2", "mm")],
-        ),
-        (
-            [
-                "Name\tTime\tinflow\th",
-                "Unit\ts\tl/s\tmm",
-                "Length\t60\t60\t60",
-                "Min\t0\t4\t950",
-                "Max\t59\t5\t951",
-            ],
-            "\t{0}\t4.{0}\t950.{0}",
-            [("Time", "s"), ("inflow", "l/s"), ("h", "mm")],
-        ),
-        (
-            [
-                "Start time\t3/5/2024 10:00 AM",
-                "Sample rate\t2",
-                "Time [s]\tinflow [l/s] AVE\th [mm] AVE",
-            ],
-            "{0}\t4.{0}\t950.{0}",
-            [("Time", "s"), ("inflow AVE", "l/s"), ("h AVE", "mm")],
-        ),
-        (
-            ['"Zeit 1 [s]"\t"inflow [l/s]"\t"h [mm]"', '"RAW"\t"MX840"\t"MX840"'],
-            "{0}\t4.{0}\t950.{0}",
-            [("Zeit 1", "s"), ("inflow", "l/s"), ("h", "mm")],
-        ),
-        (
-            [
-                "Abtastfrequenz [Hz]: 2",
-                "",
-                "Kanal:\t1\t2",
-                "Name:\tinflow\th",
-                "Einheit:\tl/s\tmm",
-                "Skalierung:\t1.0\t1.0",
-            ],
-            "{0}\t4.{0}\t950.{0}",
-            [("Name:", ""), ("inflow", "l/s"), ("h", "mm")],
-        ),
-        (
-            [
-                "LabVIEW Measurement",
-                "Date\t2024/03/05",
-                "Time\t10:00:00.123",
-                "***End_of_Header***",
-                "Channels\t2",
-                "Samples\t60\t60",
-                "Y_Unit_Label\tl/s\tmm",
-                "X0\t0.0\t0.0",
-                "Delta_X\t1.0\t1.0",
-                "***End_of_Header***",
-                "X_Value\tinflow\th\tComment",
-            ],
-            "{0}\t4.{0}\t950.{0}",
-            [("time", "s"), ("inflow", "l/s"), ("h", "mm")],
-        ),
-        (
-            [
-                '"TraceName","inflow","h"',
-                '"VUnit","l/s","mm"',
-                '"HOffset",0,0',
-                '"Date","2024/03/05"',
-                "",
-            ],
-            ",4.{0},950.{0}",
-            [("inflow", "l/s"), ("h", "mm")],
-        ),
-        (
-            ["s;l/s;mm", "Time;inflow;h"],
-            "{0};4.{0};950.{0}",
-            [("Time", "s"), ("inflow", "l/s"), ("h", "mm")],
-        ),
-        (
-            ['"Time', '[s]";"inflow', '[l/s]";"h', '[mm]"'],
-            "{0};4.{0};950.{0}",
-            [("Time", "s"), ("inflow", "l/s"), ("h", "mm")],
-        ),
-        (
-            ["Time;inflow;h"],
-            "{0} s;4.{0} l/s;950.{0} mm",
-            [("Time", "s"), ("inflow", "l/s"), ("h", "mm")],
-        ),
-        (
-            ["   Time   inflow       h", "    (s)    (l/s)    (mm)"],
-            "{0:6d} 4.{0:<6d} 950.{0}",
-            [("Time", "s"), ("inflow", "l/s"), ("h", "mm")],
-        ),
-        (
-            ["Time inflow [l/s] h [mm]"],
-            "2024-03-05 10:00:{0:02d} 4.{0} 950.{0}",
-            [("Time", "s"), ("inflow", "l/s"), ("h", "mm")],
-        ),
-    ],
-    ids=[
-        *("TOA5", "parts of a second", "numbered", "two rows of names", "channel numbers"),
-        *("Graphtec", "DIAdem", "DEWESoft", "catman", "labels", "LabVIEW", "Yokogawa"),
-        *(
-            "units above",
-            "folded",
-            "units behind numbers",
-            "units in brackets",
-            "a name over date and time",
-        ),
-    ],
-)
-def test_names_and_units_stand_in_rows_of_their_own(tmp_path, head, row, expected):
-    path = table(tmp_path / "a.csv", [*head, *(row.format(k) for k in range(60))])
-    assert channels(path) == expected
+@pytest.mark.parametrize("recorder", HEADERS.values(), ids=HEADERS)
+def test_names_and_units_stand_in_rows_of_their_own(tmp_path, recorder):
+    rows = [recorder["row"].format(k) for k in range(60)]
+    path = table(tmp_path / "a.csv", [*recorder["head"].split("\n"), *rows])
+    assert channels(path) == [(name, unit) for name, unit in recorder["channels"]]
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,7 @@
 """Distance of a stop: formulas of standards, the loop on the model, recordings, predictions."""
 
 import json
+import tomllib
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -425,38 +426,12 @@ def test_the_old_name_of_valid_stops_warns(train):
 # --- what a system file says of stops ---
 
 OWN = Path(__file__).parent.parent / "modelica" / "TrainRig" / "system.toml"
-MISTAKES = {
-    "nothing that rises": (
-        ('timed_by = "pB1"', 'timed_by = "mass1"'),
-        r"\[distance\] timed_by: found 'mass1'.* expected an input that rises",
-    ),
-    "no state": (
-        ('state = "vTrain"', 'state = "omegaReading[1]"'),
-        r"\[distance\] state: found 'omegaReading\[1\]'.* expected a continuous state",
-    ),
-    "what is not asked": (
-        ('vTrain = "speed"', 'vTrain = "sped"'),
-        r"start\] vTrain: found 'sped' \(closest: 'speed'\); expected an asked quantity",
-    ),
-    "an input without a word": (
-        ('mass1 = { is = "mass1" }\n', ""),
-        r"inputs\]: found no 'mass1'",
-    ),
-    "two spreads": (
-        ("share = 0.01  #", "spread = 100.0\nshare = 0.01  #"),
-        r"differs\]\] 2: found 'spread' and 'share'; expected one of the two",
-    ),
-    "a place": (('at = "end"', 'at = "rest"'), r"at: found 'rest'; expected one of command, end"),
-    "no speed": (
-        ("[distance.asked.speed]", "[distance.asked.velocity]"),
-        r"expected a table 'speed' in m/s",
-    ),
-}
+MISTAKES = tomllib.loads((Path(__file__).parent / "wrong" / "stops.toml").read_text())
 
 
 @pytest.mark.parametrize("mistake", MISTAKES)
 def test_a_mistake_in_what_is_said_of_stops_is_refused(mistake, tmp_path):
-    (old, new), message = MISTAKES[mistake]
+    old, new, message = MISTAKES[mistake].values()
     text = OWN.read_text().replace("../../fmus", str(OWN.parents[2] / "fmus"))
     assert old in text
     path = tmp_path / "system.toml"

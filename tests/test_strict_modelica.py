@@ -1,6 +1,7 @@
 """What a library says of others must be so: each wrong one is refused in words, with its line."""
 
 import re
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -26,140 +27,13 @@ def write(folder: Path, text: str) -> Path:
 
 
 # Model M, and what is said of it.
-WRONG = {
-    "modifier of a component": (
-        "model M Part part(kk=2.0); end M;",
-        r"modifier of 'kk', but Lib\.Part has no such element \(closest: 'k'\)",
-    ),
-    "modifier where it extends": (
-        "model M extends Part(depth=2.0); end M;",
-        r"modifier of 'depth', but Lib\.Part has no such element",
-    ),
-    "modifier within a modifier": (
-        "model N Part part; end N; model M N n(part(slot(gain=2.0))); end M;",
-        r"modifier of 'gain', but Lib\.Unchanged has no such element",
-    ),
-    "modifier of what is redeclared": (
-        "model M Part part[2](redeclare Gain slot(gane=3.0)); end M;",
-        r"modifier of 'gane', but Lib\.Gain has no such element \(closest: 'gain'\)",
-    ),
-    "modifier after a redeclaration": (
-        "model N = Part(redeclare Gain slot); model M N n(slot(bias=1.0)); end M;",
-        r"modifier of 'bias', but Lib\.Gain has no such element",
-    ),
-    "modifier of a constraint": (
-        "model M replaceable Gain g(u=1.0) constrainedby Slot(gain=1.0); end M;",
-        r"modifier of 'gain', but Lib\.Slot has no such element",
-    ),
-    "attribute": (
-        "model M Part part(k(mni=1.0)); end M;",
-        r"modifier 'mni' \(closest: 'min'\) of Real",
-    ),
-    "attribute of a type": (
-        'type Speed = Real(uint="m/s"); model M Speed v = 1.0; end M;',
-        r"modifier 'uint' \(closest: 'unit'\) of Real",
-    ),
-    "attribute of another type": (
-        'model M parameter Integer n(unit="1") = 1; end M;',
-        "modifier 'unit'.* of Integer",
-    ),
-    "modifier of an attribute": (
-        "model M Real x(start(min=1.0)); equation x = 1.0; end M;",
-        r"modifier 'start\(\.\.\.\)' of Real",
-    ),
-    "attribute that is final": (
-        'model M Part part(x(unit="mm")); end M;',
-        r"modifier 'unit', which is final in Lib\.Length",
-    ),
-    "modifier of what is final": (
-        "model M Part part(n=4.0); end M;",
-        r"modifier of 'n', which is final",
-    ),
-    "modifier of what became final": (
-        "model N extends Part(final k=2.0); end N; model M N n(k=3.0); end M;",
-        r"modifier of 'k', which is final",
-    ),
-    "modifier of what is protected": (
-        "model M Part part(hidden=4.0); end M;",
-        r"modifier of 'hidden', which is protected in Lib\.Part",
-    ),
-    "two modifiers of a name": (
-        "model M Part part(k=1.0, k=2.0); end M;",
-        "second modifier of 'k'",
-    ),
-    "two elements of a name": (
-        "model M Part part; Gain part(u=1.0); end M;",
-        r"second element 'part' of Lib\.M",
-    ),
-    "redeclaration of nothing": (
-        "model M Part part(redeclare Gain solt); end M;",
-        r"modifier of 'solt', but Lib\.Part has no such element \(closest: 'slot'\)",
-    ),
-    "redeclaration of what is not replaceable": (
-        "model M Part part(redeclare Gain firm); end M;",
-        "redeclaration of 'firm', which is not replaceable",
-    ),
-    "second redeclaration": (
-        "model N = Part(redeclare Gain slot); model M N n(redeclare Gain slot); end M;",
-        "redeclaration of 'slot', which is not replaceable",
-    ),
-    "redeclaration by what does not fit": (
-        "model M Part part(redeclare Other slot); end M;",
-        r"Lib\.Other for 'slot', without Real y; expected a class that has all that Lib\.Slot has",
-    ),
-    "redeclaration by what is not there": (
-        "model M Part part(redeclare Gane slot); end M;",
-        r"no class 'Gane' \(closest: 'Gain'\)",
-    ),
-    "redeclaration of a class": (
-        "model M Holder holder(redeclare model Law = Other); end M;",
-        r"Lib\.Other for 'Law', without Real y",
-    ),
-    "redeclaration of a class that is not replaceable": (
-        "model M Holder holder(redeclare model Fixed = Gain); end M;",
-        "redeclaration of 'Fixed', which is not replaceable",
-    ),
-    "default that does not fit": (
-        "model M replaceable Other o(u=1.0) constrainedby Slot; end M;",
-        r"Lib\.Other for 'o', without Real y",
-    ),
-    "class": ("model M Prat part; end M;", r"no class 'Prat' \(closest: 'Part'\)"),
-    "base": ("model M extends Prat; end M;", r"no class 'Prat' \(closest: 'Part'\)"),
-    "class that contains itself": (
-        "model N M m; end N; model M N n; end M;",
-        r"Lib\.M, which has a component of its own class",
-    ),
-    "connector": (
-        "model M Part a; Part b; equation for i in 1:2 loop connect(a.a, b.aa); end for; end M;",
-        r"connect with 'b\.aa', but Lib\.Part has no 'aa'",
-    ),
-    "connector of nothing": (
-        "model M Part a; equation connect(b[1].a, a.a); end M;",
-        r"connect with 'b\.a', but Lib\.M has no 'b'",
-    ),
-    "connector that is protected": (
-        "model M Part a; Part b; equation connect(a.a, b.inside); end M;",
-        r"connect with 'b\.inside', but 'inside' is protected in Lib\.Part",
-    ),
-    "connectors of two kinds": (
-        "model M Part a; Part b; equation connect(a.a, b.p); end M;",
-        r"connection of a\.a and b\.p, which are Lib\.Flange and Lib\.Pin",
-    ),
-    "connection of no connector": (
-        "model M Part a; Part b; equation connect(a, b); end M;",
-        r"connect with 'a', which is a Lib\.Part",
-    ),
-    "outer without inner": (
-        "model N Falls falls[2]; end N; model M N n; end M;",
-        r"'outer world' in Lib\.Falls, which Lib\.M has; expected an 'inner world'",
-    ),
-}
+WRONG = tomllib.loads((ROOT / "tests" / "wrong" / "modelica.toml").read_text())
 
 
-@pytest.mark.parametrize(("text", "message"), WRONG.values(), ids=WRONG)
-def test_what_is_not_so_is_refused_with_its_line(text, message, tmp_path):
-    with pytest.raises(InputError, match=message) as refused:
-        check(read_library(write(tmp_path, text)), "Lib.M")
+@pytest.mark.parametrize("wrong", WRONG.values(), ids=WRONG)
+def test_what_is_not_so_is_refused_with_its_line(wrong, tmp_path):
+    with pytest.raises(InputError, match=wrong["message"]) as refused:
+        check(read_library(write(tmp_path, wrong["text"])), "Lib.M")
     assert re.search(r"Lib/package\.mo:\d+$", refused.value.where)
 
 

@@ -1,5 +1,8 @@
 """Machines whose recordings others have published: a module for each set, and its plugin here."""
 
+import tomllib
+from pathlib import Path
+
 from workbench.system.plugins import Plugin
 
 
@@ -15,3 +18,10 @@ LEAKING_CHAMBER = _set_of("leaking_chamber")
 POSITIONING_STAGE = _set_of("positioning_stage")
 SEAL_FRICTION = _set_of("seal_friction")
 SERVO_PENDULUM = _set_of("servo_pendulum")
+
+
+def checksums(module: str) -> dict[str, list[str]]:
+    """SHA-256 of the files of a set, by recording, as `checksums.toml` has them."""
+    text = Path(__file__).with_name("checksums.toml").read_text(encoding="utf-8")
+    listed: dict[str, list[str]] = tomllib.loads(text)[module]
+    return listed

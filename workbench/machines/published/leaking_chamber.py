@@ -12,33 +12,12 @@ from pathlib import Path
 
 import numpy as np
 
+from workbench.machines.published import checksums
 from workbench.machines.published.pneumatic_cylinder import LICENCE, SOURCE, Columns, layouts
 from workbench.recordings.datasets import PublishedRecording, PublishedSet
 
 _BETWEEN = 2.0  # bar: what is above is fitted, what is below is held out
 _CLOSED = 0.05  # bar from a sample to the next: as long as air comes in, pressure moves by less
-_PUBLISHED = {  # SHA-256: by the publisher, in folders
-    "Aluminium": (
-        "5580b794ef9c83fa8123537de5f9dec87df0f0e4631f8a0f8294ddff2debb667",
-        "31288eecacd270cde69c6c9184c207c0c50869d1de9a7e961788f6a511df1fe0",
-    ),
-    "Formlabs": (
-        "a5314aac7deff4828ee2a3899d159f1f47172dc2ac96cf0354aa5f488a50a6b8",
-        "cafd72e55725d5756d2adf471580837128567e5540064e4333002fa3ab5d4906",
-    ),
-    "Prusa": (
-        "8296b3f1b7b8e80dffb23623be4063322c19e8f61fa955931ef305b56b722e7c",
-        "2914ccd0b4ac5e7fcff2185393c6c2f7ec7676f0cb9d6098a10d403964eb46ae",
-    ),
-    "Ultimaker_015": (
-        "b8991631f490eaa424c655c919f57050aa3c4e8d3cc5f36d6ca20780ba1f27d3",
-        "016eadff37c9ac754094de7c12025d4bbe0432fa9f90b78a6cf624a524b494ad",
-    ),
-    "Ultimaker_020": (
-        "cdcad454a471ed2a098c81e584f9419350ec19343f0b1dc17b4c59d6b5f4e6a5",
-        "9a053a030b8e0674991e6e3aa599f5124e56d370fb13ca26c36dbc8b072d5fb8",
-    ),
-}
 
 
 def _recordings(name: str, columns: Columns, file: str) -> list[PublishedRecording]:
@@ -95,7 +74,7 @@ PUBLISHED = PublishedSet(
             "chamber",
             ("time", "pressure"),
         ),
-        _PUBLISHED,
+        checksums("leaking_chamber"),
         _recordings,
     ),
 )

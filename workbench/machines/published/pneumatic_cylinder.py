@@ -20,7 +20,7 @@ Columns = Mapping[str, Vector]
 def layouts(
     own: tuple[str, Callable[[Path], Columns]],
     folders: tuple[str, str, Sequence[str]],
-    files: Mapping[str, tuple[str, str]],
+    files: Mapping[str, Sequence[str]],
     recordings: Callable[[str, Columns, str], Sequence[PublishedRecording]],
 ) -> tuple[FolderLayout, ...]:
     """The publisher's own files, and folders with a `measured.csv` each, in a folder or beside.

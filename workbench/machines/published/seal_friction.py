@@ -13,46 +13,13 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from workbench.arrays import Vector
+from workbench.machines.published import checksums
 from workbench.machines.published.pneumatic_cylinder import LICENCE, SOURCE, Columns, layouts
 from workbench.recordings.datasets import PublishedRecording, PublishedSet
 
 _HELD_OUT = "_5bar"
 _DROPPED = 15  # samples at the start, as the publisher does
 _WINDOW = 11  # samples, 0.1 s: noise of 0.01 mm becomes one of 0.1 mm/s
-_PUBLISHED = {  # SHA-256: by the publisher, in folders
-    "NAPN_1bar": (
-        "008a31e1007d67b1f0ebd9e6772cfe9e58a65667148e41ba29466deabb5551b9",
-        "95c4c58a23dbcf7c19bcdd0702c87089ce0ae3c047cbe9e8ba1fa8f0c110a36b",
-    ),
-    "NAPN_3bar": (
-        "87a0e11e56e8824203f1a2cb161f45a62ece2b95c1c5ad7712218a74035909f2",
-        "1e4a070f1e54d4861d29bf6fdcd55cf115475a5b71ac6e485670080e059aa6d4",
-    ),
-    "NAPN_5bar": (
-        "3bf6ec120f435a0e3feee07b4978db80f3d63208974e7c6749e0822270d9618b",
-        "0a23c58e1412e5eb02ae60a53aae3f6224608332419f7fa50fea01ac477be137",
-    ),
-    "NAPN_7bar": (
-        "fae7d01899d6111f32b726ab869c89128c572393fb40cc16df9553160c8f25a9",
-        "129e3029346f388134713915ec0d87f9a5858436a4ce251de3c1488e3d0b9d29",
-    ),
-    "O-ring_1bar": (
-        "b795d01ad801c0a4222ca0bd4fa561dbbb7a3c87546b0e2cbdc13efc2c9c874b",
-        "b72f8823a968ea01941599b19d085ae751febf0d4ef3b2ebf88d5e2887e34d9d",
-    ),
-    "O-ring_3bar": (
-        "d78d5575b6d9dcf57453107bea96b6dd8d59944a9f2df57f448621025115dade",
-        "105e4c95909fc7271d85e470c22fc993379a2f13795383f36a0dc6946e2f704f",
-    ),
-    "O-ring_5bar": (
-        "163b266a3ae723b4d3d8be90ad50f3caca390fa5e76ff13a7c5287a1c8502755",
-        "f56d6144471cd694db1c1ccef4dfda69c3c1a9d7a83d433a044f2d2e4a8d0abb",
-    ),
-    "O-ring_7bar": (
-        "e3814abff4dae2bfa70a53d925a5990699dc65e5a6472b42d1dad01293de7a35",
-        "b079e8dba7d94fd17b4a448e47fd90f453166baddeb9d33605987b5a7f2d0033",
-    ),
-}
 
 
 def rate(time: Vector, stroke: Vector) -> Vector:
@@ -129,7 +96,7 @@ PUBLISHED = PublishedSet(
             "friction",
             ("time", "stroke", "pressure", "force"),
         ),
-        _PUBLISHED,
+        checksums("seal_friction"),
         _recordings,
     ),
 )
