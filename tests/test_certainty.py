@@ -4,6 +4,7 @@ A gauge whose law is known in closed form: a curve that bends, and a ripple that
 places.
 """
 
+import math
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -17,9 +18,11 @@ from workbench import case_from_frame
 from workbench.diagnosis import build_everything, read_effects
 from workbench.diagnosis.data.motion import ModelSource
 from workbench.diagnosis.inference.certainty import assess
+from workbench.diagnosis.inference.discrepancy import autocovariance, share_by_form
 from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.search import FittedModel
 from workbench.diagnosis.inference.selection import anew
+from workbench.diagnosis.inference.verdict import Interval
 from workbench.diagnosis.simulation.residual_model import ResidualModel
 from workbench.models.modelica import read_library
 
@@ -121,3 +124,55 @@ def test_a_fit_that_sits_in_a_wrong_minimum_is_told(fits):
     certainty = assess(fit, wrong, lambda _: None)
     assert certainty.lower > 100.0
     assert "sizes may be others" in certainty.sentence
+
+
+# --- errors that go on in time, against closed forms ---
+
+
+def test_autocovariance_is_that_of_a_process_of_first_order():
+    """Reference: a^k/(1 - a^2) at lag k. Of 1e5 samples it is known to some 2 %."""
+    rng, a = np.random.default_rng(3), 0.8
+    errors = [np.zeros(2000) for _ in range(50)]
+    for own in errors:
+        for k, noise in enumerate(rng.standard_normal(own.size - 1), start=1):
+            own[k] = a * own[k - 1] + noise
+    found = autocovariance(errors)
+    assert_allclose(found[:5], a ** np.arange(5) / (1.0 - a**2), rtol=0.06)
+
+
+def test_a_size_is_as_unsure_as_what_remains_of_its_effect():
+    """Student's t of two degrees of freedom: 4.303, over 1.96 of the band."""
+    assert share_by_form(4.0, 400.0) == pytest.approx(0.1 * 4.303 / 1.96, rel=1e-3)
+    assert share_by_form(-0.1, 400.0) == 0.0
+
+
+# --- sizes at their bounds ---
+
+
+ESTIMATE = Interval(0.01, 0.009, 0.011, "N.m")
+GREATEST = Interval(0.0133, 0.012, math.inf, "N.m", "greatest")
+BETTER = Interval(0.0133, 0.012, math.inf, "N.m", "greatest", beyond=0.015)
+ALONE = Interval(0.0133, 0.012, math.inf, "N.m", "greatest", beyond=0.015, alone=True)
+LEAST = Interval(-0.2, -math.inf, -0.18, "1", "least")
+
+
+@pytest.mark.parametrize(
+    ("size", "text"),
+    [
+        (ESTIMATE, "0.01 N.m (95 %: 0.009 to 0.011)"),
+        (GREATEST, "at its limit of 0.0133 N.m, which is no estimate: larger may fit better"),
+        (LEAST, "at its limit of -20 %, which is no estimate: smaller may fit better"),
+        (BETTER, "no estimate: 0.015 N.m, beyond it, fits better"),
+        (ALONE, "no estimate: 0.015 N.m, beyond it, fits better, alone"),
+    ],
+)
+def test_a_size_at_its_bound_is_no_estimate(size, text):
+    assert size.text.endswith(text)
+
+
+def test_an_interval_is_open_to_the_side_of_a_bound():
+    """JSON has no infinity."""
+    assert (GREATEST.to_dict()["low"], GREATEST.to_dict()["high"]) == (0.012, None)
+    assert (LEAST.to_dict()["low"], LEAST.to_dict()["high"]) == (None, -0.18)
+    assert GREATEST.to_dict()["limit"] == "greatest"
+    assert ESTIMATE.to_dict()["high"] == 0.011

@@ -12,30 +12,46 @@ from numpy.testing import assert_allclose
 from scipy.ndimage import uniform_filter1d
 from scipy.stats import chi2, multivariate_normal
 
+import workbench as wb
 from workbench.__main__ import main
 from workbench.arrays import Matrix, Vector
-from workbench.diagnosis import Errors, build_everything, given_values, read_effects
+from workbench.diagnosis import Errors, build_everything, choose, given_values, read_effects
 from workbench.diagnosis.data.motion import ModelSource
-from workbench.diagnosis.effects.extension import variables
+from workbench.diagnosis.effects.extension import ExtendedModel, build, variables
 from workbench.diagnosis.effects.slots import read_slots
 from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.laws.forms import SIGNED, ClosedForm, candidates
 from workbench.diagnosis.laws.outcome import _falls, worse_everywhere
 from workbench.diagnosis.laws.periods import strongest_period
-from workbench.diagnosis.laws.places import Carrier, Law, LawInfluence, places, turning
+from workbench.diagnosis.laws.places import (
+    CLOCK,
+    Carrier,
+    Law,
+    LawInfluence,
+    Place,
+    laws,
+    places,
+    turning,
+)
+from workbench.diagnosis.laws.scan import watching
 from workbench.diagnosis.laws.splines import COEFFICIENTS, Knots, kernel, smoothest
+from workbench.diagnosis.laws.writing import extended_library
+from workbench.diagnosis.problem import Problem
 from workbench.diagnosis.simulation.prediction import Variation
 from workbench.diagnosis.simulation.residual_model import ResidualModel
-from workbench.models.modelica import read_library
-from workbench.recordings.case import read_cases
-from workbench.studies.power.left_out import SHARES, summarise_left_out
+from workbench.machines.wheelset.rig import CONSTANT_PADS, SCENARIOS, plant
+from workbench.models.fmu import FMU
+from workbench.models.modelica import Library, read_library
+from workbench.recordings.case import Case, read_case, read_cases
+from workbench.studies.power.left_out import SHARES, function_error, summarise_left_out
 from workbench.studies.power.report import left_out_check
 from workbench.system.registry import load_system
-from workbench.system.system import OBSERVER
+from workbench.system.system import OBSERVER, System
 from workbench.system.template import AREA, OUTLET, write_system
 
 from .built import MACHINES
 from .page_rules import check_page
+from .recordings import record
 
 THRESHOLD, RATE = 1.2, 3e-3  # [m], [m2/s] of a leak that begins at a level
 PERIOD = 1.885  # [m] of way
@@ -491,3 +507,144 @@ def test_the_overflow_of_a_real_tank_is_proposed_as_a_threshold_of_its_level(
     told = json.loads((tmp_path / "proposed" / "proposal.json").read_text())
     thresholds = [law for law in told["laws"] if "threshold" in law["parameters"]]
     assert "upperRim" in {threshold["slot"] for threshold in thresholds}
+
+
+# --- a law that begins with an input, on the virtual rig ---
+
+
+def stops(system: System, seed: int, folder: Path) -> list[Case]:
+    """Three dry stops with pads that have lost 8 % of their friction at first contact."""
+    planted = plant(CONSTANT_PADS, ["bedding_in=0.08"])
+    for name in ("02_dry_100_2.7", "03_dry_120_3.6", "05_dry_120_2.7_rev"):
+        record(SCENARIOS[name], seed, planted, folder / name)
+    return [read_case(path, system) for path in sorted(folder.iterdir())]
+
+
+@pytest.mark.long
+def test_pads_that_bed_in_are_told_by_the_time_since_they_touch(system, tmp_path):
+    """The catalogue knows the wheel's load alone. No inertia may mimic it, by seven times its size.
+
+    What the law makes of the friction is within 15 % of the range of what the cause does, on stops
+    that neither was fitted to.
+    """
+    cases = stops(system, 1, tmp_path / "stops")
+    quiet = {"workers": 2, "report": lambda _: None}
+    before = wb.diagnose(system, cases, effects=["WheelLoad"], out=tmp_path / "a", **quiet)
+    assert before.diagnosis.verdict == "unexplained"
+    found = wb.propose(before, out=tmp_path / "b", **quiet)
+    (law,) = found.laws
+    form = found.forms[law.effect.name]
+    assert form.law.influence is not None
+    assert (form.law.influence.kind, form.form.name) == ("since", "Saturation")
+    slots = {form.law.place.slot.name for form in found.forms.values()}
+    assert "padFriction" in slots
+    assert slots <= {
+        "padFriction",
+        "actuation",
+        "cylinder",
+    }  # what presses is as good as what grips
+    known = wb.diagnose(system, cases, effects=["BeddingIn"], out=tmp_path / "c", **quiet)
+    library = read_library(system.library)
+    effects = read_effects(library, system.models[OBSERVER].name)
+    (bedding,) = choose(["BeddingIn"], effects)
+    fresh = stops(system, 2, tmp_path / "fresh")
+    problem = Problem(system, fresh, library, effects)
+    error = function_error(problem, known, found, bedding)
+    if form.law.place.slot.name == "padFriction":
+        assert error is not None
+        assert error < 0.15
+    else:
+        assert error is None
+
+
+@pytest.mark.long
+def test_friction_that_falls_with_deceleration_is_no_sum_of_known_causes(
+    system: System, tmp_path: Path
+) -> None:
+    """No catalogue has it; bedding in, a return spring and a film bend to it down to 1.26."""
+    planted = plant(CONSTANT_PADS, ["friction_deceleration=-0.04"])
+    for name in list(SCENARIOS)[:6]:
+        record(SCENARIOS[name], 1, planted, tmp_path / "stops" / name)
+    cases = [read_case(path, system) for path in sorted((tmp_path / "stops").iterdir())]
+    quiet = {"workers": 2, "report": lambda _: None}
+    found = wb.diagnose(system, cases, out=tmp_path / "out", **quiet)
+    assert found.diagnosis.verdict == "unexplained"
+    assert any("is at its bound" in why for near in found.diagnosis.nearest for why in near.reasons)
+
+
+# --- laws of heat that is kept, or lost again ---
+
+
+LONGEST = 40.0  # [s]
+
+
+@pytest.fixture(scope="module")
+def library(system) -> Library:
+    return read_library(system.library)
+
+
+@pytest.fixture(scope="module")
+def pads(library, system) -> Place:
+    """Where the pads' friction coefficient acts."""
+    base = system.models[OBSERVER].name
+    every = places(library, base, read_slots(library, base))
+    return next(one for one in every if one.slot.name == "padFriction")
+
+
+def braking(pads: Place) -> tuple[Vector, dict[str, Vector]]:
+    """Times and what is watched at the pads, in a stop."""
+    time = np.linspace(0.0, LONGEST, 401)
+    courses = {"Fperp": 3e4 * (1.0 - np.exp(-time)), "v": 20.0 - 0.5 * time}
+    inputs = {variable.name: courses.get(variable.name, 0.0 * time) for variable in pads.inputs}
+    watched = {**inputs, "mu": 0.35 + 0.0 * time}
+    return time, {f"padFriction.{name}": course for name, course in watched.items()}
+
+
+def of_heat(pads: Place) -> dict[float, ClosedForm]:
+    """Laws in proportion to heat, that multiply the coefficient, by time constant [s]."""
+    found = {}
+    for law in laws(pads, [braking(pads)], 0.25):
+        if law.influence is not None and law.influence.kind == "work":
+            first = next(candidates(law, Knots(0.0, 1e7), 1.0))
+            found.setdefault(law.influence.span, first)
+    return found
+
+
+def test_friction_may_depend_on_the_heat_it_makes_kept_or_lost(pads):
+    """All of its power: force, speed and the coefficient itself."""
+    found = of_heat(pads)
+    # From heat that a stop keeps to heat of which most is gone at its end.
+    assert set(found) == {0.0, 10.0 * LONGEST, 3.0 * LONGEST, LONGEST}
+    for one in found.values():
+        assert [part.name for part in one.law.influence.factors] == ["Fperp", "v", "mu"]
+
+
+@pytest.mark.parametrize("span", [0.0, LONGEST])
+def test_the_class_of_a_law_holds_the_heat_that_was_looked_at(
+    span, library, pads, system, dry_case, tmp_path
+):
+    """What the model integrates, beside the integral over samples of what was watched."""
+    base = system.models[OBSERVER].name
+    law = of_heat(pads)[span]
+    extended = extended_library(library, [law.written], tmp_path)
+    (own,) = [effect for effect in read_effects(extended, base) if effect.name == law.written.name]
+    names = [f"padFriction.{name}" for name in ("Fperp", "v", "mu")]
+    text = watching(ExtendedModel(extended, base, "Heat", [own], "A law of heat").source(), names)
+    path = tmp_path / "Heat.fmu"
+    build(extended, "Heat", text, path, every_platform=False)
+    with FMU(path) as fmu:
+        (clock,) = (name for name in fmu.states if name.endswith(CLOCK))
+    with ResidualModel(
+        ModelSource(path, system, given_values(path, system)), [dry_case]
+    ) as simulations:
+        unknowns = Fit(simulations, [own]).unknowns
+        points = unknowns.values(unknowns.start())
+        (table,) = simulations.along(points, ["watched0", "watched1", "watched2", clock])
+        (recording,) = simulations.recordings
+    moving = slice(0, int(np.flatnonzero(recording.told)[-1]))
+    *seen, held = table[moving].T
+    course = dict(zip(names, seen, strict=True))
+    heat = law.law.influence.course(pads, course, recording.time[moving])
+    assert heat.max() > 1e6  # of a stop from 120 km/h; [J]
+    # The trapezoidal rule over 5 ms, where the pressure rises in some tenths of a second.
+    assert_allclose(held, heat, rtol=0.0, atol=1e-4 * heat.max())
