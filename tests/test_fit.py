@@ -15,7 +15,7 @@ from workbench.__main__ import main
 from workbench.errors import InputError
 from workbench.models.description import read_description
 from workbench.recordings.case import Case
-from workbench.studies.fit.files import write_fmu
+from workbench.studies.fit.report import write_fmu
 from workbench.system.system import System
 
 from .built import build_text, machine_file, write_case

@@ -36,7 +36,7 @@ from workbench.studies.design.candidates import (
     other_settings,
     settings_fraction,
 )
-from workbench.studies.design.separation import discrimination_chance, precision, refitted
+from workbench.studies.design.prediction import discrimination_chance, precision, refitted
 from workbench.studies.power.diagnosing import distance
 from workbench.system.experiments import (
     RELEASE,

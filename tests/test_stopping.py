@@ -33,8 +33,7 @@ from workbench.studies.distance.forecast import (
 )
 from workbench.studies.distance.outcome import Forecast
 from workbench.studies.distance.past import MachineLevels
-from workbench.studies.distance.plain import quantile
-from workbench.studies.distance.rare_events import Tail, descend, plain_runs
+from workbench.studies.distance.rare_events import Tail, descend, plain_runs, quantile
 from workbench.studies.distance.recorded import Stop, asked_stop, read_stop
 from workbench.studies.distance.standard import (
     StopConditions,

@@ -20,7 +20,7 @@ from workbench.observers.trust import Contradiction
 from workbench.pages.answer import Measure
 from workbench.recordings.case import UNKNOWN
 from workbench.studies.distance.outcome import SafetyLevel
-from workbench.studies.distance.plain import PlainLevel
+from workbench.studies.distance.rare_events import PlainLevel
 from workbench.studies.fit.outcome import LOSSES, FittedValue
 from workbench.studies.power import following, left_out
 from workbench.studies.power.campaign import EffectChance, EffectLimit

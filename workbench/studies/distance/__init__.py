@@ -25,8 +25,7 @@ from workbench.studies.distance.forecast import (
 )
 from workbench.studies.distance.outcome import Distance, Forecast, PastStop, Safety
 from workbench.studies.distance.past import PastFit, fit_past_stops, places
-from workbench.studies.distance.plain import PlainSampling
-from workbench.studies.distance.rare_events import Tail
+from workbench.studies.distance.rare_events import PlainSampling, Tail
 from workbench.studies.distance.recorded import RecordedStop, Stop, asked_stop, read_stop
 from workbench.studies.distance.standard import NominalRate
 from workbench.system.stopping import SPEED

@@ -12,8 +12,7 @@ import pandas as pd
 from workbench.arrays import Vector
 from workbench.pages.figures import LIGHT, styled
 from workbench.studies.distance.forecast import stopping_of
-from workbench.studies.distance.plain import PlainSampling
-from workbench.studies.distance.rare_events import Tail, plain_runs
+from workbench.studies.distance.rare_events import PlainSampling, Tail, plain_runs
 from workbench.studies.distance.recorded import RecordedStop, Stop
 from workbench.studies.distance.standard import (
     NominalRate,

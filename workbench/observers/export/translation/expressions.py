@@ -2,6 +2,7 @@
 
 import ast
 import builtins
+import math
 import operator
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
@@ -11,8 +12,6 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from workbench.errors import InputError
-from workbench.observers.export.translation.elements import element, sizes_of, view
-from workbench.observers.export.translation.mathematics import of_numbers
 from workbench.observers.export.translation.values import (
     BOOL,
     DOUBLE,
@@ -28,6 +27,178 @@ from workbench.observers.export.translation.values import (
     field,
     number,
 )
+
+# --- functions of numbers ---
+
+
+# By name of the function of numbers in C; of all numpy and Python have under a name.
+_REAL = {
+    "sqrt": (np.sqrt, math.sqrt),
+    "exp": (np.exp, math.exp),
+    "log": (np.log, math.log),
+    "sin": (np.sin, math.sin),
+    "cos": (np.cos, math.cos),
+    "tan": (np.tan, math.tan),
+    "asin": (np.arcsin, math.asin),
+    "acos": (np.arccos, math.acos),
+    "atan": (np.arctan, math.atan),
+    "atan2": (np.arctan2, math.atan2),
+    "sinh": (np.sinh, math.sinh),
+    "cosh": (np.cosh, math.cosh),
+    "tanh": (np.tanh, math.tanh),
+    "hypot": (np.hypot, math.hypot),
+    "floor": (np.floor,),
+    "ceil": (np.ceil,),
+    "fabs": (np.abs, np.fabs, math.fabs),
+}
+_TRUTH = {
+    "isnan": (np.isnan, math.isnan),
+    "isinf": (np.isinf, math.isinf),
+    "isfinite": (np.isfinite, math.isfinite),
+}
+_ONE, _TWO = 1, 2
+
+
+def of_numbers(function: Any, given: Sequence[Value]) -> Value | None:
+    """A function of numbers; None if it is another one."""
+    if function is builtins.len and len(given) == _ONE and isinstance(given[0].type, Array):
+        return given[0].sizes[0]
+    if not given or not all(isinstance(argument.type, Number) for argument in given):
+        return None
+    listed = ", ".join(argument.text for argument in given)
+    for table, kind in ((_REAL, DOUBLE), (_TRUTH, BOOL)):
+        for name, functions in table.items():
+            if any(function is known for known in functions):
+                count = _TWO if name in ("atan2", "hypot") else _ONE
+                return (
+                    expression(kind, f"{name}({listed})", *given) if len(given) == count else None
+                )
+    return _builtin(function, given)
+
+
+def _builtin(function: Any, given: Sequence[Value]) -> Value | None:
+    first = given[0]
+    if function is builtins.min or function is builtins.max:
+        return _extreme("python_least" if function is builtins.min else "python_most", given)
+    if len(given) > _ONE:
+        return None
+    if function is builtins.abs:
+        name = "fabs" if first.kind == DOUBLE else "abs"
+        return expression(
+            common(first.kind, INT), f"{name}({first.text})", first, natural=first.kind != DOUBLE
+        )
+    if function is builtins.float:
+        return expression(DOUBLE, f"(double){first.operand}", first)
+    if function is builtins.int:
+        return expression(INT, f"(int){first.operand}", first, natural=first.natural)
+    if function is builtins.bool:
+        return expression(BOOL, f"{first.operand} != 0", first)
+    return None
+
+
+def _extreme(name: str, given: Sequence[Value]) -> Value | None:
+    """The least or largest, the first of equal ones, by comparisons in Python's order."""
+    if len(given) < _TWO:
+        return None
+    result = given[0]
+    for argument in given[1:]:
+        kind = common(common(result.kind, argument.kind), INT)
+        of = name if kind == DOUBLE else f"{name}_int"
+        natural = kind == INT and result.natural and argument.natural
+        result = expression(
+            kind, f"{of}({result.text}, {argument.text})", result, argument, natural=natural
+        )
+    return result
+
+
+# --- elements, rows and pieces of arrays ---
+
+
+Piece: TypeAlias = tuple[Value | None, Value | None]  # first element, and that after the last one
+
+
+def sizes_of(array: Value) -> tuple[Value, ...]:
+    """Sizes of an array, for each axis."""
+    assert isinstance(array.type, Array)
+    return array.sizes
+
+
+def element(index: Value, size: Value) -> str:
+    """An index as C takes it: from the end where Python's is negative."""
+    if index.known is not None:
+        known = int(index.known)
+        if known < 0 and size.known is not None:
+            return str(known + int(size.known))
+        if known >= 0:
+            return str(known)
+    return index.text if index.natural else f"python_index({index.text}, {size.text})"
+
+
+def view(array: Value, indices: Sequence[Value | Piece]) -> Value:
+    """An element of an array, or the part that some indices leave."""
+    type_ = array.type
+    assert isinstance(type_, Array)
+    terms = [array.offset] if array.offset else []
+    sizes: list[Value] = []
+    strides: list[int] = []
+    for axis, stride in enumerate(type_.strides):
+        size = array.sizes[axis]
+        if axis >= len(indices):
+            sizes.append(size)
+            strides.append(stride)
+            continue
+        index = indices[axis]
+        if isinstance(index, tuple):
+            first, size = _piece(index, size)
+            sizes.append(size)
+            strides.append(stride)
+        else:
+            first = element(index, size)
+        if first != "0":
+            terms.append(_times(first, stride))
+    offset = " + ".join(terms)
+    if len(terms) == 1 and offset.startswith("("):
+        offset = offset[1:-1]
+    if not sizes:
+        return Value(Number(type_.kind), f"{array.text}[{offset or '0'}]", reads=not type_.constant)
+    shape = tuple(int(size.known) if size.known is not None else None for size in sizes)
+    left = Array(type_.kind, shape, tuple(strides), type_.constant)
+    return Value(left, array.text, offset=offset, sizes=tuple(sizes))
+
+
+def _times(index: str, stride: int) -> str:
+    if stride == 1:
+        return index if index.isidentifier() or index.isdigit() else f"({index})"
+    if index.isdigit():
+        return str(int(index) * stride)
+    return f"{stride} * {index}" if index.isidentifier() else f"{stride} * ({index})"
+
+
+def _piece(piece: Piece, size: Value) -> tuple[str, Value]:
+    """First element of a slice, and its size."""
+    first, last = (
+        _end(end, size, instead) for end, instead in zip(piece, (number(0), size), strict=True)
+    )
+    if first.known is not None and last.known is not None:
+        return first.text, number(max(int(last.known - first.known), 0))
+    if first.known == 0:
+        return "0", last
+    return first.text, expression(INT, f"python_length({first.text}, {last.text})", natural=True)
+
+
+def _end(end: Value | None, size: Value, instead: Value) -> Value:
+    if end is None:
+        return instead
+    if end.known is not None and size.known is not None:
+        known, count = int(end.known), int(size.known)
+        return number(min(max(known + count if known < 0 else known, 0), count))
+    if end.known == 0:
+        return end
+    return expression(INT, f"python_end({end.text}, {size.text})", natural=True)
+
+
+# --- expressions ---
+
 
 Found: TypeAlias = Value | tuple[Value, ...]
 
