@@ -27,7 +27,7 @@ def write(folder: Path, text: str) -> Path:
 
 
 # Model M, and what is said of it.
-WRONG = tomllib.loads((ROOT / "tests" / "wrong" / "modelica.toml").read_text())
+WRONG = tomllib.loads(machine_file("strict/wrong.toml"))
 
 
 @pytest.mark.parametrize("wrong", WRONG.values(), ids=WRONG)
@@ -37,45 +37,7 @@ def test_what_is_not_so_is_refused_with_its_line(wrong, tmp_path):
     assert re.search(r"Lib/package\.mo:\d+$", refused.value.where)
 
 
-RIGHT = {
-    "attributes of every kind": (
-        "model M parameter Integer n(min=1, max=3) = 2; parameter State s(start=State.open);"
-        ' Real x(quantity="Length", unit="m", displayUnit="mm", min=0, max=1, start=0, fixed=true,'
-        " nominal=1, unbounded=false, stateSelect=StateSelect.prefer); parameter Boolean b(start="
-        'true) = true; parameter String t(start="") = "a"; equation der(x) = n; end M;'
-    ),
-    "inherited elements, two classes up": (
-        "model N extends Part(k=2.0); end N; model M extends N(slot(y(min=0.0)), k=3.0); end M;"
-    ),
-    "protected elements of a base": "model M extends Part(hidden(min=0.0)); end M;",
-    "arrays": "model M Part part[2](each k=2.0, x(each start=0.0), slot(u={1.0, 2.0})); end M;",
-    "elements of what is redeclared": (
-        "model N = Part(redeclare replaceable Gain slot); model M N n(slot(gain=2.0)); "
-        "N o(redeclare Named slot(label(min=0.0))); end M;"
-    ),
-    "elements of a redeclared class": (
-        "model M Holder a(redeclare model Law = Gain(gain=3.0), law(gain=4.0)); end M;"
-    ),
-    "a stand-in that extends nothing": (
-        "model Alike input Real u; output Real y; equation y = u; end Alike;"
-        " model M Part part(redeclare Alike slot); end M;"
-    ),
-    "connectors of the same variables": (
-        "connector Alike Real s; flow Real f; end Alike; model N Alike c; equation c.s = 1.0;"
-        " end N; model M Part part[2]; N n; equation for i in 1:2 loop connect(part[i].a, n.c); "
-        "end for; if true then connect(part[1].p, part[2].p); end if; end M;"
-    ),
-    "connectors of a predefined type": (
-        "model N Signal u; end N; model M Signal u; N n; equation connect(u, n.u); end M;"
-    ),
-    "what an expandable connector gets": (
-        "model M Bus bus; Signal u; equation connect(bus.speed, u); end M;"
-    ),
-    "an inner further out": (
-        "model N Falls falls; end N; model M N n; inner World world(g=1.6); end M;"
-    ),
-    "what is wrong in another model": "model M Part part; end M; model N Part part(kk=1.0); end N;",
-}
+RIGHT = tomllib.loads(machine_file("strict/right.toml"))
 
 
 @pytest.mark.parametrize("text", RIGHT.values(), ids=RIGHT)

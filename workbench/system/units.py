@@ -4,6 +4,7 @@ import math
 import re
 from collections.abc import Sequence
 from functools import cache
+from pathlib import Path
 from tokenize import TokenError
 
 import pint
@@ -20,46 +21,6 @@ _EXAMPLES = {
     "m": "m or mm",
     "K": "K",
 }
-
-# Angles have a dimension of their own here, so that Hz and 1/s are not taken for rad/s.
-_DEFINITIONS = f"""\
-micro- = 1e-6 = \u00b5- = \u03bc- = u-
-milli- = 1e-3 = m-
-centi- = 1e-2 = c-
-deci- = 1e-1 = d-
-deca- = 1e1 = da-
-hecto- = 1e2 = h-
-kilo- = 1e3 = k-
-mega- = 1e6 = M-
-second = [time] = s
-minute = 60 * second = min
-hour = 3600 * second = h
-meter = [length] = m
-gram = [mass] = g
-newton = kilogram * meter / second ** 2 = N
-newton_meter = newton * meter = Nm
-pascal = newton / meter ** 2 = Pa
-bar = 1e5 * pascal
-radian = [angle] = rad
-degree = {math.pi!r} / 180 * radian = deg = °
-revolution = {2 * math.pi!r} * radian = rev
-rpm = revolution / minute
-hertz = 1 / second = Hz
-liter = 1e-3 * meter ** 3 = l = L
-tonne = 1000 * kilogram = t
-joule = newton * meter = J
-watt = joule / second = W
-ampere = [current] = A
-volt = watt / ampere = V
-ohm = volt / ampere = Ohm
-farad = ampere * second / volt = F
-henry = volt * second / ampere = H
-kelvin = [temperature] = K
-mole = [substance] = mol
-percent = 0.01
-permille = 1e-3
-"""
-
 
 # As Modelica and people write them: N.m, kg.m2, m3/s, J/(kg.K), W/m^2.
 _UNIT = re.compile(
@@ -175,7 +136,8 @@ def _pint_spelling(unit: str) -> str:
 @cache
 def _units() -> pint.UnitRegistry[float]:
     registry: pint.UnitRegistry[float] = pint.UnitRegistry(None)
-    registry.load_definitions(_DEFINITIONS.splitlines())
+    definitions = Path(__file__).with_name("units.txt").read_text(encoding="utf-8")
+    registry.load_definitions(definitions.splitlines())
     return registry
 
 
