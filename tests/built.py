@@ -24,9 +24,9 @@ def machine_file(path: str, **values: object) -> str:
     return Template(text).substitute(values) if values else text
 
 
-def machine(name: str) -> tuple[str, str]:
-    """Modelica library and system file of a machine for tests."""
-    return machine_file(f"{name}/package.mo"), machine_file(f"{name}/system.toml")
+def machine(name: str, **values: object) -> tuple[str, str]:
+    """Modelica library of a machine for tests, and its system file with these values."""
+    return machine_file(f"{name}/package.mo"), machine_file(f"{name}/system.toml", **values)
 
 
 def build_here(package: Path, model: str, path: Path, fmi: int = 2) -> None:

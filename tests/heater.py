@@ -13,16 +13,15 @@ from workbench.recordings.case import Case
 from workbench.runtime.engine import Engine
 from workbench.system.system import System
 
-from .built import declare, machine_file
+from .built import declare, machine
 
-LIBRARY = machine_file("heater/package.mo")
 NOISE = 0.05  # [K]
 
 
 def system(folder: Path, sensor: str = "", effect: str = "") -> System:
     """The heater, with more keys of its sensor, or with one more effect in Modelica."""
-    library = LIBRARY.replace("  model Draught", effect + "  model Draught")
-    return declare(folder, library, machine_file("heater/system.toml", sensor=sensor))
+    library, file = machine("heater", sensor=sensor)
+    return declare(folder, library.replace("  model Draught", effect + "  model Draught"), file)
 
 
 def cases(of: System, frames: Sequence[pd.DataFrame]) -> list[Case]:

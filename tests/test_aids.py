@@ -25,13 +25,12 @@ from workbench.system.system import System
 
 from .built import declare, machine
 
-STILL, STILL_SYSTEM = machine("still")
 TRAIN = load_system("train")
 
 
 @pytest.fixture(scope="module")
 def still(tmp_path_factory) -> System:
-    return declare(tmp_path_factory.mktemp("still"), STILL, STILL_SYSTEM, Level="Still.Level")
+    return declare(tmp_path_factory.mktemp("still"), *machine("still"), Level="Still.Level")
 
 
 @pytest.fixture(scope="module")

@@ -490,9 +490,6 @@ def test_what_co_simulation_alone_cannot_do_is_said_with_what_would_make_it_poss
             fmu.state_jacobian()
 
 
-ARRAYS = machine_file("arrays_fmu/modelDescription.xml")
-
-
 def test_the_open_loop_reads_and_sets_elements_of_arrays(tmp_path):
     """der(x[i]) = -k[i] x[i]: the second element with k[2] = 3 instead of 2."""
     headers = Path(fmpy.__file__).parent / "c-code"
@@ -508,7 +505,7 @@ def test_the_open_loop_reads_and_sets_elements_of_arrays(tmp_path):
     flags = ["-shared", "-fPIC", "-w", "-I", headers]
     subprocess.run([str(COMPILER), *flags, tmp_path / "model.c", "-o", library], check=True)
     with zipfile.ZipFile(tmp_path / "Arrays.fmu", "w") as archive:
-        archive.writestr("modelDescription.xml", ARRAYS)
+        archive.writestr("modelDescription.xml", machine_file("arrays_fmu/modelDescription.xml"))
         archive.write(library, f"binaries/{fmpy.platform_tuple}/{library.name}")
     (tmp_path / "system.toml").write_text(
         'title = "Arrays"\nsample_time = "0.5 s"\nmodels.observer = { fmu = "Arrays.fmu" }\n'

@@ -22,7 +22,7 @@ from workbench.recordings.case import Case
 from workbench.system.registry import open_model
 from workbench.system.system import System
 
-from .built import declare, machine, machine_file
+from .built import declare, machine
 
 NAMES = ["open_loop", "ekf", "mhe"]
 
@@ -30,7 +30,7 @@ NAMES = ["open_loop", "ekf", "mhe"]
 @pytest.fixture(scope="module")
 def vessel(tmp_path_factory) -> System:
     folder = tmp_path_factory.mktemp("vessel")
-    return declare(folder, VESSEL, SYSTEM)
+    return declare(folder, *machine("vessel"))
 
 
 def result_of(system: System, noise: float, seed: int, leak: float = 0.0) -> CaseResult:
@@ -131,14 +131,11 @@ def test_a_mean_shows_though_it_is_far_below_the_noise():
     assert test.value == pytest.approx(0.2 / deviations["y"][-1], rel=0.2)
 
 
-COIL = machine_file("coil/package.mo")
-
-
 @pytest.mark.parametrize("step", [1e-4, 1e-3, 5e-3])
 @pytest.mark.parametrize("name", ["ekf", "ukf", "mhe"])
 def test_bands_hold_or_what_is_said_is_that_samples_are_too_far_apart(tmp_path, name, step):
     """A sound coil, from a thirtieth to twice its time constant of 3 ms; nothing is lost in it."""
-    system = declare(tmp_path / "coil", COIL, machine_file("coil/system.toml", step=step))
+    system = declare(tmp_path / "coil", *machine("coil", step=step))
     rng, count = np.random.default_rng(4), 2000
     u = np.repeat(rng.uniform(-12.0, 12.0, count // 40), 40)
     current = [0.0]
@@ -161,13 +158,10 @@ def test_bands_hold_or_what_is_said_is_that_samples_are_too_far_apart(tmp_path, 
         assert any("do not resolve the model" in text for text in result.warnings())
 
 
-SWING = machine_file("swing/package.mo")
-
-
 def swing(folder: Path, samples: int, mistuned: float = 1.0) -> CaseResult:
     """Ten undamped periods by their closed form, with so many samples a period."""
     step = 1.0 / samples
-    system = declare(folder, SWING, machine_file("swing/system.toml", step=step))
+    system = declare(folder, *machine("swing", step=step))
     time = step * np.arange(10 * samples + 1)
     noise = 1e-3 * np.random.default_rng(5).standard_normal(time.size)
     place = 0.5 * np.cos(2.0 * np.pi * mistuned * time) + noise
@@ -199,7 +193,6 @@ def test_an_error_that_the_model_makes_is_not_put_down_to_steps(tmp_path):
 # --- inputs that are held between samples ---
 
 
-VESSEL, SYSTEM = machine("vessel")
 ESTIMATORS = [
     "open_loop",
     "disturbance_observer",

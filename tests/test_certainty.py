@@ -28,7 +28,6 @@ from workbench.models.modelica import read_library
 
 from .built import declare, machine
 
-LIBRARY, SYSTEM = machine("gauge")
 SCALE, BEND, TEETH, NOISE = 2.1, 0.3, 3.0, 0.1
 
 
@@ -36,7 +35,7 @@ SCALE, BEND, TEETH, NOISE = 2.1, 0.3, 3.0, 0.1
 def fits(tmp_path_factory) -> Iterator[dict[str, Fit]]:
     """Two pulls of a gauge with each of the effects."""
     folder = tmp_path_factory.mktemp("gauge")
-    system, rng = declare(folder, LIBRARY, SYSTEM), np.random.default_rng(1)
+    system, rng = declare(folder, *machine("gauge")), np.random.default_rng(1)
     library = read_library(system.library)
     effects = read_effects(library, "Observer")
     path = folder / "AllEffects.fmu"

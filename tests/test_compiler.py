@@ -211,11 +211,8 @@ def test_the_archive_holds_sources_and_no_paths_of_the_building_machine(minimal_
             assert folder.encode() not in archive.read(name), f"{folder} in {name}"
 
 
-TWO_OF_ONE_NAME = machine_file("two_of_one_name/Pumps.mo")
-
-
 def test_a_model_has_its_own_experiment_not_that_of_a_namesake(tmp_path):
-    package = library(tmp_path, TWO_OF_ONE_NAME)
+    package = library(tmp_path, machine_file("two_of_one_name/Pumps.mo"))
     new, old, plain = (
         flatten(package, f"Lib.{name}") for name in ("New.Pump", "Old.Pump", "New.Plain")
     )

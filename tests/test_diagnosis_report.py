@@ -430,13 +430,11 @@ def test_pages_of_six_and_fourteen_long_stops_stay_small(system, summary, dry_ca
 
 # --- in a browser ---
 
-PROBE = script("diagnosis")
-
 
 @pytest.fixture(scope="module")
 def browser(results, probe) -> dict[str, Any]:
     """What a script that uses the page finds."""
-    return probe(results / "index.html", PROBE)
+    return probe(results / "index.html", script("diagnosis"))
 
 
 def test_page_opens_without_errors_and_draws_every_figure(browser):

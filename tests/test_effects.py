@@ -26,12 +26,10 @@ ROOT = Path(__file__).parent.parent
 WHEELSET = read_library(ROOT / "modelica" / "WheelsetRig" / "package.mo")
 EFFECTS = read_effects(WHEELSET, "MinimalObserver")
 
-TANK = machine_file("tank_that_runs_out/package.mo")
-
 
 def tank(folder: Path, *changes: tuple[str, str]) -> Library:
     """A library of one file, with changes."""
-    text = TANK
+    text = machine_file("tank_that_runs_out/package.mo")
     for old, new in changes:
         assert old in text
         text = text.replace(old, new, 1)
@@ -273,11 +271,8 @@ def test_a_base_model_that_is_not_there_is_refused(tmp_path):
         read_effects(tank(tmp_path), "Bas")
 
 
-ORCHARD = machine_file("orchard/Orchard.mo")
-
-
 def orchard(folder: Path, change: tuple[str, str] = ("", "")) -> Library:
-    (folder / "Orchard.mo").write_text(ORCHARD.replace(*change))
+    (folder / "Orchard.mo").write_text(machine_file("orchard/Orchard.mo").replace(*change))
     return read_library(folder / "Orchard.mo")
 
 
@@ -331,11 +326,8 @@ def test_places_that_cannot_be_counted_or_told_apart_are_refused(old, new, messa
         read_effects(orchard(tmp_path, (old, new)), "Base")
 
 
-STAGE = machine_file("stage/package.mo")
-
-
 def stage(folder: Path, *changes: tuple[str, str]) -> Path:
-    text = STAGE
+    text = machine_file("stage/package.mo")
     for old, new in changes:
         assert old in text
         text = text.replace(old, new, 1)

@@ -21,7 +21,6 @@ from workbench.system.system import System
 from .built import build_text, machine_file, write_case
 from .schemas import check
 
-BLOCK = machine_file("heated_block/Block.mo")
 SYSTEM = machine_file("heated_block/system.toml")
 C, G, NOISE, STEP = 100.0, 2.0, 0.05, 4.0  # J/K, W/K, K, s
 TIME = STEP * np.arange(24)
@@ -49,7 +48,7 @@ def measured(seed: int, T: float = 4.0) -> np.ndarray:
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("block")
-    build_text(folder, BLOCK)
+    build_text(folder, machine_file("heated_block/Block.mo"))
     (folder / "system.toml").write_text(SYSTEM)
     for seed in (1, 3):
         columns = {"time [s]": TIME, "P [W]": power(seed), "T [K]": measured(seed)}

@@ -28,7 +28,6 @@ from workbench.system.system import System
 from .built import build_text, machine_file, write_case
 
 # The level has another name than the output, so that no output's name tells where it begins.
-MODEL = machine_file("tank_alone/Tank.mo")
 SYSTEM = machine_file("tank_alone/system.toml")
 
 
@@ -58,7 +57,7 @@ def record(folder: Path, seed: int, area=0.5, outlet=1e-3, gain=0.0, zero=0.0) -
 @pytest.fixture(scope="module")
 def tank(tmp_path_factory) -> System:
     folder = tmp_path_factory.mktemp("tank")
-    build_text(folder, MODEL)
+    build_text(folder, machine_file("tank_alone/Tank.mo"))
     (folder / "system.toml").write_text(SYSTEM)
     return load_system(folder)
 
@@ -179,7 +178,6 @@ def test_what_needs_the_equations_says_so(tank, tmp_path):
 # --- terms beside rates ---
 
 SWING = machine_file("swing_alone/Swing.mo")
-SWING_SYSTEM = machine_file("swing_alone/system.toml")
 LAWS = {
     "Coulomb": lambda v: 0.4 * np.tanh(v / 1e-3),
     "Viscous": lambda v: 0.3 * v,
@@ -191,7 +189,7 @@ LAWS = {
 def swing(tmp_path_factory: pytest.TempPathFactory) -> System:
     folder = tmp_path_factory.mktemp("swing")
     build_text(folder, SWING)
-    (folder / "system.toml").write_text(SWING_SYSTEM)
+    (folder / "system.toml").write_text(machine_file("swing_alone/system.toml"))
     return load_system(folder)
 
 

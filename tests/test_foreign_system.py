@@ -30,7 +30,6 @@ from workbench.system.system import System
 
 from .built import declare, machine
 
-LIBRARY, SYSTEM = machine("two_tanks")
 CASE = 'title = "Pump on and off"\nmeasurement.file = "measured.csv"\n'
 
 AREA, PIPE, DRAIN = 0.5, 2e-3, 1e-3  # as in the model
@@ -86,7 +85,7 @@ def folder(tmp_path_factory) -> Path:
 
 @pytest.fixture(scope="module")
 def tanks(folder) -> System:
-    return declare(folder, LIBRARY, SYSTEM, Tanks="Water.Tanks")
+    return declare(folder, *machine("two_tanks"), Tanks="Water.Tanks")
 
 
 @pytest.fixture(scope="module")

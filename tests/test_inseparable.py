@@ -15,10 +15,9 @@ from workbench.observers.report import format_table
 from workbench.observers.simulation import CaseResult, prepare
 from workbench.system.registry import open_model
 
-from .built import declare, machine, machine_file
+from .built import declare, machine
 from .schemas import check
 
-TRAM, SYSTEM = machine("tram")
 QUANTITIES = {
     "m": 'correction = "dm"\nunit = "kg"\nrange = ["20000 kg", "70000 kg"]\n'
     'walk = "1 kg"\nspread = "8000 kg"\n',
@@ -32,7 +31,8 @@ def ran(folder: Path, *estimated: str, power: float = 1.6e5) -> CaseResult:
     """The filter on a tram that accelerates and rolls in turns."""
     folder.mkdir()
     tables = "".join(f'[estimated.{n}]\n{QUANTITIES[n]}acts_on = "v"\n' for n in estimated)
-    system = declare(folder, TRAM, SYSTEM + tables)
+    library, file = machine("tram")
+    system = declare(folder, library, file + tables)
     time, rng = np.arange(600.0), np.random.default_rng(3)
     powers = np.where((time // 60.0) % 3.0 < 2.0, power, 0.125 * power)
     speed = [5.0]
@@ -101,15 +101,10 @@ def test_estimates_that_no_recording_tells_end_with_a_status(tmp_path, capsys):
     assert "found m and e, which the outputs do not show" in capsys.readouterr().err
 
 
-CELL = machine_file("cell/package.mo")
-
-
 @pytest.mark.parametrize("step", [0.1, 1.0, 10.0])
 def test_states_that_no_quantity_moves_are_observable_where_outputs_show_them(tmp_path, step):
     point = 'points.design.inputs = { I = "2 A" }\n'
-    system = declare(
-        tmp_path / "cell", CELL, machine_file("cell/system.toml", step=step, point=point)
-    )
+    system = declare(tmp_path / "cell", *machine("cell", step=step, point=point))
     with open_model(system) as fmu:
         test = linear_test(fmu, system)
     assert test.rank == 2

@@ -24,8 +24,8 @@ from workbench.studies.power.diagnosing import build_everything, library_effects
 from workbench.system.parts import StateNoise
 from workbench.system.system import System
 
-from .built import declare, machine_file
-from .heater import LIBRARY, NOISE, cases, diagnosed
+from .built import declare, machine, machine_file
+from .heater import NOISE, cases, diagnosed
 from .heater import system as heated_block
 
 G, SPREAD = 0.3, 0.015  # of both of the block's own conductances together [W/K]
@@ -36,9 +36,9 @@ def block(folder: Path, more: str) -> System:
     """The heater whose block has two conductances of its own, with more tables of its file."""
     folder.mkdir()
     own = f'  parameter Real Ga(unit="W/K") = {G / 2}, Gb(unit="W/K") = {G / 2};\n'
-    library = LIBRARY.replace("  input Real P(", own + "  input Real P(")
-    library = library.replace("- loss.Q;", "- (Ga + Gb)*T - loss.Q;")
-    return declare(folder, library, machine_file("heater/system.toml", sensor="") + more)
+    library, file = machine("heater", sensor="")
+    library = library.replace("  input Real P(", own + "  input Real P(")
+    return declare(folder, library.replace("- loss.Q;", "- (Ga + Gb)*T - loss.Q;"), file + more)
 
 
 def recorded(conductance: float, seed: int, share: float = 1.0) -> pd.DataFrame:
@@ -152,11 +152,9 @@ def test_a_free_run_is_free_whatever_noise_an_input_declares(tmp_path):
     free, corrected = [], []
     for name, noise in (("exact", "0 W"), ("noisy", "5 W")):
         folder = tmp_path / name
-        file = machine_file("heater/system.toml", sensor="").replace(
-            'noise = "0 W"', f'noise = "{noise}"'
-        )
-        file = file.replace('[states]\nTc = { spread = "30 K" }\n', "")
-        of = declare(folder, LIBRARY, file)
+        library, file = machine("heater", sensor="")
+        file = file.replace('noise = "0 W"', f'noise = "{noise}"')
+        of = declare(folder, library, file.replace('[states]\nTc = { spread = "30 K" }\n', ""))
         outcome = diagnosed(of, cases(of, frames[:1]), folder, cases(of, frames)[1:])
         free.append([error.free_run[0] for error in outcome.errors])
         corrected.append([error.rms[0] for error in outcome.errors])
@@ -201,7 +199,6 @@ def test_a_level_of_known_spread_hides_nothing(tmp_path):
 # --- a law that stands for two ---
 
 
-CONVECTION = machine_file("heater/Convection.mo")
 DRAUGHT, S = 0.3, 0.006  # planted [W/K], [W/K2]
 HELD, COUNT = 60, 20  # [s] and number of powers
 
@@ -233,7 +230,7 @@ def test_a_law_that_stands_for_two_gives_way_to_them(tmp_path):
     Either alone is no match for a law between the two; the recordings are solutions of the
     equations by SciPy, not of the compiled model.
     """
-    block = heated_block(tmp_path / "block", effect=CONVECTION)
+    block = heated_block(tmp_path / "block", effect=machine_file("heater/Convection.mo"))
     frames = [radiating(seed) for seed in range(3)]
     found = diagnosed(block, cases(block, frames), tmp_path).diagnosis
     assert "Convection" in [step.rivals[0].active[-1].name for step in found.steps]

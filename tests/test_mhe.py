@@ -26,14 +26,13 @@ from workbench.system.system import System
 
 from .built import build_here, machine_file
 
-LIBRARY = machine_file("leaking_tanks/package.mo")
 STEP = 2.0  # [s]
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("tanks")
-    (folder / "package.mo").write_text(LIBRARY)
+    (folder / "package.mo").write_text(machine_file("leaking_tanks/package.mo"))
     for model in ("Linear", "Bent"):
         build_here(folder / "package.mo", f"Water.{model}", folder / f"{model}.fmu")
     return folder

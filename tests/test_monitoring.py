@@ -352,9 +352,6 @@ def test_a_condition_that_the_model_needs_and_nobody_knows_is_told(history, trai
     assert "found rail: unknown" in found.refused["02"]
 
 
-READ = script("monitoring")
-
-
 def test_the_page_shows_what_has_changed_and_where(usual, tmp_path, probe):
     provenance = {"run": run_of("monitor", usual.system, {})}
     page = write_monitoring(usual, provenance, tmp_path)
@@ -372,7 +369,7 @@ def test_the_page_shows_what_has_changed_and_where(usual, tmp_path, probe):
     nominal = usual.system.values["muDC[3]"]
     assert mark.text_content().endswith(f"{100.0 * size / nominal:+.1f} %")
     # The recording in the middle of sixteen, by keyboard.
-    found = probe(page, READ)
+    found = probe(page, script("monitoring"))
     assert not found["errors"]
     assert found["read"] == "recording 9"
 

@@ -24,13 +24,12 @@ pytest.importorskip("ziglang", reason="needs the extra [compiler]")
 
 from .built import build_text, machine_file
 
-OVEN = machine_file("oven/Oven.mo")
 NOISE = 0.05  # K
 
 
 @pytest.fixture(scope="module")
 def fmu(tmp_path_factory) -> Path:
-    return build_text(tmp_path_factory.mktemp("oven"), OVEN)
+    return build_text(tmp_path_factory.mktemp("oven"), machine_file("oven/Oven.mo"))
 
 
 def write_log(

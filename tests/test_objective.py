@@ -14,14 +14,13 @@ from workbench.observers.run import Ending, Run
 from workbench.observers.score import judged_window, low_pass, score
 from workbench.observers.simulation import prepare
 from workbench.recordings.case import Case, read_cases
-from workbench.system.registry import load_system
 from workbench.system.system import System
 from workbench.tuning.cost import evaluators
 from workbench.tuning.recipe import pose
 from workbench.tuning.validation import evaluate_gains
 
 from . import heater
-from .built import machine_file
+from .built import declare, machine
 
 
 def stop(Fx: np.ndarray | None, step: float = 0.005) -> Case:
@@ -142,13 +141,10 @@ def test_a_sensor_that_rectifies_is_scored_by_its_reading(tmp_path):
     it would err by twice the temperature wherever the block is cold.
     """
     folder = tmp_path / "block"
-    folder.mkdir()
     output = '  output Real reading(unit="K") = abs(T) "As read";\n'
-    library = heater.LIBRARY.replace("    Real Tc(", f"  {output}    Real Tc(")
-    (folder / "package.mo").write_text(library)
-    file = machine_file("heater/system.toml", sensor='reading = "reading"')
-    (folder / "system.toml").write_text(f'{file}\n[objective]\njudged = "T"\n')
-    block = load_system(folder)
+    library, file = machine("heater", sensor='reading = "reading"')
+    library = library.replace("    Real Tc(", f"  {output}    Real Tc(")
+    block = declare(folder, library, f'{file}\n[objective]\njudged = "T"\n')
     time = np.arange(600.0)
     power = 60.0 * np.sign(np.sin(2.0 * np.pi * time / 200.0 + 0.1))
 

@@ -27,13 +27,12 @@ from workbench.system.system import System
 
 from .built import declare, machine, write_case
 
-MODEL, SYSTEM = machine("boiler")
 TRUE_LOSS = 14.0  # [W/K], nominal is 10
 
 
 @pytest.fixture(scope="module")
 def boiler(tmp_path_factory) -> System:
-    return declare(tmp_path_factory.mktemp("boiler"), MODEL, SYSTEM, Vessel="Boiler.Vessel")
+    return declare(tmp_path_factory.mktemp("boiler"), *machine("boiler"), Vessel="Boiler.Vessel")
 
 
 @pytest.fixture(scope="module")

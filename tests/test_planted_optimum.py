@@ -36,7 +36,6 @@ from workbench.tuning import (
 
 from .built import declare, machine
 
-MODEL, SYSTEM = machine("rolling_wheelset")
 RW, RR, JR, MU_DC, PADS = 0.46, 0.70, 1500.0, 0.275, 0.09  # as in the model
 PRESSURE = 2e5  # [Pa]
 VELOCITY = 1.0  # [m/s], so slow that a fifth of the feedback has faded out
@@ -227,7 +226,7 @@ def gain(found: Search, name: str) -> float:
 def prepare_rolling(tmp_path_factory) -> Callable[..., Job]:
     """Prepares jobs on the linear model."""
     folder = tmp_path_factory.mktemp("rolling")
-    rolling = declare(folder, MODEL, SYSTEM, RollingWheelset="Lib.RollingWheelset")
+    rolling = declare(folder, *machine("rolling_wheelset"), RollingWheelset="Lib.RollingWheelset")
     assert corner(rolling.objective) == pytest.approx(CORNER)
 
     def prepared(gains: Gains, weights: Mapping[str, float], *cases: Case) -> Job:

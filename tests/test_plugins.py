@@ -14,7 +14,6 @@ from workbench.system.plugins import Plugin, find_plugin
 from .built import machine_file
 from .processes import python
 
-PROJECT = machine_file("spinning/pyproject.toml")
 PLUGIN = """
 from pathlib import Path
 from workbench import Plugin
@@ -52,7 +51,7 @@ def installed(root, tmp_path_factory) -> Path:
     sources, folder = tmp_path_factory.mktemp("sources"), tmp_path_factory.mktemp("installed")
     fmu = root / "fmus" / "fmi2" / "MinimalObserver.fmu"
     for name, text in {
-        "pyproject.toml": PROJECT,
+        "pyproject.toml": machine_file("spinning/pyproject.toml"),
         "spinning/__init__.py": PLUGIN,
         "spinning/system.toml": machine_file("spinning/system.toml", fmu=fmu),
         "spinning/spin.py": COMMAND,

@@ -213,13 +213,10 @@ def test_curve_of_the_page_is_that_of_the_data(results, page):
     assert_allclose(shown[inside], error[inside], rtol=0, atol=0.51 * (high - low) / levels)
 
 
-PROBE = script("report")
-
-
 @pytest.fixture(scope="module")
 def browser(results, probe) -> dict[str, Any]:
     """What a script that uses the page finds."""
-    return probe(results / "index.html", PROBE)
+    return probe(results / "index.html", script("report"))
 
 
 def test_page_opens_without_errors_and_draws_every_panel(browser):

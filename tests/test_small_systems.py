@@ -28,7 +28,6 @@ from workbench.system.units import quantity
 from .built import build_here, machine, write_case
 
 BALANCE, BALANCE_FILE = machine("balance")
-BOTTLE, BOTTLE_FILE = machine("bottle")
 STIFFNESS, FRICTION, LEAK = 103.0, 0.4, 0.01
 
 
@@ -62,7 +61,7 @@ def balance(tmp_path_factory) -> Path:
 @pytest.fixture(scope="module")
 def bottle(tmp_path_factory) -> Path:
     """Three bottles that leak."""
-    folder = written(tmp_path_factory.mktemp("small") / "bottle", BOTTLE, BOTTLE_FILE)
+    folder = written(tmp_path_factory.mktemp("small") / "bottle", *machine("bottle"))
     rng = np.random.default_rng(2)
     for k in range(3):
         t = np.arange(200.0)

@@ -11,20 +11,15 @@ from workbench import case_from_frame
 from workbench.observers import choose
 from workbench.observers.run import Run
 from workbench.observers.simulation import CaseResult, prepare
-from workbench.system.registry import load_system
 
-from .built import declare, machine, machine_file
+from .built import declare, machine
 
-KETTLE = machine_file("kettle/package.mo")
 BODY, WATER = 60.0, 35.0  # K, where the recordings begin
 
 
 def ran(folder: Path, name: str, step: float, more: str = "") -> tuple[CaseResult, Run, np.ndarray]:
     """A filter on the kettle, which begins elsewhere than its model; and the truth of the body."""
-    folder.mkdir()
-    (folder / "package.mo").write_text(KETTLE)
-    (folder / "system.toml").write_text(machine_file("kettle/system.toml", step=step, more=more))
-    system = load_system(folder)
+    system = declare(folder, *machine("kettle", step=step, more=more))
     time, rng, fine = np.arange(0.0, 200.0, step), np.random.default_rng(5), 100
     truth = [np.array([BODY, WATER])]
     for _ in range(fine * (time.size - 1)):  # the truth, by steps that err by less than the noise

@@ -18,13 +18,12 @@ from workbench.system.registry import load_system
 
 from .built import build_here, build_text, machine_file, write_case
 
-MODEL = machine_file("block/Block.mo")
 H = 0.005
 
 
 @pytest.fixture(scope="module")
 def block(tmp_path_factory) -> Iterator[FMU]:
-    with FMU(build_text(tmp_path_factory.mktemp("block"), MODEL)) as fmu:
+    with FMU(build_text(tmp_path_factory.mktemp("block"), machine_file("block/Block.mo"))) as fmu:
         yield fmu
 
 
@@ -79,7 +78,6 @@ def test_stick_and_slip_agree_with_an_error_controlled_integrator(amplitude, blo
 
 
 SAMPLE, NOISE, FADES = 2e-3, 1e-2, 3.0  # [s], [m], [1/s]
-LIBRARY = machine_file("fading_swing/package.mo")
 SYSTEM = f"""title = "A mass on a spring"
 sample_time = "{SAMPLE} s"
 [models]
@@ -101,7 +99,7 @@ scale = "1 m"
 @pytest.mark.parametrize(("samples", "fine"), [(9, True), (400, False)])
 def test_a_fading_swing_leaves_noise_alone(samples, fine, tmp_path):
     damped = 2.0 * np.pi / (samples * SAMPLE)
-    (tmp_path / "package.mo").write_text(LIBRARY)
+    (tmp_path / "package.mo").write_text(machine_file("fading_swing/package.mo"))
     omega = float(np.hypot(damped, FADES))
     (tmp_path / "system.toml").write_text(SYSTEM.replace("OMEGA", repr(omega)))
     time = SAMPLE * np.arange(1000)
@@ -126,13 +124,13 @@ def test_a_fading_swing_leaves_noise_alone(samples, fine, tmp_path):
 # --- derivatives by parameters, against closed forms ---
 
 
-TANK = machine_file("draining_tank/Tank.mo")
 END = 2.0  # [s]
 
 
 @pytest.fixture(scope="module", params=[2, 3])
 def tank(request, tmp_path_factory) -> Iterator[FMU]:
-    with FMU(build_text(tmp_path_factory.mktemp("tank"), TANK, request.param)) as fmu:
+    folder, model = tmp_path_factory.mktemp("tank"), machine_file("draining_tank/Tank.mo")
+    with FMU(build_text(folder, model, request.param)) as fmu:
         yield fmu
 
 

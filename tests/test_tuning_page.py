@@ -111,15 +111,12 @@ def test_a_hostile_name_of_a_case_stays_text(page):
     assert not page.xpath("//img|//@onerror")
 
 
-NARROW = script("tuning_narrow")
-
-
 def test_page_opens_without_errors_and_draws_its_curve(results, probe):
     curve = "document.querySelector('.dots .curve')"
     shown = probe(
         results / "index.html",
         f"told.length = {curve}.getTotalLength(); told.fill = getComputedStyle({curve}).fill;"
-        f"{NARROW}",
+        f"{script('tuning_narrow')}",
     )
     assert shown["errors"] == []
     assert shown["length"] > 100  # [px]
