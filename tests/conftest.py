@@ -144,9 +144,9 @@ def prepare(system) -> Callable[[str, Sequence[Case]], Problem]:
 
     def prepared(name: str, cases: Sequence[Case]) -> Problem:
         problem = pose(system, name, cases, {})
-        kind = tunable(system, name)
-        with open_model(system, kind.role) as model:
-            space = kind.space(model, system, problem.job.gains, slowest=1 / 40, fastest=200.0)
+        cls = tunable(system, name)
+        with open_model(system, cls.role) as model:
+            space = cls.space(model, system, problem.job.gains, slowest=1 / 40, fastest=200.0)
         return replace(problem, space=space)
 
     return prepared

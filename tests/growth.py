@@ -131,10 +131,10 @@ def stop(system: System) -> tuple[Vector, Matrix, Matrix]:
     return t, inputs, outputs
 
 
-def time_filter(system: System, kind: type[ExtendedKalmanFilter]) -> float:
+def time_filter(system: System, cls: type[ExtendedKalmanFilter]) -> float:
     """Processor time of a filter for a sample, the least of five runs [s]."""
     with open_model(system) as fmu:
-        estimator, samples = kind(fmu, system, kind.default_gains(fmu, system)), stop(system)
+        estimator, samples = cls(fmu, system, cls.default_gains(fmu, system)), stop(system)
         estimator.run(*samples)
         spent = []
         for _ in range(_REPEATS):
@@ -152,12 +152,12 @@ def report(sizes: Iterable[int], most: int) -> Iterable[str]:
             begin = time.monotonic()
             system = build(vehicles, Path(scratch))
             yield f"{axles:>3} axles, ready after {time.monotonic() - begin:.0f} s"
-            for kind in (BlockKalmanFilter, ExtendedKalmanFilter):
-                if kind is ExtendedKalmanFilter and vehicles > most:
+            for cls in (BlockKalmanFilter, ExtendedKalmanFilter):
+                if cls is ExtendedKalmanFilter and vehicles > most:
                     continue
-                spent = 1e6 * time_filter(system, kind)
+                spent = 1e6 * time_filter(system, cls)
                 each = f"{spent / axles:>6.2f} us an axle"
-                yield f"  {kind.name:<5} {spent:>8.1f} us a sample, {each}"
+                yield f"  {cls.name:<5} {spent:>8.1f} us a sample, {each}"
 
 
 def main() -> None:
@@ -165,8 +165,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("vehicles", type=int, nargs="+", help="number of vehicles of each train")
     parser.add_argument("--ekf", type=int, default=8, help="most of them for the extended filter")
-    told = parser.parse_args()
-    for line in report(told.vehicles, told.ekf):
+    options = parser.parse_args()
+    for line in report(options.vehicles, options.ekf):
         print(line, flush=True)
 
 

@@ -71,8 +71,8 @@ def main() -> None:
     parser.add_argument("workers", type=int, nargs="+", help="numbers of workers, in turn")
     parser.add_argument("--trains", type=int, default=50, help="machines of the fleet")
     parser.add_argument("--days", type=int, default=20, help="of each, with one stop a day")
-    told = parser.parse_args()
-    for line in report(told.trains, told.days, told.workers):
+    options = parser.parse_args()
+    for line in report(options.trains, options.days, options.workers):
         print(line, flush=True)
 
 

@@ -76,9 +76,9 @@ def estimators() -> Iterator[dict[str, Estimator]]:
     with open_model(SYSTEM) as minimal, open_model(SYSTEM, "full") as full:
         models = {"observer": minimal, "full": full}
         yield {
-            name: kind(fmu, SYSTEM, usual_gains(kind, fmu, SYSTEM))
-            for name, kind in KINDS.items()
-            if (fmu := models[kind.role])
+            name: cls(fmu, SYSTEM, usual_gains(cls, fmu, SYSTEM))
+            for name, cls in KINDS.items()
+            if (fmu := models[cls.role])
         }
 
 

@@ -58,8 +58,8 @@ def stop(fmu: FMU, muDC: Vector, noise: float = 1.0, seed: int = 5) -> tuple[np.
     return np.arange(len(y)) * STEP, u, y
 
 
-def estimate(fmu: FMU, kind: type[ExtendedKalmanFilter], system: System, *stop: Vector) -> Estimate:
-    return kind(fmu, system, kind.default_gains(fmu, system)).run(*stop)
+def estimate(fmu: FMU, cls: type[ExtendedKalmanFilter], system: System, *stop: Vector) -> Estimate:
+    return cls(fmu, system, cls.default_gains(fmu, system)).run(*stop)
 
 
 MUDC = list(WHEELSET.columns).index("muDC")
@@ -125,7 +125,7 @@ def test_a_jump_of_a_friction_is_followed_at_once(fmu, kind, within, limit):
 def runs(fmu) -> dict[str, list[tuple[slice, Run]]]:
     made = {name: estimators_of(WHEELSET)[name] for name in FILTERS}
     ready = {
-        name: kind(fmu, WHEELSET, kind.default_gains(fmu, WHEELSET)) for name, kind in made.items()
+        name: cls(fmu, WHEELSET, cls.default_gains(fmu, WHEELSET)) for name, cls in made.items()
     }
     cases = read_cases([ROOT / "cases"], WHEELSET)
     return {

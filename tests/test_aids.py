@@ -54,23 +54,23 @@ def samples(count: int) -> tuple[Vector, Matrix, Matrix]:
 @pytest.mark.parametrize("name", ["ekf", "arrow", "ukf", "mhe"])
 def test_a_constant_is_the_weighted_mean_of_what_was_measured(name, still, level):
     """In closed form: of n readings of variance R and k of variance r, (n/R + k/r)^-1."""
-    kind = estimators_of(still)[name]
+    cls = estimators_of(still)[name]
     t, u, y = samples(40)
-    found = kind(level, still, kind.default_gains(level, still)).run(t, u, y)
+    estimate = cls(level, still, cls.default_gains(level, still)).run(t, u, y)
     weights = np.isfinite(y) / np.array([0.2, 0.05]) ** 2
     information = weights.cumsum(axis=0).sum(axis=1)
     mean = (weights * np.nan_to_num(y)).cumsum(axis=0).sum(axis=1) / information
-    assert list(kind.fed(still).columns) == ["coarse", "fine"]
+    assert list(cls.fed(still).columns) == ["coarse", "fine"]
     # Points of the unscented filter and nodes of a window are rounded by themselves.
-    assert_allclose(found.values[:, 0], mean, rtol=1e-6)
-    assert_allclose(found.values[:, 1], mean, rtol=1e-6)
-    assert_allclose(found.sigma[:, 0], information**-0.5, rtol=1e-6)
+    assert_allclose(estimate.values[:, 0], mean, rtol=1e-6)
+    assert_allclose(estimate.values[:, 1], mean, rtol=1e-6)
+    assert_allclose(estimate.sigma[:, 0], information**-0.5, rtol=1e-6)
 
 
 def test_innovations_are_those_of_what_was_measured(still, level):
-    kind = ExtendedKalmanFilter
+    cls = ExtendedKalmanFilter
     t, u, y = samples(2000)
-    nis = kind(level, still, kind.default_gains(level, still)).run(t, u, y).nis[1:]
+    nis = cls(level, still, cls.default_gains(level, still)).run(t, u, y).nis[1:]
     fed = np.isfinite(y[1:]).sum(axis=1)
     # Each is chi-squared of so many outputs: the mean of n of them scatters by sqrt(2 k/n).
     for k in (1, 2):
@@ -98,11 +98,11 @@ def test_an_aid_that_is_never_there_changes_nothing(name, stop):
 def test_estimators_with_fixed_gains_do_without_aids(still, level):
     t, u, y = samples(40)
     for name in ("open_loop", "parameter_estimator"):
-        kind = estimators_of(still)[name]
-        assert list(kind.fed(still).columns) == ["coarse"]
-    kind = estimators_of(still)["open_loop"]
-    found = kind(level, still, kind.default_gains(level, still)).run(t, u, y)
-    assert_array_equal(found.values[:, 0], np.full(40, y[0, 0]))
+        cls = estimators_of(still)[name]
+        assert list(cls.fed(still).columns) == ["coarse"]
+    cls = estimators_of(still)["open_loop"]
+    estimate = cls(level, still, cls.default_gains(level, still)).run(t, u, y)
+    assert_array_equal(estimate.values[:, 0], np.full(40, y[0, 0]))
 
 
 # --- recordings ---
@@ -161,16 +161,16 @@ def test_what_a_recorder_lacks_of_an_aid_holds_up_nothing_else(still, tmp_path):
 
 def test_what_the_crew_says_is_a_model_with_those_parameters(stop):
     case, _ = stop
-    kind, part = ExtendedKalmanFilter, slice(0, 150)
+    cls, part = ExtendedKalmanFilter, slice(0, 150)
     wet = {"muWR": 0.275, "polach.kA": 0.3, "polach.kS": 0.1, "polach.B": 0.2}
     with open_model(TRAIN) as model:
-        told = kind(model, TRAIN, kind.default_gains(model, TRAIN))
+        told = cls(model, TRAIN, cls.default_gains(model, TRAIN))
         values = []
         for rail in ("wet", "dry"):
             told.set_conditions({"rail": rail})
             values.append(told.run(case.time[part], case.u[part], case.y[part]).values)
         variant = model.variant(wet)
-        plain = kind(variant, TRAIN, kind.default_gains(variant, TRAIN))
+        plain = cls(variant, TRAIN, cls.default_gains(variant, TRAIN))
         plain.set_conditions({"rail": "unknown"})
         expected = plain.run(case.time[part], case.u[part], case.y[part]).values
     corrections = [list(told.system.columns).index(correction) for correction in TRAIN.corrections]
@@ -182,9 +182,9 @@ def test_what_the_crew_says_is_a_model_with_those_parameters(stop):
 
 def test_who_finds_a_condition_is_not_told(stop):
     case, _ = stop
-    kind, part = estimators_of(TRAIN)["imm"], slice(0, 20)
+    cls, part = estimators_of(TRAIN)["imm"], slice(0, 20)
     with open_model(TRAIN) as model:
-        bank = kind(model, TRAIN, kind.default_gains(model, TRAIN))
+        bank = cls(model, TRAIN, cls.default_gains(model, TRAIN))
         found = []
         conditions: list[dict[str, Value]] = [{"rail": "dry"}, {"rail": "wet"}]
         for condition in conditions:
@@ -198,8 +198,8 @@ def test_who_finds_a_condition_is_not_told(stop):
 
 @pytest.fixture(scope="module")
 def stop(tmp_path_factory) -> tuple[Case, SimulatedStop]:
-    (one,) = simulated("01_120_service_dry", 1, tmp_path_factory.mktemp("stop"))
-    return one
+    (recorded,) = simulated("01_120_service_dry", 1, tmp_path_factory.mktemp("stop"))
+    return recorded
 
 
 def simulated(name: str, seed: int, folder: Path) -> list[tuple[Case, SimulatedStop]]:
@@ -295,12 +295,12 @@ def gradient_error(case: Case, made: SimulatedStop) -> Vector:
 
 
 def test_what_is_of_a_recording_is_not_watched_over_many():
-    names = {one.name for one in watched(TRAIN)}
+    names = {quantity.name for quantity in watched(TRAIN)}
     kinds = [f"{kind}[{i}]" for kind in ("muDC", "r") for i in range(1, 9)]
     assert names == {*kinds, "bias"}
 
 
 def test_a_constant_is_refused_by_who_could_not_find_it():
-    kind = estimators_of(TRAIN)["disturbance_observer"]
+    cls = estimators_of(TRAIN)["disturbance_observer"]
     with open_model(TRAIN) as model, pytest.raises(InputError, match="found 0: a constant"):
-        kind.default_gains(model, TRAIN)
+        cls.default_gains(model, TRAIN)

@@ -326,8 +326,8 @@ def test_a_correction_is_an_input_of_its_own(correction, found, build):
 def test_compiled_code_gets_samples_of_the_size_that_it_needs(build):
     with FMU(build("RELAYS")) as fmu:
         filter_ = estimator(fmu, "ekf")
-        time, one, two = np.arange(5.0), np.zeros((5, 1)), np.zeros((5, 2))
-        for u, y in ((two, one), (one[:4], one), (one, one[:4])):
+        time, single, double = np.arange(5.0), np.zeros((5, 1)), np.zeros((5, 2))
+        for u, y in ((double, single), (single[:4], single), (single, single[:4])):
             with pytest.raises(ValueError, match="samples of shape"):
                 filter_.run(time, u, y)
 

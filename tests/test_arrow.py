@@ -142,9 +142,9 @@ def test_a_model_without_blocks_has_the_extended_filter():
         plain, estimator = made(fmu, system)
         t, u, y = growth.stop(system)
         first = slice(0, 20)
-        found, expected = (one.run(t[first], u[first], y[first]) for one in (estimator, plain))
-    np.testing.assert_array_equal(found.values, expected.values)
-    np.testing.assert_array_equal(found.sigma, expected.sigma)
+        estimate, expected = (one.run(t[first], u[first], y[first]) for one in (estimator, plain))
+    np.testing.assert_array_equal(estimate.values, expected.values)
+    np.testing.assert_array_equal(estimate.sigma, expected.sigma)
 
 
 def test_a_model_whose_structure_is_not_said_is_one_block(filling, vessels):
@@ -171,8 +171,8 @@ def test_like_parts_of_a_linear_machine_are_filtered_exactly(filling, vessels, d
     plain, estimator = made(filling, vessels)
     filling.has_directional_derivatives = True
     samples = recording(vessels, 400)
-    found, expected = estimator.run(*samples), plain.run(*samples)
-    assert_alike(found, expected, 1e-5 if differences else 1e-8)
+    estimate, expected = estimator.run(*samples), plain.run(*samples)
+    assert_alike(estimate, expected, 1e-5 if differences else 1e-8)
     assert_allclose(estimator.covariance, plain.covariance, rtol=1e-6, atol=1e-16)
 
 
@@ -239,7 +239,7 @@ def test_a_sample_is_taken_as_by_matrices_of_all_unknowns(rolling, train):
     t, u, y = growth.stop(train)
     blind(estimator, (t, u, y), 60)
     z, P, settings = estimator._state.z.copy(), estimator._joint(), estimator._settings.filter
-    found = estimator.advance(np.array([1e-15]), u[60:61], y[60:61])
+    estimate = estimator.advance(np.array([1e-15]), u[60:61], y[60:61])
     seen = settings.layout.seen
     noise = (settings.floor + settings.relative * np.abs(y[60])) / faded(estimator, y[60])
     R = np.diag(noise**2)
@@ -247,7 +247,7 @@ def test_a_sample_is_taken_as_by_matrices_of_all_unknowns(rolling, train):
     K, innovation = np.linalg.solve(S, P[seen]).T, y[60] - z[seen]
     after = P - K @ P[seen]
     sigma = np.sqrt(np.diag(after))
-    assert_allclose(found.nis[0], innovation @ np.linalg.solve(S, innovation), rtol=1e-6)
+    assert_allclose(estimate.nis[0], innovation @ np.linalg.solve(S, innovation), rtol=1e-6)
     assert_allclose((estimator._state.z - z - K @ innovation) / sigma, 0.0, atol=1e-6)
     assert_allclose((estimator._joint() - after) / np.outer(sigma, sigma), 0.0, atol=1e-6)
 
@@ -310,11 +310,11 @@ def test_estimates_of_a_train_are_those_of_the_extended_filter(rolling, train):
     columns = list(train.columns)
     first = columns.index(train.estimated[0].name)
     for samples, truth in stops(rolling, train, 30):
-        found, expected = estimator.run(*samples), plain.run(*samples)
-        apart.append(((found.values - expected.values) / expected.sigma)[1:])
-        narrower.append((found.sigma / expected.sigma)[1:])
+        estimate, expected = estimator.run(*samples), plain.run(*samples)
+        apart.append(((estimate.values - expected.values) / expected.sigma)[1:])
+        narrower.append((estimate.sigma / expected.sigma)[1:])
         own = slice(first, first + truth.size)
-        for one in (found, expected):
+        for one in (estimate, expected):
             error = np.abs(one.values[:, own] - truth)
             held.append(error < 1.96 * one.sigma[:, own])
     assert np.sqrt(np.mean(np.square(apart), axis=(0, 1))).max() < 0.15

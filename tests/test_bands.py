@@ -226,8 +226,8 @@ def filled(vessel) -> Case:
 def test_a_switched_pump_is_integrated_exactly_and_nothing_is_made_of_the_switch(
     vessel, fmu, filled, name
 ):
-    kind = estimators_of(vessel)[name]
-    run = replay(filled, kind(fmu, vessel, kind.default_gains(fmu, vessel)))
+    cls = estimators_of(vessel)[name]
+    run = replay(filled, cls(fmu, vessel, cls.default_gains(fmu, vessel)))
     assert_allclose(run.signal("V"), filled["V"], rtol=0.0, atol=1e-12)
     assert_allclose(run.signal("leak"), 0.0, atol=1e-12)
     # What a sensor sees at a sample is the input from there on.
@@ -235,8 +235,8 @@ def test_a_switched_pump_is_integrated_exactly_and_nothing_is_made_of_the_switch
 
 
 def test_an_exported_observer_holds_the_input_too(vessel, fmu, filled, tmp_path):
-    kind = estimators_of(vessel)["disturbance_observer"]
-    estimator = kind(fmu, vessel, kind.default_gains(fmu, vessel))
+    cls = estimators_of(vessel)["disturbance_observer"]
+    estimator = cls(fmu, vessel, cls.default_gains(fmu, vessel))
     path = tmp_path / "observer.fmu"
     build_observer(estimator, path, 2, platforms=[native()])
     names = [signal.name for signal in (*vessel.inputs, *vessel.outputs)]

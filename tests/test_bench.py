@@ -145,10 +145,10 @@ def test_compiled_laws_agree_with_loops_written_in_numpy(system, dry_case, name)
     """Coasting, braking and standstill. 1e-9 of a column's largest value: rounding, grown 1e4."""
     samples = (dry_case.time, dry_case.u, dry_case.y)
     system = plain_filters(system)
-    kind = choose(system, [name])[name]
-    with open_model(system, kind.role) as fmu:
-        gains = kind.default_gains(fmu, system)
-        ours = kind(fmu, system, gains).run(*samples)
+    cls = choose(system, [name])[name]
+    with open_model(system, cls.role) as fmu:
+        gains = cls.default_gains(fmu, system)
+        ours = cls(fmu, system, gains).run(*samples)
         with by_fmpy(name, fmu, system, gains) as loop:
             theirs = loop(*samples)
     scale = np.abs(theirs.values).max(axis=0)

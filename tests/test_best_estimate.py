@@ -33,8 +33,8 @@ def outcome(system, tmp_path_factory) -> Outcome:
 
 @pytest.fixture(scope="module")
 def estimates(outcome) -> dict[str, CaseResult]:
-    found = {case.name: best_estimate(outcome, case.name) for case in outcome.cases}
-    return {name: one for name, one in found.items() if one is not None}
+    by_recording = {case.name: best_estimate(outcome, case.name) for case in outcome.cases}
+    return {name: estimate for name, estimate in by_recording.items() if estimate is not None}
 
 
 def test_the_band_holds_what_the_load_cells_say_once_the_model_is_extended(outcome, estimates):
@@ -43,8 +43,8 @@ def test_the_band_holds_what_the_load_cells_say_once_the_model_is_extended(outco
     assert cause.effect.name == "DriveTorqueGain"
     inside: dict[str, list[float]] = {"nominal_model": [], "extended_model": []}
     assert len(estimates) == len(STOPS)
-    for found in estimates.values():
-        for model, numbers in bands(found).items():
+    for estimate in estimates.values():
+        for model, numbers in bands(estimate).items():
             inside[model].append(numbers["Fx"]["inside"])
             assert numbers["Fx"]["low"] < numbers["Fx"]["value"] < numbers["Fx"]["high"]
     # Of 95 %; the cells ring, and stand 21.6 Hz behind the contact.

@@ -135,8 +135,8 @@ def test_autocovariance_is_that_of_a_process_of_first_order():
     for own in errors:
         for k, noise in enumerate(rng.standard_normal(own.size - 1), start=1):
             own[k] = a * own[k - 1] + noise
-    found = autocovariance(errors)
-    assert_allclose(found[:5], a ** np.arange(5) / (1.0 - a**2), rtol=0.06)
+    covariance = autocovariance(errors)
+    assert_allclose(covariance[:5], a ** np.arange(5) / (1.0 - a**2), rtol=0.06)
 
 
 def test_a_size_is_as_unsure_as_what_remains_of_its_effect():

@@ -159,14 +159,14 @@ CLIENTS: dict[str, Callable[[Path], np.ndarray]] = {
 @pytest.mark.parametrize("client", CLIENTS)
 def test_every_client_computes_the_same_stop(model, fmi, client):
     reference = run_fmpy(fmu_path(2, model), "ModelExchange")
-    found = CLIENTS[client](fmu_path(fmi, model))
+    result = CLIENTS[client](fmu_path(fmi, model))
     # At the jump itself a client may show the force before or after it.
     compared = abs(TIMES - BRAKE) > STEP / 2
     speeds, force = abs(reference[:, :2]).max(), abs(reference[:, 2]).max()
     # ecos sets no tolerance, so the FMU's own holds: 1e-6 of each state, in each of few steps.
-    assert_allclose(found[compared, :2], reference[compared, :2], rtol=0, atol=2e-6 * speeds)
+    assert_allclose(result[compared, :2], reference[compared, :2], rtol=0, atol=2e-6 * speeds)
     # The slip, 1e-3 of the speeds at this force, enlarges a relative error of speeds by 1e3.
-    assert_allclose(found[compared, 2], reference[compared, 2], rtol=0, atol=1e-4 * force)
+    assert_allclose(result[compared, 2], reference[compared, 2], rtol=0, atol=1e-4 * force)
 
 
 @MODELS

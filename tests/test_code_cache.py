@@ -127,8 +127,8 @@ def test_code_is_made_again_when_what_makes_it_changes(name, tmp_path, monkeypat
 
 def test_what_two_processes_need_at_once_is_compiled_by_one(home):
     with started(home) as one, started(home) as other:
-        told = [process.communicate(timeout=LONGEST) for process in (one, other)]
-    assert sorted(told) == [("0 kept\n", ""), ("1 kept\n", "")]
+        outputs = [process.communicate(timeout=LONGEST) for process in (one, other)]
+    assert sorted(outputs) == [("0 kept\n", ""), ("1 kept\n", "")]
     names = {file.name for file in home.rglob("*") if file.is_file()}
     assert {Path(name).suffix for name in names - {"turns", "key"}} == {".code"}
 
@@ -257,7 +257,7 @@ def test_fmus_are_those_of_their_manifest_and_it_is_of_these_sources():
         path.relative_to(fmus()).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest()
         for path in fmus().rglob("*.fmu")
     }
-    assert held == {name: one["sha256"] for name, one in manifest["fmus"].items()}
+    assert held == {name: entry["sha256"] for name, entry in manifest["fmus"].items()}
 
 
 @pytest.mark.long

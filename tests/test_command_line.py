@@ -102,15 +102,15 @@ def test_an_option_takes_the_same_everywhere():
     for parser in PARSERS:
         for action in parser._actions:
             for option in action.option_strings:
-                kind = (type(action).__name__, action.type, action.nargs)
-                meant.setdefault(option, set()).add(kind)
+                form = (type(action).__name__, action.type, action.nargs)
+                meant.setdefault(option, set()).add(form)
     twice = {option: kinds for option, kinds in meant.items() if len(kinds) > 1}
     # An exported observer is one; a run has several.
     assert set(twice) == {"--estimator"}
-    assert {kind[1:] for kind in twice["--estimator"]} == {(None, None)}
+    assert {form[1:] for form in twice["--estimator"]} == {(None, None)}
 
 
-@pytest.mark.parametrize("parser", PARSERS, ids=lambda one: one.prog)
+@pytest.mark.parametrize("parser", PARSERS, ids=lambda item: item.prog)
 def test_every_command_knows_json_and_quiet(parser):
     options = {option for action in parser._actions for option in action.option_strings}
     assert {"--json", "--quiet", "--help"} <= options

@@ -98,9 +98,9 @@ def test_an_input_that_is_held_stays_until_its_next_sample(system):
 
 def test_loggers_are_brought_together_by_their_time_stamps(system):
     time = np.arange(0.0, 5.0, 0.01)
-    one = group("", time, 1000.0, **rolling(system, time, 20.0 + time))
+    first = group("", time, 1000.0, **rolling(system, time, 20.0 + time))
     other = group("", time, 998.5, pB=1e4 * time)  # began 1.5 s before
-    files = [file(one), file(other)]
+    files = [file(first), file(other)]
     measured = merge(files, propose(files, system, {}), system)
     assert measured.start == 998.5
     assert measured.time[0] == pytest.approx(1.5)
@@ -111,16 +111,16 @@ def test_loggers_are_brought_together_by_their_time_stamps(system):
 
 def test_clocks_that_cannot_be_compared_are_refused(system):
     time = np.arange(0.0, 5.0, 0.01)
-    one = group("", time, 1000.0, **rolling(system, time, 20.0 + time))
-    files = [file(one), file(group("", time, pB=1e4 * time))]
+    first = group("", time, 1000.0, **rolling(system, time, 20.0 + time))
+    files = [file(first), file(group("", time, pB=1e4 * time))]
     with pytest.raises(InputError, match="times without a date beside others that have one"):
         merge(files, propose(files, system, {}), system)
 
 
 def test_recordings_of_different_times_are_refused(system):
     time = np.arange(0.0, 5.0, 0.01)
-    one = group("", time, 1000.0, **rolling(system, time, 20.0 + time))
-    files = [file(one), file(group("", time, 2000.0, pB=1e4 * time))]
+    first = group("", time, 1000.0, **rolling(system, time, 20.0 + time))
+    files = [file(first), file(group("", time, 2000.0, pB=1e4 * time))]
     with pytest.raises(InputError, match="0 samples at common times"):
         merge(files, propose(files, system, {}), system)
 
@@ -166,8 +166,8 @@ def test_a_counted_time_goes_before_stamps_that_are_coarser(system):
 
 def test_one_channel_of_two_groups_is_not_taken_for_the_other(system):
     time = np.arange(0.0, 5.0, 0.01)
-    one = group("run 1", time, pB=time, **rolling(system, time, 20.0 + time))
-    held = file(one, group("run 2", time, pB=2 * time))
+    first = group("run 1", time, pB=time, **rolling(system, time, 20.0 + time))
+    held = file(first, group("run 2", time, pB=2 * time))
     proposal = propose([held], system, {})
     assert proposal.problems == ("pB: it may be 'run 1/pB' or 'run 2/pB'",)
     named = propose([held], system, {"pB": NamedChannel("run 2/pB")})
@@ -248,9 +248,9 @@ def test_a_long_file_becomes_cases_and_a_figure(tmp_path, system, root):
     assert main(["import", str(tmp_path / "day.csv"), "--out", str(out), "--yes"]) == 0
     assert [read_case.name for read_case in wb.read_cases(out, system)] == ["01_day", "02_day"]
     assert (out / "day_cuts.png").stat().st_size > 10_000
-    (one,) = json.loads((out / "import.json").read_text())["imports"]
-    assert [part["case"] for part in one["cut"] if part["case"]] == ["01_day", "02_day"]
-    assert sum(part["samples"] for part in one["cut"]) == 2 * twice[0].time.size
+    (entry,) = json.loads((out / "import.json").read_text())["imports"]
+    assert [part["case"] for part in entry["cut"] if part["case"]] == ["01_day", "02_day"]
+    assert sum(part["samples"] for part in entry["cut"]) == 2 * twice[0].time.size
     again = ["import", str(tmp_path / "day.csv"), "--out", str(tmp_path / "w"), "--yes", "--whole"]
     assert main(again) == 0
     assert [read_case.name for read_case in wb.read_cases(tmp_path / "w", system)] == ["day"]

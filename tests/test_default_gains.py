@@ -54,8 +54,8 @@ def test_models_that_gains_were_not_tuned_on_get_reasoned_ones(system, models):
     known = estimators_of(system)
     minimal, full = models.values()
     gains = {
-        name: (usual_gains(kind, minimal, system), usual_gains(kind, full, system))
-        for name, kind in known.items()
+        name: (usual_gains(cls, minimal, system), usual_gains(cls, full, system))
+        for name, cls in known.items()
     }
     tuned = {n: [one.source.startswith("tuned") for one in both] for n, both in gains.items()}
     assert tuned.pop("disturbance_observer") == tuned.pop("disturbance_observer_disc")
@@ -98,15 +98,15 @@ def test_gains_act_on_the_states_they_were_tuned_for_in_whatever_order_a_compile
 
 def test_simulate_says_whose_gains_it_used(root, tmp_path):
     case = str(root / "cases" / "03_dry_120_3.6")
-    told = {}
+    sources = {}
     for extra in ([], ["--untuned"]):
         out = tmp_path / f"run{len(extra)}"
         chosen = ["--estimator", "disturbance_observer", "--workers", "1", "--out", str(out)]
         assert main(["simulate", case, *chosen, *extra]) == 0
         provenance = json.loads((out / "summary.json").read_text())["provenance"]
-        told[len(extra)] = provenance["disturbance_observer"]["source"]
-    assert told[0] == "tuned, disturbance_observer.toml"
-    assert told[1].startswith("stationary Kalman gain")
+        sources[len(extra)] = provenance["disturbance_observer"]["source"]
+    assert sources[0] == "tuned, disturbance_observer.toml"
+    assert sources[1].startswith("stationary Kalman gain")
 
 
 def slow_disturbance_observer(fmu: FMU, system: System) -> tuple[Estimator, Gains]:

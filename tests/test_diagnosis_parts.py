@@ -271,9 +271,9 @@ def test_single_wrong_samples_are_found_wherever_they_strike(name):
         at = rng.choice(np.arange(5, values.size - 5), struck, replace=False)
         wrong = values.copy()
         wrong[at] += rng.choice([-1, 1], struck) * rng.uniform(0.1, 1.0, struck) * abs(values).max()
-        found = outliers(wrong, sensor, SOUND)
-        missed += int(np.sum(~found[at]))
-        more += int(np.sum(np.delete(found & ~before, at)))
+        wrong_samples = outliers(wrong, sensor, SOUND)
+        missed += int(np.sum(~wrong_samples[at]))
+        more += int(np.sum(np.delete(wrong_samples & ~before, at)))
     # Two that strike within a window of the median, or a ramp's foot, hide each other.
     assert missed <= 0.03 * 14 * struck
     assert more == 0
@@ -483,13 +483,13 @@ def test_sizes_have_bounds_units_and_a_zero_default(everything):
         for effect in EFFECTS:
             for parameter in effect.sizes:
                 for name in variables(effect, parameter):
-                    one = described[name]
+                    size = described[name]
                     assert fmu.defaults[name] == 0.0
-                    assert one.unit
-                    assert one.minimum <= 0.0 < effect.matters < one.maximum
+                    assert size.unit
+                    assert size.minimum <= 0.0 < effect.matters < size.maximum
             for shape, values in effect.shapes:
-                one = described[variables(effect, shape)[0]]
-                assert one.minimum <= min(values) <= max(values) <= one.maximum
+                size = described[variables(effect, shape)[0]]
+                assert size.minimum <= min(values) <= max(values) <= size.maximum
 
 
 def test_water_is_where_the_conditions_say_if_those_of_any_stop_do(everything):
@@ -504,7 +504,8 @@ def test_water_is_where_the_conditions_say_if_those_of_any_stop_do(everything):
             point = replace(fit.unknowns.start(), sizes={("WaterFilm", "film"): 0.3})
             values = fit.unknowns.values(point)
             both = [
-                [fit.unknowns.presence.at(one, k) for k in range(len(of))] for one in (film, lag)
+                [fit.unknowns.presence.at(effect, k) for k in range(len(of))]
+                for effect in (film, lag)
             ]
             assert [value["padFriction.waterFilm.film"] > 0.0 for value in values] == both[0]
             wet = [value.get("padFriction.waterFilm.wet") for value in values]
@@ -546,8 +547,8 @@ def test_derivatives_of_the_errors_are_those_of_central_differences():
     with simulating(SimulatorSetup(MINIMAL, SYSTEM, (samples,))) as simulator:
         with FMU(MINIMAL) as fmu:
             nominal = {name: fmu.defaults[name] for name in steps} | point
-        found = simulator.derivatives(0, nominal, [Variation((name,)) for name in steps])
-        found = np.column_stack([simulator.at(0, nominal).jacobian, found])
+        slopes = simulator.derivatives(0, nominal, [Variation((name,)) for name in steps])
+        slopes = np.column_stack([simulator.at(0, nominal).jacobian, slopes])
         for j, (name, step) in enumerate({delay("Fx"): 1e-3, **steps}.items()):
             sides = [
                 simulator.at(0, {**nominal, name: nominal[name] + s * step}) for s in (0.5, -0.5)
@@ -557,7 +558,7 @@ def test_derivatives_of_the_errors_are_those_of_central_differences():
             # than a thousandth. The wheel load does a thousandth of what friction does: there, a
             # hundredth.
             share = {"Fz": 0.02}.get(name, 1e-3)
-            np.testing.assert_allclose(found[:, j], central, atol=share * np.abs(central).max())
+            np.testing.assert_allclose(slopes[:, j], central, atol=share * np.abs(central).max())
 
 
 def test_derivatives_that_grow_beyond_all_bounds_are_refused_in_words():
@@ -700,11 +701,11 @@ def brute(r: Vector, P: Matrix, begun: Vector, prior: Vector, bounds: Vector) ->
 @pytest.mark.parametrize("furthest", [0.25, 0.6, 9.0])
 def test_tolerances_follow_a_step_as_far_as_their_bounds(furthest):
     rng = np.random.default_rng(2)
-    one = recording(rng, 2, furthest)
-    begun, prior = np.append(one.deviations, 0.0), np.array([1.0, 1.0, 0.0])
+    system = recording(rng, 2, furthest)
+    begun, prior = np.append(system.deviations, 0.0), np.array([1.0, 1.0, 0.0])
     for z in rng.normal(size=(20, 2)):
-        least = brute(one.r + one.J @ z, one.P, begun, prior, one.furthest)
-        moved = one.moved(z)
+        least = brute(system.r + system.J @ z, system.P, begun, prior, system.furthest)
+        moved = system.moved(z)
         assert_allclose(moved.chi_squared, least, **NEAR)
         assert np.abs(moved.deviations).max() <= furthest + 1e-9
 
@@ -713,9 +714,9 @@ def rival(rng: np.random.Generator, furthest: float) -> Rival:
     """Two recordings on a dry rail and two on a wet one."""
     systems = []
     for other in (2, 2, 1, 1):
-        one = recording(rng, 3, furthest)
-        one.J[:, other] = 0.0
-        systems.append(one.compressed())
+        system = recording(rng, 3, furthest)
+        system.J[:, other] = 0.0
+        systems.append(system.compressed())
     N = np.diag([0.0, SIGMA**-2, SIGMA**-2])
     prior = Quadratic(N, np.array([0.0, 0.0, AWAY / SIGMA]), AWAY**2, 0)
     return Rival(("effect",), {SIZE: 1.0}, {ON_DRY: 0.3, ON_WET: 0.1}, tuple(systems), prior, 0.0)
@@ -725,20 +726,20 @@ def rival(rng: np.random.Generator, furthest: float) -> Rival:
 @pytest.mark.parametrize(("furthest", "above"), [(0.3, 1e-3), (9.0, 1e-6)])
 def test_recordings_so_far_hold_the_unknowns_of_new_ones(furthest, above):
     """Reference: all of them side by side, with what new ones do not have among their own."""
-    one = rival(np.random.default_rng(3), furthest)
+    known = rival(np.random.default_rng(3), furthest)
     shared = (SIZE, ("friction", "greasy"), ON_DRY)
-    so_far = one.so_far(shared, 3.0)
-    assert_allclose(so_far.chi_squared, one.chi_squared, rtol=1e-12)
+    so_far = known.so_far(shared, 3.0)
+    assert_allclose(so_far.chi_squared, known.chi_squared, rtol=1e-12)
     # Side by side: the friction that new ones lack, then the three own unknowns of each recording.
     P = np.zeros((4 * 7, 1 + 4 * 3))
-    for k, system in enumerate(one.recordings):
+    for k, system in enumerate(known.recordings):
         P[7 * k : 7 * k + 7, 0] = system.J[:, 2] * SIGMA
         P[7 * k : 7 * k + 7, 1 + 3 * k : 4 + 3 * k] = system.P
-    begun = np.concatenate([[AWAY], *(np.append(o.deviations, 0.0) for o in one.recordings)])
+    begun = np.concatenate([[AWAY], *(np.append(o.deviations, 0.0) for o in known.recordings)])
     prior = np.append(1.0, np.tile([1.0, 1.0, 0.0], 4))
-    bounds = np.concatenate([[3.0], *(o.furthest for o in one.recordings)])
-    r = np.concatenate([o.r for o in one.recordings])
-    J = np.vstack([o.J for o in one.recordings])
+    bounds = np.concatenate([[3.0], *(o.furthest for o in known.recordings)])
+    r = np.concatenate([o.r for o in known.recordings])
+    J = np.vstack([o.J for o in known.recordings])
     for size, dry, greasy in np.random.default_rng(4).normal(size=(20, 3)):
         least = brute(r + J @ [size, dry, 0.0], P, begun, prior, bounds)
         found = so_far.moved(np.array([size, greasy, dry])).chi_squared
@@ -746,10 +747,10 @@ def test_recordings_so_far_hold_the_unknowns_of_new_ones(furthest, above):
 
 
 def test_information_is_that_of_all_recordings_and_of_what_was_known():
-    one = rival(np.random.default_rng(5), 9.0)
-    keys = (*one.sizes, *one.levels)
-    joint = Joint(keys, keys, tuple(one.levels), one.recordings, one.prior)
-    assert_allclose(one.information, joint.total().N, rtol=1e-12)
+    known = rival(np.random.default_rng(5), 9.0)
+    keys = (*known.sizes, *known.levels)
+    joint = Joint(keys, keys, tuple(known.levels), known.recordings, known.prior)
+    assert_allclose(known.information, joint.total().N, rtol=1e-12)
     # Of all unknowns that new recordings have too, nothing is eliminated.
-    held = one.so_far(keys, 3.0).eliminated().N + one.prior.N
-    assert_allclose(held, one.information, rtol=1e-9, atol=1e-9)
+    held = known.so_far(keys, 3.0).eliminated().N + known.prior.N
+    assert_allclose(held, known.information, rtol=1e-9, atol=1e-9)

@@ -311,7 +311,9 @@ def test_best_estimates_of_the_recording_shown_are_those_of_the_data(page, resul
     window = slice(braking[0].idxmax(), braking[1][::-1].idxmax() + 1)
     for j, (model, numbers) in enumerate(smoothed["models"].items()):
         force, friction = numbers["Fx"], numbers["muDC"]
-        value, sigma = (table[f"{model}.{kind}Fx [N]"][window].mean() for kind in ("", "sigma_"))
+        value, sigma = (
+            table[f"{model}.{prefix}Fx [N]"][window].mean() for prefix in ("", "sigma_")
+        )
         assert_allclose(force["value"], value, rtol=1e-3)
         assert_allclose(force["high"] - force["low"], 2 * 1.96 * sigma, rtol=1e-2)
         cell = rows["Creep force Fx [kN]"][1 + 2 * j]
@@ -409,13 +411,13 @@ def test_observers_are_compared_at_every_stop_that_could_be_judged(
 
 def test_pages_of_six_and_fourteen_long_stops_stay_small(system, summary, dry_case, tmp_path):
     """Residuals of noise, of every kind, are the longest that curves can be."""
-    one = residuals(gap=True)
+    long_stop = residuals(gap=True)
     rng = np.random.default_rng(2)
     balances = tuple(
-        Balance(name, name, "N.m", "N.m", rng.normal(size=one.time.size))
+        Balance(name, name, "N.m", "N.m", rng.normal(size=long_stop.time.size))
         for name in ("wheelset", "roller", "slip")
     )
-    long = replace(one, balances=balances)
+    long = replace(long_stop, balances=balances)
     for count, most in ((6, 3e6), (14, 3e6)):
         figures = [
             replace(
@@ -493,21 +495,21 @@ def test_noise_alone_leaves_one_and_a_lasting_error_stands_out():
 
 
 def test_an_error_that_turns_with_the_wheel_is_shown_where_means_would_hide_it(dry_case, system):
-    one = residuals(gap=False)
-    turning = one.after + 5.0 * (-1.0) ** np.arange(len(one.after))[:, None]
-    one = replace(one, before=turning)
-    assert (lasting(one, LASTING).noises()[0] < 1.5).all()
-    assert (lasting(one, FAST).noises()[0] > 4.5).all()
-    figure = recording_figure(one, dry_case, system, "with X", FAST)
+    long_stop = residuals(gap=False)
+    turning = long_stop.after + 5.0 * (-1.0) ** np.arange(len(long_stop.after))[:, None]
+    long_stop = replace(long_stop, before=turning)
+    assert (lasting(long_stop, LASTING).noises()[0] < 1.5).all()
+    assert (lasting(long_stop, FAST).noises()[0] > 4.5).all()
+    figure = recording_figure(long_stop, dry_case, system, "with X", FAST)
     assert "means over 50 ms" in figure.finding
 
 
 def test_no_mean_and_no_line_bridges_what_was_set_aside(dry_case, system):
-    one = residuals(gap=True)
-    quiet, loud = one.block_time < 10.0, one.block_time > 15.0
-    assert abs(lasting(one, LASTING).before[quiet]).max() < 3.0
-    assert lasting(one, LASTING).before[loud].min() > 7.0
-    figure = recording_figure(one, dry_case, system, "with X", LASTING)
+    long_stop = residuals(gap=True)
+    quiet, loud = long_stop.block_time < 10.0, long_stop.block_time > 15.0
+    assert abs(lasting(long_stop, LASTING).before[quiet]).max() < 3.0
+    assert lasting(long_stop, LASTING).before[loud].min() > 7.0
+    figure = recording_figure(long_stop, dry_case, system, "with X", LASTING)
     inside = (figure.time > 10.0) & (figure.time < 15.0)
     for panel in figure.panels:
         for curve in panel.curves:

@@ -79,11 +79,11 @@ def with_all_gains(gains: Gains) -> Gains:
 
 @pytest.fixture(scope="module", params=NAMES)
 def exported(request, tmp_path_factory) -> Iterator[Exported]:
-    kind = KINDS[request.param]
-    with open_model(SYSTEM, kind.role) as fmu:
-        gains = with_all_gains(kind.default_gains(fmu, SYSTEM))
-        python = kind(fmu, SYSTEM, gains)
-        yield Exported(write_fmu(tmp_path_factory.mktemp(kind.name), python), python)
+    cls = KINDS[request.param]
+    with open_model(SYSTEM, cls.role) as fmu:
+        gains = with_all_gains(cls.default_gains(fmu, SYSTEM))
+        python = cls(fmu, SYSTEM, gains)
+        yield Exported(write_fmu(tmp_path_factory.mktemp(cls.name), python), python)
 
 
 @pytest.fixture(scope="module")
@@ -141,23 +141,25 @@ def disagreement(found: np.ndarray, expected: np.ndarray) -> float:
 def test_fmu_reproduces_python_on_all_recorded_stops(exported, cases):
     for case in cases:
         recording = case.time, case.u, case.y
-        found = run_fmu(exported.path, *recording)
-        assert disagreement(found, run_python(exported.python, *recording)) < AGREEMENT, case.name
+        estimate = run_fmu(exported.path, *recording)
+        assert disagreement(estimate, run_python(exported.python, *recording)) < AGREEMENT, (
+            case.name
+        )
 
 
 def test_fmu_reproduces_python_on_samples_that_are_not_even(exported, dry_case):
     keep = np.flatnonzero(np.random.default_rng(1).random(dry_case.time.size) < 0.7)
     recording = dry_case.time[keep], dry_case.u[keep], dry_case.y[keep]
-    found = run_fmu(exported.path, *recording)
-    assert disagreement(found, run_python(exported.python, *recording)) < AGREEMENT
+    estimate = run_fmu(exported.path, *recording)
+    assert disagreement(estimate, run_python(exported.python, *recording)) < AGREEMENT
 
 
 def test_limits_of_friction_are_kept_and_reached(exported, dry_case):
     """A pressure sensor that reads 0.4 of the pressure wants more friction than pads have."""
     recording = dry_case.time, dry_case.u * [0.4, 1.0], dry_case.y
-    found = run_fmu(exported.path, *recording)
-    assert found[:, list(OUTPUTS).index("muDC")].max() == 0.45
-    assert disagreement(found, run_python(exported.python, *recording)) < AGREEMENT
+    estimate = run_fmu(exported.path, *recording)
+    assert estimate[:, list(OUTPUTS).index("muDC")].max() == 0.45
+    assert disagreement(estimate, run_python(exported.python, *recording)) < AGREEMENT
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
@@ -181,8 +183,8 @@ def test_a_tool_without_python_of_ours_gets_the_same(tmp_path, dry_case, name, f
         output=[*OUTPUTS],
         output_interval=float(description.defaultExperiment.stepSize),
     )
-    found = np.column_stack([result[output] for output in OUTPUTS])
-    assert disagreement(found[1:], expected[:-1]) < AGREEMENT
+    estimate = np.column_stack([result[output] for output in OUTPUTS])
+    assert disagreement(estimate[1:], expected[:-1]) < AGREEMENT
 
 
 def test_a_restored_state_repeats_the_steps(exported, dry_case):
@@ -220,7 +222,7 @@ def test_gains_are_parameters_that_another_tool_may_set(exported, tmp_path, dry_
         [(0.005 * k, *sample) for k, sample in enumerate(samples)],
         [(name, float) for name in ("time", *INPUTS)],
     )
-    found = fmpy.simulate_fmu(
+    estimate = fmpy.simulate_fmu(
         str(path),
         start_values=dict(zip(gains.names, python.gains.values.tolist(), strict=True)),
         input=recorded,
@@ -228,7 +230,7 @@ def test_gains_are_parameters_that_another_tool_may_set(exported, tmp_path, dry_
         output=[*OUTPUTS],
         output_interval=0.005,
     )
-    estimates = np.column_stack([found[output] for output in OUTPUTS])
+    estimates = np.column_stack([estimate[output] for output in OUTPUTS])
     expected = run_python(python, recorded["time"], dry_case.u, dry_case.y)
     assert disagreement(estimates[1:], expected[:-1]) < AGREEMENT
 
@@ -390,8 +392,8 @@ def test_steps_before_the_inputs_are_connected_do_not_start_the_observer(exporte
     time, u, y = dry_case.time[:count], dry_case.u[:count], dry_case.y[:count]
     earlier = np.append(time[0] - 0.005 * np.arange(3, 0, -1), time)
     padded = np.vstack([np.zeros((3, 2)), u]), np.vstack([np.zeros((3, 2)), y])
-    found = run_fmu(exported.path, earlier, *padded)[3:]
-    assert disagreement(found, run_python(exported.python, time, u, y)) < AGREEMENT
+    estimate = run_fmu(exported.path, earlier, *padded)[3:]
+    assert disagreement(estimate, run_python(exported.python, time, u, y)) < AGREEMENT
 
 
 def test_start_values_of_the_package_cover_the_observer(package):

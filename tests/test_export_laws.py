@@ -69,9 +69,9 @@ def write_fmu(path: Path, estimator: Estimator, fmi: int = 2) -> Path:
 
 @contextmanager
 def opened(system: System, name: str) -> Iterator[Estimator]:
-    kind = choose(system, [name])[name]
-    with open_model(system, kind.role) as fmu:
-        yield kind(fmu, system, kind.default_gains(fmu, system))
+    cls = choose(system, [name])[name]
+    with open_model(system, cls.role) as fmu:
+        yield cls(fmu, system, cls.default_gains(fmu, system))
 
 
 @pytest.fixture(scope="module", params=NAMES)
@@ -158,8 +158,8 @@ def run_fmu(path: Path, time: np.ndarray, u: np.ndarray, y: np.ndarray) -> np.nd
 
 def run_python(estimator: Estimator, time: np.ndarray, u: np.ndarray, y: np.ndarray) -> np.ndarray:
     """All that an estimate has, in the order of the FMU's outputs."""
-    found = estimator.run(time, u, y)
-    return np.column_stack([found.values, found.sigma, found.probability, found.nis])
+    estimate = estimator.run(time, u, y)
+    return np.column_stack([estimate.values, estimate.sigma, estimate.probability, estimate.nis])
 
 
 def assert_same(found: np.ndarray, expected: np.ndarray) -> None:
@@ -214,10 +214,10 @@ def test_the_first_whole_sample_that_is_connected_starts_it(exported, dry_case, 
     before = y[:3].copy()
     before[:, 1 if np.isnan(gap) else slice(None)] = gap
     earlier = np.append(time[0] - 0.005 * np.arange(3, 0, -1), time)
-    found = run_fmu(exported.path, earlier, np.vstack([u[:3], u]), np.vstack([before, y]))
+    estimate = run_fmu(exported.path, earlier, np.vstack([u[:3], u]), np.vstack([before, y]))
     # Rounding of the times; without it, to the bit.
-    assert_same(found[3:], run_python(exported.python, time, u, y))
-    assert (found[:3] == found[0]).all()
+    assert_same(estimate[3:], run_python(exported.python, time, u, y))
+    assert (estimate[:3] == estimate[0]).all()
 
 
 def test_a_restored_state_repeats_the_steps(exported, slide):
@@ -367,7 +367,7 @@ def test_a_machine_whose_output_is_no_state_exports(tmp_path):
     system = load_system("seal_friction")
     rng = np.random.default_rng(5)
     time = np.arange(300) * system.sample_time
-    u = np.array([one.scale for one in system.inputs]) * rng.standard_normal(
+    u = np.array([quantity.scale for quantity in system.inputs]) * rng.standard_normal(
         (300, len(system.inputs))
     )
     y = np.array([output.scale for output in system.outputs]) * rng.standard_normal(
@@ -426,9 +426,9 @@ class Shared(ExtendedKalmanFilter):
 )
 def test_what_does_not_become_c_is_refused_in_words(tmp_path, minimal, name, match):
     (tmp_path / "own.py").write_text(OWN)
-    found = importlib.util.spec_from_file_location("own", tmp_path / "own.py")
-    module = importlib.util.module_from_spec(found)
-    found.loader.exec_module(module)
+    spec = importlib.util.spec_from_file_location("own", tmp_path / "own.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
     kind = getattr(module, name)
     estimator = kind(minimal, SYSTEM, kind.default_gains(minimal, SYSTEM))
     with pytest.raises(InputError, match=match):
@@ -458,8 +458,8 @@ def test_the_command_writes_a_bank_with_gains_of_its_filters(command, tmp_path):
     with opened(SYSTEM, "ekf") as estimator:
         gains = estimator.gains.with_values(0.5 * estimator.gains.values)
     (tmp_path / "gains.toml").write_text(format_gains(gains, "", {"z": 0.3}))
-    told = "--gains", str(tmp_path / "gains.toml"), "--platforms", "native"
-    assert command("--estimator", "imm", *told) == 0
+    options = "--gains", str(tmp_path / "gains.toml"), "--platforms", "native"
+    assert command("--estimator", "imm", *options) == 0
     names = {file.name for file in (tmp_path / "out").iterdir()}
     model = "InteractingMultipleModel"
     assert names == {f"{model}.fmu", f"{model}.ssp", "summary.json"}

@@ -113,12 +113,12 @@ def test_a_model_that_knows_the_fade_of_its_pads_lowers_the_error_of_the_force(
 def test_a_state_without_effect_changes_no_estimate(minimal, extended, dry_case):
     gains = gains_of(minimal)
     recording = dry_case.time, dry_case.u, dry_case.y
-    expected, found = (
+    expected, estimate = (
         DisturbanceObserver(fmu, SYSTEM, gains).run(*recording).values
         for fmu in (minimal, extended["Warming"])
     )
     # Rounding only, amplified by the stiff slip.
-    assert_allclose(found, expected, rtol=1e-6, atol=1e-6)
+    assert_allclose(estimate, expected, rtol=1e-6, atol=1e-6)
 
 
 def test_the_disturbance_observer_follows_a_disc_that_it_does_not_measure(extended, fading_stop):

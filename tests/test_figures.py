@@ -184,9 +184,9 @@ def test_a_command_that_fails_costs_its_own_table(monkeypatch, capfd, tmp_path):
 
 def test_a_table_is_written_in_its_place_and_nothing_else_is_touched():
     text = "before\n\n<!-- figures: accuracy -->\n\nold\n\n<!-- figures end -->\n\nafter\n"
-    found = figures.placed(text, "accuracy", WORST)
-    assert found == text.replace("old", figures.written("accuracy", WORST))
-    assert "| force, dry discs | 2 % | 0.18 % |\n" in found
+    page = figures.placed(text, "accuracy", WORST)
+    assert page == text.replace("old", figures.written("accuracy", WORST))
+    assert "| force, dry discs | 2 % | 0.18 % |\n" in page
     with pytest.raises(SystemExit, match="found 0 places for coverage, expected one"):
         figures.placed(text, "coverage", COVERED)
 

@@ -100,8 +100,8 @@ def case(folder, tanks) -> Case:
 
 
 def made(fmu: FMU, tanks: System, name: str) -> Estimator:
-    kind = estimators_of(tanks)[name]
-    return kind(fmu, tanks, kind.default_gains(fmu, tanks))
+    cls = estimators_of(tanks)[name]
+    return cls(fmu, tanks, cls.default_gains(fmu, tanks))
 
 
 @pytest.fixture(scope="module")

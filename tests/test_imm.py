@@ -162,7 +162,7 @@ def test_with_one_hypothesis_it_is_the_extended_filter():
     with open_model(plain) as opened:
         gains = ExtendedKalmanFilter.default_gains(opened, plain)
         kinds = (ExtendedKalmanFilter, InteractingMultipleModel)
-        alone, one = (kind(opened, plain, gains).run(case.time, case.u, case.y) for kind in kinds)
+        alone, one = (cls(opened, plain, gains).run(case.time, case.u, case.y) for cls in kinds)
     assert_allclose(one.values, alone.values, rtol=1e-12, atol=0)
     assert_allclose(one.sigma, alone.sigma, rtol=1e-12, atol=0)
     assert_allclose(one.nis, alone.nis, rtol=1e-12, atol=0)

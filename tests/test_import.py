@@ -84,18 +84,18 @@ def test_a_file_is_imported_without_a_wrong_number(tmp_path, stop, system, name)
 def test_what_was_done_to_a_file_is_written_down(tmp_path, stop, system):
     csv_of_a_german_rig(tmp_path / "a.csv", recorded(stop, system))
     main(["import", str(tmp_path / "a.csv"), "--out", str(tmp_path / "out"), "--yes"])
-    (one,) = json.loads((tmp_path / "out" / "import.json").read_text())["imports"]
-    (file,) = one["files"]
+    (entry,) = json.loads((tmp_path / "out" / "import.json").read_text())["imports"]
+    (file,) = entry["files"]
     assert file["format"].startswith("CSV, semicolons, decimal commas, Windows-1252")
     assert file["notes"][0].startswith("1 lines that are no samples were left out, the first in")
-    assert one["dropped"] == ["Temperatur [degC]"]
-    assert one["channels"]["omegaR"]["converted"] == {
+    assert entry["dropped"] == ["Temperatur [degC]"]
+    assert entry["channels"]["omegaR"]["converted"] == {
         "to": "rad/s",
         "factor": pytest.approx(1 / 3.6 / system.values["rR"], rel=1e-12),
         "zero": 0.0,
         "recorded_as": "rR * omegaR",
     }
-    conditions = one["cases"]["a"]["conditions"]
+    conditions = entry["cases"]["a"]["conditions"]
     assert conditions["initial_speed"]["from"] == "shown by the record"
     assert conditions["wheel_rail"] == {"value": "unknown", "from": "unknown"}
 
@@ -124,8 +124,8 @@ def test_the_end_that_a_tdms_file_lacks_is_told(tmp_path, stop, system, capsys):
     assert main(command) == 0
     warning = f"warning: {path}: [nptdms.reader WARNING] Last segment of file has less data"
     assert capsys.readouterr().err.count(warning) == 1
-    told = json.loads((tmp_path / "cases" / "import.json").read_text())
-    assert any("less data" in doubt for doubt in told["imports"][-1]["files"][0]["doubts"])
+    written = json.loads((tmp_path / "cases" / "import.json").read_text())
+    assert any("less data" in doubt for doubt in written["imports"][-1]["files"][0]["doubts"])
     # The same without an import.
     (tmp_path / "columns.toml").write_bytes((tmp_path / "cases" / "columns.toml").read_bytes())
     with pytest.warns(UserWarning, match=r"stop\.tdms: \[nptdms"):
@@ -408,9 +408,9 @@ def test_a_unit_that_alone_is_plausible_is_asked_about_and_said(
     monkeypatch.setattr(builtins, "input", lambda: "")
     path = table(Bremsdruck="Bremsdruck")
     assert main(["import", str(path), "--out", str(tmp_path / "out")]) == 0
-    (one,) = json.loads((tmp_path / "out" / "import.json").read_text())["imports"]
-    assert one["channels"]["pB"]["unit"] == "bar"
-    assert not one["channels"]["pB"]["unit_stated"]
+    (entry,) = json.loads((tmp_path / "out" / "import.json").read_text())["imports"]
+    assert entry["channels"]["pB"]["unit"] == "bar"
+    assert not entry["channels"]["pB"]["unit_stated"]
     assert_allclose(imported(tmp_path / "out", "a", system)["pB"], stop["pB"], atol=rounding("pB"))
 
 
@@ -483,9 +483,9 @@ def test_each_recording_of_a_file_is_a_case_without_a_wrong_number(
     write, called = FORMATS_OF_STOPS[name]
     write(tmp_path / name, stops)
     assert take(name) == 0
-    told = record(tmp_path)
-    assert [entry["recording"] for entry in told] == list(called)
-    for one, truth in zip(told, cases, strict=True):
+    recorded = record(tmp_path)
+    assert [entry["recording"] for entry in recorded] == list(called)
+    for one, truth in zip(recorded, cases, strict=True):
         (folder,) = one["cases"]
         (got,) = wb.read_cases(tmp_path / "out" / folder, system)
         assert_same(got, truth)
@@ -550,12 +550,14 @@ def test_a_unit_that_one_sheet_alone_states_is_not_taken_for_the_others(
 def test_a_sheet_that_lacks_a_channel_is_refused_and_leaves_the_others(
     tmp_path, take, stops, capsys
 ):
-    third = {name: one for name, one in stops["Stop 1"].items() if name != "Bremsdruck"}
+    third = {name: column for name, column in stops["Stop 1"].items() if name != "Bremsdruck"}
     workbook(tmp_path / "a.xlsx", {**stops, "third": third})
     assert take("a.xlsx") == 2
     assert "a.xlsx, 'third': found pB: no channel whose name" in capsys.readouterr().err
-    for one in record(tmp_path):
-        assert any("'third' is no such recording: pB" in note for note in one["files"][0]["notes"])
+    for entry in record(tmp_path):
+        assert any(
+            "'third' is no such recording: pB" in note for note in entry["files"][0]["notes"]
+        )
 
 
 def test_what_else_a_workbook_holds_is_written_down(tmp_path, take, stops, capsys):
@@ -572,8 +574,8 @@ def test_what_else_a_workbook_holds_is_written_down(tmp_path, take, stops, capsy
     book.save(tmp_path / "a.xlsx")
     assert take("a.xlsx") == 0
     assert "'climate' holds other channels: Feuchte, Zeit" in capsys.readouterr().out
-    for one in record(tmp_path):
-        notes = " ".join(one["files"][0]["notes"])
+    for entry in record(tmp_path):
+        notes = " ".join(entry["files"][0]["notes"])
         for note in ("'Sheet' was left out", "'Stop 2' is hidden", "'climate' holds other"):
             assert note in notes
     assert [entry["recording"] for entry in record(tmp_path)] == list(NAMES)
@@ -673,8 +675,8 @@ def test_channels_of_one_sheet_may_be_named(tmp_path, take, stops, system, cases
     channels["omegaR"] = "v_Rolle"
     said = [part for key, name in channels.items() for part in ("--column", f"{key}=two/{name}")]
     assert take("a.xlsx", *said) == 0
-    (one,) = record(tmp_path)
-    assert not one.get("recording")
+    (entry,) = record(tmp_path)
+    assert not entry.get("recording")
     (got,) = wb.read_cases(tmp_path / "out" / "a", system)
     assert_same(got, cases[1])
 
@@ -735,8 +737,8 @@ def test_channels_of_two_loggers_on_two_sheets_are_one_recording(
     assert take("a.xlsx") == 0
     (got,) = wb.read_cases(tmp_path / "out" / "a", system)
     assert_same(got, cases[0])
-    (one,) = record(tmp_path)
-    assert not one.get("recording")
+    (entry,) = record(tmp_path)
+    assert not entry.get("recording")
 
 
 def test_a_sheet_whose_names_are_less_alike_is_left_out(tmp_path, take, stops, system, cases):

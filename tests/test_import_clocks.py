@@ -48,8 +48,8 @@ def table(path: Path, stamps: Sequence[str], name: str = "Time") -> Path:
 
 def clock(path: Path, system: System, time: str = "") -> Clock:
     columns = dict([parse_named(f"time={time}", "", system.signals)]) if time else {}
-    (found,) = propose([read_recorded_file(path)], system, columns).clocks.values()
-    return found
+    (read_clock,) = propose([read_recorded_file(path)], system, columns).clocks.values()
+    return read_clock
 
 
 def local(begin: datetime, count: int, form: str, step: float = QUARTER) -> list[str]:

@@ -67,8 +67,8 @@ def test_columns_beyond_the_header_may_be_empty(tmp_path):
 
 def clock(path: Path, system: System, **columns: NamedChannel) -> Clock:
     """The one clock of a file."""
-    (found,) = propose([read_recorded_file(path)], system, columns).clocks.values()
-    return found
+    (read_clock,) = propose([read_recorded_file(path)], system, columns).clocks.values()
+    return read_clock
 
 
 MINUTE = np.arange(0.0, 60.0, 0.5)  # s
@@ -82,8 +82,8 @@ def test_times_beside_data_are_in_the_unit_that_stands_there(tmp_path, tank):
 
 def test_times_beside_data_that_state_no_unit_are_asked_about(tmp_path, tank):
     savemat(tmp_path / "a.mat", {"h": {"unit": "mm", "data": MINUTE, "time": 1e3 * MINUTE}})
-    found = clock(tmp_path / "a.mat", tank)
-    assert (found.unit, found.certain) == ("ms", False)
+    read_clock = clock(tmp_path / "a.mat", tank)
+    assert (read_clock.unit, read_clock.certain) == ("ms", False)
     said = clock(tmp_path / "a.mat", tank, time=NamedChannel("time", "ms"))
     assert_allclose(said.times, MINUTE, rtol=1e-12)
 
@@ -180,9 +180,9 @@ def test_times_that_may_be_seconds_or_minutes_are_asked_for(tmp_path, tank, name
 def test_months_may_be_written_by_their_names(tmp_path, tank, day):
     """The first as MATLAB writes it."""
     rows = [f"{day} 08:15:{t:06.3f};{t}" for t in MINUTE]
-    found = clock(table(tmp_path / "a.csv", ["Time;h [mm]", *rows]), tank)
-    assert_allclose(found.times, MINUTE, atol=1e-9)
-    assert iso(found.start) == "2024-03-01T08:15:00.000000"
+    read_clock = clock(table(tmp_path / "a.csv", ["Time;h [mm]", *rows]), tank)
+    assert_allclose(read_clock.times, MINUTE, atol=1e-9)
+    assert iso(read_clock.start) == "2024-03-01T08:15:00.000000"
 
 
 @pytest.mark.parametrize("day", ["01-Mon-2024", "31-Feb-2024", "Mar-2024", "01-Mar-24 x"])
@@ -250,8 +250,8 @@ def test_a_unit_that_contradicts_the_one_in_the_file_is_told(tmp_path, tank, cap
     ]
     columns = ("time=t [s]", "h=h [mm]", "inflow=inflow [l/s]")
     assert main([*command, *(part for column in columns for part in ("--column", column))]) == 0
-    told = [line for line in capsys.readouterr().err.splitlines() if "as named" in line]
-    assert [line.partition("channel ")[2] for line in told] == [
+    printed = [line for line in capsys.readouterr().err.splitlines() if "as named" in line]
+    assert [line.partition("channel ")[2] for line in printed] == [
         "'h': taken in [mm], as named, and the file states [Zoll]",
         "'t': taken in [s], as named, and the file states [ms]",
     ]

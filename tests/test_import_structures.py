@@ -30,8 +30,8 @@ def simulink(labels: tuple[str, str], times: np.ndarray = TIME) -> Mapping[str, 
 
 def group(path: Path, content: Mapping[str, Any], form: Literal["4", "5"] = "5") -> Group:
     savemat(path, dict(content), format=form)
-    (found,) = read_recorded_file(path).groups
-    return found
+    (held,) = read_recorded_file(path).groups
+    return held
 
 
 @pytest.mark.parametrize(
@@ -184,11 +184,11 @@ def test_results_of_modelica_tools_are_recordings(tmp_path, *, turned):
     times = np.array([0.0, 1.0, 2.0, 2.0, 3.0])
     data = np.array([times, 10.0 * times, [0.0, 0.0, 0.0, 1.0, 1.0]])
     info = np.array([[0, 1, 0, -1], [2, 2, 0, -1], [2, -2, 0, -1], [1, 2, 0, 0], [2, 3, 0, -1]])
-    kind = "binTrans" if turned else "binNormal"
+    matrix = "binTrans" if turned else "binNormal"
     names = ["time", "tank.h", "mirror", "A", "valve"]
     about = ["Time in [s]", "Level [m|cm]", "Level turned [m]", "Area [m2]", "open"]
     content = {
-        "Aclass": texts(["Atrajectory", "1.1", "", kind], turned=False),
+        "Aclass": texts(["Atrajectory", "1.1", "", matrix], turned=False),
         "name": texts(names, turned=turned),
         "description": texts(about, turned=turned),
         "dataInfo": (info.T if turned else info).astype(np.int32),

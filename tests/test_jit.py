@@ -97,8 +97,8 @@ def test_arrays_of_one_call_are_not_those_of_the_next():
 
 
 def _named(fields: list[tuple[str, Any]]) -> Callable[..., Any]:
-    kind: Any = NamedTuple("Pair", fields)
-    return kind
+    pair: Any = NamedTuple("Pair", fields)
+    return pair
 
 
 @compiled

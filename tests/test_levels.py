@@ -232,11 +232,11 @@ def test_a_law_that_stands_for_two_gives_way_to_them(tmp_path):
     """
     block = heated_block(tmp_path / "block", effect=machine_file("heater/Convection.mo"))
     frames = [radiating(seed) for seed in range(3)]
-    found = diagnosed(block, cases(block, frames), tmp_path).diagnosis
-    assert "Convection" in [step.rivals[0].active[-1].name for step in found.steps]
-    sizes = {cause.effect.name: cause.parameters for cause in found.causes}
+    diagnosis = diagnosed(block, cases(block, frames), tmp_path).diagnosis
+    assert "Convection" in [step.rivals[0].active[-1].name for step in diagnosis.steps]
+    sizes = {cause.effect.name: cause.parameters for cause in diagnosis.causes}
     assert set(sizes) == {"Draught", "Radiation"}
     assert sizes["Draught"]["G"].low <= DRAUGHT <= sizes["Draught"]["G"].high
     assert sizes["Radiation"]["s"].low <= S <= sizes["Radiation"]["s"].high
     # Block means of noise keep their size; of some sixty a recording, four sigma are a third.
-    assert found.gain.after == pytest.approx(1.0, abs=0.33)
+    assert diagnosis.gain.after == pytest.approx(1.0, abs=0.33)

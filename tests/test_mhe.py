@@ -163,10 +163,10 @@ def test_samples_that_come_late_count_as_if_they_had_come_in_time(linear):
             estimator.fill_in(late, np.array([y[k - late, 0], np.nan]))
     for age in range(late):
         estimator.fill_in(age, np.array([y[59 - age, 0], np.nan]))
-    found = estimator.step(time[60], u[60], y[60])
+    estimate = estimator.step(time[60], u[60], y[60])
     # Rounding, over the 1e6 that lie between variances of levels and flows.
-    assert_allclose(found.values, expected.values[60], rtol=1e-9)
-    assert_allclose(found.sigma, expected.sigma[60], rtol=1e-9)
+    assert_allclose(estimate.values, expected.values[60], rtol=1e-9)
+    assert_allclose(estimate.sigma, expected.sigma[60], rtol=1e-9)
     with pytest.raises(InputError, match="20 steps old"):
         estimator.fill_in(20, y[40])
 
@@ -174,12 +174,12 @@ def test_samples_that_come_late_count_as_if_they_had_come_in_time(linear):
 @pytest.mark.parametrize("samples", [1, 2, 7, 20, 200])
 def test_on_a_linear_model_it_is_the_kalman_filter(linear, samples):
     expected = kalman(*linear, recording())
-    found = horizon(*linear, samples).run(*recording())
+    estimate = horizon(*linear, samples).run(*recording())
     # Rounding of double precision, over the 1e6 that lie between variances of levels and flows.
     scale = np.abs(expected.values).max(axis=0)
-    assert_allclose(found.values / scale, expected.values / scale, rtol=0, atol=1e-10)
-    assert_allclose(found.sigma, expected.sigma, rtol=1e-10)
-    assert_allclose(found.nis[1:], expected.nis[1:], rtol=1e-8, atol=1e-10)
+    assert_allclose(estimate.values / scale, expected.values / scale, rtol=0, atol=1e-10)
+    assert_allclose(estimate.sigma, expected.sigma, rtol=1e-10)
+    assert_allclose(estimate.nis[1:], expected.nis[1:], rtol=1e-8, atol=1e-10)
 
 
 def test_a_full_horizon_solves_the_nonlinear_least_squares_problem(bent):
@@ -191,8 +191,8 @@ def test_a_full_horizon_solves_the_nonlinear_least_squares_problem(bent):
     window = estimator._state.window
     count = window.filled[0]
     # Differences of scipy's derivatives are good to 1e-8 of a term; a standard deviation is 1.
-    found = window.nodes[:count] / SIZES
-    assert_allclose(found, best.x.reshape(-1, 3) / SIZES, rtol=0, atol=2e-4)
+    solution = window.nodes[:count] / SIZES
+    assert_allclose(solution, best.x.reshape(-1, 3) / SIZES, rtol=0, atol=2e-4)
     assert cost(window) == pytest.approx(2.0 * best.cost, rel=1e-7)
     assert_allclose(
         estimator._state.filter.z[:2], residuals(best.x, "Bent", samples)[1][-1, :2], atol=2e-6
@@ -226,13 +226,13 @@ def test_with_active_bounds_it_is_the_bounded_least_squares_solution(folder):
         estimator = horizon(fmu, known, 50, rare=1e-300)
         estimator.run(*samples)
         window = estimator._state.window
-        found = window.arrived[: window.filled[0]] / unit.reshape(-1, 3)
+        solution = window.arrived[: window.filled[0]] / unit.reshape(-1, 3)
     # Rounding, grown by a condition number of about 1e5.
-    assert_allclose(found, best.x.reshape(-1, 3), rtol=0, atol=1e-6)
-    gradient = matrix.T @ (matrix @ found.ravel() + offset)
+    assert_allclose(solution, best.x.reshape(-1, 3), rtol=0, atol=1e-6)
+    gradient = matrix.T @ (matrix @ solution.ravel() + offset)
     active = window.active[: window.filled[0]].ravel()
     np.testing.assert_array_equal(active, best.active_mask)
-    size = np.abs(matrix).T @ np.abs(matrix @ found.ravel() + offset)
+    size = np.abs(matrix).T @ np.abs(matrix @ solution.ravel() + offset)
     assert np.abs(gradient[active == 0] / size[active == 0]).max() < 1e-8
     assert (gradient[active == 1] <= 0.0).all()
     assert (window.multiplier[: window.filled[0]].ravel()[active != 0] >= 0.0).all()
@@ -294,34 +294,34 @@ def test_the_smoother_is_the_batch_least_squares_solution(linear):
     best = np.linalg.lstsq(matrix, -offset, rcond=None)[0] * unit
     factor = np.linalg.qr(matrix, mode="r")
     deviations = np.linalg.norm(np.linalg.inv(factor), axis=1) * unit
-    found = smoother(*linear).run(*samples)
+    estimate = smoother(*linear).run(*samples)
     ends = residuals(best, "Linear", samples)[1]
-    h1, dleak = found.values[1:, 1], found.values[1:, 2]
+    h1, dleak = estimate.values[1:, 1], estimate.values[1:, 2]
     # Rounding, grown by a condition number of 1e3.
     assert_allclose(h1, ends[:, 0], rtol=1e-10)
     assert_allclose(dleak, ends[:, 2], rtol=0, atol=1e-10 * 1e-4)
-    assert_allclose(found.sigma[1:, 2], deviations.reshape(-1, 3)[:, 2], rtol=1e-9)
+    assert_allclose(estimate.sigma[1:, 2], deviations.reshape(-1, 3)[:, 2], rtol=1e-9)
 
 
 def test_the_smoother_knows_no_less_than_the_filter_and_ends_where_it_does(linear):
     samples = recording()
-    found, filtered = smoother(*linear).run(*samples), kalman(*linear, samples)
-    assert (found.sigma <= filtered.sigma * (1.0 + 1e-12)).all()
-    assert found.sigma[40, 2] < 0.8 * filtered.sigma[40, 2]
+    estimate, filtered = smoother(*linear).run(*samples), kalman(*linear, samples)
+    assert (estimate.sigma <= filtered.sigma * (1.0 + 1e-12)).all()
+    assert estimate.sigma[40, 2] < 0.8 * filtered.sigma[40, 2]
     # Rounding, over the 1e6 that lie between variances of levels and flows.
-    assert_allclose(found.values[-1], filtered.values[-1], rtol=1e-10)
-    assert_allclose(found.sigma[-1], filtered.sigma[-1], rtol=1e-10)
+    assert_allclose(estimate.values[-1], filtered.values[-1], rtol=1e-10)
+    assert_allclose(estimate.sigma[-1], filtered.sigma[-1], rtol=1e-10)
 
 
 def test_the_smoother_solves_the_nonlinear_least_squares_problem(bent):
     """Reference: scipy on the textbook terms, from the true levels."""
     samples = recording("Bent", 60)
     best = least(samples)
-    found = smoother(*bent).run(*samples)
+    estimate = smoother(*bent).run(*samples)
     ends = residuals(best.x, "Bent", samples)[1]
     # Differences of scipy's derivatives are good to 1e-8 of a term; a standard deviation is 1.
-    assert_allclose(found.values[1:, 1] / 0.01, ends[:, 0] / 0.01, rtol=0, atol=2e-4)
-    assert_allclose(found.values[1:, 2] / 1e-5, ends[:, 2] / 1e-5, rtol=0, atol=2e-3)
+    assert_allclose(estimate.values[1:, 1] / 0.01, ends[:, 0] / 0.01, rtol=0, atol=2e-4)
+    assert_allclose(estimate.values[1:, 2] / 1e-5, ends[:, 2] / 1e-5, rtol=0, atol=2e-3)
 
 
 def test_the_smoother_keeps_quantities_within_their_bounds(folder):
@@ -333,10 +333,10 @@ def test_the_smoother_keeps_quantities_within_their_bounds(folder):
         estimator.run(*samples)
         window = estimator._state.window
         expected = window.arrived[: window.filled[0]]
-        found = smoother(fmu, known).run(*samples)
-    assert (np.abs(found.values[1:, 2] - 0.5e-4) < 1e-15).sum() > 5
-    assert_allclose(found.values[1:, 2], expected[:, 2], rtol=0, atol=1e-6 * 1e-5)
-    assert_allclose(found.values[1:, 1], expected[:, 0], rtol=0, atol=1e-6 * 0.01)
+        estimate = smoother(fmu, known).run(*samples)
+    assert (np.abs(estimate.values[1:, 2] - 0.5e-4) < 1e-15).sum() > 5
+    assert_allclose(estimate.values[1:, 2], expected[:, 2], rtol=0, atol=1e-6 * 1e-5)
+    assert_allclose(estimate.values[1:, 1], expected[:, 0], rtol=0, atol=1e-6 * 0.01)
 
 
 def test_the_smoother_refuses_a_recording_that_is_not_over(linear):

@@ -244,27 +244,27 @@ def test_recordings_that_come_later_twice_or_damaged_change_nothing(
     for part in (names[:5], names[5:6], names[6:]):
         for name in part:
             shutil.copytree(history / name, inbox / name)
-        found = wb.monitor(train, inbox, out=out, workers=1)
-    same(found, usual)
+        result = wb.monitor(train, inbox, out=out, workers=1)
+    same(result, usual)
     shutil.copytree(history / "05", inbox / "z_again")
     damaged = inbox / "17" / "measured.csv"
     shutil.copytree(history / "16", inbox / "17")
     damaged.write_bytes(damaged.read_bytes()[:5000])
     (inbox / "18").mkdir()
-    found = wb.monitor(train, inbox, out=out, workers=1)
-    assert found.again == {"z_again": "05"}
-    assert set(found.refused) == {"17", "18"}
-    assert "measured.csv" in found.refused["17"]
-    pd.testing.assert_frame_equal(found.to_frame(), usual.to_frame(), check_exact=True)
+    result = wb.monitor(train, inbox, out=out, workers=1)
+    assert result.again == {"z_again": "05"}
+    assert set(result.refused) == {"17", "18"}
+    assert "measured.csv" in result.refused["17"]
+    pd.testing.assert_frame_equal(result.to_frame(), usual.to_frame(), check_exact=True)
     # What came whole and is damaged now is kept; what is repaired counts.
     (inbox / "05" / "measured.csv").write_text("")
     shutil.copy(history / "16" / "case.toml", inbox / "17" / "case.toml")
     (inbox / "17" / "case.toml").write_text((history / "16" / "case.toml").read_text())
     shutil.rmtree(inbox / "17")
     write_stop(inbox / "17", 17, {3: 0.255}, "2026-03-17")
-    found = wb.monitor(train, inbox, out=out, workers=1)
-    assert found.names == (*usual.names, "17")
-    assert set(found.refused) == {"05", "18"}
+    result = wb.monitor(train, inbox, out=out, workers=1)
+    assert result.names == (*usual.names, "17")
+    assert set(result.refused) == {"05", "18"}
 
 
 def test_nothing_is_estimated_twice(history, train, tmp_path, monkeypatch):
@@ -272,8 +272,8 @@ def test_nothing_is_estimated_twice(history, train, tmp_path, monkeypatch):
         shutil.copytree(history / name, tmp_path / "in" / name)
     wb.monitor(train, tmp_path / "in", out=tmp_path / "out", workers=1)
     monkeypatch.setattr("workbench.studies.monitoring.estimate.replay", None)  # would fail
-    found = wb.monitor(train, tmp_path / "in", out=tmp_path / "out", workers=1)
-    assert found.names == ("01", "02")
+    result = wb.monitor(train, tmp_path / "in", out=tmp_path / "out", workers=1)
+    assert result.names == ("01", "02")
 
 
 def test_a_state_of_another_model_or_a_damaged_one_is_refused(history, train, tmp_path):
@@ -347,21 +347,21 @@ def test_a_condition_that_the_model_needs_and_nobody_knows_is_told(history, trai
         shutil.copytree(history / name, tmp_path / "in" / name)
     toml = tmp_path / "in" / "02" / "case.toml"
     toml.write_text(toml.read_text().replace('"dry"', '"unknown"'))
-    found = wb.monitor(train, tmp_path / "in", workers=1)
-    assert found.names == ("01",)
-    assert "found rail: unknown" in found.refused["02"]
+    result = wb.monitor(train, tmp_path / "in", workers=1)
+    assert result.names == ("01",)
+    assert "found rail: unknown" in result.refused["02"]
 
 
 def test_the_page_shows_what_has_changed_and_where(usual, tmp_path, probe):
     provenance = {"run": run_of("monitor", usual.system, {})}
     page = write_monitoring(usual, provenance, tmp_path)
-    told = check_page(page, json.loads((tmp_path / "summary.json").read_text()))
+    content = check_page(page, json.loads((tmp_path / "summary.json").read_text()))
     # Of eight axles, the third is marked, with its loss.
-    (mark,) = told.xpath("//ol[@class='strip']/li[contains(@class, 'wrong')]")
+    (mark,) = content.xpath("//ol[@class='strip']/li[contains(@class, 'wrong')]")
     assert mark.xpath("string(span)") == "3"
     (alarm,) = {
         (row.xpath("string(th)"), row.xpath("string(td[1])"))
-        for row in told.get_element_by_id("alarm-table").xpath("tbody/tr")
+        for row in content.get_element_by_id("alarm-table").xpath("tbody/tr")
     }
     (_, change), *_ = usual.changes
     assert alarm == (usual.names[change.raised], "muDC[3] against the others")
@@ -369,17 +369,17 @@ def test_the_page_shows_what_has_changed_and_where(usual, tmp_path, probe):
     nominal = usual.system.values["muDC[3]"]
     assert mark.text_content().endswith(f"{100.0 * size / nominal:+.1f} %")
     # The recording in the middle of sixteen, by keyboard.
-    found = probe(page, script("monitoring"))
-    assert not found["errors"]
-    assert found["read"] == "recording 9"
+    shown = probe(page, script("monitoring"))
+    assert not shown["errors"]
+    assert shown["read"] == "recording 9"
 
 
 def test_a_machine_that_has_not_changed_says_so(usual, tmp_path):
     sound = replace(usual, tracks=tuple(replace(track, changes=()) for track in usual.tracks))
     page = write_monitoring(sound, {"run": run_of("monitor", usual.system, {})}, tmp_path)
-    told = check_page(page, json.loads((tmp_path / "summary.json").read_text()))
-    assert "nothing has changed" in told.xpath("string(//h2[@id='shown'])")
-    assert not told.xpath("//ol[@class='strip']")
+    content = check_page(page, json.loads((tmp_path / "summary.json").read_text()))
+    assert "nothing has changed" in content.xpath("string(//h2[@id='shown'])")
+    assert not content.xpath("//ol[@class='strip']")
 
 
 def test_the_command_writes_what_it_says(history, usual, tmp_path, capsys):
@@ -404,11 +404,11 @@ def test_a_slow_loss_over_months_is_told_before_it_has_reached_a_tenth(train):
     """12 % of the friction of axle 7, from stop 15 to 30: at the 28th it has reached 10 %."""
     if not RECORDINGS.exists():
         pytest.skip("the recordings are not at hand")
-    found = wb.monitor(train, RECORDINGS / "history", workers=1)
-    assert len(found.names) == 40
-    assert list(changed(found.tracks)) == ["muDC[7] against"]
-    track, first = found.changes[0]
-    assert "015" <= found.names[first.raised] <= "028"
+    result = wb.monitor(train, RECORDINGS / "history", workers=1)
+    assert len(result.names) == 40
+    assert list(changed(result.tracks)) == ["muDC[7] against"]
+    track, first = result.changes[0]
+    assert "015" <= result.names[first.raised] <= "028"
     size, known = track.level[0] - first.before[0], np.hypot(track.level[1], first.before[1])
     # Of 0.30; its last stops before the loss was complete are in the level, too.
     assert abs(size + 0.12 * 0.30) < 3.0 * known
@@ -476,9 +476,9 @@ def estimates(out: Path) -> pd.DataFrame:
 
 
 def test_each_machine_is_watched_as_it_is_alone(fleet, local, tmp_path):
-    told = pd.read_csv(local / "fleet.csv").set_index("machine")
-    assert list(told["recordings"]) == [0, 2, 2]
-    assert "no recording that can be used" in told.loc["broken", "refusal"]
+    table = pd.read_csv(local / "fleet.csv").set_index("machine")
+    assert list(table["recordings"]) == [0, 2, 2]
+    assert "no recording that can be used" in table.loc["broken", "refusal"]
     alone = wb.monitor(load_system("train"), fleet / "two", out=tmp_path, workers=1)
     frame = alone.to_frame().to_csv(index=False, float_format="%.8g")
     assert (local / "two" / "estimates.csv").read_text() == frame

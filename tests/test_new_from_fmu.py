@@ -175,9 +175,9 @@ def diagnosed(folder: Path, out: Path, effects: Sequence[str] = ()) -> Outcome:
 
 
 def test_the_wall_that_seeps_is_named(folder, tmp_path):
-    found = diagnosed(folder, tmp_path).diagnosis
-    assert found.verdict == "found"
-    (cause,) = found.causes
+    diagnosis = diagnosed(folder, tmp_path).diagnosis
+    assert diagnosis.verdict == "found"
+    (cause,) = diagnosis.causes
     assert cause.effect.name == "Seepage"
     assert cause.parameters["k"].low < SEEPAGE < cause.parameters["k"].high
 

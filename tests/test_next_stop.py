@@ -319,8 +319,8 @@ def test_a_difference_that_the_models_own_error_drowns_is_told_so(proposed):
     same = replace(best.prediction, pairwise=nothing, chance=nothing)
     lost = replace(best, prediction=same)
     rivals = replace(proposed.rivals, variance_factors=np.full(len(proposed.channels), 400.0))
-    found = replace(proposed, tried=(lost,), rivals=rivals)
-    assert "20 times the noise, drowns their difference" in found.sentence
+    proposal = replace(proposed, tried=(lost,), rivals=rivals)
+    assert "20 times the noise, drowns their difference" in proposal.sentence
     assert "0.0" not in lost.measures
 
 
@@ -329,13 +329,13 @@ def test_what_is_beside_the_best_of_a_fraction_is_tried_too(block, undecided, mo
     knob = FurtherSetting("knob", "a knob", "1", (Setting(0.0, "0"), Setting(1.0, "1")))
     asked = replace(block.experiments, further=(*block.experiments.further, knob))
     assert len(settings_fraction(asked)) == 1
-    found = next_stop(replace(block, experiments=asked), undecided.rivals, ALONE)
-    turned = {one.prediction.candidate.settings["knob"].value for one in found.tried}
+    proposal = next_stop(replace(block, experiments=asked), undecided.rivals, ALONE)
+    turned = {row.prediction.candidate.settings["knob"].value for row in proposal.tried}
     assert turned == {0.0, 1.0}
 
 
 def test_an_experiment_drawn_at_random_parts_half_as_often_at_most(proposed):
-    likely = [one.prediction.right > 0.5 for one in proposed.tried]
+    likely = [row.prediction.right > 0.5 for row in proposed.tried]
     assert likely[0]
     assert np.mean(likely) <= 0.5
 
@@ -349,10 +349,10 @@ def test_the_last_experiment_of_the_list_leaves_them_together(block, mild, propo
 
 def test_the_separation_is_what_recordings_then_show(block, mild, proposed):
     """Of every experiment, within 20 %: noise moves it by one standard deviation."""
-    for one in proposed.tried:
-        expected = np.sqrt(one.prediction.pairwise[0, 1])
-        shown = parted(block, [*mild, *named_anew(made(block, one))], "Draught", "Radiation")
-        assert shown == pytest.approx(expected, rel=0.2, abs=1.0), one.text
+    for row in proposed.tried:
+        expected = np.sqrt(row.prediction.pairwise[0, 1])
+        shown = parted(block, [*mild, *named_anew(made(block, row))], "Draught", "Radiation")
+        assert shown == pytest.approx(expected, rel=0.2, abs=1.0), row.text
 
 
 def test_a_rival_cannot_use_what_its_recordings_so_far_hold(block, undecided, proposed):
@@ -371,8 +371,8 @@ def test_a_rival_cannot_use_what_its_recordings_so_far_hold(block, undecided, pr
             for model in rivals.models
         ]
         plan = [proposed.tried[0].prediction.candidate]
-        (found,) = predict_experiments(block, replace(rivals, models=tuple(models)), plan, 1)
-        apart.append(found.prediction.pairwise[0, 1])
+        (proposal,) = predict_experiments(block, replace(rivals, models=tuple(models)), plan, 1)
+        apart.append(proposal.prediction.pairwise[0, 1])
     # Within five standard deviations nothing is held here, and what is held parts more.
     assert_allclose(apart[1], apart[0], rtol=1e-6)
     assert apart[2] > 1.1 * apart[1]
@@ -391,7 +391,7 @@ def test_each_experiment_is_drawn_as_often(block):
 
 def test_the_cost_is_what_the_file_says(proposed):
     """Half a Euro a minute, five minutes."""
-    assert {one.cost for one in proposed.tried} == {2.5}
+    assert {row.cost for row in proposed.tried} == {2.5}
     assert proposed.to_dict()["tried"][0]["cost"] == {"value": 2.5, "unit": "Euro"}
 
 
@@ -399,11 +399,11 @@ def test_of_a_single_cause_the_deviation_of_its_size_falls_as_predicted(
     block, mild, undecided, tmp_path
 ):
     alone = replace(undecided.rivals, models=undecided.rivals.models[:1])
-    found = next_stop(block, alone, ALONE)
-    deviations = [one.prediction.precision[1] for one in found.tried]
+    proposal = next_stop(block, alone, ALONE)
+    deviations = [row.prediction.precision[1] for row in proposal.tried]
     assert deviations == sorted(deviations)
-    assert "times as sure" in found.sentence
-    both = [*mild, *named_anew(made(block, found.tried[0]))]
+    assert "times as sure" in proposal.sentence
+    both = [*mild, *named_anew(made(block, proposal.tried[0]))]
     rivals = diagnosed(block, both, tmp_path).rivals
     shown = rivals.models[0].information[0, 0] ** -0.5
     # Of information that adds up, the draw of noise moves the derivatives by little.

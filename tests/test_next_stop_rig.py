@@ -96,12 +96,12 @@ def test_the_proposed_stop_parts_what_stops_alike_did_not(
 @pytest.mark.parametrize("rank", [0, -1])
 def test_the_separation_is_what_the_stop_then_shows(rank, one_speed, alike, proposed, tmp_path):
     """Of the best stop and of the last, within 20 %; noise moves it by one standard deviation."""
-    one = proposed.tried[rank]
+    row = proposed.tried[rank]
     true, other = (proposed.names.index(name) for name in EFFECTS)
-    expected = np.sqrt(one.prediction.pairwise[true, other])
-    shown = parted(one_speed, [*alike, made(one, one_speed, tmp_path)], *EFFECTS)
+    expected = np.sqrt(row.prediction.pairwise[true, other])
+    shown = parted(one_speed, [*alike, made(row, one_speed, tmp_path)], *EFFECTS)
     assert shown == pytest.approx(expected, rel=0.2, abs=2.0)
-    assert (one.prediction.right > 0.5) == (rank == 0)
+    assert (row.prediction.right > 0.5) == (rank == 0)
 
 
 def test_full_fits_end_within_half_a_deviation_of_where_more_rounds_lead(
@@ -109,13 +109,13 @@ def test_full_fits_end_within_half_a_deviation_of_where_more_rounds_lead(
 ):
     """Of some stops: what is left moves by half of what noise moves it by, at most."""
     rivals = undecided.rivals
-    plan = [one.prediction.candidate for one in proposed.tried[1::2]]
+    plan = [row.prediction.candidate for row in proposed.tried[1::2]]
     ended = predict_experiments(one_speed, rivals, plan, workers=1)
     least = Fit.least
     monkeypatch.setattr(Fit, "least", lambda *given: least(*given[:4]))
     further = predict_experiments(one_speed, rivals, plan, workers=1)
     at, then = (
-        {one.text: np.sqrt(np.abs(one.prediction.pairwise)) for one in some}
+        {row.text: np.sqrt(np.abs(row.prediction.pairwise)) for row in some}
         for some in (ended, further)
     )
     assert at.keys() == then.keys()
@@ -191,10 +191,10 @@ def test_rivals_that_bend_far_are_fitted_again_in_full(
     The decision is that of the diagnosis, which tells apart beyond 40 of chi-squared.
     """
     cases, rivals, effects = of_two(system, planted, names, tmp_path)
-    (one,) = predict_experiments(system, rivals, [other_surface(system, rail, imitated)], 1)
+    (experiment,) = predict_experiments(system, rivals, [other_surface(system, rail, imitated)], 1)
     true, other = ([model.effects for model in rivals.models].index((name,)) for name in names)
-    expected = np.sqrt(max(0.0, one.prediction.pairwise[true, other]))
-    stop = stop_of(one.to_dict(), system)
+    expected = np.sqrt(max(0.0, experiment.prediction.pairwise[true, other]))
+    stop = stop_of(experiment.to_dict(), system)
     record(stop, 30, effects, tmp_path / stop.name)
     shown = parted(system, [*cases, read_case(tmp_path / stop.name, system)], *names)
     assert (shown**2 > 40.0) == (expected**2 > 40.0) == (imitated < 7840.0)

@@ -68,9 +68,9 @@ def constant() -> Case:
 
 
 def test_a_gain_error_is_its_own_nrmse(system, constant):
-    judged = score(constant, run_of(system, constant, Fx=1.03 * constant["Fx"]), system)
-    assert_allclose(judged.nrmse, 0.03, rtol=1e-12)
-    assert_allclose(judged.rms, 360.0, rtol=1e-12)
+    result = score(constant, run_of(system, constant, Fx=1.03 * constant["Fx"]), system)
+    assert_allclose(result.nrmse, 0.03, rtol=1e-12)
+    assert_allclose(result.rms, 360.0, rtol=1e-12)
 
 
 def test_only_braking_counts(system, constant):
@@ -78,16 +78,16 @@ def test_only_braking_counts(system, constant):
     window = judged_window(constant, system)
     assert_allclose([constant.time[window.start], constant.time[window.stop - 1]], [5.0, 14.995])
     outside = (constant.time < 4.0) | (constant.time > 16.0)
-    judged = score(constant, run_of(system, constant, Fx=constant["Fx"] + 5e3 * outside), system)
+    result = score(constant, run_of(system, constant, Fx=constant["Fx"] + 5e3 * outside), system)
     # What the zero-phase filter carries over one second at 5 Hz is far below 1e-6.
-    assert judged.nrmse < 1e-6
+    assert result.nrmse < 1e-6
 
 
 def test_ringing_of_the_load_cell_does_not_count(system, constant):
     ringing = 1000.0 * np.sin(2 * np.pi * 21.6 * constant.time)
-    judged = score(constant, run_of(system, constant, Fx=constant["Fx"] + ringing), system)
+    result = score(constant, run_of(system, constant, Fx=constant["Fx"] + ringing), system)
     # Butterworth of order 2, forward and backward: (5/21.6)^4 = 0.3 % of 1 kN over 12 kN.
-    assert judged.nrmse < 0.003 / np.sqrt(2) * 1000 / 12e3 * 1.1
+    assert result.nrmse < 0.003 / np.sqrt(2) * 1000 / 12e3 * 1.1
 
 
 def test_the_filter_shifts_no_phase():
@@ -114,9 +114,9 @@ def test_z_is_the_weighted_mean_of_absolute_errors(system, constant):
 
 def test_without_measured_force_there_is_no_score_but_a_reason(system):
     case = stop(None)
-    judged = score(case, run_of(system, case, Fx=np.zeros(case.time.size)), system)
-    assert (judged.rms, judged.nrmse, judged.z) == (None, None, None)
-    assert "no Fx" in judged.reason
+    result = score(case, run_of(system, case, Fx=np.zeros(case.time.size)), system)
+    assert (result.rms, result.nrmse, result.z) == (None, None, None)
+    assert "no Fx" in result.reason
 
 
 def test_uneven_samples_give_the_same_score(system):

@@ -127,8 +127,8 @@ def made(fmu, root, system) -> Iterator[dict[str, Estimator]]:
     with FMU(root / "fmus" / "fmi2" / "FullObserver.fmu") as full:
         by_role = {"observer": fmu, "full": full}
         yield {
-            name: kind(by_role[kind.role], system, kind.default_gains(by_role[kind.role], system))
-            for name, kind in estimators_of(system).items()
+            name: cls(by_role[cls.role], system, cls.default_gains(by_role[cls.role], system))
+            for name, cls in estimators_of(system).items()
         }
 
 
@@ -158,8 +158,8 @@ def test_a_wrong_radius_does_not_lead_the_smoother_astray(made, dry_case, radius
     wrong = dry_case.with_signals({"omegaW": dry_case["omegaW"] * 0.46 / (0.46 + radius)})
     errors = {}
     for name in ("ekf", "smoother"):
-        judged = score(wrong, replay(wrong, made[name]), WHEELSET)
-        errors[name] = judged.nrmse
+        result = score(wrong, replay(wrong, made[name]), WHEELSET)
+        errors[name] = result.nrmse
     assert errors["smoother"] < 1.1 * errors["ekf"]
     assert errors["smoother"] < 0.0025  # no more than twice that of the right radius
 
@@ -175,8 +175,8 @@ def test_every_observer_recovers_friction_and_force(stop, made, name):
     # 0.01 is the accuracy asked of dry friction; noise is averaged over what 5 Hz pass.
     error = low_pass(case.time, run.signal("muDC") - truth, 5.0)[settled]
     assert np.abs(error).max() < 0.01
-    judged = score(case, run, WHEELSET)
-    assert judged.nrmse < 0.02
+    result = score(case, run, WHEELSET)
+    assert result.nrmse < 0.02
 
 
 @pytest.mark.parametrize("name", OBSERVERS)
@@ -249,10 +249,10 @@ def test_observers_run_on_the_full_model_too(fmu, stop, root, name):
     """Whose suspension and rocker swing without being measured."""
     case = stop(drying)
     with FMU(root / "fmus" / "fmi2" / "FullObserver.fmu") as full:
-        kind = estimators_of(WHEELSET)[name]
-        estimator = kind(full, WHEELSET, kind.default_gains(full, WHEELSET))
-        judged = score(case, replay(case, estimator), WHEELSET)
-        assert judged.nrmse < 0.02
+        cls = estimators_of(WHEELSET)[name]
+        estimator = cls(full, WHEELSET, cls.default_gains(full, WHEELSET))
+        result = score(case, replay(case, estimator), WHEELSET)
+        assert result.nrmse < 0.02
 
 
 @pytest.mark.parametrize("fmi", ["fmi2", "fmi3"])
@@ -425,11 +425,11 @@ def test_direct_inversion_lags_by_its_time_constant(fmu):
 def test_unstable_gains_end_as_a_value_not_as_an_exception(fmu, gains, dry_case):
     wild = gains.with_values(np.append(-1e6 * np.ones(16), gains.values[16:]))
     run = replay(dry_case, DisturbanceObserver(fmu, WHEELSET, wild))
-    judged = score(dry_case, run, WHEELSET)
+    result = score(dry_case, run, WHEELSET)
     # Where frictions at their limits keep it finite, it is a hundred times off (0.15 % if stable).
-    assert run.ending is not Ending.OK or (judged.nrmse or 0.0) > 0.15
+    assert run.ending is not Ending.OK or (result.nrmse or 0.0) > 0.15
     if run.ending is not Ending.OK:
-        assert run.ending.value in judged.reason
+        assert run.ending.value in result.reason
 
 
 def test_estimator_that_is_called_tunable_must_say_where_gains_are_sought(minimal, system):
@@ -504,7 +504,7 @@ def test_a_trend_of_zero_size_is_the_constant_bit_for_bit(fmu, system, gains, dr
 
 
 def test_the_two_observers_can_be_told_apart_by_name(fmu, system, gains):
-    names = [kind(fmu, system, gains).name for kind in (DisturbanceObserver, DiscObserver)]
+    names = [cls(fmu, system, gains).name for cls in (DisturbanceObserver, DiscObserver)]
     assert names == ["disturbance_observer", "disturbance_observer_disc"]
 
 
@@ -587,7 +587,7 @@ def test_slow_feedback_errs_half_as_much_with_the_trend(root, fmu, system, gains
     case = read_case(root / "cases" / name, system)
     slow = slowed(gains, 0.03)
     constant, physical = (
-        score(case, replay(case, kind(fmu, system, slow)), system).nrmse
-        for kind in (DisturbanceObserver, DiscObserver)
+        score(case, replay(case, cls(fmu, system, slow)), system).nrmse
+        for cls in (DisturbanceObserver, DiscObserver)
     )
     assert physical < 0.5 * constant

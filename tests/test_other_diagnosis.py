@@ -270,8 +270,8 @@ def test_the_extended_model_rubs_and_lacks_nothing(fan, diagnosed, tmp_path):
     outcome, out = diagnosed(rubbing)
     assert outcome.extension.difference < 1e-3
     with FMU(outcome.extension.fmu) as fmu:
-        found = outcome.diagnosis.causes[0].parameters["tau_c"].value
-        assert fmu.defaults["friction.bearingFriction.tau_c"] == pytest.approx(found)
+        size = outcome.diagnosis.causes[0].parameters["tau_c"].value
+        assert fmu.defaults["friction.bearingFriction.tau_c"] == pytest.approx(size)
     better = with_model(fan, "observer", outcome.extension.fmu)
     cases = read_cases([out.parent / "recordings"], better)
     assert diagnosis(better, cases, tmp_path).diagnosis.verdict == "nothing"

@@ -87,11 +87,11 @@ def test_panels_follow_from_signals_where_none_are_declared(result):
 
 def test_outputs_of_one_unit_share_a_panel(boiler):
     """Where another signal is judged, which has a panel of its own."""
-    judged = replace(boiler.outputs[0], name="TRoom", label="temperature of the room")
+    room = replace(boiler.outputs[0], name="TRoom", label="temperature of the room")
     other = replace(
         boiler,
-        reference_signals=(judged,),
-        objective=replace(boiler.objective, signal=judged.name),
+        reference_signals=(room,),
+        objective=replace(boiler.objective, signal=room.name),
     )
     titles = [view.title for view in views(other)]
     assert titles[0] == "Temperature of the skin TSkin (solid), temperature of the water T (dashed)"

@@ -54,11 +54,11 @@ def at_most(size: int) -> Iterator[None]:
 def refused(command: str, out: Path, capsys: pytest.CaptureFixture[str]) -> str:
     """What is said when a command cannot write; nothing of its work is begun."""
     assert main([*COMMANDS[command], "--out", str(out)]) == 2
-    told = capsys.readouterr()
-    assert "s left" not in told.err
-    assert "done" not in told.err
-    assert told.out == ""
-    return told.err
+    printed = capsys.readouterr()
+    assert "s left" not in printed.err
+    assert "done" not in printed.err
+    assert printed.out == ""
+    return printed.err
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -152,13 +152,13 @@ def test_a_file_that_cannot_be_written_is_refused_before_the_work(tmp_path):
 def test_a_figure_that_cannot_be_written_costs_no_numbers(root, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(root)
     name = "01_dry_80_1.5"
-    for kind in ("png", "svg"):  # a folder stands where a figure is to be
-        (tmp_path / f"{name}.{kind}" / "mine").mkdir(parents=True)
+    for suffix in ("png", "svg"):  # a folder stands where a figure is to be
+        (tmp_path / f"{name}.{suffix}" / "mine").mkdir(parents=True)
     arguments = ["simulate", f"cases/{name}", "--estimator", "open_loop", "--workers", "1"]
     assert main([*arguments, "--out", str(tmp_path)]) == 0
-    told = capsys.readouterr()
-    assert told.err.count("warning: ") == 2
-    assert "open_loop" in told.out
+    printed = capsys.readouterr()
+    assert printed.err.count("warning: ") == 2
+    assert "open_loop" in printed.out
     written = sorted(path.name for path in tmp_path.iterdir() if path.is_file())
     assert written == [f"{name}.csv", "index.html", "summary.json"]
 
@@ -221,8 +221,8 @@ def test_a_place_that_is_no_folder_is_refused(tmp_path):
 def test_a_part_that_takes_long_says_how_much_is_left_of_it():
     lines: list[str] = []
     done = ProgressReporter(lines.append, "simulations", every=0.0).part(4)
-    for one in range(4):
-        done(one)
+    for step in range(4):
+        done(step)
     assert [line.partition(",")[0] for line in lines] == [f"{n} simulations" for n in (1, 2, 3, 4)]
     assert re.fullmatch(r"1 simulations, about \d+ s left of these 4", lines[0])
     assert lines[-1] == "4 simulations"  # nothing is left
@@ -234,8 +234,8 @@ def test_parts_add_up_from_any_thread():
 
     def part(size: int) -> None:
         done = pace.part(size)
-        for one in range(size):
-            done(one)
+        for step in range(size):
+            done(step)
 
     with ThreadPoolExecutor(4) as threads:
         list(threads.map(part, [25, 50, 75, 100]))
@@ -246,8 +246,8 @@ def test_parts_add_up_from_any_thread():
 def test_what_is_soon_done_says_nothing():
     lines: list[str] = []
     done = ProgressReporter(lines.append, "simulations", every=3600.0).part(100)
-    for one in range(100):
-        done(one)
+    for step in range(100):
+        done(step)
     assert lines == []
 
 

@@ -105,7 +105,7 @@ def test_code_is_compiled_where_nothing_can_be_kept(root):
 def test_the_fmus_that_come_along_are_those_that_system_files_name(root):
     listed = json.loads((root / "fmus" / "manifest.json").read_text())["fmus"]
     named = [name for names in built_models().values() for name in names]
-    assert {path: one["model"] for path, one in listed.items()} == {
+    assert {path: entry["model"] for path, entry in listed.items()} == {
         f"fmi{fmi}/{name.rpartition('.')[2]}.fmu": name for fmi in (2, 3) for name in named
     }
 

@@ -230,10 +230,10 @@ def prepare_rolling(tmp_path_factory) -> Callable[..., Job]:
     assert corner(rolling.objective) == pytest.approx(CORNER)
 
     def prepared(gains: Gains, weights: Mapping[str, float], *cases: Case) -> Job:
-        judged = replace(rolling, objective=replace(rolling.objective, weights=weights))
-        recordings = tuple(recording(case, judged) for case in cases)
+        weighted = replace(rolling, objective=replace(rolling.objective, weights=weights))
+        recordings = tuple(recording(case, weighted) for case in cases)
         model = (folder / "RollingWheelset.fmu").read_bytes()
-        return Job(gains.estimator, judged, model, gains, recordings, follows=False)
+        return Job(gains.estimator, weighted, model, gains, recordings, follows=False)
 
     return prepared
 
@@ -284,7 +284,7 @@ def test_search_finds_the_kalman_gain_from_an_observer_without_feedback(
 
     blind = gains_of(0.0, 0.0, process.rate)
     job = prepare_rolling(blind, FORCE_ALONE, record(process, samples, np.random.default_rng(2)))
-    found = search(
+    tuned = search(
         inline(job),
         job,
         around(blind, free),
@@ -292,10 +292,10 @@ def test_search_finds_the_kalman_gain_from_an_observer_without_feedback(
         Plan(40, 1, seed=2),
         Checkpointing(tmp_path / "c.json"),
     )
-    assert found.history[0].z > 2 * z
+    assert tuned.history[0].z > 2 * z
 
     optimum = np.array([best["L11"], best["L41"]])
-    x = np.array([gain(found, name) for name in free])
+    x = np.array([gain(tuned, name) for name in free])
 
     def expected(x: np.ndarray) -> float:
         return expected_force(gains_of(*x, process.rate), process)
@@ -343,7 +343,7 @@ def test_search_ends_where_the_two_worst_cases_are_equally_bad(prepare_rolling, 
     rng = np.random.default_rng(3)
     cases = [record(process, samples, rng) for process in (lively, noisy)]
     job = prepare_rolling(blind, FORCE_ALONE, *cases)
-    found = search(
+    tuned = search(
         inline(job),
         job,
         around(blind, ["L41"]),
@@ -351,12 +351,12 @@ def test_search_ends_where_the_two_worst_cases_are_equally_bad(prepare_rolling, 
         Plan(40, 1, seed=3),
         Checkpointing(tmp_path / "c.json"),
     )
-    assert found.history[0].z > 1.5 * expected(lively, crossing)
+    assert tuned.history[0].z > 1.5 * expected(lively, crossing)
     # A search ends when z is spread by 1e-3; next to the crossing that is a difference of so much.
-    assert_allclose(found.z_k[0], found.z_k[1], rtol=0.01)
+    assert_allclose(tuned.z_k[0], tuned.z_k[1], rtol=0.01)
     at_crossing = gains_of(L11, -np.exp(crossing), lively.rate)
     errors = [stationary(at_crossing, p).standard_errors(samples)[2] for p in (lively, noisy)]
     # Two curves that are wrong by so much cross elsewhere by their difference over that of slopes.
     margin = 4 * float(np.hypot(*errors)) / (rise_noisy - rise_lively)
     assert margin < 0.2
-    assert abs(np.log(-gain(found, "L41")) - crossing) < margin
+    assert abs(np.log(-gain(tuned, "L41")) - crossing) < margin

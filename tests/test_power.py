@@ -152,7 +152,7 @@ def test_longer_plan_holds_the_shorter_one():
     """So that a run can be resumed with more sets."""
 
     def options(groups: list[Group]) -> set[str]:
-        return {one.options for group in groups for one in group}
+        return {planted.options for group in groups for planted in group}
 
     shorter = plan(REPERTOIRE, 2, [1.0, 4.0], 1, 2, 1)
     longer = plan(REPERTOIRE, 5, [0.5, 1.0, 4.0], 2, 3, 1)
@@ -164,7 +164,7 @@ def test_each_simulation_has_tolerances_of_its_own():
     groups = plan(REPERTOIRE, 50, [0.5, 1.0, 2.0, 4.0], 3, 30, 1)
     seeds = [group[0].seed for group in groups]
     assert len(set(seeds)) == len(seeds)
-    assert all(one.seed == group[0].seed for group in groups for one in group)
+    assert all(planted.seed == group[0].seed for group in groups for planted in group)
 
 
 def test_plan_that_is_cut_short_has_something_of_each_kind():
@@ -174,9 +174,9 @@ def test_plan_that_is_cut_short_has_something_of_each_kind():
 
 def test_what_is_planted_has_both_signs_where_it_may_and_the_size_asked_for():
     signs: dict[str, set[float]] = {}
-    for one, *_ in plan(REPERTOIRE, 1, [3.0], 12, 1, 1):
-        if one.kind == "single":
-            ((name, gain),) = one.gains.items()
+    for planted, *_ in plan(REPERTOIRE, 1, [3.0], 12, 1, 1):
+        if planted.kind == "single":
+            ((name, gain),) = planted.gains.items()
             size = REPERTOIRE.size(REPERTOIRE.plantable(name))
             assert abs(gain) == pytest.approx(3.0 * size, rel=1e-5)  # six digits
             signs.setdefault(name, set()).add(np.sign(gain))
@@ -190,20 +190,20 @@ def test_what_is_planted_has_both_signs_where_it_may_and_the_size_asked_for():
 @pytest.mark.parametrize(("hits", "of"), [(0, 50), (1, 50), (7, 12), (12, 12)])
 def test_interval_of_a_share_leaves_2_5_percent_on_either_side(hits, of):
     """Definition of Clopper and Pearson (1934), by the binomial distribution itself."""
-    found = share([True] * hits + [False] * (of - hits))
-    assert found["share"] == hits / of
+    interval = share([True] * hits + [False] * (of - hits))
+    assert interval["share"] == hits / of
     # To rounding: both sides are computed by inverse functions of double precision.
     if hits:
-        assert binom.sf(hits - 1, of, found["low"]) == pytest.approx(0.025, rel=1e-9)
+        assert binom.sf(hits - 1, of, interval["low"]) == pytest.approx(0.025, rel=1e-9)
     if hits < of:
-        assert binom.cdf(hits, of, found["high"]) == pytest.approx(0.025, rel=1e-9)
-    assert (found["low"] == 0.0) == (hits == 0)
-    assert (found["high"] == 1.0) == (hits == of)
+        assert binom.cdf(hits, of, interval["high"]) == pytest.approx(0.025, rel=1e-9)
+    assert (interval["low"] == 0.0) == (hits == 0)
+    assert (interval["high"] == 1.0) == (hits == of)
 
 
 def test_share_of_no_trials_is_unknown():
-    found = share([])
-    assert (found["share"], found["low"], found["high"]) == (None, 0.0, 1.0)
+    interval = share([])
+    assert (interval["share"], interval["low"], interval["high"]) == (None, 0.0, 1.0)
 
 
 def test_right_name_is_the_first_one_or_in_its_group():
@@ -250,7 +250,7 @@ def test_summary_counts_what_was_said(tmp_path):
         said({"friction_step": 0.04}, kind="outside", other="unexplained"),
         said({"drive_beat": 0.02}, kind="outside", other="failed"),
     ]
-    found = summarise(results, REPERTOIRE)
+    summary = summarise(results, REPERTOIRE)
     shares = (
         "false_alarms",
         "right_first",
@@ -259,7 +259,7 @@ def test_summary_counts_what_was_said(tmp_path):
         "unexplained",
         "coverage",
     )
-    assert {key: (found[key]["hits"], found[key]["of"]) for key in shares} == {
+    assert {key: (summary[key]["hits"], summary[key]["of"]) for key in shares} == {
         "false_alarms": (1, 2),
         "right_first": (2, 5),  # the inertia cannot be seen, and is no miss
         "right_first_above_noise": (2, 4),
@@ -267,36 +267,36 @@ def test_summary_counts_what_was_said(tmp_path):
         "unexplained": (1, 3),
         "coverage": (1, 1),
     }
-    assert [found["pairs"][key]["of"] for key in ("both", "both_seen_alone")] == [1, 0]
-    assert found["outside"]["friction_step"]["verdicts"] == {"4": {"found": 1, "unexplained": 1}}
-    assert found["confusion"]["BrakeFade"] == {"BrakeFade": 1, "WaterFilm": 1}
-    assert [one["said"] for one in found["wrong"]] == [["WaterFilm"], ["WaterFilm"]]
-    assert len(found["failed"]) == 1
-    write_power(found, REPERTOIRE.effects, PROVENANCE, tmp_path)
+    assert [summary["pairs"][key]["of"] for key in ("both", "both_seen_alone")] == [1, 0]
+    assert summary["outside"]["friction_step"]["verdicts"] == {"4": {"found": 1, "unexplained": 1}}
+    assert summary["confusion"]["BrakeFade"] == {"BrakeFade": 1, "WaterFilm": 1}
+    assert [one["said"] for one in summary["wrong"]] == [["WaterFilm"], ["WaterFilm"]]
+    assert len(summary["failed"]) == 1
+    write_power(summary, REPERTOIRE.effects, PROVENANCE, tmp_path)
     written = json.loads((tmp_path / "power.json").read_text())
     check("power", written)
     page = check_page(tmp_path / "index.html", written)
-    assert len(page.get_element_by_id("effect-table").xpath("tbody/tr")) == len(found["effects"])
+    assert len(page.get_element_by_id("effect-table").xpath("tbody/tr")) == len(summary["effects"])
     assert {path.name for path in tmp_path.iterdir()} == {
         "power.json",
         "index.html",
         *(
-            f"{name}.{kind}"
+            f"{name}.{suffix}"
             for name in ("power", "confusion", "coverage")
-            for kind in ("png", "svg")
+            for suffix in ("png", "svg")
         ),
     }
-    (row,) = (line for line in format_power(found).splitlines() if line.startswith("BrakeFade "))
+    (row,) = (line for line in format_power(summary).splitlines() if line.startswith("BrakeFade "))
     _, shown, unit = row.split(maxsplit=2)
     assert unit.startswith("% per 100 K")
-    assert float(shown) * 1e-4 == pytest.approx(found["effects"]["BrakeFade"]["size"])
+    assert float(shown) * 1e-4 == pytest.approx(summary["effects"]["BrakeFade"]["size"])
 
 
 @pytest.mark.parametrize("results", [[], [said({}, kind="clean")]])
 def test_run_that_ended_early_is_reported(results, tmp_path):
-    found = summarise(results, REPERTOIRE)
-    write_power(found, REPERTOIRE.effects, PROVENANCE, tmp_path)
-    assert f"{len(results)} sets" in format_power(found)
+    summary = summarise(results, REPERTOIRE)
+    write_power(summary, REPERTOIRE.effects, PROVENANCE, tmp_path)
+    assert f"{len(results)} sets" in format_power(summary)
 
 
 # --- verdicts on the disk ---
@@ -511,17 +511,17 @@ def test_what_was_followed_is_counted():
         **{"sensed": (1, 1), "answered": (3, 4)},
         "separations": (4, 6),  # 1.9 of 10 off is within a fifth, the small ones within noise
     }
-    told = following_check(rows).text
-    assert "A or B -> A (one that is drawn: does not): a stop" in told
-    assert "A or B -> A or B (one that is drawn: ): a stop; with a sensor of the load: A" in told
-    assert f"2 of 4 {SHARES['proposed']} (7% to 93%)" in told
+    text = following_check(rows).text
+    assert "A or B -> A (one that is drawn: does not): a stop" in text
+    assert "A or B -> A or B (one that is drawn: ): a stop; with a sensor of the load: A" in text
+    assert f"2 of 4 {SHARES['proposed']} (7% to 93%)" in text
 
 
 def test_a_rival_that_is_nearer_than_the_true_cause_is_predicted_as_such():
     row = {"planted": "A", "multiple": 8.0, "verdict": "found", "group": ["A", "B"], "sensed": None}
     rows = [row | {"proposed": made(False, False, -9.0, shown), "drawn": []} for shown in (-9.5, 9)]
-    found = summarise_following(rows)["separations"]
-    assert (found["hits"], found["of"]) == (1, 2)
+    summary = summarise_following(rows)["separations"]
+    assert (summary["hits"], summary["of"]) == (1, 2)
 
 
 def test_a_rig_that_makes_no_experiments_is_refused(tmp_path, capsys):

@@ -92,9 +92,9 @@ def test_cases_of_an_earlier_run_go_unless_somebody_changed_them(pumps, tmp_path
 
 def test_a_set_says_where_it_is_to_be_had(capsys):
     assert main(["prepare", "cascaded_tanks"]) == 0
-    told = capsys.readouterr().out
+    printed = capsys.readouterr().out
     for part in ("https://doi.org/10.4121/12960104", "CC BY-SA 4.0", "dataBenchmark.mat"):
-        assert part in told
+        assert part in printed
 
 
 def test_a_system_whose_recordings_nobody_published_says_so():
@@ -133,12 +133,12 @@ def test_a_folder_with_other_files_is_left_as_it_is(tmp_path):
 def test_what_was_read_and_cut_is_told_to_machines(tmp_path, published):
     for _ in range(2):  # over its own files it writes again
         write_cases("cascaded_tanks", published("cascaded_tanks"), tmp_path)
-    told = json.loads((tmp_path / PREPARED).read_text())
-    assert told["licence"] == "CC BY-SA 4.0"
-    assert list(told["read"]) == ["dataBenchmark.mat"]
-    assert told["cases"].keys() == {"estimation", "test"}
-    assert told["held_out"] == ["test"]
-    assert told["cases"]["test"]["rows"] == [0, 1023]
+    written = json.loads((tmp_path / PREPARED).read_text())
+    assert written["licence"] == "CC BY-SA 4.0"
+    assert list(written["read"]) == ["dataBenchmark.mat"]
+    assert written["cases"].keys() == {"estimation", "test"}
+    assert written["held_out"] == ["test"]
+    assert written["cases"]["test"]["rows"] == [0, 1023]
 
 
 def test_a_script_gets_recordings_to_fit_and_those_held_out(tmp_path, published):

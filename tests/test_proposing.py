@@ -85,23 +85,23 @@ def test_evidence_is_the_density_of_what_was_measured():
     basis = Knots(0.0, 1.0).basis(np.linspace(0.0, 1.0, 60))
     truth = np.linalg.cholesky(kernel(3.0)) @ rng.standard_normal(COEFFICIENTS)
     y = basis @ truth + rng.standard_normal(60)
-    found = smoothest(basis.T @ basis, -basis.T @ y)
-    process = multivariate_normal(cov=basis @ found.covariance @ basis.T + np.eye(60))
+    fitted = smoothest(basis.T @ basis, -basis.T @ y)
+    process = multivariate_normal(cov=basis @ fitted.covariance @ basis.T + np.eye(60))
     noise = multivariate_normal(cov=np.eye(60))
-    assert_allclose(found.evidence, process.logpdf(y) - noise.logpdf(y), rtol=1e-8)
+    assert_allclose(fitted.evidence, process.logpdf(y) - noise.logpdf(y), rtol=1e-8)
     # The regression that goes with it: Rasmussen & Williams (2006), equation 2.12.
-    gain = found.covariance @ basis.T @ np.linalg.inv(process.cov_object.covariance)
-    assert_allclose(found.coefficients, gain @ y, rtol=1e-4, atol=1e-4)  # the prior's jitter
+    gain = fitted.covariance @ basis.T @ np.linalg.inv(process.cov_object.covariance)
+    assert_allclose(fitted.coefficients, gain @ y, rtol=1e-4, atol=1e-4)  # the prior's jitter
 
 
 def test_noise_alone_asks_for_no_function():
     """Odds above 12 would turn up by chance in at most one of twelve (Markov's inequality)."""
     rng = np.random.default_rng(2)
     basis = Knots(0.0, 1.0).basis(np.linspace(0.0, 1.0, 60))
-    found = [
+    evidence = [
         smoothest(basis.T @ basis, -basis.T @ rng.standard_normal(60)).evidence for _ in range(100)
     ]
-    assert np.mean(np.array(found) > np.log(12.0)) < 1.0 / 12.0
+    assert np.mean(np.array(evidence) > np.log(12.0)) < 1.0 / 12.0
 
 
 def test_splines_hold_straight_lines_and_stay_beyond_their_ends():
@@ -165,16 +165,16 @@ def proposal(folder, tmp_path_factory) -> Path:
 
 
 def test_a_leak_that_begins_at_a_level_is_proposed(proposal):
-    told = json.loads((proposal / "proposal.json").read_text())
-    (law,) = told["laws"]
+    written = json.loads((proposal / "proposal.json").read_text())
+    (law,) = written["laws"]
     assert law["class"].endswith("Threshold")
     assert law["slot"] == "outlet"
     # The flow of the outlet is a function of the level: they cannot be told apart.
-    assert any("h (level)" in text for text in told["tied"])
+    assert any("h (level)" in text for text in written["tied"])
     threshold = law["parameters"]["threshold"]
     if threshold["unit"] == "m":
         assert threshold["low"] < THRESHOLD < threshold["high"]
-    assert "not known physics" in told["sentence"]
+    assert "not known physics" in written["sentence"]
 
 
 def test_a_proposed_law_is_an_effect_with_units_model_and_gain(proposal):
@@ -228,10 +228,10 @@ def test_a_law_is_proposed_beside_a_cause_that_explains_most(tmp_path):
     assert main(["diagnose", str(folder / "recordings"), *options, "--propose"]) == 0
     before = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert [cause["effect"] for cause in before["causes"]] == ["Seepage"]
-    told = json.loads((tmp_path / "out" / "proposed" / "proposal.json").read_text())
-    (law,) = told["laws"]
+    written = json.loads((tmp_path / "out" / "proposed" / "proposal.json").read_text())
+    (law,) = written["laws"]
     assert (law["slot"], "time since the beginning" in law["text"]) == ("outlet", True)
-    assert "beside Seepage" in told["sentence"]
+    assert "beside Seepage" in written["sentence"]
     after = json.loads((tmp_path / "out" / "proposed" / "summary.json").read_text())
     (known,) = [cause for cause in after["causes"] if cause["effect"] == "Seepage"]
     assert known["parameters"]["k"]["low"] < seepage < known["parameters"]["k"]["high"]
@@ -251,8 +251,8 @@ def test_slots_that_are_proposed_rightly_are_counted():
         shown | {"left_out": [], "after_with_it": None},  # in no catalogue
         shown | {"left_out": [], "slot_right": None, "asked": False, "laws": []},  # no cause
     ]
-    found = summarise_left_out(rows)
-    counted = {name: (one["hits"], one["of"]) for name, one in found.items()}
+    summary = summarise_left_out(rows)
+    counted = {name: (row["hits"], row["of"]) for name, row in summary.items()}
     assert counted == {
         **{"right_slot": (3, 4), "gain": (1, 2), "function": (1, 1)},
         **{"outside": (1, 1), "clean": (0, 1)},
@@ -281,9 +281,9 @@ def swinging(
 def test_a_period_is_found_whatever_its_phase_in_each_recording():
     """Within what two frequencies have to differ by to lose a period over the longest way."""
     errors, clocks = swinging(np.random.default_rng(5), 1.0)
-    found = strongest_period(errors, clocks, 20)
-    assert found is not None
-    assert abs(1.0 / found.length - 1.0 / PERIOD) < 0.5 / max(map(np.ptp, clocks))
+    period = strongest_period(errors, clocks, 20)
+    assert period is not None
+    assert abs(1.0 / period.length - 1.0 / PERIOD) < 0.5 / max(map(np.ptp, clocks))
 
 
 def test_white_noise_has_no_period_that_a_search_would_not_find_by_chance():
@@ -291,15 +291,15 @@ def test_white_noise_has_no_period_that_a_search_would_not_find_by_chance():
     rng, beyond = np.random.default_rng(6), 0
     for _ in range(40):
         errors, clocks = swinging(rng, 0.0, (150, 240))
-        found = strongest_period(errors, clocks, 20)
+        period = strongest_period(errors, clocks, 20)
         fast = [error - uniform_filter1d(error, 20, axis=0, mode="nearest") for error in errors]
         power = 0.0
         for own, clock in zip(fast, clocks, strict=True):
-            wave = np.exp(2j * np.pi * clock / found.length)
-            wave *= np.gradient(clock) / found.length <= 0.4
+            wave = np.exp(2j * np.pi * clock / period.length)
+            wave *= np.gradient(clock) / period.length <= 0.4
             power += 2.0 * np.sum(np.abs(wave @ own) ** 2) / np.count_nonzero(wave)
         # Between frequencies that are told apart there are others: four for each.
-        beyond += power > chi2.isf(0.01 / (4.0 * found.tried), 8)
+        beyond += power > chi2.isf(0.01 / (4.0 * period.tried), 8)
     assert beyond <= 2
 
 
@@ -324,7 +324,7 @@ def test_the_time_since_an_input_began_does_not_count_before(folder):
     library = read_library(system.library)
     base = system.models[OBSERVER].name
     (outlet,) = places(library, base, read_slots(library, base))
-    (level,) = (one for one in outlet.inputs if one.name == "h")
+    (level,) = (quantity for quantity in outlet.inputs if quantity.name == "h")
     time = np.linspace(0.0, 10.0, 1001)
     watched = {f"{outlet.slot.name}.h": np.where(time < 4.0, 0.0, -3.0)}
     course = LawInfluence("since", (level,), 0.06).course(outlet, watched, time)
@@ -340,8 +340,8 @@ def test_an_outlet_that_pulses_is_proposed_with_its_period(tmp_path):
     )
     options = ["--system", str(folder), "--out", str(tmp_path / "out"), "--workers", "1"]
     assert main(["diagnose", str(folder / "recordings"), *options, "--propose"]) == 0
-    told = json.loads((tmp_path / "out" / "proposed" / "proposal.json").read_text())
-    (law,) = told["laws"]
+    written = json.loads((tmp_path / "out" / "proposed" / "proposal.json").read_text())
+    (law,) = written["laws"]
     assert law["class"].endswith("Harmonic")
     assert (law["slot"], "time, with a period of" in law["text"]) == ("outlet", True)
     # Within half a period over a recording of 600 s.
@@ -392,7 +392,7 @@ def test_heat_that_is_lost_follows_its_closed_form(folder):
     (outlet,) = places(library, base, read_slots(library, base))
     time = np.linspace(0.0, 30.0, 3001)
     watched = {f"{outlet.slot.name}.h": -4.0 * time}
-    (level,) = (one for one in outlet.inputs if one.name == "h")
+    (level,) = (quantity for quantity in outlet.inputs if quantity.name == "h")
     for span in (10.0, 100.0):
         left = LawInfluence("work", (level,), span).course(outlet, watched, time)
         exact = 4.0 * span * (time - span * (1.0 - np.exp(-time / span)))
@@ -408,7 +408,10 @@ def test_slots_tell_where_a_law_may_act(folder):
     base = system.models[OBSERVER].name
     (outlet,) = places(library, base, read_slots(library, base))
     assert (outlet.name, outlet.output.unit) == ("OutletActual", "m3/s")
-    assert [(one.name, one.unit) for one in outlet.inputs] == [("nominal", "m3/s"), ("h", "m")]
+    assert [(quantity.name, quantity.unit) for quantity in outlet.inputs] == [
+        ("nominal", "m3/s"),
+        ("h", "m"),
+    ]
 
 
 def test_bounds_of_a_size_follow_from_its_function_and_are_widened(folder):
@@ -441,8 +444,8 @@ def test_a_form_whose_bounds_bind_is_fitted_with_wider_ones(tmp_path):
     )
     options = ["--system", str(folder), "--out", str(tmp_path / "out"), "--workers", "1"]
     assert main(["diagnose", str(folder / "recordings"), *options, "--propose"]) == 0
-    told = json.loads((tmp_path / "out" / "proposed" / "proposal.json").read_text())
-    sizes = {name: size for law in told["laws"] for name, size in law["parameters"].items()}
+    written = json.loads((tmp_path / "out" / "proposed" / "proposal.json").read_text())
+    sizes = {name: size for law in written["laws"] for name, size in law["parameters"].items()}
     assert sizes
     assert not any(size["limit"] for size in sizes.values())
 
@@ -504,8 +507,8 @@ def test_the_overflow_of_a_real_tank_is_proposed_as_a_threshold_of_its_level(
     command = ["diagnose", str(folder), *options, "--effects", *left, "--propose", "--workers", "1"]
     assert main(command) == 0
     assert json.loads((tmp_path / "summary.json").read_text())["verdict"] == "unexplained"
-    told = json.loads((tmp_path / "proposed" / "proposal.json").read_text())
-    thresholds = [law for law in told["laws"] if "threshold" in law["parameters"]]
+    written = json.loads((tmp_path / "proposed" / "proposal.json").read_text())
+    thresholds = [law for law in written["laws"] if "threshold" in law["parameters"]]
     assert "upperRim" in {threshold["slot"] for threshold in thresholds}
 
 
@@ -531,12 +534,12 @@ def test_pads_that_bed_in_are_told_by_the_time_since_they_touch(system, tmp_path
     quiet = {"workers": 2, "report": lambda _: None}
     before = wb.diagnose(system, cases, effects=["WheelLoad"], out=tmp_path / "a", **quiet)
     assert before.diagnosis.verdict == "unexplained"
-    found = wb.propose(before, out=tmp_path / "b", **quiet)
-    (law,) = found.laws
-    form = found.forms[law.effect.name]
+    proposal = wb.propose(before, out=tmp_path / "b", **quiet)
+    (law,) = proposal.laws
+    form = proposal.forms[law.effect.name]
     assert form.law.influence is not None
     assert (form.law.influence.kind, form.form.name) == ("since", "Saturation")
-    slots = {form.law.place.slot.name for form in found.forms.values()}
+    slots = {form.law.place.slot.name for form in proposal.forms.values()}
     assert "padFriction" in slots
     assert slots <= {
         "padFriction",
@@ -549,7 +552,7 @@ def test_pads_that_bed_in_are_told_by_the_time_since_they_touch(system, tmp_path
     (bedding,) = choose(["BeddingIn"], effects)
     fresh = stops(system, 2, tmp_path / "fresh")
     problem = Problem(system, fresh, library, effects)
-    error = function_error(problem, known, found, bedding)
+    error = function_error(problem, known, proposal, bedding)
     if form.law.place.slot.name == "padFriction":
         assert error is not None
         assert error < 0.15
@@ -567,9 +570,10 @@ def test_friction_that_falls_with_deceleration_is_no_sum_of_known_causes(
         record(SCENARIOS[name], 1, planted, tmp_path / "stops" / name)
     cases = [read_case(path, system) for path in sorted((tmp_path / "stops").iterdir())]
     quiet = {"workers": 2, "report": lambda _: None}
-    found = wb.diagnose(system, cases, out=tmp_path / "out", **quiet)
-    assert found.diagnosis.verdict == "unexplained"
-    assert any("is at its bound" in why for near in found.diagnosis.nearest for why in near.reasons)
+    outcome = wb.diagnose(system, cases, out=tmp_path / "out", **quiet)
+    nearest = outcome.diagnosis.nearest
+    assert outcome.diagnosis.verdict == "unexplained"
+    assert any("is at its bound" in why for near in nearest for why in near.reasons)
 
 
 # --- laws of heat that is kept, or lost again ---
@@ -612,10 +616,10 @@ def of_heat(pads: Place) -> dict[float, ClosedForm]:
 
 def test_friction_may_depend_on_the_heat_it_makes_kept_or_lost(pads):
     """All of its power: force, speed and the coefficient itself."""
-    found = of_heat(pads)
+    laws = of_heat(pads)
     # From heat that a stop keeps to heat of which most is gone at its end.
-    assert set(found) == {0.0, 10.0 * LONGEST, 3.0 * LONGEST, LONGEST}
-    for one in found.values():
+    assert set(laws) == {0.0, 10.0 * LONGEST, 3.0 * LONGEST, LONGEST}
+    for one in laws.values():
         assert [part.name for part in one.law.influence.factors] == ["Fperp", "v", "mu"]
 
 

@@ -234,10 +234,10 @@ def test_held_out_hours_are_foreseen_as_by_the_published_structure(house, outcom
 
 def test_with_all_hours_fitted_it_errs_less_than_the_published_model(house, tmp_path):
     """The protocol of its figure: parameters from all 141 h, theirs of one-step predictions."""
-    found = diagnosed(load_system("heated_house"), list(house.values()), tmp_path)
-    (cause,) = found.diagnosis.causes
+    outcome = diagnosed(load_system("heated_house"), list(house.values()), tmp_path)
+    (cause,) = outcome.diagnosis.causes
     assert cause.effect.name == "ShellStore"
-    errors = {error.recording: error for error in found.errors}
+    errors = {error.recording: error for error in outcome.errors}
     squares = sum(error.samples * error.rms[1] ** 2 for error in errors.values())
     samples = sum(error.samples for error in errors.values())
     published = free_run(np.array(PARAMETERS), house["rest"])
@@ -442,10 +442,12 @@ def servo(published_cases) -> Path:
 
 
 def test_records_of_one_gain_are_held_out(servo):
-    told = json.loads((servo / PREPARED).read_text())
-    assert len(told["cases"]) == 16
-    assert sorted(told["held_out"]) == [name for name in sorted(told["cases"]) if "kp200" in name]
-    assert len(told["held_out"]) == 4
+    written = json.loads((servo / PREPARED).read_text())
+    assert len(written["cases"]) == 16
+    assert sorted(written["held_out"]) == [
+        name for name in sorted(written["cases"]) if "kp200" in name
+    ]
+    assert len(written["held_out"]) == 4
 
 
 def test_a_record_has_its_gain_and_its_signals(servo):

@@ -28,12 +28,12 @@ FADE = plant(CONSTANT_PADS, ["fade=4e-4"])
 
 
 def test_fade_begins_where_the_stop_before_left_it():
-    cold, warm = (simulate(one, 3, FADE, REFERENCE) for one in (STOP, WARM))
+    cold, warm = (simulate(scenario, 3, FADE, REFERENCE) for scenario in (STOP, WARM))
     for stop, temperature in ((cold, 333.15), (warm, 450.0)):
         expected = 0.30 * stop.drawn.muDC * (1.0 - 4e-4 * (temperature - 373.15))
         assert stop.truth["muDC1"][0] == pytest.approx(expected, rel=1e-9)
     # Both are heated nearly alike, and the air takes more from the warmer one.
-    end = [one.truth["temperature1"][-1] for one in (cold, warm)]
+    end = [scenario.truth["temperature1"][-1] for scenario in (cold, warm)]
     assert end[0] < end[1] < end[0] + (450.0 - 333.15)
 
 

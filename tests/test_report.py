@@ -124,14 +124,14 @@ def best_estimator(summary: dict[str, Any]) -> str:
 def test_worst_case_of_the_best_estimator_comes_first(page, summary, system):
     best = best_estimator(summary)
     errors = {n: c["estimators"][best]["Fx_nrmse"] for n, c in summary["cases"].items()}
-    judged = sorted(CASES, key=lambda name: -errors[name])
+    worst_first = sorted(CASES, key=lambda name: -errors[name])
     names = [row[0].text_content().strip() for row in rows(page.get_element_by_id("case-table"))]
-    assert names == [*judged, UNJUDGED]
+    assert names == [*worst_first, UNJUDGED]
     assert page.xpath("//article/h3/text()") == names
     headline = page.find_class("headline")[0].text_content()
     assert label(best, system) in headline
-    assert judged[0] in headline
-    assert f"{100 * errors[judged[0]]:.2f} %" in headline
+    assert worst_first[0] in headline
+    assert f"{100 * errors[worst_first[0]]:.2f} %" in headline
 
 
 def test_the_answer_says_how_sure_it_is(page, summary):

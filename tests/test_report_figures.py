@@ -126,8 +126,8 @@ def test_speeds_are_told_in_kilometres_per_hour_beside(uncertain):
 def test_samples_are_those_of_the_curves(uncertain):
     """What packing.py says of its codes, taken back by hand."""
     figure = case_figure(uncertain)
-    told, text = pack_samples(figure)
-    count = json.loads(told)["samples"]
+    header, text = pack_samples(figure)
+    count = json.loads(header)["samples"]
     planes = np.frombuffer(zlib.decompress(base64.b64decode(text)), np.uint8)
     low, high = planes.reshape(2, -1, count).astype(np.int64)
     folded = low | (high << 8)
@@ -137,7 +137,7 @@ def test_samples_are_those_of_the_curves(uncertain):
     assert_allclose(figure.time[0] + ticks * span, figure.time, atol=1e-8 * span)
     rows = iter(codes[2:])
     curves = [curve for panel in figure.panels for curve in panel.curves]
-    for curve, ranges in zip(curves, json.loads(told)["curves"], strict=True):
+    for curve, ranges in zip(curves, json.loads(header)["curves"], strict=True):
         for values, (least, most) in zip((curve.values, curve.reach), ranges, strict=False):
             row = next(rows)
             found = np.where(row == 65535, np.nan, least + (most - least) * row / 65534)

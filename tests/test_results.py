@@ -47,25 +47,25 @@ def verdicts(before: Path, after: Path) -> dict[str, str]:
 def test_a_folder_says_command_date_version_system_answer_and_files(results, root, capsys):
     capsys.readouterr()
     assert main(["results", str(results.parent), "--json"]) == 0
-    (one,) = json.loads(capsys.readouterr().out)["result"]["runs"]
+    (entry,) = json.loads(capsys.readouterr().out)["result"]["runs"]
     summary = json.loads((results / "summary.json").read_text())
     error = summary["cases"][CASE]["estimators"]["ekf"]["Fx_nrmse"]
-    assert one["headline"][NAME]["value"] == 100.0 * error
-    assert (one["run"]["command"], one["run"]["system"]) == ("simulate", "wheelset")
+    assert entry["headline"][NAME]["value"] == 100.0 * error
+    assert (entry["run"]["command"], entry["run"]["system"]) == ("simulate", "wheelset")
     measured = (root / "cases" / CASE / "measured.csv").read_bytes()
-    assert one["run"]["data"] == {CASE: hashlib.sha256(measured).hexdigest()}
-    assert one["files"] == {"csv": 1, "png": 1, "svg": 1, "html": 1, "json": 1}
+    assert entry["run"]["data"] == {CASE: hashlib.sha256(measured).hexdigest()}
+    assert entry["files"] == {"csv": 1, "png": 1, "svg": 1, "html": 1, "json": 1}
     assert main(["results", str(results.parent)]) == 0
     said = capsys.readouterr().out
     assert f"{100 * error:.4g} %" in said
-    assert one["run"]["date"][:10] in said
+    assert entry["run"]["date"][:10] in said
     assert summary["answer"]["sentence"] in said
 
 
 def test_a_run_compared_with_itself_is_unchanged(results):
     assert set(verdicts(results, results).values()) == {"unchanged"}
-    (one,) = read_runs(results)
-    assert differences(one, one) == []
+    (run,) = read_runs(results)
+    assert differences(run, run) == []
 
 
 @pytest.mark.parametrize(
@@ -152,9 +152,9 @@ def test_what_does_not_say_what_made_it_is_warned_of_beside_others(results, tmp_
     (tmp_path / "old" / "summary.json").write_text('{"cases": {}}')
     capsys.readouterr()
     assert main(["results", str(tmp_path)]) == 0
-    told = capsys.readouterr()
-    assert "old/summary.json: found a summary that does not say what made it" in told.err
-    assert "one: simulate" in told.out
+    printed = capsys.readouterr()
+    assert "old/summary.json: found a summary that does not say what made it" in printed.err
+    assert "one: simulate" in printed.out
 
 
 def test_results_of_other_places_are_told(results, tmp_path):

@@ -113,8 +113,8 @@ def test_errors_of_slides_are_as_large_as_their_weights_say():
     )
     system = replace(SYSTEM, comparison=replace(SYSTEM.comparison, exclusions=exclusions))
     # No structure stands before these load cells.
-    judged = tuple(replace(signal, mode=None) for signal in system.reference_signals)
-    system = replace(system, reference_signals=judged)
+    signals = tuple(replace(signal, mode=None) for signal in system.reference_signals)
+    system = replace(system, reference_signals=signals)
     samples = ready(sliding(1.0), system)
     with simulating(SimulatorSetup(MINIMAL, system, (samples,))) as simulator:
         weighed = simulator.weighed(0, WET)
@@ -139,8 +139,8 @@ def diagnosed(
     with ResidualModel(
         ModelSource(everything, SYSTEM, {}), read_cases([folder], SYSTEM)
     ) as simulations:
-        found = conclude(Fit(simulations, EFFECTS), EFFECTS, lambda _: None)
-        return found, [recording.set_aside for recording in simulations.recordings]
+        diagnosis = conclude(Fit(simulations, EFFECTS), EFFECTS, lambda _: None)
+        return diagnosis, [recording.set_aside for recording in simulations.recordings]
 
 
 @pytest.mark.long
@@ -155,17 +155,17 @@ def test_what_slip_makes_of_friction_is_named_from_three_slides(
     planted, name, size, everything, tmp_path
 ):
     scenarios = [SCENARIOS[slide] for slide in SLIDES]
-    found, aside = diagnosed(everything, tmp_path, scenarios, 801, Effects(**{planted: size}))
-    assert [cause.effect.name for cause in found.causes] == [name]
-    gain = found.causes[0].parameters["gain"]
+    diagnosis, aside = diagnosed(everything, tmp_path, scenarios, 801, Effects(**{planted: size}))
+    assert [cause.effect.name for cause in diagnosis.causes] == [name]
+    gain = diagnosis.causes[0].parameters["gain"]
     assert gain.low <= size <= gain.high
     assert not any(samples["slide"] for samples in aside)
 
 
 def test_nothing_is_found_in_slides_where_nothing_is_missing(everything, tmp_path):
     scenarios = [SCENARIOS[slide] for slide in SLIDES]
-    found, aside = diagnosed(everything, tmp_path, scenarios, 802, Effects())
-    assert found.verdict == "nothing"
+    diagnosis, aside = diagnosed(everything, tmp_path, scenarios, 802, Effects())
+    assert diagnosis.verdict == "nothing"
     assert not any(samples["slide"] for samples in aside)
 
 
@@ -174,6 +174,6 @@ def test_a_patch_that_no_law_explains_is_left_out(everything, tmp_path):
     """Low adhesion from the sixth to the eighth second, on a rail that is said to be dry."""
     patched = replace(SCENARIOS["04_dry_160_4.2"], patch=Patch(6.0, 8.0, 0.12))
     others = [SCENARIOS[one] for one in ("03_dry_120_3.6", "05_dry_120_2.7_rev")]
-    found, aside = diagnosed(everything, tmp_path, [patched, *others], 803, Effects())
-    assert found.verdict == "nothing"
+    diagnosis, aside = diagnosed(everything, tmp_path, [patched, *others], 803, Effects())
+    assert diagnosis.verdict == "nothing"
     assert [samples["slide"] > 0 for samples in aside] == [False, True, False]

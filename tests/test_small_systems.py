@@ -97,8 +97,8 @@ def test_an_fmu_without_states_is_built_and_fit(balance, tmp_path, fmi):
         finding for finding in findings if "not tried: the FMU has no" in finding.reason
     ]
     assert integrated.name == "Co-Simulation against Model Exchange"
-    for kind in (FMU, CoSimulation):
-        with kind(file) as fmu:
+    for cls in (FMU, CoSimulation):
+        with cls(file) as fmu:
             fmu.start({})
             fmu.set(fmu.variables(["s", "dc"]), np.array([0.2, 3.0]))
             assert fmu.states == ()
@@ -115,8 +115,8 @@ def test_estimators_find_the_stiffness_without_a_state(balance, tmp_path):
     for name in ("disturbance_observer", "parameter_estimator", "ekf", "ukf", "smoother"):
         # Friction is 5 % of the spring's force there at most, and changes its sign.
         pulled = estimates["measured.F [N]"] > 8.0
-        found = estimates[f"{name}.c [N/m]"][pulled].mean()
-        assert found == pytest.approx(STIFFNESS, rel=0.02)
+        estimate = estimates[f"{name}.c [N/m]"][pulled].mean()
+        assert estimate == pytest.approx(STIFFNESS, rel=0.02)
 
 
 def test_noise_of_an_input_that_the_output_shows_at_once_counts(balance):
@@ -190,8 +190,8 @@ def test_a_correction_has_the_sign_by_which_the_output_shows_it(balance, tmp_pat
     estimates = pd.read_csv(tmp_path / "00_press.csv")
     pressed = estimates["measured.F [N]"] < -8.0
     for name in ("disturbance_observer", "parameter_estimator"):
-        found = estimates[f"{name}.c [N/m]"][pressed].mean()
-        assert found == pytest.approx(STIFFNESS, rel=0.02)
+        estimate = estimates[f"{name}.c [N/m]"][pressed].mean()
+        assert estimate == pytest.approx(STIFFNESS, rel=0.02)
 
 
 # --- without inputs, and few samples ---
@@ -202,8 +202,8 @@ def test_estimators_follow_a_leak_without_an_input(bottle, tmp_path):
     assert main(["simulate", str(bottle / "recordings" / "00_leak"), *options]) == 0
     estimates = pd.read_csv(tmp_path / "00_leak.csv")
     for name in ("disturbance_observer", "ekf", "ukf"):
-        found = estimates[f"{name}.k [1/s]"].iloc[100:].mean()
-        assert found == pytest.approx(LEAK, rel=0.05)
+        estimate = estimates[f"{name}.k [1/s]"].iloc[100:].mean()
+        assert estimate == pytest.approx(LEAK, rel=0.05)
 
 
 def test_the_pore_is_named_and_not_the_wall(bottle, tmp_path):

@@ -132,14 +132,14 @@ def test_a_stop_is_that_of_the_models_own_integrator(train, stopping, forecaster
         speed = stop.asked["speed"]
         start = {f"omega{axle}": speed / 0.46 for axle in range(1, 9)}
         model.start({"vTrain": speed, **start})
-        inputs = model.variables([one.name for one in stopping.driven])
+        inputs = model.variables([quantity.name for quantity in stopping.driven])
         seen = model.variables(["vTrain"])
         way, t = 0.0, 0.0
         while speed > 0.1:
-            for j, one in enumerate(stopping.driven):
-                risen = t + 0.5 * h - one.delay
-                share = 1.0 if one.lag == 0.0 else -np.expm1(-max(risen, 0.0) / one.lag)
-                inputs.values[j] = float(one.formula(stop.asked)) * share
+            for j, quantity in enumerate(stopping.driven):
+                risen = t + 0.5 * h - quantity.delay
+                share = 1.0 if quantity.lag == 0.0 else -np.expm1(-max(risen, 0.0) / quantity.lag)
+                inputs.values[j] = float(quantity.formula(stop.asked)) * share
             model.set(inputs, inputs.values)
             model.step(h)
             before, speed = speed, float(model.get(seen)[0])
@@ -228,11 +228,11 @@ def test_the_safety_level_agrees_with_plain_samples(train, stopping, forecaster)
     points = np.random.default_rng(2).standard_normal((1500, count))
     plain = -np.log(forecaster.distances(asked, points))
     runs = tuple(forecaster.descent(asked, 2, 150, seed)[0] for seed in range(4))
-    found = Tail(runs, asked.addend).quantile(2)
+    quantile = Tail(runs, asked.addend).quantile(2)
     # The fifteenth of 1500 is known to 26 %; of both, two and a half deviations.
     low, high = np.sort(plain)[[5, 29]]
-    assert low < found.high
-    assert found.low < high
+    assert low < quantile.high
+    assert quantile.low < high
 
 
 def test_ranks_of_a_sample_hold_its_quantile_as_often_as_they_say():
@@ -256,11 +256,11 @@ def test_the_safety_level_agrees_with_many_plain_samples(train, stopping, foreca
     plain = np.sort(-np.log(forecaster.distances(asked, points)))
     runs = tuple(forecaster.descent(asked, 9, 1000, seed)[0] for seed in range(8))
     for decade, rank in ((2, 1000), (3, 100), (4, 10)):
-        found = Tail(runs, asked.addend).quantile(decade)
+        quantile = Tail(runs, asked.addend).quantile(decade)
         away = 2.5 * np.sqrt(rank)
         low, high = plain[[max(0, round(rank - away)), round(rank + away)]]
-        assert low < found.high
-        assert found.low < high
+        assert low < quantile.high
+        assert quantile.low < high
 
 
 # --- recordings ---
@@ -338,20 +338,20 @@ def folder(tmp_path_factory) -> Path:
 @pytest.fixture(scope="module")
 def result(folder, tmp_path_factory) -> Path:
     out = tmp_path_factory.mktemp("result")
-    told = ["--out", str(out), "--ask", "speed=140 km/h", "--samples", "400", "--safety", "1"]
-    told += ["--plain", "2100"]
-    assert main(["distance", "--system", "train", str(folder), *told, "--workers", "1"]) == 0
+    options = ["--out", str(out), "--ask", "speed=140 km/h", "--samples", "400", "--safety", "1"]
+    options += ["--plain", "2100"]
+    assert main(["distance", "--system", "train", str(folder), *options, "--workers", "1"]) == 0
     return out
 
 
 def test_bands_hold_stops_that_were_not_used(result):
     truth = json.loads((RECORDINGS / "healthy" / "truth.json").read_text())["cases"]
     stops = pd.read_csv(result / "stops.csv", keep_default_na=False).set_index("stop")
-    true = pd.Series({name: one["stop_distance"] for name, one in truth.items()})
+    true = pd.Series({name: true_stop["stop_distance"] for name, true_stop in truth.items()})
     claimed = stops.index[stops["outside"] == ""]
     # Slides of more than a second on a wet rail and two patches of leaves are beyond the model.
     assert [name for name in stops.index if name not in claimed] == [
-        name for name, one in truth.items() if max(one["slide_seconds"]) > 0.0
+        name for name, true_stop in truth.items() if max(true_stop["slide_seconds"]) > 0.0
     ]
     low, high = stops["low [m]"].astype(float), stops["high [m]"].astype(float)
     assert ((low < true) & (true < high))[claimed].all()
@@ -404,7 +404,7 @@ def test_bands_hold_forty_stops_of_months(train, tmp_path):
     if not RECORDINGS.exists():
         pytest.skip("the recordings are not at hand")
     write_cases("train", RECORDINGS / "history", tmp_path)
-    found: Distance = wb.distance(
+    prediction: Distance = wb.distance(
         train,
         wb.read_cases(tmp_path, train),
         effort=Effort(800, decades=0),
@@ -412,7 +412,7 @@ def test_bands_hold_forty_stops_of_months(train, tmp_path):
     )
     truth = json.loads((RECORDINGS / "history" / "truth.json").read_text())["cases"]
     held = []
-    for stop in found.valid:
+    for stop in prediction.valid:
         low, high = stop.forecast.band
         held.append(low < truth[stop.recorded.stop.name]["stop_distance"] < high)
         assert stop.forecast.width < 1.3
@@ -486,22 +486,24 @@ def largest(points: Matrix) -> Vector:
 def test_quantiles_are_those_of_closed_forms_down_to_one_in_1e9(evaluate, dimension, exact):
     """Of 95 % intervals nine in ten hold: what runs miss together, they do not show."""
     tails = [tail(evaluate, dimension, 100 * k) for k in range(10)]
-    found = [[tail.quantile(decade) for decade in DECADES] for tail in tails]
+    quantiles = [[tail.quantile(decade) for decade in DECADES] for tail in tails]
     held = [
-        row.low <= value <= row.high for one in found for row, value in zip(one, exact, strict=True)
+        row.low <= value <= row.high
+        for one in quantiles
+        for row, value in zip(one, exact, strict=True)
     ]
     # 90 intervals, those of one tail alike; of ten tails, two and a half deviations are 0.24.
     assert np.mean(held) > 0.66
-    mean = np.mean([[row.value for row in one] for one in found], axis=0)
+    mean = np.mean([[row.value for row in one] for one in quantiles], axis=0)
     # Ten tails leave half a percent at 1e-9; 500 samples of a decade bias it by as much.
     assert_allclose(mean, exact, rtol=0.01)
 
 
 def test_a_probability_scatters_as_it_says():
     """Coefficient of variation at 1e-6, over 25 tails whose quantiles have known probability."""
-    found = [tail(summed, 10, 100 * k).quantile(6) for k in range(25)]
-    scatter = np.std(np.log(norm.cdf([one.value for one in found])), ddof=1)
-    said = np.sqrt(np.mean(np.square([one.variation for one in found])))
+    quantiles = [tail(summed, 10, 100 * k).quantile(6) for k in range(25)]
+    scatter = np.std(np.log(norm.cdf([one.value for one in quantiles])), ddof=1)
+    said = np.sqrt(np.mean(np.square([one.variation for one in quantiles])))
     # 25 give a deviation to 14 %, eight runs theirs to 27 %, 25 times: two and a half of both.
     assert 0.6 < scatter / said < 1.4
 
@@ -518,16 +520,16 @@ def test_what_is_added_with_a_heavy_tail_is_not_missed():
         return sum(quad(density, low, high, limit=400)[0] for low, high in pairwise(edges))
 
     def addend(x: Vector) -> Vector:
-        found: Vector = stdtr(freedom, x / left)
-        return found
+        quantile: Vector = stdtr(freedom, x / left)
+        return quantile
 
     one = tail(lambda points: spread * summed(points), 30, 1, addend)
     for decade in (4, 9):
         exact = brentq(lambda x, p=10.0**-decade: np.log(beyond(x) / p), -2.0, 0.0)
-        found = one.quantile(decade)
+        quantile = one.quantile(decade)
         # Three times the half of its interval, which is 1 % at 1e-6 where the tail turns.
-        assert abs(found.value - exact) < 1.5 * (found.high - found.low)
-        assert_allclose(found.value, exact, rtol=0.03)
+        assert abs(quantile.value - exact) < 1.5 * (quantile.high - quantile.low)
+        assert_allclose(quantile.value, exact, rtol=0.03)
 
 
 def test_it_agrees_with_plain_sampling_of_a_function_that_bends():
@@ -535,18 +537,18 @@ def test_it_agrees_with_plain_sampling_of_a_function_that_bends():
         return points[:, 0] + 0.3 * points[:, 1] ** 2 - 0.2 * np.exp(points[:, 2])
 
     plain = bent(np.random.default_rng(1).standard_normal((1_000_000, 3)))
-    found = tail(bent, 3, 1).quantile(4)
+    quantile = tail(bent, 3, 1).quantile(4)
     # The hundredth of a million: its probability is known to 10 %, as is the other's.
     low, high = np.sort(plain)[[70, 130]]
-    assert low < found.high
-    assert found.low < high
+    assert low < quantile.high
+    assert quantile.low < high
 
 
 def test_the_same_seed_gives_the_same_samples():
-    one, other = (descend(summed, 5, 4, 100, seed=3) for _ in range(2))
-    assert_allclose(one.values, other.values, rtol=0.0)
-    assert_allclose(one.weights.sum(), 1.0, rtol=1e-12)  # of all that there is
-    assert one.evaluations == 100 + 3 * 90
+    first, other = (descend(summed, 5, 4, 100, seed=3) for _ in range(2))
+    assert_allclose(first.values, other.values, rtol=0.0)
+    assert_allclose(first.weights.sum(), 1.0, rtol=1e-12)  # of all that there is
+    assert first.evaluations == 100 + 3 * 90
 
 
 def test_plain_sampling_takes_a_hundred_times_the_inverse_for_a_tenth():

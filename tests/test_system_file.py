@@ -90,16 +90,16 @@ def test_parameters_of_this_machine_act_as_the_defaults_of_its_model_would(
     mine = read_system(changed(tmp_path, ("[parameters]", '[parameters]\nrW = "0.42 m"')))
     usual = read_system(changed(tmp_path))
     assert mine.values == usual.values | {"rW": 0.42}
-    (kind,) = choose(mine, ["open_loop"]).values()
+    (cls,) = choose(mine, ["open_loop"]).values()
     part = slice(0, 2000)
     samples = (dry_case.time[part], dry_case.u[part], dry_case.y[part])
     with FMU(minimal_path, {}, {"rW": 0.42}) as theirs, open_model(mine) as ours:
-        expected = kind(theirs, usual, kind.default_gains(theirs, usual)).run(*samples)
-        found = kind(ours, mine, kind.default_gains(ours, mine)).run(*samples)
-    assert_array_equal(found.values, expected.values)
+        expected = cls(theirs, usual, cls.default_gains(theirs, usual)).run(*samples)
+        estimate = cls(ours, mine, cls.default_gains(ours, mine)).run(*samples)
+    assert_array_equal(estimate.values, expected.values)
     with open_model(usual) as nominal:
-        other = kind(nominal, usual, kind.default_gains(nominal, usual)).run(*samples)
-    assert np.abs(found.values - other.values).max() > 1.0
+        other = cls(nominal, usual, cls.default_gains(nominal, usual)).run(*samples)
+    assert np.abs(estimate.values - other.values).max() > 1.0
 
 
 def test_bands_change_what_a_filter_says_it_knows_and_no_estimate(system, dry_case):
@@ -107,14 +107,14 @@ def test_bands_change_what_a_filter_says_it_knows_and_no_estimate(system, dry_ca
     wider = replace(system, bands={"ekf": {"Fx": 1.5}})
     part = slice(0, 2000)
     samples = (dry_case.time[part], dry_case.u[part], dry_case.y[part])
-    (kind,) = choose(plain, ["ekf"]).values()
+    (cls,) = choose(plain, ["ekf"]).values()
     with open_model(system) as fmu:
-        expected = kind(fmu, plain, kind.default_gains(fmu, plain)).run(*samples)
-        found = kind(fmu, wider, kind.default_gains(fmu, wider)).run(*samples)
-    assert_array_equal(found.values, expected.values)
-    assert_array_equal(found.nis, expected.nis)
+        expected = cls(fmu, plain, cls.default_gains(fmu, plain)).run(*samples)
+        estimate = cls(fmu, wider, cls.default_gains(fmu, wider)).run(*samples)
+    assert_array_equal(estimate.values, expected.values)
+    assert_array_equal(estimate.nis, expected.nis)
     factors = [1.5 if name == "Fx" else 1.0 for name in system.columns]
-    assert_array_equal(found.sigma, expected.sigma * factors)
+    assert_array_equal(estimate.sigma, expected.sigma * factors)
 
 
 def test_what_is_derived_by_a_sensor_that_only_judges_is_asked_of_no_model(system):

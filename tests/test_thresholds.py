@@ -91,10 +91,12 @@ def test_the_largest_of_all_candidates_is_significant_at_the_stated_rate():
 @pytest.mark.parametrize("name", threshold_values(thresholds(28)))
 def test_one_threshold_is_changed_and_no_other(name, factor):
     usual = threshold_values(thresholds(28))
-    found = threshold_values(scaled(thresholds(28), name, factor))
+    scaled_values = threshold_values(scaled(thresholds(28), name, factor))
     # What is counted stays a whole number.
-    assert found.pop(name) == pytest.approx(factor * usual[name], abs=0.5 * (name == "rivals"))
-    assert found == {other: value for other, value in usual.items() if other != name}
+    assert scaled_values.pop(name) == pytest.approx(
+        factor * usual[name], abs=0.5 * (name == "rivals")
+    )
+    assert scaled_values == {other: value for other, value in usual.items() if other != name}
 
 
 def short(name: str, speed: float) -> Scenario:
@@ -124,7 +126,7 @@ def test_sets_are_of_all_kinds_alike():
         for kind, count in (("clean", 9), ("single", 90), ("pair", 2))
         for seed in range(count)
     ]
-    kinds = [one.kind for one in draw_sets(groups, 9, 1)]
+    kinds = [draw_set.kind for draw_set in draw_sets(groups, 9, 1)]
     assert [kinds.count(kind) for kind in ("clean", "single", "pair")] == [4, 3, 2] or [
         kinds.count(kind) for kind in ("clean", "single", "pair")
     ] == [3, 4, 2]

@@ -159,13 +159,13 @@ LABELLED = {  # set: what is planted, as it is called here
 def test_a_labelled_fault_is_named_with_its_place(name, train, tmp_path):
     """Pads by what they have beside the other axles': a tolerance of theirs is no other loss."""
     cases, truth = cases_of(f"labelled/{name}", train, tmp_path / "cases")
-    found = wb.diagnose(train, cases, out=tmp_path / "out", workers=2).diagnosis
+    diagnosis = wb.diagnose(train, cases, out=tmp_path / "out", workers=2).diagnosis
     effect, size, planted = LABELLED[name]
     if name == "pads_axle":
         levels = np.array([truth["cases"][case.name]["pad_level"] for case in cases])
         planted = 1.0 - float(np.mean(levels[:, 2] / np.delete(levels, 2, axis=1).mean(axis=1)))
         assert planted == pytest.approx(0.19, abs=0.005)  # of which 0.15 were planted
-    (cause,) = found.causes
+    (cause,) = diagnosis.causes
     assert effect in (cause.effect.name, *cause.confusable_with)
     if cause.effect.name == effect:
         assert cause.parameters[size].low < planted < cause.parameters[size].high
@@ -188,14 +188,14 @@ def test_friction_and_radius_of_each_axle_are_estimated(train, tmp_path):
     """Pads of axle 3 have lost 15 %; profiles and loads of a sound train blur axles by 2 %."""
     cases, truth = cases_of("labelled/pads_axle", train, tmp_path / "cases")
     case = next(case for case in cases if case.name == "01_120_service_dry")
-    told, run = truth["cases"][case.name], wb.observe(train, case, "ekf").to_frame()
-    at = int(np.searchsorted(case.time, told["standstill"] - 15.0))  # at about 15 m/s
+    truth_of_case, run = truth["cases"][case.name], wb.observe(train, case, "ekf").to_frame()
+    at = int(np.searchsorted(case.time, truth_of_case["standstill"] - 15.0))  # at about 15 m/s
     friction = np.array([run[f"muDC[{i}] [1]"].iloc[at] for i in range(1, 9)])
     # Three deviations of profile, load and law, of 3 % in all, of the worst of eight axles.
-    assert_allclose(friction, told["pad_level"], atol=0.09 * 0.30)
+    assert_allclose(friction, truth_of_case["pad_level"], atol=0.09 * 0.30)
     assert friction.argmin() == 2
     radius = np.array([run[f"r[{i}] [m]"].iloc[at] for i in range(1, 9)])
-    assert_allclose(radius, 1e-3 * np.array(told["radius_mm"]), atol=4e-5)
+    assert_allclose(radius, 1e-3 * np.array(truth_of_case["radius_mm"]), atol=4e-5)
 
 
 @pytest.mark.parametrize(
@@ -206,13 +206,13 @@ def test_satellites_tell_radii_and_speed_when_brakes_are_told_to_act(name, train
     cases, truth = cases_of(name, train, tmp_path / "cases")
     radii, speeds = [], []
     for case in cases:
-        told, run = truth["cases"][case.name], wb.observe(train, case, "ekf")
+        truth_of_case, run = truth["cases"][case.name], wb.observe(train, case, "ekf")
         file = RECORDINGS / name / case.name / "case.toml"
         conditions = tomllib.loads(file.read_text())["conditions"]
         at = int(np.searchsorted(case.time, float(conditions["brake_command"].split()[0])))
         radius = np.array([run.signal(f"r[{i}]")[at] for i in range(1, 9)])
-        radii.append(1e3 * radius - np.array(told["radius_mm"]))
-        speeds.append(3.6 * run.signal("vGNSS")[at] - told["speed_at_command"])
+        radii.append(1e3 * radius - np.array(truth_of_case["radius_mm"]))
+        speeds.append(3.6 * run.signal("vGNSS")[at] - truth_of_case["speed_at_command"])
     # Of 0.06 km/h in a reading at 10 Hz, averaged over 20 s and more, next to nothing is left but
     # half a step of 0.1 s, in which the train slows by 0.02 km/h.
     assert np.abs(speeds).max() < 0.04
@@ -225,10 +225,10 @@ def test_a_wet_rail_is_told_from_a_dry_one_by_the_slip_of_axles_that_brake(train
     for name in ("healthy", "labelled/pads_axle", "labelled/cylinder_lag_bogie"):
         cases, truth = cases_of(name, train, tmp_path / name)
         for case in cases:
-            told = truth["cases"][case.name]
-            if told["patch"] is None:
+            truth_of_case = truth["cases"][case.name]
+            if truth_of_case["patch"] is None:
                 probability = wb.observe(train, case, "imm").probability
-                at = int(np.searchsorted(case.time, told["standstill"] - 5.0))
+                at = int(np.searchsorted(case.time, truth_of_case["standstill"] - 5.0))
                 said.append(probability[f"rail_{case.conditions['rail']}"][at])
     assert len(said) == 14
     assert min(said) > 0.95
@@ -240,7 +240,7 @@ def test_masses_of_a_sound_train_stay_as_weighed_where_no_axle_slides(train, tmp
     rolled = [case for case in cases if not any(truth["cases"][case.name]["slide_seconds"])]
     assert len(rolled) >= 5
     for case in rolled:
-        told, run = truth["cases"][case.name], wb.observe(train, case, "ekf")
-        at = int(np.searchsorted(case.time, told["standstill"] - 4.0))
+        truth_of_case, run = truth["cases"][case.name], wb.observe(train, case, "ekf")
+        at = int(np.searchsorted(case.time, truth_of_case["standstill"] - 4.0))
         values = np.array([run.signal(f"mass[{k}]")[at] * case[f"mass{k}"][0] for k in (1, 2)])
-        assert_allclose(values, 1e3 * np.array(told["mass"]), rtol=0.05)
+        assert_allclose(values, 1e3 * np.array(truth_of_case["mass"]), rtol=0.05)

@@ -274,7 +274,7 @@ def calls_itself(a, m, x):
         (calls_numpy, 1, r"a call of what is no compiled function: np.sum\(a\)"),
         (calls_itself, -1, "'calls_itself', which calls itself"),
     ],
-    ids=lambda one: getattr(one, "__name__", None),
+    ids=lambda item: getattr(item, "__name__", None),
 )
 def test_what_has_no_translation_is_refused_with_file_and_line(law, line, found):
     # A decorator is the first line, the second has the name.

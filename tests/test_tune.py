@@ -25,9 +25,9 @@ from .recordings import write_beginnings
 
 
 def default_gains(system: System, name: str) -> Gains:
-    kind = tunable(system, name)
-    with open_model(system, kind.role) as fmu:
-        return kind.default_gains(fmu, system)
+    cls = tunable(system, name)
+    with open_model(system, cls.role) as fmu:
+        return cls.default_gains(fmu, system)
 
 
 @pytest.mark.parametrize("name", ["disturbance_observer", "parameter_estimator", "ekf", "ukf"])
@@ -133,9 +133,9 @@ def test_results_keep_their_contract(root, system, folder, tmp_path, monkeypatch
     for name in ("convergence.png", "cases.png"):
         assert (tmp_path / name).stat().st_size > 10_000
     assert not list(tmp_path.glob("*.part"))
-    kind = tunable(system, "parameter_estimator")
-    simulation = prepare(system, {kind.name: kind}, path)
-    assert_array_equal(simulation.gains[kind.name].values, gains.values)
+    cls = tunable(system, "parameter_estimator")
+    simulation = prepare(system, {cls.name: cls}, path)
+    assert_array_equal(simulation.gains[cls.name].values, gains.values)
 
 
 @pytest.mark.parametrize(

@@ -42,11 +42,11 @@ FASTEST = 200.0  # [rad/s] that the samples of a recording carry
 def test_planted_gains_are_found(system, prepare, stop_beginnings, inline, tmp_path):
     """The force is replaced by what known gains estimate, so that these have z = 0."""
     name = "parameter_estimator"
-    kind = estimators_of(system)[name]
-    with open_model(system, kind.role) as fmu:
-        reasoned = kind.default_gains(fmu, system)
+    cls = estimators_of(system)[name]
+    with open_model(system, cls.role) as fmu:
+        reasoned = cls.default_gains(fmu, system)
         planted = reasoned.values * [1, 1, 0.5, 2, 1, 2, 1, 0.5]
-        estimator = kind(fmu, system, reasoned.with_values(planted))
+        estimator = cls(fmu, system, reasoned.with_values(planted))
         forces = [replay(case, estimator).signal("Fx") for case in stop_beginnings]
     pairs = zip(stop_beginnings, forces, strict=True)
     problem = prepare(name, [case.with_signals({"Fx": force}) for case, force in pairs])
@@ -54,13 +54,13 @@ def test_planted_gains_are_found(system, prepare, stop_beginnings, inline, tmp_p
     everything = range(len(forces))
     pool = inline(job)
     plan = Plan(80, 5, seed=2)
-    found = search(
+    tuned = search(
         pool, job, problem.space, everything, plan, Checkpointing(tmp_path / "checkpoint.json")
     )
     z_reasoned = evaluate_gains(pool, job, [reasoned.values]).max()
-    assert found.z < 0.02 * z_reasoned
+    assert tuned.z < 0.02 * z_reasoned
     # Columns that decide about the force; a tenth is what is left of z over its slope.
-    assert_allclose(found.best[[3, 5, 7]], planted[[3, 5, 7]], rtol=0.1)
+    assert_allclose(tuned.best[[3, 5, 7]], planted[[3, 5, 7]], rtol=0.1)
 
 
 def judging_force_alone(system: System) -> System:
@@ -175,10 +175,10 @@ def test_a_gain_without_effect_does_not_matter(problem, pool, tmp_path):
     """A decay of 0.02 1/s forgets 12 % of a deviation in 6 s; L42 is the loop of muDC."""
     job, space = problem.job, problem.space
     plan = Plan(generations=1, population=1, seed=3)
-    found = search(
+    tuned = search(
         pool, job, space, range(len(job.recordings)), plan, Checkpointing(tmp_path / "c.json")
     )
-    matters = {e.gain: e.matters for e in sensitivities(pool, job, space, found)}
+    matters = {e.gain: e.matters for e in sensitivities(pool, job, space, tuned)}
     assert matters["L42"]
     assert not matters["T_muWR"]
 

@@ -135,14 +135,14 @@ def test_the_convergence_and_all_else_fit_a_narrow_screen(results, narrow):
 
 
 def test_headline_tells_z_the_worst_case_and_the_bounds_in_one_sentence(page, summary):
-    told = headline(page)
+    line = headline(page)
     z_k = sorted(((case["z_k"], name) for name, case in summary["cases"].items()), reverse=True)
     (worst, first), (next_worst, second) = z_k
-    assert f"from {summary['z_reasoned']:.4g} with the reasoned gains to {worst:.4g}" in told
-    assert f"worst case is {first}, by {100 * (1 - next_worst / worst):.1f} % over {second}" in told
+    assert f"from {summary['z_reasoned']:.4g} with the reasoned gains to {worst:.4g}" in line
+    assert f"worst case is {first}, by {100 * (1 - next_worst / worst):.1f} % over {second}" in line
     bound = [name for name, gain in summary["gains"].items() if gain["at_bound"]]
-    assert f"; {', '.join(bound) or 'no gain'} ended at a bound" in told
-    assert not re.search(r"\. [A-Z]", told)
+    assert f"; {', '.join(bound) or 'no gain'} ended at a bound" in line
+    assert not re.search(r"\. [A-Z]", line)
 
 
 def test_gains_at_a_bound_are_named_and_flagged(changed, tmp_path):
@@ -212,10 +212,10 @@ TUNABLE = [name for name, kind in estimators_of(load_system("wheelset")).items()
 
 def told(system: System, estimator: str) -> tuple[Gains, dict[str, tuple[str, str]]]:
     """Reasoned gains of an estimator, and what it tells of them."""
-    kind = estimators_of(system)[estimator]
-    with open_model(system, kind.role) as fmu:
-        gains = kind.default_gains(fmu, system)
-        return gains, kind.meanings(fmu, system, gains)
+    cls = estimators_of(system)[estimator]
+    with open_model(system, cls.role) as fmu:
+        gains = cls.default_gains(fmu, system)
+        return gains, cls.meanings(fmu, system, gains)
 
 
 @pytest.mark.parametrize("estimator", TUNABLE)
@@ -372,10 +372,10 @@ def test_what_got_worse_comes_before_the_tables(changed, tmp_path):
     changed["cases"][HOSTILE]["z_k_reasoned"] = 0.5 * changed["cases"][HOSTILE]["z_k"]
     changed["work"]["crashed"] = 3
     changed["folds"] = []
-    told = news(written(changed, tmp_path))
-    assert f"Worse than with the reasoned gains: {HOSTILE} (" in told
-    assert "03_dry_120_3.6 (" not in told
-    assert "blocked their worker: 3" in told
+    line = news(written(changed, tmp_path))
+    assert f"Worse than with the reasoned gains: {HOSTILE} (" in line
+    assert "03_dry_120_3.6 (" not in line
+    assert "blocked their worker: 3" in line
 
 
 def test_a_search_that_could_go_on_says_with_which_gain(changed, tmp_path):

@@ -83,11 +83,11 @@ def test_gains_do_not_depend_on_the_number_of_workers_nor_on_the_death_of_one(
                 killed.append(two.submit(pid).result())
                 os.kill(killed[0], signal.SIGKILL)
 
-        found = run(two, problem, tmp_path / "two.json", SMALL, report=kill_once)
+        tuned = run(two, problem, tmp_path / "two.json", SMALL, report=kill_once)
         assert killed[0] not in {two.submit(pid).result() for _ in range(100)}
-    assert_array_equal(found.best, alone.best)
-    assert_array_equal(found.z_k, alone.z_k)
-    assert [g.z for g in found.history] == [g.z for g in alone.history]
+    assert_array_equal(tuned.best, alone.best)
+    assert_array_equal(tuned.z_k, alone.z_k)
+    assert [g.z for g in tuned.history] == [g.z for g in alone.history]
 
 
 def pid(evaluator: Evaluator) -> int:
@@ -111,10 +111,10 @@ def test_a_cluster_finds_the_same_gains(problem, pool, tmp_path):
     with distributed.LocalCluster(processes=False, **options) as cluster:
         remote = DaskPool(cluster.scheduler_address, Evaluator, job, 60.0)
         try:
-            found = run(remote, problem, tmp_path / "remote.json", SMALL)
+            tuned = run(remote, problem, tmp_path / "remote.json", SMALL)
         finally:
             remote.close()
-    assert_array_equal(found.best, alone.best)
+    assert_array_equal(tuned.best, alone.best)
 
 
 LATE = """
@@ -218,12 +218,12 @@ def test_only_workers_with_the_same_code_get_work(scheduler, problem, pool, tmp_
             client.wait_for_workers(3, timeout=120)
             remote = DaskPool(address, Evaluator, problem.job, 60.0, warn=warnings.append)
             try:
-                found = run(remote, problem, tmp_path / "remote.json", SMALL)
+                tuned = run(remote, problem, tmp_path / "remote.json", SMALL)
             finally:
                 remote.close()
     assert len(warnings) == 2
     assert all("it gets no work" in warning for warning in warnings)
-    assert_array_equal(found.best, run(pool, problem, tmp_path / "alone.json", SMALL).best)
+    assert_array_equal(tuned.best, run(pool, problem, tmp_path / "alone.json", SMALL).best)
 
 
 def test_a_scheduler_that_dies_keeps_the_best_and_resuming_changes_nothing(
@@ -338,10 +338,10 @@ def test_only_the_candidate_that_kills_workers_is_lost(problem, pool):
     candidates = [Candidate(v, np.inf, (0, 1, 2)) for v in values]
     undisturbed = evaluate_all(pool, candidates, 3)
     with evaluators(job, 2) as two:
-        found = evaluate_all(Deadly(two, float(values[7][0])), candidates, 3)
-    assert [one.crashed for one in found] == [i == 7 for i in range(20)]
+        evaluations = evaluate_all(Deadly(two, float(values[7][0])), candidates, 3)
+    assert [evaluation.crashed for evaluation in evaluations] == [i == 7 for i in range(20)]
     others = [i for i in range(20) if i != 7]
-    assert_array_equal([found[i].z for i in others], [undisturbed[i].z for i in others])
+    assert_array_equal([evaluations[i].z for i in others], [undisturbed[i].z for i in others])
 
 
 # --- checkpoints ---
@@ -364,12 +364,12 @@ def test_a_full_disk_costs_a_warning_and_keeps_the_checkpoint_before(
 
             monkeypatch.setattr(os, "fsync", refuse)
 
-    found = run(pool, problem, path, SMALL, report=fill_disk, warn=warnings.append)
+    tuned = run(pool, problem, path, SMALL, report=fill_disk, warn=warnings.append)
     assert path.read_bytes() == kept[0]
     assert not list(tmp_path.glob("*.part"))
     assert len(warnings) == SMALL.generations - 1
     assert "No space left on device" in warnings[0]
-    assert_array_equal(found.best, undisturbed.best)
+    assert_array_equal(tuned.best, undisturbed.best)
 
 
 def test_interruption_keeps_the_best_so_far_and_resuming_changes_nothing(problem, pool, tmp_path):
@@ -404,10 +404,10 @@ def test_a_damaged_checkpoint_gives_way_to_the_one_before(problem, pool, tmp_pat
     whole = run(pool, problem, path, SMALL)
     path.write_text(path.read_text().replace('"z":', '"z": ', 1).replace("0.", "0.1", 1))
     warnings: list[str] = []
-    found = run(pool, problem, path, SMALL, resume=True, warn=warnings.append)
-    assert_array_equal(found.best, whole.best)
+    tuned = run(pool, problem, path, SMALL, resume=True, warn=warnings.append)
+    assert_array_equal(tuned.best, whole.best)
     assert "its checksum is another one" in warnings[0]
-    assert len(found.history) == len(whole.history)
+    assert len(tuned.history) == len(whole.history)
 
 
 @pytest.fixture

@@ -42,34 +42,36 @@ def run(root, tmp_path, monkeypatch) -> Callable[..., Names]:
     return executed
 
 
-def causes(found: wb.Outcome) -> list[set[str]]:
+def causes(outcome: wb.Outcome) -> list[set[str]]:
     """Each cause with those that it cannot be told from, strongest first."""
-    return [{cause.effect.name, *cause.confusable_with} for cause in found.diagnosis.causes]
+    return [{cause.effect.name, *cause.confusable_with} for cause in outcome.diagnosis.causes]
 
 
-def held_out(found: wb.Outcome, measure: str = "rms") -> tuple[float, float]:
+def held_out(outcome: wb.Outcome, measure: str = "rms") -> tuple[float, float]:
     """Error of all samples that were not fitted, before and after."""
-    told = [error for error in found.errors if error.held_out]
+    errors = [error for error in outcome.errors if error.held_out]
     power = 2.0 if measure == "rms" else 1.0
-    each = np.array([getattr(entry, measure) for entry in told]) ** power
-    before, after = np.average(each, axis=0, weights=[entry.samples for entry in told]) ** (
+    each = np.array([getattr(entry, measure) for entry in errors]) ** power
+    before, after = np.average(each, axis=0, weights=[entry.samples for entry in errors]) ** (
         1.0 / power
     )
     return float(before), float(after)
 
 
-def fitted(found: wb.Outcome) -> tuple[float, float]:
+def fitted(outcome: wb.Outcome) -> tuple[float, float]:
     """Root of the mean square of all samples that were fitted, before and after."""
-    told = [error for error in found.errors if not error.held_out]
-    squares = np.array([entry.rms for entry in told]) ** 2
-    before, after = np.sqrt(np.average(squares, axis=0, weights=[entry.samples for entry in told]))
+    errors = [error for error in outcome.errors if not error.held_out]
+    squares = np.array([entry.rms for entry in errors]) ** 2
+    before, after = np.sqrt(
+        np.average(squares, axis=0, weights=[entry.samples for entry in errors])
+    )
     return float(before), float(after)
 
 
-def own(found: wb.Outcome, case: wb.Case, measure: str = "rms") -> float:
+def own(outcome: wb.Outcome, case: wb.Case, measure: str = "rms") -> float:
     """Error of the extended model along one recording, as the diagnosis tells it."""
-    (told,) = (error for error in found.errors if error.recording == case.name)
-    pair: tuple[float, float] = getattr(told, measure)
+    (errors,) = (error for error in outcome.errors if error.recording == case.name)
+    pair: tuple[float, float] = getattr(errors, measure)
     return pair[1]
 
 
@@ -81,87 +83,89 @@ def test_a_folder_without_the_recordings_is_refused(tutorial, run, tmp_path):
 
 def test_both_tanks_overflow_and_the_pump_has_a_dead_zone(run):
     names = run("cascaded_tanks")
-    found = names["found"]
-    groups = causes(found)
+    outcome = names["found"]
+    groups = causes(outcome)
     for effect in ("UpperOverflow", "LowerOverflow", "SensorCurvature", "PumpDeadZone"):
         assert any(effect in group for group in groups)
     upper = next(
-        cause.parameters for cause in found.diagnosis.causes if cause.effect.name == "UpperOverflow"
+        cause.parameters
+        for cause in outcome.diagnosis.causes
+        if cause.effect.name == "UpperOverflow"
     )
     # All that the upper tank cannot hold runs over, part of it into the lower one.
     assert upper["spilled"].high == 1.0
     assert 0.0 < upper["share"].low < upper["share"].high < 1.0
-    before, after = fitted(found)
+    before, after = fitted(outcome)
     assert after < 0.5 * before
-    assert held_out(found) == pytest.approx((0.70, 0.20), abs=0.01)
-    assert found.diagnosis.gain.after > 10.0
+    assert held_out(outcome) == pytest.approx((0.70, 0.20), abs=0.01)
+    assert outcome.diagnosis.gain.after > 10.0
     # Another integrator, and all samples.
-    assert names["error"] == pytest.approx(own(found, names["case"]), rel=0.05)
+    assert names["error"] == pytest.approx(own(outcome, names["case"]), rel=0.05)
 
 
 @pytest.mark.long
 def test_servo_has_viscous_friction_and_more_under_load(run):
     names = run("servo_pendulum")
-    found = names["found"]
-    named = [cause.effect.name for cause in found.diagnosis.causes]
+    outcome = names["found"]
+    named = [cause.effect.name for cause in outcome.diagnosis.causes]
     assert named[0] == "ViscousFriction"  # alone it explains most
     assert {"LoadStribeck", "SupplyResistance"} <= set(named)
     assert "Stribeck" not in named
-    first = found.diagnosis.steps[0].rivals[0].active[0].name
+    first = outcome.diagnosis.steps[0].rivals[0].active[0].name
     assert first == "LoadFriction"  # the one friction that leaves least, as published: 47 mrad
     # Published, fitted to the same records: 128 mrad without friction, 59 with dry and viscous
     # friction and 59 with a Stribeck curve beside, 47 where it grows with the load.
-    fitted = [error.mean_absolute for error in found.errors if not error.held_out]
+    fitted = [error.mean_absolute for error in outcome.errors if not error.held_out]
     assert len(fitted) == 12
     before, after = np.mean(fitted, axis=0)
     assert 0.11 < before < 0.15
     assert after < 0.035
     measure = "mean_absolute"
-    assert held_out(found, measure) == pytest.approx((0.125, 0.029), abs=1e-3)
+    assert held_out(outcome, measure) == pytest.approx((0.125, 0.029), abs=1e-3)
     ratios = {
         error.recording: error.mean_absolute[1] / error.mean_absolute[0]
-        for error in found.errors
+        for error in outcome.errors
         if error.held_out
     }
     assert max(ratios, key=ratios.__getitem__) == "kp200_up_and_down"
-    assert names["error"] == pytest.approx(own(found, names["case"], measure), rel=0.05)
+    assert names["error"] == pytest.approx(own(outcome, names["case"], measure), rel=0.05)
 
 
 @pytest.mark.long
 def test_friction_of_both_seals_grows_with_pressure(run):
     names = run("pneumatic_cylinder")
-    found = names["found"]
+    outcome = names["found"]
     # What three parameters, fitted by hand, leave of the force at 1, 3 and 7 bar: of 5.9 N 1.0, of
     # 7.9 N 1.2.
     for seal, before, own_before, own_after in (
         ("O-ring", 6.6, 5.95, 1.0),
         ("NAPN", 9.0, 7.9, 1.2),
     ):
-        named = {cause.effect.name for cause in found[seal].diagnosis.causes}
+        named = {cause.effect.name for cause in outcome[seal].diagnosis.causes}
         assert {"PressureFriction", "PreslidingFriction"} <= named
-        assert fitted(found[seal])[0] == pytest.approx(own_before, rel=0.02)
-        assert fitted(found[seal])[1] < own_after
-        assert held_out(found[seal]) == pytest.approx((before, 0.95), abs=0.05)
+        assert fitted(outcome[seal])[0] == pytest.approx(own_before, rel=0.02)
+        assert fitted(outcome[seal])[1] < own_after
+        assert held_out(outcome[seal]) == pytest.approx((before, 0.95), abs=0.05)
         # The first second, in which the machine starts, is told by FMPy alone.
-        assert names["errors"][seal] == pytest.approx(held_out(found[seal])[1], rel=0.1)
-    assert {"LoadCellOffset", "PressureOffset"} in causes(found["NAPN"])
-    assert found["Ultimaker_020"].diagnosis.causes[0].effect.name == "LaminarLeak"
-    assert held_out(found["Ultimaker_020"]) == pytest.approx((6.16e5, 0.06e5), rel=0.05)
-    assert found["Aluminium"].diagnosis.verdict == "nothing"
+        assert names["errors"][seal] == pytest.approx(held_out(outcome[seal])[1], rel=0.1)
+    assert {"LoadCellOffset", "PressureOffset"} in causes(outcome["NAPN"])
+    assert outcome["Ultimaker_020"].diagnosis.causes[0].effect.name == "LaminarLeak"
+    assert held_out(outcome["Ultimaker_020"]) == pytest.approx((6.16e5, 0.06e5), rel=0.05)
+    assert outcome["Aluminium"].diagnosis.verdict == "nothing"
 
 
 def test_train_loses_air_in_one_of_five_ways(run):
     names = run("air_supply")
-    found = names["found"]
-    (group,) = causes(found)
+    outcome = names["found"]
+    (group,) = causes(outcome)
     assert {"LaminarLeak", "OrificeLeak", "CheckValveLeak", "SteadyConsumption"} < group
     assert len(group) == 5
     assert "CompressibleLeak" in group
-    assert "compressor off" in found.diagnosis.causes[0].effect.separation
-    for error in found.errors:
+    assert "compressor off" in outcome.diagnosis.causes[0].effect.separation
+    for error in outcome.errors:
         if not error.held_out:
             before, after = error.rms
             assert after < 0.1 * before
-    assert held_out(found) == pytest.approx((0.76e5, 0.048e5), rel=0.02)
+    assert held_out(outcome) == pytest.approx((0.76e5, 0.048e5), rel=0.02)
     # FMPy holds the flag over a twentieth of a sample.
-    assert names["error"] == pytest.approx(own(found, names["case"]), rel=0.05)
+    assert names["error"] == pytest.approx(own(outcome, names["case"]), rel=0.05)

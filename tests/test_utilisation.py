@@ -112,8 +112,8 @@ def test_nothing_is_claimed_at_walking_pace(peak_force):
 
 def made(fmu: FMU, system: System, name: str) -> Estimator:
     """An estimator with reasoned gains."""
-    kind = choose(system, [name])[name]
-    return kind(fmu, system, kind.default_gains(fmu, system))
+    cls = choose(system, [name])[name]
+    return cls(fmu, system, cls.default_gains(fmu, system))
 
 
 @pytest.fixture(scope="module")

@@ -41,7 +41,7 @@ def test_a_train_that_is_true_to_its_sheet_stops_as_its_model(tmp_path):
     with open_model(SYSTEM) as model:
         start = {output.name: case[output.name][0] for output in SYSTEM.outputs}
         model.start({**start, "vTrain": 0.46 * start["omega1"]}, {})
-        inputs = model.variables([one.name for one in SYSTEM.inputs])
+        inputs = model.variables([quantity.name for quantity in SYSTEM.inputs])
         found = []
         for k, u in enumerate(case.u[:-1]):
             model.set(inputs, u)
@@ -101,8 +101,8 @@ def told(folder: Path, effects: object) -> Path:
 
 def test_the_rig_plants_what_it_is_told(tmp_path):
     out, stop_ = tmp_path / "made", "01_120_service_dry"
-    told = ["--system", "train", "--case", stop_, "--seed", "5", "--effect", "pads[3]=0.15"]
-    assert main(["rig", *told, "--out", str(out), "--quiet"]) == 0
+    options = ["--system", "train", "--case", stop_, "--seed", "5", "--effect", "pads[3]=0.15"]
+    assert main(["rig", *options, "--out", str(out), "--quiet"]) == 0
     RIG.write(RIG.simulate(5, {"pads[3]": 0.15}), {"pads[3]": 0.15}, tmp_path / "same")
     made, same = (folder / stop_ / "measured.csv" for folder in (out, tmp_path / "same"))
     assert made.read_bytes() == same.read_bytes()
@@ -175,8 +175,8 @@ def test_a_generated_train_of_two_vehicles_is_the_one_that_is_known(tmp_path):
         order = [[x.name for x in generated.inputs].index(x.name) for x in one.inputs]
         names = [x.name for x in one.estimated]
         with open_model(one) as model:
-            kind = ExtendedKalmanFilter
-            estimator = kind(model, one, kind.default_gains(model, one))
+            cls = ExtendedKalmanFilter
+            estimator = cls(model, one, cls.default_gains(model, one))
             values = estimator.run(samples[0], samples[1][:, order], samples[2]).values
         at = [list(one.columns).index(name) for name in sorted(names)]
         estimates.append(values[:, at])
@@ -210,8 +210,8 @@ def test_force_and_adhesion_of_each_axle_are_estimated(stops, within, tmp_path):
             force, load = result.force[row], result.load[row]
             for name, unit, true in (("axleForce", "N", force), ("utilised", "1", force / load)):
                 found, sigma = (
-                    np.array([run[f"{kind}{name}[{i}] [{unit}]"] for i in range(1, 9)]).T[at]
-                    for kind in ("", "sigma_")
+                    np.array([run[f"{prefix}{name}[{i}] [{unit}]"] for i in range(1, 9)]).T[at]
+                    for prefix in ("", "sigma_")
                 )
                 ratios[name].append(found / true)
                 held.append(np.abs(found - true) < 1.96 * sigma)

@@ -43,9 +43,9 @@ def unsaid(light) -> Case:
 
 def open_loop(case: Case, role: str) -> Run:
     """A model of the rig by itself."""
-    kind = estimators_of(SYSTEM)["open_loop"]
+    cls = estimators_of(SYSTEM)["open_loop"]
     with FMU(model_path(SYSTEM, role)) as fmu:
-        return replay(case, kind(fmu, SYSTEM, kind.default_gains(fmu, SYSTEM)))
+        return replay(case, cls(fmu, SYSTEM, cls.default_gains(fmu, SYSTEM)))
 
 
 def test_what_sets_a_parameter_is_said_or_is_as_in_the_model(light, unsaid):
@@ -70,7 +70,7 @@ def test_a_load_that_is_none_is_refused(written, found, tmp_path):
 
 
 def test_slip_of_a_light_axle_goes_with_its_contact():
-    usual, less = (simulate(one, 3, CONSTANT_PADS, REFERENCE) for one in (STOP, LIGHT))
+    usual, less = (simulate(scenario, 3, CONSTANT_PADS, REFERENCE) for scenario in (STOP, LIGHT))
     held = slice(*np.searchsorted(usual.time, usual.drawn.coasting + np.array([5.0, 10.0])))
     more = less.truth["slip"][held] / usual.truth["slip"][held]
     # Polach's force bends by 1 % more where less of it is left.
@@ -78,7 +78,7 @@ def test_slip_of_a_light_axle_goes_with_its_contact():
 
 
 def test_estimators_run_with_the_load_that_was_said(light, unsaid):
-    runs = [open_loop(one, "observer") for one in (light, unsaid)]
+    runs = [open_loop(case, "observer") for case in (light, unsaid)]
     # Where the contact carries little: the model's friction is that of a slippery rail.
     begins = np.argmax(runs[0].signal("Fx") > 500.0)
     said, usual = (run.signal("slip")[begins] for run in runs)
@@ -103,5 +103,5 @@ def test_samples_are_excluded_by_the_load_that_was_said(light, unsaid):
 
 def test_a_model_without_that_parameter_runs_as_it_is(light, unsaid):
     """The full model has the wheel load as an output."""
-    runs = [open_loop(one, "full") for one in (light, unsaid)]
+    runs = [open_loop(case, "full") for case in (light, unsaid)]
     assert np.array_equal(runs[0].signal("slip"), runs[1].signal("slip"))

@@ -19,8 +19,8 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1, help="of the moments")
     parser.add_argument("--command", action="append", help="only this one; may be repeated")
     options = parser.parse_args()
-    kinds = KINDS if can_starve() else KINDS[:-1]
-    if kinds != KINDS:
+    disturbances = KINDS if can_starve() else KINDS[:-1]
+    if disturbances != KINDS:
         print("no full disk: this machine lets users mount none")
     counts: Counter[str] = Counter()
     with tempfile.TemporaryDirectory(prefix="chaos-") as scratch:
@@ -29,14 +29,16 @@ def main() -> int:
             for command in commands(Path(scratch) / "cases")
             if options.command is None or command.name in options.command
         ]
-        every = cycle([(usual, kind) for usual in wanted for kind in kinds])
-        for number, (usual, kind) in zip(range(options.count), every, strict=False):
+        every = cycle([(usual, disturbance) for usual in wanted for disturbance in disturbances])
+        for number, (usual, disturbance) in zip(range(options.count), every, strict=False):
             folder = Path(scratch) / f"{number}"
             random = Random(f"{options.seed} {number}")
-            failures = disturb(usual, kind, random, folder)
-            counts[f"{usual.command.name}, {kind}: {'fails' if failures else 'holds'}"] += 1
+            failures = disturb(usual, disturbance, random, folder)
+            counts[f"{usual.command.name}, {disturbance}: {'fails' if failures else 'holds'}"] += 1
             for failure in failures:
-                print(f"{usual.command.name}, {kind}, number {number}: {failure}", flush=True)
+                print(
+                    f"{usual.command.name}, {disturbance}, number {number}: {failure}", flush=True
+                )
     print("\n".join(f"{what} {count}" for what, count in sorted(counts.items())))
     return 1 if any("fails" in what for what in counts) or not counts else 0
 

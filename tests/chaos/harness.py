@@ -80,21 +80,21 @@ def undisturbed(command: Command, folder: Path) -> Undisturbed:
     return Undisturbed(command, command.results(folder / "out"), time.monotonic() - begin)
 
 
-def disturb(usual: Undisturbed, kind: str, random: Random, folder: Path) -> list[Failure]:
+def disturb(usual: Undisturbed, disturbance: str, random: Random, folder: Path) -> list[Failure]:
     """End a run by one of `KINDS` at a random moment, go on, and compare.
 
     Returns
     -------
     failures : empty if all that must hold does.
     """
-    if kind == "full disk":
+    if disturbance == "full disk":
         return _starved(usual, random.randrange(4, 400) * 1024, folder)
     failures: list[Failure] = []
     with _started(usual.command, folder, again=False) as process:
         try:
             process.wait(random.uniform(BEGUN, usual.seconds))
         except subprocess.TimeoutExpired:
-            _send(process, kind)
+            _send(process, disturbance)
         try:
             process.wait(LONGEST)
         except subprocess.TimeoutExpired:
@@ -103,7 +103,7 @@ def disturb(usual: Undisturbed, kind: str, random: Random, folder: Path) -> list
     if not comes_true(lambda: not living(process.pid)):
         failures.append(Failure("process", f"{living(process.pid)} stay"))
     failures += _traceback(folder)
-    if kind != "kill":  # nobody clears up after that, but the next run
+    if disturbance != "kill":  # nobody clears up after that, but the next run
         failures += _left(folder)
     return failures + _resumed(usual, folder)
 
@@ -187,11 +187,11 @@ def _run(command: Command, folder: Path, *, again: bool) -> tuple[int, str]:
     return status, (folder / "said").read_text()
 
 
-def _send(process: subprocess.Popen[bytes], kind: str) -> None:
-    if kind == "interrupt":
+def _send(process: subprocess.Popen[bytes], disturbance: str) -> None:
+    if disturbance == "interrupt":
         os.killpg(process.pid, signal.SIGINT)  # as a terminal does
     else:
-        process.send_signal(signal.SIGKILL if kind == "kill" else signal.SIGTERM)
+        process.send_signal(signal.SIGKILL if disturbance == "kill" else signal.SIGTERM)
 
 
 def _traceback(folder: Path) -> list[Failure]:

@@ -34,10 +34,10 @@ def main() -> int:
         whole = Report()
         for target in wanted:
             begin = time.perf_counter()
-            found = fuzz(target, options.seed, numbers, options.out)
-            whole.outcomes |= found.outcomes
-            whole.failures += found.failures
-            _tell(found, target.name, time.perf_counter() - begin)
+            report = fuzz(target, options.seed, numbers, options.out)
+            whole.outcomes |= report.outcomes
+            whole.failures += report.failures
+            _tell(report, target.name, time.perf_counter() - begin)
     print(
         f"{len(whole.failures)} failures" + (f", kept in {options.out}" if whole.failures else "")
     )

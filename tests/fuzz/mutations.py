@@ -62,22 +62,22 @@ def insert(content: bytes, random: Random) -> bytes:
 
 def replace_number(content: bytes, random: Random) -> bytes:
     """Write another number, or none, in the place of one."""
-    found = list(_NUMBER.finditer(content))
-    if not found:
+    matches = list(_NUMBER.finditer(content))
+    if not matches:
         return insert(content, random)
-    match = random.choice(found)
+    match = random.choice(matches)
     tens = b"%se%d" % (match[0].split(b"e")[0].split(b"E")[0], random.choice((-90, -9, 9, 90, 400)))
-    other = random.choice((random.choice(TOKENS), tens, b"-" + match[0], random.choice(found)[0]))
+    other = random.choice((random.choice(TOKENS), tens, b"-" + match[0], random.choice(matches)[0]))
     return content[: match.start()] + other + content[match.end() :]
 
 
 def replace_word(content: bytes, random: Random) -> bytes:
     """Write another word of the file, or none, in the place of one."""
-    found = list(_WORD.finditer(content))
-    if not found:
+    matches = list(_WORD.finditer(content))
+    if not matches:
         return insert(content, random)
-    match = random.choice(found)
-    other = random.choice((random.choice(TOKENS), random.choice(found)[0]))
+    match = random.choice(matches)
+    other = random.choice((random.choice(TOKENS), random.choice(matches)[0]))
     return content[: match.start()] + other + content[match.end() :]
 
 

@@ -98,7 +98,7 @@ def _of_recorders(folder: Path, system: System) -> Iterator[Target]:
     for name, write in FORMATS.items():
         write(folder / name, recorded(stop, system))
         named = _CHANNELS_OF_MATLAB if name.endswith(".mat") else _CHANNELS
-        told = RecordingOptions(
+        options = RecordingOptions(
             conditions={"wheel_rail": "dry", "discs": ["dry"] * 3},
             columns={signal: NamedChannel(channel) for signal, channel in named.items()},
             step=0.2 if name == "indices.csv" else None,
@@ -106,7 +106,7 @@ def _of_recorders(folder: Path, system: System) -> Iterator[Target]:
         yield Target(
             name,
             {name: (folder / name).read_bytes()},
-            partial(_read_recorded, name, system, told),
+            partial(_read_recorded, name, system, options),
             _impossible_case,
             changes.get(Path(name).suffix, _recording),
         )
@@ -119,8 +119,8 @@ _CHANNELS = {
 _CHANNELS_OF_MATLAB = {**_CHANNELS, "Fx": "Laengskraft", "time": "Zeit"}
 
 
-def _read_recorded(name: str, system: System, told: RecordingOptions, folder: Path) -> Case:
-    return read_file(folder / name, system, told)
+def _read_recorded(name: str, system: System, options: RecordingOptions, folder: Path) -> Case:
+    return read_file(folder / name, system, options)
 
 
 def _recording(files: Files, random: Random) -> tuple[Files, str]:
