@@ -126,7 +126,9 @@ def run_figure(run: Run) -> CaseFigure:
     for name, unit in run.columns.items():
         if not np.isnan(run.signal(name)).all():
             curve = Curve("2", run.signal(name), half_band(run, name, 1.0))
-            panels.append(_panel(name, unit, claimed_parts(curve, run, name)))
+            curves = claimed_parts(curve, run, name)
+            ends = value_range([part.values for part in curves])
+            panels.append(Panel(f"{name} [{unit}]", unit, *ends, 1.0, tuple(curves)))
     panels += [panel for panel in [probability_panel([run])] if panel.curves]
     return CaseFigure(
         name=run.case,
@@ -166,11 +168,6 @@ def half_band(run: Run, signal: str, factor: float) -> Vector | None:
     """Half of the 95 % band of an estimated signal, in its panel's unit; None without."""
     sigma = run.deviation(signal)
     return None if np.isnan(sigma).all() else BAND * sigma / factor
-
-
-def _panel(name: str, unit: str, curves: Sequence[Curve]) -> Panel:
-    ends = value_range([curve.values for curve in curves])
-    return Panel(f"{name} [{unit}]", unit, *ends, 1.0, tuple(curves))
 
 
 def value_range(signals: Sequence[Vector], margin: float = 0.08) -> tuple[float, float]:

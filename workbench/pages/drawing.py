@@ -76,7 +76,7 @@ def drawing(figure: CaseFigure) -> dict[str, Any]:
     header, samples = pack_samples(figure)
     whole = len(samples) <= _MOST
     begin, end = float(figure.time[0]), float(figure.time[-1])
-    panels = []
+    panels: list[dict[str, Any]] = []
     top = 0
     for panel in figure.panels:
         height = round(_HEIGHT * panel.height)
@@ -101,9 +101,11 @@ def drawing(figure: CaseFigure) -> dict[str, Any]:
             }
         )
         top += height
+    drawn = [curve for panel in panels for curve in panel["curves"]]
+    size = sum(len(curve["path"]) + len(curve["band"]) for curve in drawn)
     return {
         "figure": figure,
-        "size": (len(samples) if whole else 0) + _size(panels),  # [byte] about, on the page
+        "size": (len(samples) if whole else 0) + size,  # [byte] about, on the page
         "told": header,
         "samples": samples if whole else "",
         "left": _LEFT,
@@ -132,12 +134,6 @@ def ticks_within(low: float, high: float, most: int) -> list[tuple[float, str]]:
     values = MaxNLocator(most, steps=[1, 2, 5, 10]).tick_values(low, high)
     inside = [float(value) for value in values if low <= value <= high]
     return [(value, f"{value:.6g}".replace("-", "\N{MINUS SIGN}")) for value in inside]
-
-
-def _size(panels: list[dict[str, Any]]) -> int:
-    """Bytes of all paths."""
-    curves = [curve for panel in panels for curve in panel["curves"]]
-    return sum(len(curve["path"]) + len(curve["band"]) for curve in curves)
 
 
 def _further(panel: Panel, top: float, height: float) -> dict[str, Any] | None:

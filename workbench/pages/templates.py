@@ -46,14 +46,10 @@ def _environment() -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {"anchor": anchor, "day": _day, "form": _form}
+    environment.filters |= {"anchor": anchor, "day": _day}
+    environment.filters["form"] = lambda block: type(block).__name__.lower()  # name of its macro
     environment.globals["colours"] = {"light": LIGHT, "dark": DARK}
     return environment
-
-
-def _form(block: object) -> str:
-    """Name of the macro that shows a part of a page."""
-    return type(block).__name__.lower()
 
 
 def _day(date: str) -> str:

@@ -348,13 +348,14 @@ def _redundancies(
     """Signals that contradict each other while they ought to agree."""
     named: set[str] = set()  # of several that tell the same of one, the first
     for redundancy in system.redundancies:
-        names = _needed_names(redundancy)
+        limits = redundancy.while_below, redundancy.while_above
+        names = _compared_names(redundancy) | {limit.signal for limit in limits if limit}
         if redundancy.formula.text in named or not _has(names, signals, system):
             continue
         left, right = _sides(redundancy, time, signals, system)
         large = np.maximum(np.abs(left), np.abs(right))
         compared = large > redundancy.tolerance.slack
-        for limit, side in ((redundancy.while_below, -1.0), (redundancy.while_above, 1.0)):
+        for limit, side in zip(limits, (-1.0, 1.0), strict=True):
             if limit is not None:
                 size = np.abs(system.signal(limit.signal, signals))
                 compared &= side * size > side * limit.level
@@ -393,16 +394,6 @@ def _compared_names(redundancy: Redundancy) -> Set[str]:
         redundancy.store.formula.names if redundancy.store is not None else frozenset()
     )
     return redundancy.formula.names | redundancy.other.names | stored
-
-
-def _needed_names(redundancy: Redundancy) -> Set[str]:
-    """All names that a redundancy needs."""
-    limits = [
-        limit.signal
-        for limit in (redundancy.while_below, redundancy.while_above)
-        if limit is not None
-    ]
-    return _compared_names(redundancy) | set(limits)
 
 
 def _sides(

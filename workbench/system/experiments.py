@@ -7,7 +7,7 @@ from typing import Any
 from workbench.errors import InputError
 from workbench.system.declaration import Scope, Unit, declared, key, table_name
 from workbench.system.expression import Expression
-from workbench.system.parts import STATE, Condition, Signal, names_of, refuse_without_noise
+from workbench.system.parts import STATE, Condition, Ranged, Signal, names_of, refuse_without_noise
 from workbench.system.tables import Table
 from workbench.system.units import quantity
 
@@ -27,7 +27,7 @@ def _unit_of_input(scope: Scope, _: str) -> str | None:
 
 
 @declared
-class VariedInput:
+class VariedInput(Ranged):
     """An input that follows a profile."""
 
     name: str = table_name()
@@ -48,16 +48,6 @@ class VariedInput:
     lags: tuple[float, ...] = key(
         'first-order lags in series from the demand to the input, `["0.5 s"]`', "s", ()
     )
-
-    @property
-    def low(self) -> float:
-        """Least demand [unit]."""
-        return self.range[0]
-
-    @property
-    def high(self) -> float:
-        """Largest demand [unit]."""
-        return self.range[1]
 
 
 @declared

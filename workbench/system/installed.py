@@ -46,7 +46,11 @@ def built_models() -> dict[Path, list[str]]:
     by_library = {}
     for path, content in _own().items():
         models = content["models"].values()
-        built = [model["class"] for model in models if _is_kept(path.parent / model.get("fmu", ""))]
+        built = [
+            model["class"]
+            for model in models
+            if (path.parent / model.get("fmu", "")).resolve().is_relative_to(resources.fmus())
+        ]
         if built:
             by_library[path.with_name("package.mo")] = [
                 f"{path.parent.name}.{name}" for name in built
@@ -77,10 +81,6 @@ def system_path(which: str | Path) -> Path:
         expected=f"a system file, or one of {', '.join(known)}",
         remedy="correct the name or path; 'workbench systems' lists what is installed",
     )
-
-
-def _is_kept(fmu: Path) -> bool:
-    return fmu.resolve().is_relative_to(resources.fmus())
 
 
 @cache

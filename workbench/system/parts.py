@@ -317,8 +317,24 @@ def _reach(scope: Scope) -> float:
     return float((high - low) / np.sqrt(12.0))
 
 
+class Ranged:
+    """What has a range."""
+
+    range: tuple[float, float]
+
+    @property
+    def low(self) -> float:
+        """Least value [unit]."""
+        return self.range[0]
+
+    @property
+    def high(self) -> float:
+        """Largest value [unit]."""
+        return self.range[1]
+
+
 @declared
-class EstimatedQuantity:
+class EstimatedQuantity(Ranged):
     """A parameter of the model that observers estimate."""
 
     name: str = table_name()
@@ -374,16 +390,6 @@ class EstimatedQuantity:
         "with its prior",
         absent=True,
     )
-
-    @property
-    def low(self) -> float:
-        """Least estimate [unit]."""
-        return self.range[0]
-
-    @property
-    def high(self) -> float:
-        """Largest estimate [unit]."""
-        return self.range[1]
 
 
 @declared

@@ -286,7 +286,9 @@ class _Item:
             return self._formula()
         if is_table(kind):
             within = self.table.table(self.name)
-            return read(_fitting(kinds, within), within, self.scope, self.name)
+            # The class that has most of the keys, of those that it may be.
+            fitting = max(kinds, key=lambda kind: sum(name in within for name in key_names(kind)))
+            return read(fitting, within, self.scope, self.name)
         if origin is tuple:
             return self._several(inside)
         return dict(self._each(inside[1]))
@@ -379,8 +381,3 @@ class _Item:
         formula = Expression(self.table.take(self.name, str), where)
         self.scope.references += [(where, part, of) for part in sorted(formula.names) if of]
         return formula
-
-
-def _fitting(kinds: list[Any], table: Table) -> Any:
-    """The class that has most of the keys of a table, of those that it may be."""
-    return max(kinds, key=lambda kind: sum(name in table for name in key_names(kind)))

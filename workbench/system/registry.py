@@ -32,10 +32,7 @@ def load_system(
     InputError
         If there is none of this name, or its file or its library has a mistake.
     """
-    return _built(read_system(system_path(which), fmu, names))
-
-
-def _built(system: System) -> System:
+    system = read_system(system_path(which), fmu, names)
     missing = {role: model for role, model in system.models.items() if model.path is None}
     if not missing:
         return system

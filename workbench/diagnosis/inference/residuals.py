@@ -95,7 +95,8 @@ def residuals(
 ) -> list[Residuals]:
     """Residuals of all recordings, with the levels of the nominal model as fitted."""
     values = fit.unknowns.values(before.point)
-    system, known = simulations.system, _balances(simulations.system)
+    system = simulations.system
+    known: Balances | None = load(find_plugin(system.plugin).balances)
     table = []
     for k, (case, recording) in enumerate(
         zip(simulations.cases, simulations.recordings, strict=True)
@@ -121,12 +122,6 @@ def residuals(
             )
         )
     return table
-
-
-def _balances(system: System) -> Balances | None:
-    """Balances that the system's plugin knows."""
-    known: Balances | None = load(find_plugin(system.plugin).balances)
-    return known
 
 
 def dependences(simulations: ResidualModel, residuals: Sequence[Residuals]) -> list[Dependence]:

@@ -110,7 +110,13 @@ def propose(before: Outcome, problem: Problem, engine: Engine) -> Proposal:
     tied = [estimate for estimate in estimates if estimates[0].evidence - estimate.evidence < near]
     if not tied or tied[0].evidence < odds:
         return Proposal(before, tuple(scan.prospects), tuple(estimates), (), {}, None)
-    forms = {form.name: form for estimate in tied for form in _forms(estimate)}
+    forms: dict[str, ClosedForm] = {}
+    for estimate in tied:
+        prospect, largest = estimate.prospect, float(np.abs(estimate.function()[1]).max())
+        # Of an output that is nominally zero, what it seems to be.
+        known = prospect.largest or largest
+        for form in candidates(prospect.law, prospect.knots, known, largest):
+            forms[form.name] = form
     forms = _surviving(problem, forms, about, engine)
     found = (tuple(scan.prospects), tuple(estimates), tuple(tied))
     proposal = Proposal(before, *found, forms, None)
@@ -181,13 +187,6 @@ def _called(law: Law) -> tuple[str, ...]:
         return law.place.name, law.carrier.expression
     carrier = "" if law.influence.kind == "work" else law.carrier.expression
     return law.place.name, carrier, law.influence.name
-
-
-def _forms(estimate: FittedLaw) -> list[ClosedForm]:
-    """Closed forms of a law."""
-    prospect, largest = estimate.prospect, float(np.abs(estimate.function()[1]).max())
-    # Of an output that is nominally zero, what it seems to be.
-    return list(candidates(prospect.law, prospect.knots, prospect.largest or largest, largest))
 
 
 def _surviving(

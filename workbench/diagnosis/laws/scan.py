@@ -117,7 +117,11 @@ class Scan:
             self.prospects: list[LawScore] = []
             return
         names = list(
-            dict.fromkeys(f"{place.slot.name}.{name}" for place in where for name in _seen(place))
+            dict.fromkeys(
+                f"{place.slot.name}.{name}"
+                for place in where
+                for name in (place.output.name, *(variable.name for variable in place.inputs))
+            )
         )
         with tempfile.TemporaryDirectory() as scratch:
             extended = extended_library(library, map(_probe, where), Path(scratch))
@@ -282,7 +286,3 @@ def watching(text: str, names: Sequence[str]) -> str:
     outputs = [f"  output Real watched{k} = {name};\n" for k, name in enumerate(names)]
     head, end, tail = text.rpartition("end ")
     return head + "".join(outputs) + end + tail
-
-
-def _seen(place: Place) -> list[str]:
-    return [place.output.name, *(variable.name for variable in place.inputs)]

@@ -104,7 +104,7 @@ def propose(
         If a named channel is missing or is named twice, or its unit does not fit; or a group that
         holds a signal has no time.
     """
-    places = _places(files)
+    places = [PlacedChannel(*placed) for placed in placed_channels(files)]
     where = ", ".join(str(file.path) for file in files)
     assigned = {
         name: _as_named(channel, system.signals[name], places, system, where)
@@ -150,11 +150,6 @@ def _text_of(signal: Signal, texts: Sequence[FileChannel]) -> str:
             example = next(filter(None, channel.texts), "")
             return f"'{channel.name}' holds texts such as '{example}', no numbers"
     return "no channel whose name or unit tells"
-
-
-def _places(files: Sequence[RecordedFile]) -> list[PlacedChannel]:
-    """All channels, each with a name that no other has."""
-    return [PlacedChannel(*placed) for placed in placed_channels(files)]
 
 
 def _find(

@@ -557,7 +557,8 @@ class _Judgement:
     def outcome(self, interrupted: bool) -> FitOutcome:
         """The outcome; without intervals where the search was interrupted."""
         problem, search = self._problem, self._search
-        recordings = self._recordings(problem.start, problem.best)
+        outputs = problem.outputs(problem.start), problem.outputs(problem.best)
+        recordings = list(map(recording_fit, problem.runs, *outputs))
         doubts = [] if search.converged or interrupted else ["the fit has not converged"]
         if interrupted:
             doubts.append("interrupted: these are the best values so far, without intervals")
@@ -572,7 +573,9 @@ class _Judgement:
         values, correlation = self._values(), np.eye(problem.best.size)
         directions: list[Direction] = []
         if not interrupted:
-            widened = np.sqrt(max(1.0, self._excess() if contradictions else 1.0))
+            r = problem.residuals_at_best  # their variance over that of the noise
+            excess = float(r @ r / max(r.size - problem.best.size, 1))
+            widened = np.sqrt(max(1.0, excess if contradictions else 1.0))
             values, directions, correlation = self._intervals(widened)
             doubts += [f"not identified: {direction}" for direction in directions]
             doubts += [
@@ -596,18 +599,6 @@ class _Judgement:
             loss=self._settings.loss,
             interrupted=interrupted,
         )
-
-    def _recordings(self, start: Vector, best: Vector) -> list[RecordingFit]:
-        problem = self._problem
-        both = zip(problem.outputs(start), problem.outputs(best), strict=True)
-        return [
-            recording_fit(run, *outputs) for run, outputs in zip(problem.runs, both, strict=True)
-        ]
-
-    def _excess(self) -> float:
-        """Variance of the residuals over that of the noise."""
-        residuals = self._problem.residuals_at_best
-        return float(residuals @ residuals / max(residuals.size - self._problem.best.size, 1))
 
     def _values(self) -> list[FittedValue]:
         problem = self._problem

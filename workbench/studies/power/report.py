@@ -209,8 +209,9 @@ def campaign_check(rows: Sequence[EffectChance], sizes: Sequence[float]) -> Chec
 def oracle_check(rows: Sequence[EffectLimit]) -> Check:
     """Report the least sizes that recordings can show, whatever the diagnosis."""
     shown = [row for row in rows if row.sigma is not None]
+    alone = sum(row.told is not None for row in shown)
     sentence = (
-        f"Of {len(rows)} effects, these recordings can show {len(shown)}; of {_alone(shown)} they "
+        f"Of {len(rows)} effects, these recordings can show {len(shown)}; of {alone} they "
         "tell the place or cause."
     )
     headline = {"effects that can be shown": Measure(float(len(shown)), "1", "higher")}
@@ -227,10 +228,6 @@ def oracle_check(rows: Sequence[EffectLimit]) -> Check:
     return Check(
         "oracle", Answer(sentence, headline), {"effects": list(map(asdict, rows))}, "\n".join(lines)
     )
-
-
-def _alone(rows: Sequence[EffectLimit]) -> int:
-    return sum(row.told is not None for row in rows)
 
 
 def draw_chances(rows: Sequence[EffectChance], sizes: Sequence[float], out: Path) -> None:
