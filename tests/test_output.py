@@ -4,6 +4,7 @@ import json
 import os
 import re
 import resource
+import shutil
 import signal
 import subprocess
 import sys
@@ -12,10 +13,12 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+import lxml.html
 import pytest
 
 from workbench.__main__ import main
 from workbench.errors import InputError
+from workbench.pages.templates import number_of
 from workbench.runtime import files
 from workbench.runtime.files import (
     locked_folder,
@@ -258,3 +261,55 @@ def test_each_of_a_known_number_of_steps_says_what_came_of_it_and_what_is_left()
         progress.step(name)
     assert re.fullmatch(r"\[ 1/12\] first, about \d+ s left", lines[0])
     assert re.fullmatch(r"\[ 2/12\] second, about \d+ s left", lines[1])
+
+
+# --- a page as a report on paper ---
+
+
+CASE = "01_dry_80_1.5"
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory, root) -> Path:
+    """One estimator on one recorded stop, printed."""
+    if shutil.which("chromium") is None:
+        pytest.skip("no chromium")
+    out = tmp_path_factory.mktemp("printed")
+    case = str(root / "cases" / CASE)
+    assert main(["simulate", case, "--estimator", "ekf", "--pdf", "--out", str(out)]) == 0
+    return out
+
+
+def test_report_has_a_few_pages(results):
+    printed = (results / "report.pdf").read_bytes()
+    assert printed.startswith(b"%PDF-")
+    assert 2 <= len(re.findall(rb"/Type\s*/Page\b", printed)) <= 4
+
+
+def test_report_tells_number_version_and_data_and_has_lines_to_sign(results):
+    summary = json.loads((results / "summary.json").read_text())
+    run = summary["provenance"]["run"]
+    page = lxml.html.fromstring((results / "index.html").read_bytes())
+    (footer,) = page.xpath("//footer")
+    text = " ".join(footer.text_content().split())
+    assert text.startswith(f"Report {number_of(summary)} ")
+    assert run["workbench"] in text
+    assert run["data"][CASE] in text
+    for line in ("Compiled", "Checked", "Approved"):
+        assert f"{line}: name, date, signature" in text
+
+
+def test_another_result_has_another_number(results):
+    summary = json.loads((results / "summary.json").read_text())
+    number = number_of(summary)
+    assert number == number_of(json.loads(json.dumps(summary)))
+    summary["cases"][CASE]["estimators"]["ekf"]["z"] *= 1.0 + 1e-15
+    assert number_of(summary) != number
+
+
+def test_without_a_browser_nothing_is_begun(tmp_path, root, monkeypatch, capsys):
+    monkeypatch.setenv("PATH", str(tmp_path))
+    out = tmp_path / "out"
+    assert main(["simulate", str(root / "cases" / CASE), "--pdf", "--out", str(out)]) == 2
+    assert "install chromium, or leave --pdf out" in capsys.readouterr().err
+    assert not out.exists()

@@ -45,7 +45,7 @@ def reference() -> StateSpace:
 
 
 @pytest.fixture(scope="module")
-def minimal() -> StateSpace:
+def small_model() -> StateSpace:
     return make_explicit(flatten(LIBRARY, "WheelsetRig.MinimalObserver"))
 
 
@@ -254,10 +254,10 @@ def test_dry_stop_takes_the_time_and_force_of_its_case(
     assert np.ptp(heat) < 1e-3 * energy  # three units alike
 
 
-def test_minimal_model_stops_as_the_reference_does(reference, minimal):
+def test_minimal_model_stops_as_the_reference_does(reference, small_model):
     """Constant friction, 160 km/h, 4.2 bar: the frame's motion costs little of either."""
     full = simulate_stop(reference, 160.0 / 3.6, 4.2e5, {}, 34.0, truth=False)
-    small = simulate_stop(minimal, 160.0 / 3.6, 4.2e5, {"muWR": 0.40}, 34.0, truth=False)
+    small = simulate_stop(small_model, 160.0 / 3.6, 4.2e5, {"muWR": 0.40}, 34.0, truth=False)
     # Speeds differ by less than the slip of 0.1 m/s changes with wheel load, 2 mm/s at 1.5 m/s2.
     assert full.time_at(0.5) == pytest.approx(small.time_at(0.5), abs=0.002)
     settled = (full.t > 4.0) & (full.v > 0.5)
@@ -340,7 +340,7 @@ def test_strips_start_with_kalkers_slope_and_end_at_friction():
 )
 @pytest.mark.parametrize("creepage", [1e-4, 5e-4, 1e-3, 2e-3, 3e-3, 5e-3, 1e-2, 2e-2])
 def test_creep_force_agrees_with_fastsim_at_constant_friction(
-    minimal, creepage, ellipsoid, tolerance
+    small_model, creepage, ellipsoid, tolerance
 ):
     speed = 20.0
     constant = {"polach.kA": 1.0, "polach.kS": 1.0, "polach.A": 1.0, "muWR": 0.40}
@@ -348,9 +348,9 @@ def test_creep_force_agrees_with_fastsim_at_constant_friction(
         "omegaR": speed / RADIUS_ROLLER,
         "omegaW": speed * (1.0 - creepage) / RADIUS_WHEEL,
     }
-    read = ca.Function("w", [minimal.x, minimal.u, minimal.p], [minimal.w])
-    w = read(values(minimal, "states", state), 0, values(minimal, "parameters", constant))
-    force = 0.5 * float(w[[v.name for v in minimal.outputs].index("Fx")])
+    read = ca.Function("w", [small_model.x, small_model.u, small_model.p], [small_model.w])
+    w = read(values(small_model, "states", state), 0, values(small_model, "parameters", constant))
+    force = 0.5 * float(w[[v.name for v in small_model.outputs].index("Fx")])
     expected = creep_by_strips(creepage, 80e3, 0.40, ellipsoid=ellipsoid)
     assert force == pytest.approx(expected, rel=tolerance)
 

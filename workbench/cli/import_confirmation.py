@@ -93,13 +93,7 @@ def answers(files: Sequence[RecordedFile], missing: bool) -> list[str]:
 def _complete(
     files: Sequence[RecordedFile], proposed: ProposedRecordings, doubts: Sequence[str]
 ) -> ProposedRecordings:
-    """The proposal, if all that is needed has a channel.
-
-    Raises
-    ------
-    InputError
-        If something has none.
-    """
+    """The proposal, if all that is needed has a channel."""
     if problems := [*proposed.problems, *doubts]:
         raise InputError(
             where=", ".join(str(file.path) for file in files),

@@ -134,13 +134,7 @@ def _load(options: argparse.Namespace) -> System:
 
 
 def _mapping(entries: Sequence[str]) -> dict[str, str]:
-    """What --map says: the FMU's names by ours.
-
-    Raises
-    ------
-    InputError
-        If an entry cannot be read.
-    """
+    """What --map says: the FMU's names by ours."""
     given: dict[str, str] = {}
     for entry in entries:
         ours, equals, theirs = entry.partition("=")

@@ -98,13 +98,7 @@ def _document(command: str, status: int, content: Mapping[str, Any]) -> str:
 
 
 def _print(text: str) -> None:
-    """Print to whoever reads; one that has gone, as `head` does, costs nothing but the text.
-
-    Raises
-    ------
-    OSError
-        If standard output is closed, or what it is led to is full.
-    """
+    """Print to whoever reads; one that has gone, as `head` does, costs nothing but the text."""
     if sys.stdout is None:
         raise OSError("standard output is closed, so that no result can be printed")
     try:

@@ -141,13 +141,7 @@ class _CodeFile:
 
 @cache
 def _lock_descriptor() -> int:
-    """File of which a process locks a byte while it compiles; closing it would end all locks.
-
-    Raises
-    ------
-    OSError
-        If it cannot be made.
-    """
+    """File of which a process locks a byte while it compiles; closing it would end all locks."""
     _folder().mkdir(parents=True, exist_ok=True)
     return os.open(_folder() / "turns", os.O_RDWR | os.O_CREAT, 0o600)
 

@@ -260,13 +260,7 @@ def _roll_back(call: _Calls) -> None:
 
 
 def _try(task: dict[str, Any], tell: Callable[[str], None]) -> str:
-    """Make the calls; returns what the FMU refused that not everybody needs.
-
-    Raises
-    ------
-    _RefusedError
-        If it refuses another call.
-    """
+    """Make the calls; returns what the FMU refused that not everybody needs."""
     call = _Calls(task, tell)
     try:
         call.instantiate()

@@ -331,13 +331,7 @@ def sweep(place: str) -> None:
 
 
 def _held(folder: Path, *, wait: bool) -> int | None:
-    """Descriptor that holds the lock of a folder; None if the folder is not there or not ours.
-
-    Raises
-    ------
-    OSError
-        If another holds it and we do not wait.
-    """
+    """Descriptor that holds the lock of a folder; None if the folder is not there or not ours."""
     try:
         lock = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
     except FileNotFoundError:

@@ -107,13 +107,7 @@ def _read(file: Table, path: Path, built: Mapping[str, Path], names: Mapping[str
 
 
 def _names(file: Table) -> dict[str, str]:
-    """The FMU's names of variables by ours, that a file says.
-
-    Raises
-    ------
-    InputError
-        If two of our names stand for one variable, or one of ours for two.
-    """
+    """The FMU's names of variables by ours, that a file says."""
     names: dict[str, str] = {}
     ours: dict[str, str] = {}
     places = [(file.table("variables"), name, name) for name in file.table("variables").content]

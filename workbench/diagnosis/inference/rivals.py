@@ -182,13 +182,7 @@ def _told(system: RecordingSystem) -> dict[str, Any]:
 
 
 def _numbers(entry: Any, *shape: int | None, endless: bool = False) -> Vector | Matrix:
-    """Numbers of a shape, whose None is any length.
-
-    Raises
-    ------
-    ValueError
-        If they are others, or not finite where they must be.
-    """
+    """Numbers of a shape, whose None is any length."""
     flat = np.array(entry, object)
     if not all(isinstance(value, int | float) and value is not True for value in flat.flat):
         raise ValueError("no numbers")

@@ -171,13 +171,7 @@ def _refuse_contradiction(clocks: Sequence[Clock], where: str) -> None:
 
 
 def _beside_stated(clock: Clock, step: float, where: str) -> Clock:
-    """The clock, with what a file states of its steps where that is another one.
-
-    Raises
-    ------
-    InputError
-        If they are as far apart as two units of time are.
-    """
+    """The clock, with what a file states of its steps where that is another one."""
     usual = float(np.median(np.diff(clock.times[np.isfinite(clock.times)])))
     ratio = max(usual, step) / min(usual, step)
     if not ratio > _FACTOR:
@@ -456,13 +450,7 @@ def _increases(times: Vector) -> bool:
 
 
 def _going_on(clock: Clock, where: str) -> Clock:
-    """The clock, if it goes on from sample to sample.
-
-    Raises
-    ------
-    InputError
-        If it repeats itself, or goes back.
-    """
+    """The clock, if it goes on from sample to sample."""
     if _increases(clock.times):
         return clock
     held = clock.times[np.isfinite(clock.times)]

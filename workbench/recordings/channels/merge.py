@@ -160,13 +160,7 @@ def _mixed_groups(files: Sequence[RecordedFile], proposal: ProposedMapping) -> I
 def _starts(
     files: Sequence[RecordedFile], proposal: ProposedMapping
 ) -> dict[tuple[int, int], float]:
-    """What is added to the times of each group, so that they count from one zero [s].
-
-    Raises
-    ------
-    InputError
-        If only some of the clocks say when they began.
-    """
+    """What is added to the times of each group, so that they count from one zero [s]."""
     clocks = proposal.clocks
     known = [clock.start for clock in clocks.values() if math.isfinite(clock.start)]
     if not known or len(clocks) == 1:

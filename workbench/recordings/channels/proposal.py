@@ -264,13 +264,7 @@ def _clocks(
     step: float | None,
     system: System,
 ) -> dict[tuple[int, int], Clock]:
-    """Times of each group with an assigned channel, by file and group.
-
-    Raises
-    ------
-    InputError
-        If a group has none, or one rate is that of unlike numbers of samples in one file.
-    """
+    """Times of each group with an assigned channel, by file and group."""
     clocks: dict[tuple[int, int], Clock] = {}
     for i, j in dict.fromkeys(
         (assignment.file, assignment.group) for assignment in assigned.values()

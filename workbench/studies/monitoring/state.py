@@ -134,13 +134,7 @@ class State:
 
 
 def _read_result(text: str) -> RecordingResult:
-    """What `State.add` wrote.
-
-    Raises
-    ------
-    AttributeError, LookupError, OverflowError, TypeError, ValueError
-        If it was changed, or says what cannot be.
-    """
+    """What `State.add` wrote."""
     content = check_checksum(text)
     said = content.pop("estimate")
     if not all(isinstance(value, str) for value in content.values()):

@@ -112,11 +112,6 @@ def _stops(options: argparse.Namespace, system: System) -> list[Case]:
     """The stops that are asked for; where folders hold several, each with its folder's name.
 
     A rig calls its stops the same whatever its seed.
-
-    Raises
-    ------
-    InputError
-        If there are none, one cannot be read, or a folder is given twice.
     """
     from workbench.cli.inputs import given_cases
 

@@ -162,11 +162,6 @@ def _of_another(options: argparse.Namespace, output: Output, system: System) -> 
     """Make a set of recordings of another machine by its plugin, or list what can be made.
 
     The injected effects stand in `truth.json` beside them, which nothing reads.
-
-    Raises
-    ------
-    InputError
-        If the system has no virtual rig, or that cannot do what is asked.
     """
     from workbench.studies.power.planting import assigned
     from workbench.studies.power.virtual_rig import open_virtual_rig
