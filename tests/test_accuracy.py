@@ -541,7 +541,7 @@ def test_command_refuses_recordings_without_truth(root, tmp_path, monkeypatch, c
     out = tmp_path / "out"
     assert main(["accuracy", str(tmp_path / "measured"), "--out", str(out)]) == 2
     message = capsys.readouterr().err
-    for part in ("measured: found no truth.csv", "expected a case of the virtual rig", "To do: "):
+    for part in ("measured: found no truth.csv", "expected a case of the simulated rig", "To do: "):
         assert part in message
     assert not out.exists()
 

@@ -383,7 +383,7 @@ def test_a_diagnosis_that_was_not_asked_says_nothing_of_how_sure_sizes_are(
 ):
     page = written(system, {**summary, "certainty": None}, [figure], tmp_path)
     assert "noise alone" not in text(section(page, "causes"))
-    assert "Begun elsewhere" not in text(section(page, "causes"))
+    assert "Multi-start" not in text(section(page, "causes"))
 
 
 def test_a_deviation_beyond_its_tolerance_is_flagged(system, summary, figure, tmp_path):

@@ -12,7 +12,7 @@ import workbench as wb
 from workbench.cli.parser import command_line, parsers
 from workbench.diagnosis.inference.thresholds import Thresholds
 from workbench.system.declaration import key_names
-from workbench.system.reference import tables
+from workbench.system.reference import reference, tables
 from workbench.system.system import System
 
 from .pages import blocks, calls, check_calls, run_page
@@ -21,6 +21,33 @@ from .processes import python
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
 PAGES.append(ROOT / "tutorials" / "README.md")
+# Home-made words, and the term of docs/glossary.md in the place of each.
+BANNED = {
+    r"\btold\b": "report",
+    r"\bplant(ed|ing)\b|\bplants? (an?|the|what|its)\b": "injected effect",
+    r"\bvirtual (rig|train|stop)s?\b": "simulated rig",
+    r"\bsound (machine|train|set|rig|recording|axle|one)s?\b": "healthy machine",
+    r"\brecorders?\b": "logger, log file",
+    r"\bcompanions?\b": "machine plug-in",
+    r"\b(twin|rival)s?\b": "candidate",
+    r"\blasting\b": "systematic error",
+    r"\breasoned\b": "model-based gains",
+    r"\bbeg[aiu]ns? elsewhere\b": "multi-start",
+    r"\b(go|goes|going|went) together\b|\b(make|makes|made) up for\b": "correlation",
+    r"\bjudg(e|es|ed|ing)\b": "score",
+    r"\bclaimed\b": "validity range",
+    r"\btimes as sure\b": "precision gain",
+    r"\bwhat is left\b": "prediction error",
+    r"\bset aside\b|\b(do|does|did) not count\b": "excluded sample",
+    r"\blate clocks?\b|\bclocks? (that )?(is|are) late\b": "time offset of a logger",
+    r"\bnext stop\b": "next experiment",
+    r"\bhold(s|ing)? (the truth|what)\b": "coverage",
+    r"\b(its|their|your) sheet\b|(?<!data )\bsheet's\b": "data sheet",
+    r"\bconfin(e|es|ed|ing|ement)\b|\bvouch(es)?\b": "sandbox",
+    r"\bby nature\b": "recording-to-recording variation",
+    r"\bin words\b": "report",
+}
+LONGEST, MEAN, SHARE = 25, 18.0, 0.1  # words a sentence, of a page, and its share of longer ones
 RUN = [
     page
     for page in PAGES
@@ -195,3 +222,99 @@ def test_the_picture_of_the_readme_is_small_and_drawn_by_the_diagnosis():
 def test_calls_are_read_as_a_shell_does():
     code = "workbench tune ekf \\\n  --budget 2  # quick\nworkbench doctor --json > doctor.json\n"
     assert list(calls(code)) == [["tune", "ekf", "--budget", "2"], ["doctor", "--json"]]
+
+
+# --- plain English ---
+
+
+def prose(page: Path) -> str:
+    """Text of a page that people wrote as sentences, or of the cells of a tutorial."""
+    text = page.read_text(encoding="utf-8")
+    if page.suffix == ".py":
+        return "\n".join(line[2:] if line.startswith("#") else "" for line in text.splitlines())
+    text = re.sub(
+        r"<!-- (?:figures: )?(\w+) -->.*?<!-- (?:figures end|end of \1) -->", "", text, flags=re.S
+    )
+    text = re.sub(r"```.*?```|<!--.*?-->", "", text, flags=re.S)
+    return re.sub(r"^ *\|.*$|^!\[.*$", "", text, flags=re.M)
+
+
+def plain(text: str) -> str:
+    """Text in which code is one word, and of a link its words remain."""
+    return re.sub(r"\]\([^)]*\)", "]", re.sub(r"`[^`]*`", "X", text))
+
+
+def sentences(text: str) -> list[str]:
+    """Sentences of paragraphs and items of lists; headings are none."""
+    parts = re.split(r"\n\s*\n|\n(?= *(?:[-*#]|\d+\.) )", plain(text))
+    return [
+        sentence
+        for part in parts
+        if not part.strip().startswith("#")
+        for sentence in re.split(r"(?<=[.!?:])\s+(?=[A-Z*\[_\"])", " ".join(part.split()))
+        if words(sentence) > 2
+    ]
+
+
+def words(sentence: str) -> int:
+    return len(re.findall(r"[\w']+", sentence))
+
+
+def home_made(text: str) -> list[str]:
+    """Banned words of a text, each with the term in its place."""
+    return [
+        f"{match[0]!r}: {term}"
+        for pattern, term in BANNED.items()
+        for match in re.finditer(pattern, " ".join(plain(text).split()), re.IGNORECASE)
+    ]
+
+
+READ = [page for page in PAGES if page.name != "CONTRIBUTING.md"]
+READ += [ROOT / "CHANGELOG.md", *sorted((ROOT / "tutorials").glob("*.py"))]
+
+
+@pytest.mark.parametrize("page", READ, ids=lambda page: page.name)
+def test_sentences_are_short_and_words_are_those_of_the_glossary(page):
+    text = prose(page)
+    lengths = [words(sentence) for sentence in sentences(text)]
+    assert sum(lengths) <= MEAN * len(lengths)
+    assert sum(n > LONGEST for n in lengths) <= max(1, SHARE * len(lengths))
+    assert home_made(text) == []
+    assert "python -m workbench" not in page.read_text(encoding="utf-8")
+
+
+def test_help_and_the_reference_of_keys_are_read_as_pages_are():
+    texts = [
+        (parser.prog, text)
+        for parser in parsers(command_line(""))
+        for text in (parser.description, *(action.help for action in parser._actions))
+        if text
+    ]
+    known = tables(System)
+    texts += [(name, prose_of_keys(known[name])) for name in known]
+    for where, text in texts:
+        assert home_made(text) == [], where
+        long = [sentence for sentence in sentences(text) if words(sentence) > LONGEST]
+        assert long == [], where
+
+
+def prose_of_keys(table: type) -> str:
+    """Meanings of the keys of a table of the system file, each a paragraph."""
+    rows = re.findall(r"^\| .* \| ([^|]*) \|$", reference(table, ()), re.M)
+    return "\n\n".join(rows)
+
+
+def test_the_terms_in_place_of_home_made_words_are_in_the_glossary():
+    terms = re.findall(r"^\| ([^|]+) \|", (ROOT / "docs" / "glossary.md").read_text(), re.M)
+    assert set(BANNED.values()) <= set(terms)
+    assert len(set(terms)) == len(terms)
+
+
+def test_a_long_sentence_and_a_home_made_word_are_found(tmp_path):
+    page = tmp_path / "page.md"
+    page.write_text(
+        "# A sound machine\n\n| told | ```text\n\n- One is told.\n- " + 26 * "word " + "\n"
+    )
+    text = prose(page)
+    assert [words(sentence) for sentence in sentences(text)] == [3, 26]
+    assert home_made(text) == ["'told': report", "'sound machine': healthy machine"]

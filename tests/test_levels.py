@@ -179,7 +179,7 @@ def test_a_level_that_hides_an_effect_is_said(tmp_path):
     (level,) = outcome.diagnosis.shifted
     assert (level.name, level.hides) == ("Ga", ("Draught",))
     assert level.value == pytest.approx(G, rel=0.03)
-    assert "100% above its sheet of 0.15 W/K" in level.text
+    assert "100% above its data sheet of 0.15 W/K" in level.text
     assert "Draught" in outcome.to_dict()["not_visible"]
     assert level.text in outcome.warnings
     assert level.text in outcome.summary()

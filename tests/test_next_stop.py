@@ -306,7 +306,7 @@ def test_the_first_proposal_parts_what_the_recordings_before_did_not(
     (cause,) = undecided.diagnosis.causes
     assert cause.confusable_with == ("Radiation",)
     assert proposed.parts
-    assert "parts Draught from Radiation" in proposed.sentence
+    assert "discriminates Draught from Radiation" in proposed.sentence
     new = named_anew(made(block, proposed.tried[0]))
     (cause,) = diagnosed(block, [*mild, *new], tmp_path).diagnosis.causes
     assert (cause.effect.name, cause.confusable_with) == ("Draught", ())
@@ -402,7 +402,7 @@ def test_of_a_single_cause_the_deviation_of_its_size_falls_as_predicted(
     proposal = next_stop(block, alone, ALONE)
     deviations = [row.prediction.precision[1] for row in proposal.tried]
     assert deviations == sorted(deviations)
-    assert "times as sure" in proposal.sentence
+    assert "narrows the interval of" in proposal.sentence
     both = [*mild, *named_anew(made(block, proposal.tried[0]))]
     rivals = diagnosed(block, both, tmp_path).rivals
     shown = rivals.models[0].information[0, 0] ** -0.5
@@ -450,7 +450,7 @@ def test_a_summary_with_what_cannot_be_is_refused(case, block, undecided, tmp_pa
     place[key] = value(place[key]) if callable(value) else value
     (tmp_path / "summary.json").write_text(json.dumps(summary))
     assert main(["next", str(tmp_path), "--system", str(block.source)]) == 2
-    assert "no summary of a diagnosis with its rivals" in capsys.readouterr().err
+    assert "no summary of a diagnosis with its candidates" in capsys.readouterr().err
 
 
 def test_the_command_writes_what_it_prints(block, mild, undecided, tmp_path, capsys):

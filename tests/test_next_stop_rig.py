@@ -140,7 +140,7 @@ def test_what_no_stop_parts_is_said_and_the_sensor_that_would(one_speed, tmp_pat
     proposed = wb.next_stop(outcome, workers=1, report=lambda _: None)
     assert not proposed.parts
     assert proposed.sentence.startswith(
-        "No experiment here likely parts FxGain and DriveTorqueGain"
+        "No experiment here likely discriminates FxGain and DriveTorqueGain"
     )
     # The force itself, and that of a disc: three of them are what slows the wheelset.
     of_a_disc = "friction force of the disc that brakes least, at its caliper"

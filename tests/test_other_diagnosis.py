@@ -156,7 +156,7 @@ def test_a_logger_of_the_system_file_that_is_late_is_named(fan, tmp_path):
     (cause,) = outcome.diagnosis.causes
     assert (cause.effect.name, cause.effect.text) == (
         "LoggerTimeSkew[supply]",
-        "a logger of u whose clock is late",
+        "a logger of u with a time offset",
     )
     skew = cause.parameters["skew"]
     assert skew.low <= late * STEP <= skew.high

@@ -77,7 +77,7 @@ def test_every_picture_states_its_finding(page, summary):
             for values in summary["cases"][article.xpath("string(h3)")]["estimators"].values()
         ]
         if None in errors:
-            assert "no Fx to judge by" in drawing.get("aria-label")
+            assert "no Fx to score by" in drawing.get("aria-label")
         for error in errors:
             assert error is None or f"{100 * error:.2f} %" in drawing.get("aria-label")
 

@@ -138,7 +138,7 @@ def test_headline_tells_z_the_worst_case_and_the_bounds_in_one_sentence(page, su
     line = headline(page)
     z_k = sorted(((case["z_k"], name) for name, case in summary["cases"].items()), reverse=True)
     (worst, first), (next_worst, second) = z_k
-    assert f"from {summary['z_reasoned']:.4g} with the reasoned gains to {worst:.4g}" in line
+    assert f"from {summary['z_reasoned']:.4g} with the model-based gains to {worst:.4g}" in line
     assert f"worst case is {first}, by {100 * (1 - next_worst / worst):.1f} % over {second}" in line
     bound = [name for name, gain in summary["gains"].items() if gain["at_bound"]]
     assert f"; {', '.join(bound) or 'no gain'} ended at a bound" in line
@@ -180,7 +180,7 @@ def test_every_case_is_shown_with_its_numbers_the_worst_first(page, summary):
     assert table["z_k, tuned"].is_monotonic_decreasing
     for name, case in summary["cases"].items():
         row = table.loc[name]
-        assert row["z_k, reasoned"] == case["z_k_reasoned"]
+        assert row["z_k, model-based"] == case["z_k_reasoned"]
         assert row["z_k, tuned"] == case["z_k"]
         assert row["unstable candidates"] == case["unstable"]
         assert row["change"] == case["z_k"] / case["z_k_reasoned"] - 1
@@ -283,7 +283,7 @@ def test_folds_are_shown_and_lost_ones_are_bad_news(page, summary, changed, tmp_
     assert table["z, tuned without them"].is_monotonic_decreasing
     for fold in summary["folds"]:
         row = table.loc[", ".join(fold["cases"])]
-        assert row["z, reasoned"] == fold["reasoned"]
+        assert row["z, model-based"] == fold["reasoned"]
         assert row["z, tuned without them"] == fold["tuned"]
         assert row["z of the cases tuned on"] == fold["z"]
         assert row["error of Fx, reasoned"] == fold["error_reasoned"]
@@ -328,7 +328,7 @@ def test_work_and_provenance_are_told(page, summary, results):
     for package, version in provenance["packages"].items():
         assert f"{package} {version}" in told["Versions"]
     (use,) = page.xpath("//pre[@class='source']")
-    assert text(use) == f"python -m workbench simulate --gains {results / 'gains.toml'}"
+    assert text(use) == f"workbench simulate --gains {results / 'gains.toml'}"
 
 
 def searched(page: Any) -> Any:
@@ -373,7 +373,7 @@ def test_what_got_worse_comes_before_the_tables(changed, tmp_path):
     changed["work"]["crashed"] = 3
     changed["folds"] = []
     line = news(written(changed, tmp_path))
-    assert f"Worse than with the reasoned gains: {HOSTILE} (" in line
+    assert f"Worse than with the model-based gains: {HOSTILE} (" in line
     assert "03_dry_120_3.6 (" not in line
     assert "blocked their worker: 3" in line
 

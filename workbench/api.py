@@ -385,7 +385,7 @@ def next_stop(
         raise InputError(
             where="the diagnosis",
             found=f"the verdict '{found.diagnosis.verdict}'",
-            expected="a cause that was found, whose rivals or size are to be told better",
+            expected="a named effect, whose candidates or size need another recording",
             remedy="diagnose more recordings first",
         )
     return design.next_stop(found.system, found.rivals, Engine(_number(workers), report))

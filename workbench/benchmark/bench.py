@@ -35,11 +35,11 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
     bench = commands.add_parser(
         "bench",
         help=text,
-        description="Time derivatives and Jacobians through FMI beside plain C calls of the same "
-        "sources in one program, and Co-Simulation steps; then the observers beside the same "
-        "methods written with FMPy and in plain C; then the tuning: one evaluation beside FMPy, "
-        "workers, memory. Needs the extra [compiler], and for a Dask cluster [cluster].",
-        epilog="example:\n  python -m workbench bench --out /tmp/bench",
+        description="Time derivatives, Jacobians and Co-Simulation steps through FMI, beside "
+        "plain C calls of the same sources. Then time the observers beside the same "
+        "methods in FMPy and in plain C, and the tuning: one evaluation, workers, "
+        "memory. Needs the extra [compiler], and for a Dask cluster [cluster].",
+        epilog="example:\n  workbench bench --out /tmp/bench",
     )
     add_out(bench, "results/bench")
     add_system(bench)

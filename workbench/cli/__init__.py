@@ -20,7 +20,7 @@ COMMANDS = {
     "fmu": "build, describe and check FMUs",
     "results": "say what a folder of results holds, and compare two",
     "systems": "list the systems that are installed",
-    "import": "turn files of recorders into case folders",
+    "import": "turn log files into case folders",
     "prepare": "turn published recordings of a system into case folders",
     "new": "write a system of one's own to begin with",
     "doctor": "say what is installed, what is missing, and what to do",

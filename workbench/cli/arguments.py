@@ -54,8 +54,8 @@ def add_isolated(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--isolated",
         action="store_true",
-        help="for FMUs that nobody vouches for: no network, and no writing but to the results and "
-        "temporary files; a line says so, and what this system cannot do (Linux)",
+        help="sandbox for untrusted FMUs, on Linux: no network, and no writing except to results "
+        "and temporary files. A line says what this system supports",
     )
 
 
@@ -115,8 +115,8 @@ def add_recordings(parser: argparse.ArgumentParser, out: str) -> None:
         nargs="*",
         type=Path,
         metavar="CASE",
-        help="case folder, folder of case folders, or a recorder's file whose channels have the "
-        "system's names or were confirmed by 'workbench import' (default: those of the system)",
+        help="case folder, folder of case folders, or log file, whose channels have the system's "
+        "names or were confirmed by 'workbench import' (default: the system's)",
     )
     add_recording_options(parser)
     add_out(parser, out)
@@ -183,7 +183,8 @@ def add_recording_options(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="NAME=VALUE",
-        help="of recorders' files: as in case.toml, such as load='2 kN' or surface=new,worn; "
+        help="test condition of log files, as in case.toml, such as load='2 kN' or "
+        "surface=new,worn; "
         "'unknown' if nobody knows; may be repeated",
     )
     parser.add_argument(
@@ -191,11 +192,13 @@ def add_recording_options(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="SIGNAL=CHANNEL",
-        help="of recorders' files: the channel of a signal, or of time, with its unit where the "
-        "file has none or a wrong one, such as 'time=Zeit [ms]'; may be repeated",
+        help="channel of a signal, or of time, in log files. Add its unit if the file has none or "
+        "a wrong one, such as 'time=Zeit [ms]'; may be repeated",
     )
     parser.add_argument(
-        "--sample-rate", metavar="RATE", help="of recorders' files without times: such as '200 Hz'"
+        "--sample-rate",
+        metavar="RATE",
+        help="sample rate of log files without times, such as '200 Hz'",
     )
 
 

@@ -25,20 +25,20 @@ def add(commands: arguments.Commands, text: str) -> argparse.ArgumentParser:
     parser = commands.add_parser(
         "diagnose",
         help=text,
-        description="Compare recordings with the observer model: show where the simulation is "
-        "wrong, name the physical cause, say what cannot be told apart, extend the Modelica "
-        "model, and measure the gain in cross-validation. Writes a page to read "
+        description="Compare recordings with the observer model and name the missing effects. "
+        "Show where the simulation is wrong, list indistinguishable effects, extend "
+        "the model, and measure the gain in cross-validation. Writes a page to read "
         "(index.html), summary.json, data (CSV), figures (PNG, SVG) and the extended model. Needs "
         "the extra [compiler]. Ctrl-C ends the search for more causes and keeps those that were "
         "found. Exit status 0 for any verdict.",
         epilog="examples:\n"
-        "  python -m workbench diagnose my_recordings --out results/mine\n"
-        "  python -m workbench diagnose --system my_machine --effects Seepage\n"
-        "  python -m workbench diagnose my_recordings --held-out 'cold_*'\n"
-        "  python -m workbench diagnose new_recordings --fmu results/mine/model/Extended.fmu\n"
-        "  python -m workbench diagnose my_recordings --system my_machine/system.toml\n"
-        "  python -m workbench diagnose my_recordings --propose\n"
-        "  python -m workbench diagnose --list",
+        "  workbench diagnose my_recordings --out results/mine\n"
+        "  workbench diagnose --system my_machine --effects Seepage\n"
+        "  workbench diagnose my_recordings --held-out 'cold_*'\n"
+        "  workbench diagnose new_recordings --fmu results/mine/model/Extended.fmu\n"
+        "  workbench diagnose my_recordings --system my_machine/system.toml\n"
+        "  workbench diagnose my_recordings --propose\n"
+        "  workbench diagnose --list",
     )
     arguments.add_recordings(parser, out="results/diagnose")
     arguments.add_system(parser)
@@ -59,8 +59,8 @@ def add(commands: arguments.Commands, text: str) -> argparse.ArgumentParser:
     parser.add_argument(
         "--certainty",
         action="store_true",
-        help="also ask how sure the sizes are, by further fits: what noise alone allows, which "
-        "errors go together, and whether fits that begin elsewhere end the same",
+        help="also fit profile intervals of the sizes, correlations of their errors, and a "
+        "multi-start",
     )
     parser.add_argument(
         "--propose",

@@ -18,19 +18,19 @@ def add(commands: arguments.Commands, text: str) -> argparse.ArgumentParser:
     parser = commands.add_parser(
         "distance",
         help=text,
-        description="Predict the distance of a stop that was not made from past stops: levels of "
-        "the machine as the diagnosis calibrates them, how it differs from stop to stop, and what "
-        "its model left, drawn together. Every past stop is predicted from the others and stands "
+        description="Predict the distance of an untested stop from past stops. Nuisance "
+        "parameters, recording-to-recording variation and model errors are drawn "
+        "together. Every past stop is predicted from the others and stands "
         "beside what was measured, also corrected to nominal conditions. The safety level is the "
         "deceleration, over the nominal one, that is reached but for one stop in 10, 100, ..., by "
         "subset simulation. Writes distance.json, stops.csv, quantiles.csv, safety.csv, a "
         "figure and the page (index.html). Ctrl-C keeps the runs of the safety level that are "
         "done.",
         epilog="examples:\n"
-        "  python -m workbench distance --system my_machine my_stops\n"
-        "  python -m workbench distance --system my_machine my_stops --ask speed='160 km/h'\n"
-        "  python -m workbench distance --system my_machine my_stops --safety 0\n"
-        "  python -m workbench distance --system my_machine my_stops --plain 100000",
+        "  workbench distance --system my_machine my_stops\n"
+        "  workbench distance --system my_machine my_stops --ask speed='160 km/h'\n"
+        "  workbench distance --system my_machine my_stops --safety 0\n"
+        "  workbench distance --system my_machine my_stops --plain 100000",
     )
     arguments.add_recordings(parser, out="results/distance")
     arguments.add_system(parser)
@@ -61,8 +61,8 @@ def add(commands: arguments.Commands, text: str) -> argparse.ArgumentParser:
         type=arguments.count,
         default=0,
         metavar="N",
-        help="check the safety level by so many stops, each drawn by itself; 1e5 take minutes, 1e7 "
-        "hours, and Ctrl-C keeps those that are drawn (default: %(default)s)",
+        help="check the safety level by this many independent random stops. 1e5 take minutes, 1e7 "
+        "hours; Ctrl-C keeps the finished ones (default: %(default)s)",
     )
     arguments.add_model(parser)
     arguments.add_seed(parser, "all that is drawn")

@@ -27,21 +27,22 @@ def add(commands: arguments.Commands, text: str) -> argparse.ArgumentParser:
         "export",
         help=text,
         description="Write an estimator with its gains as a Co-Simulation FMU for all platforms, "
-        "which runs in any FMI tool without Python, and, where the system has a reference model, "
-        "an SSP 1.0 package in which it observes that. One communication step takes one sample. "
+        "which runs in any FMI tool without Python. If the system has a reference "
+        "model, also write an SSP 1.0 package that connects both. One communication "
+        "step takes one sample. "
         "Needs the extra [compiler].",
         epilog="examples:\n"
-        "  python -m workbench export\n"
-        "  python -m workbench export --gains results/tune/disturbance_observer/gains.toml\n"
-        "  python -m workbench export --estimator mhe --fmi 3 --out /tmp/export\n"
-        "  python -m workbench export --estimator imm --gains results/tune/ekf/gains.toml",
+        "  workbench export\n"
+        "  workbench export --gains results/tune/disturbance_observer/gains.toml\n"
+        "  workbench export --estimator mhe --fmi 3 --out /tmp/export\n"
+        "  workbench export --estimator imm --gains results/tune/ekf/gains.toml",
     )
     export.add_argument(
         "--gains",
         type=Path,
         metavar="FILE",
         help="gains.toml of 'workbench tune', which names the estimator unless --estimator does "
-        "(default: those that come tuned with the system, else those that follow from the model)",
+        "(default: tuned gains of the system, else model-based ones)",
     )
     export.add_argument(
         "--estimator",

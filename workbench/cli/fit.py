@@ -33,16 +33,17 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
     parser = commands.add_parser(
         "fit",
         help=text,
-        description="Fit parameters of an FMU, and starts of its states, to recordings: values "
-        "with intervals, what cannot be identified, residuals that contradict, errors on held-out "
-        "recordings. Writes a page (index.html), summary.json, parameters.ssv, parameters.toml and "
+        description="Fit parameters of an FMU, and starts of its states, to recordings. Report "
+        "values with intervals, what is not identifiable, tests of residuals, and "
+        "errors on held-out recordings. Writes a page (index.html), summary.json, "
+        "parameters.ssv, parameters.toml and "
         "an FMU with the fitted values. Status 1 where the values may not be relied on.",
         epilog="examples:\n"
-        "  python -m workbench fit --system my_plant\n"
-        "  python -m workbench fit --system my_plant --parameter 'motor.*' --parameter J\n"
-        "  python -m workbench fit day1 day2 --system my_plant --parameter R "
+        "  workbench fit --system my_plant\n"
+        "  workbench fit --system my_plant --parameter 'motor.*' --parameter J\n"
+        "  workbench fit day1 day2 --system my_plant --parameter R "
         "--range 'R=0.1 Ohm to 5 Ohm'\n"
-        "  python -m workbench fit day1 day2 --system my_plant --held-out day2 --loss soft_l1",
+        "  workbench fit day1 day2 --system my_plant --held-out day2 --loss soft_l1",
     )
     add_recordings(parser, out="results/fit")
     add_system(parser)
@@ -60,8 +61,8 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         action="append",
         default=[],
         metavar="NAME=LOW to HIGH",
-        help="in which a parameter is sought, such as 'R=0.1 Ohm to 5 Ohm'; may be repeated "
-        "(default: that of [fit], else min and max of the model)",
+        help="bounds of a parameter, such as 'R=0.1 Ohm to 5 Ohm'; may be repeated (default: "
+        "[fit], else min and max of the model)",
     )
     parser.add_argument(
         "--prior",

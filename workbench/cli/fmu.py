@@ -43,10 +43,10 @@ def _add_build(jobs: Commands) -> None:
         description="Compile Modelica models to FMUs (Model Exchange and Co-Simulation). "
         "Needs the extra [compiler].",
         epilog="examples:\n"
-        "  python -m workbench fmu build --all\n"
-        "  python -m workbench fmu build MyRig/package.mo MyRig.Model --fmi 3 --out model.fmu\n"
-        "  python -m workbench fmu build --all --check\n"
-        "  python -m workbench fmu build --all --compiler omc",
+        "  workbench fmu build --all\n"
+        "  workbench fmu build MyRig/package.mo MyRig.Model --fmi 3 --out model.fmu\n"
+        "  workbench fmu build --all --check\n"
+        "  workbench fmu build --all --compiler omc",
     )
     build.add_argument("package", nargs="?", type=Path, help="package.mo of the library")
     build.add_argument("model", nargs="?", help="dotted name of the model")
@@ -77,7 +77,7 @@ def _add_info(jobs: Commands) -> None:
         "info",
         help="say what an FMU is and offers",
         description="Print identity, interfaces, platforms, capabilities and variables of an FMU.",
-        epilog="example:\n  python -m workbench fmu info model.fmu",
+        epilog="example:\n  workbench fmu info model.fmu",
     )
     info.add_argument("fmu", type=Path, metavar="FILE", help="the FMU")
     info.set_defaults(job="info")
@@ -91,7 +91,7 @@ def _add_check(jobs: Commands) -> None:
         "rollback, derivatives, Co-Simulation against Model Exchange, many instances, memory, "
         "time per call. A crash of the FMU is a finding. Exit status: 0 fit, 1 not fit, 2 no FMU "
         "to check, 3 not measured, because the FMU did not answer in time.",
-        epilog="example:\n  python -m workbench fmu check my_model.fmu --json > fitness.json",
+        epilog="example:\n  workbench fmu check my_model.fmu --json > fitness.json",
     )
     checking.add_argument("fmu", type=Path, metavar="FILE", help="the FMU")
     checking.add_argument(
@@ -117,9 +117,10 @@ def _add_compare(jobs: Commands) -> None:
         help="compare the open loop of FMUs with FMPy",
         description="Simulate FMUs over their default experiments, by the open loop and by FMPy "
         "with CVode at a tolerance of 1e-8. Print a table of the largest differences, relative "
-        "to the range of the signal. 'right' is within 1e-4; 'refused' says why the workbench "
-        "does not run the FMU. Exit status: 0 all right or refused, 1 one is OFF.",
-        epilog="example:\n  python -m workbench fmu compare my_model.fmu other.fmu",
+        "to the range of the signal. The verdict 'right' is within 1e-4. The verdict 'refused' "
+        "says why the workbench does not run the FMU. Exit status: 0 all right or refused, 1 one "
+        "is OFF.",
+        epilog="example:\n  workbench fmu compare my_model.fmu other.fmu",
     )
     comparing.add_argument("fmus", type=Path, metavar="FILE", nargs="+", help="the FMUs")
     add_isolated(comparing)
@@ -210,7 +211,7 @@ def _require_model(options: argparse.Namespace) -> None:
             where="command line",
             found="no model",
             expected="the dotted name of a model, or --all",
-            remedy="see 'python -m workbench fmu build --help'",
+            remedy="see 'workbench fmu build --help'",
         )
 
 

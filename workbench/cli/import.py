@@ -26,16 +26,16 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
     parser = commands.add_parser(
         "import",
         help=text,
-        description="Turn files of recorders into case folders: CSV of any locale, Excel, MDF, "
-        "TDMS, MAT, Parquet. Channels are proposed by name, unit and plausible values; you confirm "
-        "them once, and columns.toml keeps that for further files. import.json says what was read, "
-        "converted, left out and cut. Originals are only read.",
+        description="Turn log files into case folders: CSV of any locale, Excel, MDF, "
+        "TDMS, MAT, Parquet. Channels are proposed by name, unit and plausible values. You confirm "
+        "them once; columns.toml keeps the answer for further files. import.json says what was "
+        "read, converted, left out and split. Originals are only read.",
         epilog="examples:\n"
-        "  python -m workbench import monday/*.mf4 --out cases\n"
-        "  python -m workbench import stop7.csv --out cases --condition load='2 kN'\n"
-        "  python -m workbench import stop7.csv --out cases --column 'time=Zeit [ms]' --yes",
+        "  workbench import monday/*.mf4 --out cases\n"
+        "  workbench import stop7.csv --out cases --condition load='2 kN'\n"
+        "  workbench import stop7.csv --out cases --column 'time=Zeit [ms]' --yes",
     )
-    parser.add_argument("files", nargs="+", type=Path, metavar="FILE", help="of a recorder")
+    parser.add_argument("files", nargs="+", type=Path, metavar="FILE", help="log file")
     add_out(parser, "imported")
     add_system(parser)
     add_recording_options(parser)
@@ -48,7 +48,7 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
     parts.add_argument(
         "--together",
         action="store_true",
-        help="the files, with all sheets and groups, are of one recording, by several recorders",
+        help="the files, with all sheets and groups, are of one recording, by several loggers",
     )
     parts.add_argument(
         "--apart",

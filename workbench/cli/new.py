@@ -23,23 +23,23 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
     parser = commands.add_parser(
         "new",
         help=text,
-        description="Write a commented system file, a small Modelica library with one slot and one "
-        "effect, and recordings: a tank that simulate, tune and diagnose work on as it is, to be "
-        "changed into a machine of one's own. With --fmu and --recordings, write the system file "
-        "of that FMU: signals are matched by name, unit and plausible values, noise, sample time "
-        "and ranges are estimated, each with its reason beside it, and the recordings are "
-        "imported.",
+        description="Write a commented system file, a small Modelica library with one slot and "
+        "one effect, and recordings of a tank. The commands simulate, tune and diagnose work on "
+        "it. Change it into your own machine. With --fmu and --recordings, write the "
+        "system file of that FMU, and import the recordings. Signals are matched by "
+        "name, unit and plausible values. Noise, sample time and ranges are "
+        "estimated, each with its reason beside it.",
         epilog="examples:\n"
-        "  python -m workbench new my_machine\n"
-        "  python -m workbench simulate --system my_machine\n"
-        "  python -m workbench diagnose --system my_machine\n"
-        "  python -m workbench new my_plant --fmu plant.fmu --recordings monday.csv tuesday.csv\n"
-        "  python -m workbench fit --system my_plant",
+        "  workbench new my_machine\n"
+        "  workbench simulate --system my_machine\n"
+        "  workbench diagnose --system my_machine\n"
+        "  workbench new my_plant --fmu plant.fmu --recordings monday.csv tuesday.csv\n"
+        "  workbench fit --system my_plant",
     )
     parser.add_argument("folder", type=Path, metavar="DIR", help="where to write; made as needed")
     parser.add_argument("--fmu", type=Path, metavar="FILE", help="model of the machine, an FMU")
     parser.add_argument(
-        "--recordings", nargs="+", type=Path, default=[], metavar="FILE", help="of recorders"
+        "--recordings", nargs="+", type=Path, default=[], metavar="FILE", help="log file"
     )
     add_recording_options(parser)
     parser.add_argument(
@@ -64,7 +64,7 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
         return _from_fmu(options, output)
     written = [nearby(path) for path in write_system(options.folder)]
     output.result("\n".join(map(str, written)))
-    output.result(f"next: python -m workbench simulate --system {options.folder}")
+    output.result(f"next: workbench simulate --system {options.folder}")
     return CommandResult({"written": written})
 
 
@@ -105,8 +105,8 @@ def _from_fmu(options: argparse.Namespace, output: Output) -> CommandResult:
         f"wrote {nearby(path)}: read its comments"
         + (f", {len(draft.questions)} of them questions" if draft.questions else "")
     )
-    output.result(f"next: python -m workbench simulate --system {folder}{which}")
-    output.result(f"      python -m workbench fit --system {folder}")
+    output.result(f"next: workbench simulate --system {folder}{which}")
+    output.result(f"      workbench fit --system {folder}")
     result = {
         "written": [nearby(path), nearby(fmu)],
         "signals": {signal.name: signal.channel.channel for signal in draft.signals},

@@ -27,16 +27,17 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
     parser = commands.add_parser(
         "next",
         help=text,
-        description="Say which recording to make next: of all experiments that the system file "
-        "allows, those that part best the causes which a diagnosis could not tell apart; or, of a "
-        "single cause, that make its size most sure. Three are proposed, with the separation that "
-        "is left when every model is fitted again, the chance that the right cause is then named, "
-        "and the cost. Writes next.json, experiments.csv (all that were tried) and a figure of "
+        description="Recommend the next experiment, of all that the system file allows: the one "
+        "that best discriminates between the candidates of a diagnosis. For a single "
+        "effect, the one that makes its size most precise. Three are proposed, with "
+        "the separation of the refitted models, the chance that the right effect is "
+        "then named, and the cost. Writes next.json, experiments.csv (all that were "
+        "tried) and a figure of "
         "the responses. Needs the extra [compiler].",
         epilog="examples:\n"
-        "  python -m workbench diagnose my_recordings --out results/mine\n"
-        "  python -m workbench next results/mine\n"
-        "  python -m workbench next results/mine --system my_machine --out results/mine_next",
+        "  workbench diagnose my_recordings --out results/mine\n"
+        "  workbench next results/mine\n"
+        "  workbench next results/mine --system my_machine --out results/mine_next",
     )
     parser.add_argument(
         "result", type=Path, metavar="RESULT", help="folder of a diagnosis, with summary.json"
@@ -99,13 +100,13 @@ def _read_rivals(file: Path) -> tuple[str, Rivals]:
     except (AttributeError, LookupError, OverflowError, RecursionError, TypeError, ValueError):
         raise InputError(
             where=str(file),
-            found="no summary of a diagnosis with its rivals",
+            found="no summary of a diagnosis with its candidates",
             expected="what 'workbench diagnose' writes",
             remedy=remedy,
         ) from None
     raise InputError(
         where=str(file),
         found=f"the verdict '{verdict}'",
-        expected="a cause that was found, whose rivals or size are to be told better",
+        expected="a named effect, whose candidates or size need another recording",
         remedy="diagnose more recordings first",
     )

@@ -29,13 +29,13 @@ def add(commands: arguments.Commands, text: str) -> argparse.ArgumentParser:
     observability = commands.add_parser(
         "observability",
         help=text,
-        description="Show what the measured outputs can tell: a linear test of the observer "
-        "models, and for each recording how well half a second of samples can know the estimated "
-        "quantities (Cramer-Rao bound). Writes windows (CSV), observability.json and figures.",
+        description="Show what the measured outputs can identify: a linear test of the observer "
+        "models, and the Cramer-Rao bound along each recording. Writes windows (CSV), "
+        "observability.json and figures.",
         epilog="examples:\n"
-        "  python -m workbench observability\n"
-        f"  python -m workbench observability {own} --out /tmp/one\n"
-        "  python -m workbench observability my_cases --system my/system.toml",
+        "  workbench observability\n"
+        f"  workbench observability {own} --out /tmp/one\n"
+        "  workbench observability my_cases --system my/system.toml",
     )
     arguments.add_recordings(observability, out="results/observability")
     arguments.add_system(observability)

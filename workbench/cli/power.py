@@ -31,24 +31,24 @@ def add(commands: arguments.Commands, text: str) -> argparse.ArgumentParser:
     parser = commands.add_parser(
         "power",
         help=text,
-        description="Plant effects in the virtual rig of the system's plugin, or else in the "
-        "system's own model, diagnose the recordings without telling, and count: "
-        "false alarms on clean sets, right names against the size of the effect, pairs, "
-        "causes that are not in the catalogue, coverage of the intervals. Writes power.json, "
+        description="Measure by Monte Carlo simulation how often the diagnosis is right. Effects "
+        "are injected into the simulated rig of the system's plugin, or else into its "
+        "own model. Counted are false alarms, right names by size, pairs, effects "
+        "outside the catalogue, and coverage of intervals. Writes power.json, "
         "figures (PNG, SVG) and the verdict on each set (sets.jsonl). Takes hours; Ctrl-C keeps "
         "what there is and reports it, --resume goes on. Needs the extra [compiler].",
         epilog="examples:\n"
-        "  python -m workbench power\n"
-        "  python -m workbench power --clean 5 --sizes 4 --repeats 1 --pairs 5 --out /tmp/quick\n"
-        "  python -m workbench power --effects NAME --sizes 4 --repeats 1 --clean 0\n"
-        "  python -m workbench power --clean 200 --resume\n"
-        "  python -m workbench power --thresholds --sets 8\n"
-        "  python -m workbench power --plan --case 01_dry_80_1.5 --case 04_dry_160_4.2\n"
-        "  python -m workbench power --oracle --system train\n"
-        "  python -m workbench power --follow --case 24_alike_80_2.7 --case 25_alike_80_2.7\n"
-        "  python -m workbench power --leave-out-effect --sizes 8 --repeats 1 --clean 0\n"
-        "  python -m workbench power --sheet-error --repeats 2\n"
-        "  python -m workbench power --system train --recorded labelled healthy",
+        "  workbench power\n"
+        "  workbench power --clean 5 --sizes 4 --repeats 1 --pairs 5 --out /tmp/quick\n"
+        "  workbench power --effects NAME --sizes 4 --repeats 1 --clean 0\n"
+        "  workbench power --clean 200 --resume\n"
+        "  workbench power --thresholds --sets 8\n"
+        "  workbench power --plan --case 01_dry_80_1.5 --case 04_dry_160_4.2\n"
+        "  workbench power --oracle --system train\n"
+        "  workbench power --follow --case 24_alike_80_2.7 --case 25_alike_80_2.7\n"
+        "  workbench power --leave-out-effect --sizes 8 --repeats 1 --clean 0\n"
+        "  workbench power --sheet-error --repeats 2\n"
+        "  workbench power --system train --recorded labelled healthy",
     )
     _add_sets(parser)
     arguments.add_workers(parser)
@@ -94,15 +94,15 @@ def _add_sets(parser: argparse.ArgumentParser) -> None:
         default=[],
         metavar="FOLDER",
         help="sets that were recorded, each with a truth.json of what is wrong in them, in place "
-        "of sets that the virtual rig makes",
+        "of sets of the simulated rig",
     )
     parser.add_argument(
         "--case",
         action="append",
         default=[],
         metavar="NAME",
-        help="recording of a set, may be repeated (default: those that are usual for the system); "
-        "without a plugin a folder of recordings of the machine, whose inputs drive its own model",
+        help="recording of a set, may be repeated (default: the usual ones of the system). "
+        "Without a plugin: a folder of recordings, whose inputs drive the system's own model",
     )
 
 
@@ -117,24 +117,23 @@ def _add_checks(parser: argparse.ArgumentParser) -> None:
         ),
         (
             "--leave-out-effect",
-            "leave the planted effect out of the catalogue, and tell which law is proposed in its "
-            "place, on --repeats sets of each at the largest size (into OUT/left_out)",
+            "leave the injected effect out of the catalogue, and report the law proposed instead, "
+            "on --repeats sets at the largest size (into OUT/left_out)",
         ),
         (
             "--plan",
-            "before a recording is made: the chance that the recordings named by --case show each "
-            "effect at --sizes, from one set without any (into OUT/plan)",
+            "before recording: the chance that the recordings of --case show each effect at "
+            "--sizes, from one set without effects (into OUT/plan)",
         ),
         (
             "--oracle",
-            "the least that the recordings named by --case can show of each effect, by the exact "
-            "model, the noise of the sensors and the tolerances of the system file; no diagnosis "
-            "finds less (into OUT/oracle)",
+            "smallest size of each effect that the recordings of --case can show, by the exact "
+            "model, sensor noise and tolerances (into OUT/oracle)",
         ),
         (
             "--follow",
-            "where a set leaves the planted effect with others, make the recording that is "
-            "proposed next and some that are drawn, and tell which part them (into OUT/followed)",
+            "if a set leaves several candidates, simulate the proposed next experiment and some "
+            "random ones, and report which discriminate (into OUT/followed)",
         ),
         (
             "--sheet-error",
@@ -215,7 +214,7 @@ def _select(names: Sequence[str], rig: VirtualRig) -> tuple[Plantable, ...]:
                 name,
                 known,
                 where=f"--effects {name}",
-                found="no effect that the virtual rig can plant",
+                found="no effect that the simulated rig can inject",
                 expected=f"some of {', '.join(known)}",
                 remedy="choose others, or leave --effects out for all",
             )
@@ -232,7 +231,7 @@ def _provenance(
         "workbench": version("wheelset-workbench"),
         "seed": options.seed,
         "stops": list(study.rig.recordings),
-        "machine": study.rig.identity.get("machine", "a plugin's virtual rig"),
+        "machine": study.rig.identity.get("machine", "a plugin's simulated rig"),
         "interrupted": interrupted,
     }
 

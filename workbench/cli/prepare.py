@@ -13,12 +13,13 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
     parser = commands.add_parser(
         "prepare",
         help=text,
-        description="Say where the published recordings of a system are to be had and what they "
-        "are; with --from, turn a folder of them into case folders. Files are checked by their "
+        description="Say where to get the published recordings of a system, and what they are. "
+        "With --from, turn a folder of them into case folders. Files are checked by "
+        "their "
         "checksums; the workbench comes with none of them.",
         epilog="examples:\n"
-        "  python -m workbench prepare cascaded_tanks\n"
-        "  python -m workbench prepare cascaded_tanks --from DOWNLOADED --out tanks",
+        "  workbench prepare cascaded_tanks\n"
+        "  workbench prepare cascaded_tanks --from DOWNLOADED --out tanks",
     )
     parser.add_argument("system", metavar="SYSTEM", help="an installed system, or a system file")
     parser.add_argument(

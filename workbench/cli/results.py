@@ -24,9 +24,9 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         "worse, what stayed, and what else is not the same (version, recordings, settings). Of two "
         "folders with several runs, those of the same place are compared.",
         epilog="examples:\n"
-        "  python -m workbench results results\n"
-        "  python -m workbench results results/before results/after\n"
-        "  python -m workbench results results/before results/after --json",
+        "  workbench results results\n"
+        "  workbench results results/before results/after\n"
+        "  workbench results results/before results/after --json",
     )
     parser.add_argument(
         "folder", type=Path, metavar="FOLDER", help="of results, or before a change"

@@ -38,12 +38,12 @@ def add(commands: arguments.Commands, text: str) -> argparse.ArgumentParser:
         description="Run all estimators on recordings; write a page to read (index.html), and "
         "beside it scores (summary.json), data (CSV) and figures (PNG, SVG).",
         epilog="examples:\n"
-        "  python -m workbench simulate\n"
-        f"  python -m workbench simulate {own} --out /tmp/one\n"
-        "  python -m workbench simulate my_cases --system my/system.toml\n"
-        "  python -m workbench simulate my_cases --fmu my_model.fmu --out results/mine\n"
-        f"  python -m workbench simulate {own} --live\n"
-        "  python -m workbench simulate --estimator disturbance_observer --estimator ekf",
+        "  workbench simulate\n"
+        f"  workbench simulate {own} --out /tmp/one\n"
+        "  workbench simulate my_cases --system my/system.toml\n"
+        "  workbench simulate my_cases --fmu my_model.fmu --out results/mine\n"
+        f"  workbench simulate {own} --live\n"
+        "  workbench simulate --estimator disturbance_observer --estimator ekf",
     )
     arguments.add_recordings(parser, out="results/simulate")
     arguments.add_system(parser)
@@ -53,12 +53,13 @@ def add(commands: arguments.Commands, text: str) -> argparse.ArgumentParser:
         type=Path,
         metavar="FILE",
         help="gains.toml of 'workbench tune', for the estimator that it names (default: gains "
-        "tuned for the system's models, else gains reasoned from the linearised models)",
+        "tuned for the system's models, else model-based gains)",
     )
     parser.add_argument(
         "--untuned",
         action="store_true",
-        help="gains reasoned from the linearised models, to compare tuned ones with",
+        help="use model-based gains, from the linearised models, for comparison with tuned ones "
+        "with",
     )
     parser.add_argument(
         "--estimator",

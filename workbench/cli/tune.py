@@ -34,11 +34,11 @@ def add(commands: arguments.Commands, text: str) -> argparse.ArgumentParser:
         "summary.json, figures and a page. Ctrl-C keeps the best so far; --resume goes on from "
         "there, to the same result.",
         epilog="examples:\n"
-        "  python -m workbench tune disturbance_observer\n"
-        "  python -m workbench tune parameter_estimator --budget 20 --out /tmp/quick\n"
-        "  python -m workbench tune disturbance_observer --folds 5\n"
-        "  python -m workbench tune disturbance_observer --judge-by smoother\n"
-        "  python -m workbench tune disturbance_observer --cluster tcp://10.0.0.1:8786",
+        "  workbench tune disturbance_observer\n"
+        "  workbench tune parameter_estimator --budget 20 --out /tmp/quick\n"
+        "  workbench tune disturbance_observer --folds 5\n"
+        "  workbench tune disturbance_observer --judge-by smoother\n"
+        "  workbench tune disturbance_observer --cluster tcp://10.0.0.1:8786",
     )
     parser.add_argument(
         "estimator", metavar="ESTIMATOR", help="one with gains, such as disturbance_observer or ekf"
@@ -89,21 +89,20 @@ def _add_search(parser: argparse.ArgumentParser) -> None:
         "--radius-error",
         type=float,
         metavar="PERCENT",
-        help="judge each case again with an output's scale off by this much, alternately to both "
-        "sides, so that gains do not rely on what nobody knows as well; 0: only as recorded "
-        "(default: as the system says)",
+        help="score each case again with an output's scale off by this much, to both sides in "
+        "turn; 0: as recorded (default: of the system)",
     )
     parser.add_argument(
         "--folds",
         type=int,
         default=0,
         metavar="K",
-        help="also tune K times without a K-th of the cases, and judge on these",
+        help="also tune K times without a K-th of the cases, and score on these",
     )
     parser.add_argument(
         "--judge-by",
         metavar="ESTIMATOR",
-        help="judge by one that knows whole recordings, such as smoother, what no sensor measures "
+        help="score by an estimator of whole recordings, such as smoother, what no sensor measures "
         "(default: by what is measured)",
     )
     parser.add_argument(

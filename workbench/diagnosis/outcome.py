@@ -120,7 +120,7 @@ class Outcome:
         """The verdict in one sentence."""
         found = self.diagnosis
         cost = "".join(
-            f" Without a measured {signal.label}, fewer effects can be told apart."
+            f" Without a measured {signal.label}, fewer effects can be discriminated."
             for signal in self.missing
         )
         if found.verdict == "nothing":
@@ -273,7 +273,7 @@ class Outcome:
             lines += ["", f"extended model{part}: {', '.join(files)}"]
         aside = sum(counts[FAULTY] + counts[MISSING] for counts in self.set_aside.values())
         if aside:
-            lines.append(f"{aside} samples were missing or wrong, and set aside")
+            lines.append(f"{aside} samples were missing or wrong, and are excluded")
         return "\n".join(lines)
 
     def _sample_errors(self) -> list[str]:
@@ -492,8 +492,8 @@ def _told(cause: Cause) -> list[str]:
     lines.append(f"  explains {cause.explained:.1%} of what can be, in cross-validation")
     if cause.confusable_with:
         lines.append(
-            f"  cannot be told from {', '.join(cause.confusable_with)} in these data; "
-            f"what would: {cause.effect.separation}"
+            f"  indistinguishable from {', '.join(cause.confusable_with)} in these data; "
+            f"to discriminate: {cause.effect.separation}"
         )
     return lines
 
@@ -732,7 +732,7 @@ def draw_confusability(
         marked = [f"▸ {name}" if name in found else name for name in names]
         axes.set_xticks(range(len(names)), names, rotation=90)
         axes.set_yticks(range(len(names)), marked)
-        axes.set_title("Similarity of signatures in these data: 100 cannot be told apart")
+        axes.set_title("Similarity of signatures in these data: 100 is indistinguishable")
         save_figure(sheet, paths)
 
 

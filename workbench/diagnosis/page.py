@@ -83,7 +83,7 @@ def write_diagnosis_page(
         Part("shown", f"The {title}", [*_shown(system, summary, figures, others, first)]),
         Part("dependences", "What the errors go with", _dependences(summary)),
         Part("causes", "Causes, strongest first", [*_causes(summary)], printed=True),
-        Part("confusability", "What cannot be told apart", _confusable(summary)),
+        Part("confusability", "Indistinguishable effects", _confusable(summary)),
         Part("gain", "Gain in cross-validation", [*_gain(system, summary)]),
     ]
     if estimate is not None:
@@ -91,7 +91,9 @@ def write_diagnosis_page(
         parts.append(Part("estimate", title, _estimate(system, summary["smoothed"], estimate)))
     if summary["model"]["modelica"] is not None:
         parts.append(Part("model", "The extended model", _model(summary["model"], folder)))
-    parts.append(Part("baseline", "Levels, tolerances, samples set aside", _baseline(summary)))
+    parts.append(
+        Part("baseline", "Nuisance parameters, tolerances, excluded samples", _baseline(summary))
+    )
     if others:
         parts.append(Part("recordings", "The other recordings, clearest first", others))
     parts.append(
@@ -384,7 +386,7 @@ def _traded(certainty: Mapping[str, Any], effect: str, name: str) -> str:
         for k, (other, value) in enumerate(others)
     ]
     return Markup(
-        "What {} is wrong by, others make up for: its error goes with that of {}."
+        "Others compensate for an error of {}, which is correlated with that of {}."
     ).format(name, joined(", ", told))
 
 
@@ -485,7 +487,7 @@ def _confusable(summary: Mapping[str, Any]) -> list[Block]:
     read = " ".join(f"{first} and {other}: {cosine:.0f}." for first, other, cosine in pairs)
     caption = (
         "Cosine of the angle between what two effects leave in the errors, levels and tolerances "
-        "apart, in percent; 100 cannot be told apart, numbers are given from 70 on"
+        "apart, in percent; 100 is indistinguishable, numbers are given from 70 on"
         f"{', the effect that was found is framed' if found else ''}. Data and figure"
     )
     told = "No two effects of the catalogue leave similar traces in these recordings and signals."
@@ -635,12 +637,12 @@ def _estimate(system: System, smoothed: Mapping[str, Any], recording: Recording)
     text = (
         f"What the smoother makes of {smoothed['recording']} with the "
         f"{' and with the '.join(names)}, from inputs and outputs alone, with bands that hold 95 % "
-        "if the model is right. Sensors that only judge are drawn beside; one that is itself the "
+        "if the model is right. Validation sensors are drawn beside; one that is itself the "
         "cause stays outside."
     )
     caption = Markup(
-        "Means of estimates, and of the ends of their bands, where they are judged and may be "
-        "claimed; and the share of a sensor's means over {} that lie in the band with the sensor's "
+        "Means of estimates, and of the ends of their bands, where they are scored and valid; and "
+        "the share of a sensor's means over {} that lie in the band with the sensor's "
         'own noise. Data: <a href="smoothed.csv">smoothed.csv</a>'
     ).format(duration(system.comparison.block))
     columns = [column for name in names for column in (Numbers(name), Numbers("sensor inside [%]"))]
@@ -664,7 +666,7 @@ def _model(model: Mapping[str, Any], folder: Path) -> list[Block]:
         "Compiled, it predicts as the fit does: the largest difference on these recordings is "
         "{:.1e} standard deviations of the noise."
     ).format(quote(source), source, quote(fmu), fmu, model["difference_from_fit"])
-    again = f"python -m workbench diagnose NEW_RECORDINGS --model {model['fmu']} --out results/next"
+    again = f"workbench diagnose NEW_RECORDINGS --model {model['fmu']} --out results/next"
     return [
         told,
         Source(Path(model["modelica"]).read_text(), "Modelica source"),
@@ -688,7 +690,8 @@ def _baseline(summary: Mapping[str, Any]) -> list[Block]:
         for name, level in summary["levels"].items()
     }
     return [
-        "Levels differ from day to day by nature. They are fitted for every model alike and need "
+        "Nuisance parameters differ from day to day without a fault. They are fitted for every "
+        "model alike and need "
         "no cause:",
         Definitions(levels, grid=True),
         table(
@@ -700,7 +703,7 @@ def _baseline(summary: Mapping[str, Any]) -> list[Block]:
         ),
         table(
             "aside-table",
-            "Samples that were set aside and never fitted, by reason; a sample may have several.",
+            "Excluded samples, which are never fitted, by reason; a sample may have several.",
             summary["set_aside"],
             lambda count: number(count, ""),
         ),
@@ -730,8 +733,9 @@ def _terms(
             "are for the eye; the search uses prediction errors."
         )
     terms |= {
-        "Cross-validation": "Each recording is judged with parameters fitted to the other "
-        "recordings only. An effect that merely bends to noise gains nothing there.",
+        "Cross-validation": "Each recording is scored with parameters fitted to the other "
+        "recordings only. An effect that merely bends to noise gains nothing "
+        "there.",
         "Held-out recordings": "Those named by --held-out. Nothing common was ever fitted to them, "
         "and no effect chosen by them.",
         "Chi-squared": "Sum of squared errors in units of their standard deviation. An effect is "
@@ -746,6 +750,6 @@ def _terms(
             "ends at unequal distances say that the law bends."
         )
     return terms | {
-        "Explained": "Share of the mean square of lasting errors, less that of noise, which "
+        "Explained": "Fraction of the mean square of systematic errors, less that of noise, which "
         "disappears in cross-validation when the cause is added to the others.",
     }

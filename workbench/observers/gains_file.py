@@ -16,7 +16,7 @@ from workbench.system.plugins import find_plugin
 from workbench.system.system import System
 from workbench.system.tables import LARGEST, read_table, shown
 
-_AGAIN = "take the gains.toml that 'python -m workbench tune' wrote"
+_AGAIN = "take the gains.toml that 'workbench tune' wrote"
 
 
 def read_gains(path: Path, reasoned: Mapping[str, Gains]) -> Gains:

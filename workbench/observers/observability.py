@@ -502,7 +502,7 @@ def information(fmu: FMU, system: System, case: Case) -> Information | None:
 def guesses(inseparable: Mapping[tuple[str, ...], float], untold: Sequence[str]) -> list[str]:
     """What is said of quantities that a recording does not tell, see `Information`."""
     together = [
-        f"{' and '.join(names)} cannot be told apart by this recording (correlation "
+        f"{' and '.join(names)} are indistinguishable in this recording (correlation "
         f"{correlation:.4f}): their estimates are guesses, and others fit as well. Estimate "
         "one of them, or record what moves one of them alone"
         for names, correlation in inseparable.items()

@@ -201,7 +201,7 @@ def _case_lines(system: System, done: Sequence[CaseObservability]) -> list[str]:
     header += "".join(f"{name:>11}" for name in hidden)
     span = first.span
     lines = [
-        f"Share of time {system.objective.when or 'that is judged'} in which {span:g} s of samples "
+        f"Share of time {system.objective.when or 'that is scored'} in which {span:g} s of samples "
         f"tell: {', '.join(system.corrections)} ({first.model})"
         + (f", states ({last.model})" if hidden else ""),
         header,
@@ -211,7 +211,7 @@ def _case_lines(system: System, done: Sequence[CaseObservability]) -> list[str]:
         row = f"{result.case.name:<{width}}"
         shares, states = _shares(result.tests[0], result), _shares(result.tests[-1], result)
         if shares["useful"] is None:
-            lines.append(f"{row}  nothing is judged")
+            lines.append(f"{row}  nothing is scored")
             continue
         medians = _medians(result)
         for quantity in system.estimated:
@@ -266,8 +266,8 @@ _EXPLAINED = (
     "by more where the model differs."
 )
 _LINEAR = (
-    "Some time about one operating point: what is left of the standard deviation of a state after "
-    "it, over that before it. A state that keeps nearly all of it cannot be observed there."
+    "Some time about one operating point: the standard deviation of a state after it, over that "
+    "before it. A state that keeps nearly all of it cannot be observed there."
 )
 
 
@@ -307,12 +307,13 @@ def _figure(observability: CaseObservability) -> CaseFigure:
     legend = [("raw", "an estimate serves below")]
     legend += [(style, t.model) for t, style in zip(observability.tests, _STYLES, strict=False)]
     share = (
-        f"All quantities can be told in {100.0 * _share(observability):.0f} % of the judged time."
+        f"All quantities are identifiable in {100.0 * _share(observability):.0f} % of the scored "
+        "time."
     )
     return CaseFigure(
         name=observability.case.name,
         title=observability.case.title,
-        finding=share if observability.judged.any() else "Nothing is judged here.",
+        finding=share if observability.judged.any() else "Nothing is scored here.",
         time=time,
         window=None,
         legend=(("measured", "measured"), *legend),
@@ -327,7 +328,7 @@ def _cases(system: System, summary: Mapping[str, Any]) -> Table:
         columns += [
             Numbers(f"{quantity.name}, median{unit}"),
             Numbers(
-                f"{quantity.name} can be told [%]",
+                f"{quantity.name} identifiable [%]",
                 meaning=f"time with a bound below {quantity.useful:g}",
             ),
             Numbers(f"bound of {quantity.name}, median{unit}"),
@@ -350,7 +351,7 @@ def _cases(system: System, summary: Mapping[str, Any]) -> Table:
             ]
         rows.append((name, *cells))
     caption = (
-        f"How well windows of {summary['window_s']:g} s know each quantity, over the judged time "
+        f"How well windows of {summary['window_s']:g} s know each quantity, over the scored time "
         "of each recording, by the first model."
     )
     return Table("case-table", caption, columns, rows)
@@ -391,7 +392,7 @@ def _terms(summary: Mapping[str, Any]) -> dict[str, str]:
         "Bound": "Cramer-Rao: no unbiased estimator has a smaller standard deviation, given the "
         f"noise of the sensors and {summary['window_s']:g} s of samples, with what is known "
         "beforehand.",
-        "Can be told": "The bound is below the value from which on an estimate serves, which the "
+        "Identifiable": "The bound is below the value from which on an estimate serves, which the "
         "system file gives for each quantity ("
         + ", ".join(f"{name} {value:g}" for name, value in summary["useful"].items())
         + ").",
@@ -413,7 +414,7 @@ def observability_answer(system: System, summary: Mapping[str, Any]) -> Answer:
                 shares[case] = first["useful"][quantity.correction]
                 bounds[case] = first["median_bound"][quantity.correction]
         for case, share in shares.items():
-            details[f"{case}: time in which {quantity.name} can be told"] = percentage(
+            details[f"{case}: time in which {quantity.name} is identifiable"] = percentage(
                 share, "higher"
             )
             details[f"{case}: bound of {quantity.name}"] = Measure(
@@ -421,14 +422,14 @@ def observability_answer(system: System, summary: Mapping[str, Any]) -> Answer:
             )
         if shares:
             middle = float(np.median(list(shares.values())))
-            headline[f"time in which {quantity.name} can be told, median"] = percentage(
+            headline[f"time in which {quantity.name} is identifiable, median"] = percentage(
                 middle, "higher"
             )
             low, high = min(shares.values()), max(shares.values())
             between = f" ({whole_percent(low)} to {whole_percent(high)})" if len(shares) > 1 else ""
             words.append(
                 f"{quantity.label} {quantity.name} to {quantity.useful:g}"
-                f"{unit_suffix(quantity.unit)} in {whole_percent(middle)} of the judged "
+                f"{unit_suffix(quantity.unit)} in {whole_percent(middle)} of the scored "
                 f"time{between}"
             )
     first, test = next(iter(summary["linear"].items()))

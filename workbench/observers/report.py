@@ -195,12 +195,12 @@ def simulation_answer(system: System, summary: Mapping[str, Any]) -> Answer:
     count = len(summary["cases"])
     trust = "".join(f" {line}" for line in _contradictions(summary))
     if best.worst is None:
-        sentence = f"{len(ranking)} estimators ran on {recordings(count)}; none could be judged."
+        sentence = f"{len(ranking)} estimators ran on {recordings(count)}; none could be scored."
         return Answer(sentence + trust, headline, details)
     share, signal = percent(best.worst), called(system, reference)
     first = f"The {label(best.name, system)} errs least: {share} of the mean {signal} in"
     if best.judged == 1:
-        only = f"{best.case}, the only recording that was judged; one cannot say how others differ."
+        only = f"{best.case}, the only scored recording; one cannot say how others differ."
         return Answer(f"{first} {only}{trust}", headline, details)
     sentence = f"{first} the worst of {recordings(best.judged)}, {best.case}"
     if None not in best.usual:
@@ -239,9 +239,9 @@ def write_page(
     quantity = called(system, reference)
     shown = (
         f"From top to bottom: what was measured and fed to the estimators, the {quantity} measured "
-        "and estimated, its error, and the quantities behind it. Estimators are judged in the "
-        "shaded time. Bands, where an estimator knows its uncertainty, hold 95 %. Where a "
-        "recording has no sensor that judges, the grey band is the reference. Curves that leave a "
+        "and estimated, its error, and the quantities behind it. Estimators are scored in the "
+        "shaded time. Bands, where an estimator knows its uncertainty, hold 95 %. If a recording "
+        "has no validation sensor, the grey band is the reference. Curves that leave a "
         "panel are cut, most often of the open loop."
     )
     title = "The worst recording" if best.worst is not None else "A recording"
@@ -315,7 +315,7 @@ def _estimators(system: System, ranking: Sequence[Standing]) -> Table:
                 "geometric mean of the cases, with its 95 % interval by how they differ",
             ),
             _Z,
-            Numbers("cases judged"),
+            Numbers("scored cases"),
             Numbers("computing time [s]"),
         ),
         rows,
@@ -343,7 +343,7 @@ def _cases(
     errors = [Numbers(f"{label(standing.name, system)} [%]") for standing in ranking]
     errors[0] = Numbers(errors[0].title, sorted="descending")
     root = Markup("{} error [{}]").format(
-        term("rms", "root of the mean square, in the judged time"), unit
+        term("rms", "root of the mean square, in the scored time"), unit
     )
     return Table(
         "case-table",
@@ -402,7 +402,7 @@ def _terms(system: System) -> dict[str, str]:
     unseen = (
         ""
         if reference in (output.name for output in system.outputs)
-        else (f" {reference} was measured only to judge by; no estimator sees it.")
+        else (f" {reference} is a validation sensor; no estimator uses it.")
     )
     weighed = " + ".join(
         f"{weight} {inverse(system.unit(name))} · |error of {name}|"
@@ -415,8 +415,9 @@ def _terms(system: System) -> dict[str, str]:
         "Objective z": "As in equation (12) of Schwarz, Brembeck, Heckmann (2018): the mean over "
         f"the whole recording of {weighed}{f', of errors {limit}' if limit else ''}. Of several "
         "cases, the largest counts.",
-        "Computing time": "Wall time of the estimator on one processor, without reading, judging "
-        "and drawing. The first run on a machine compiles the loops of the estimators, and this "
+        "Computing time": "Wall time of the estimator on one processor, without reading, scoring "
+        "and drawing. The first run on a machine compiles the loops of the "
+        "estimators, and this "
         "time is in it.",
     }
 
@@ -452,7 +453,7 @@ def _run(system: System, summary: Mapping[str, Any]) -> list[Block]:
         for key, settings in provenance.items()
         if key not in (*_OTHER, *models) and isinstance(settings, Mapping)
     ]
-    repeat = Markup("To repeat the run: <code>python -m workbench simulate</code>.")
+    repeat = Markup("To repeat the run: <code>workbench simulate</code>.")
     return [Definitions(terms, grid=True), *tables, repeat]
 
 

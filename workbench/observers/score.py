@@ -168,7 +168,7 @@ def score(case: Case, run: Run, system: System) -> Score:
     if run.ending is not Ending.OK:
         return Score(None, None, None, f"{run.ending.value} {run.message}".strip())
     if missing := [name for name in (objective.signal, *objective.weights) if name not in case]:
-        return Score(None, None, None, f"the recording has no {missing[0]} to judge by")
+        return Score(None, None, None, f"the recording has no {missing[0]} to score by")
     # A method that takes a signal as measured makes no error in it.
     deviations = np.column_stack(
         [
@@ -183,7 +183,7 @@ def score(case: Case, run: Run, system: System) -> Score:
     )
     window = judged_window(case, system)
     if window.stop - window.start < 2:
-        return Score(None, None, z, "the recording holds nothing that is judged")
+        return Score(None, None, z, "the recording has no scored time")
     column = scored_column(system, run.columns, objective.signal)
     error = run.signal(column) - case[objective.signal]
     measured = low_pass(case.time, case[objective.signal], objective.bandwidth)

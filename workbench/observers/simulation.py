@@ -596,7 +596,7 @@ def _finding(result: CaseResult) -> str:
     )
     if not shares:
         reasons = sorted({score.reason for score in result.scores.values()})
-        return f"Estimated, not judged: {'; '.join(reasons)}."
+        return f"Estimated, not scored: {'; '.join(reasons)}."
     share, first, rms = shares[0]
     others = ", ".join(f"{name} {percent(value)}" for value, name, _ in shares[1:])
     trust = "".join(

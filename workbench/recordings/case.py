@@ -539,8 +539,8 @@ def _refuse_markers(values: Vector, source: Path, column: str) -> None:
         first = int(np.flatnonzero(values == value)[0])
         raise InputError(
             where=f"{source}, line {first + 2}, column '{column}'",
-            found=f"{value:g} in {count} samples, far outside of all others, as recorders write "
-            "where they have none",
+            found=f"{value:g} in {count} samples, far outside of all others, as loggers write for "
+            "missing values",
             expected="samples",
             remedy=f"run 'workbench import {source}', which leaves them out, or remove the lines",
         )

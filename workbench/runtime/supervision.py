@@ -533,18 +533,18 @@ def confine(folders: Sequence[Path]) -> str:
     What holds from now on, for people; it names what this system cannot do.
     """
     if sys.platform != "linux":
-        return "in a process of its own; this system has no means to confine it further"
+        return "in a process of its own; this system has no sandbox"
     libc = ctypes.CDLL(None, use_errno=True)
     writing = _confine_files(libc, folders)
     calls = _confine_calls(libc)
     places = ", ".join(map(str, folders))
     holds = [
-        f"writing only below {places}" if writing else "writing NOT confined (no Landlock here)",
+        f"writing only below {places}" if writing else "writing NOT restricted (no Landlock here)",
         "no network; no sockets; no change of modes, owners, times or attributes of files, nor of "
         "limits or memory of other processes"
         if calls
-        else "network, sockets and modes of files NOT confined (no seccomp filter here)",
-        "reading is not confined",
+        else "network, sockets and modes of files NOT restricted (no seccomp filter here)",
+        "reading is not restricted",
     ]
     if os.geteuid() == 0:
         holds.append("run as root: prefer a user of its own")

@@ -22,7 +22,7 @@ from workbench.system.parts import (
 )
 
 RATE = 0.002
-"""Sets of a sound machine that may be called something else, unless its system says otherwise: a
+"""Sets of a healthy machine that may be called something else, unless its system says otherwise: a
 tenth of the 2 % that power allows, since noise of real sensors has heavier tails, and tests on one
 set are several."""
 
@@ -124,7 +124,7 @@ class Exclusion:
     EITHER: ClassVar = Either(
         ("above", "below"),
         expected="one of the two",
-        remedy="say from which level on samples do not count",
+        remedy="say from which value on samples are excluded",
     )
 
     reason: str = key("why, for people")

@@ -468,8 +468,8 @@ class Tolerance:
     """By how much two values that tell the same may differ."""
 
     within: tuple[float, float] = key(
-        "`[0.05, 0.3]`: largest likely and possible difference, as a fraction of the larger value, "
-        "in the median of all samples; the most is 2, which is never refused",
+        "`[0.05, 0.3]`: largest likely and possible difference, as a fraction of the larger "
+        "value, in the median of all samples; 2 is never refused",
         least=0.0,
         ordered=True,
         equal=True,

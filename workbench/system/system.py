@@ -157,8 +157,8 @@ class System:
     )
     cases: Path | None = key("folder of the system's own recordings", absent=None)
     plugin: str = key(
-        "Python code for this machine, such as a simulated rig, estimators, published recordings: "
-        "the name of an entry point of the group `workbench.machines`, or the place of "
+        "Python code for this machine, such as a simulated rig: an entry point of "
+        "the group `workbench.machines`, or the place of "
         'a [`Plugin`](own-machine.md#a-plugin), `"package.module:NAME"`',
         aliases=("companion",),
         absent="",

@@ -95,7 +95,7 @@ def recording(case: Case, system: System) -> Recording:
         raise InputError(
             where=str(case.source),
             found=f"no column '{missing[0]}'",
-            expected="all measured signals by which gains are judged",
+            expected="all measured signals by which gains are scored",
             remedy="leave this case out of the tuning with --cases",
         )
     steps, shares = samples(case.time)

@@ -159,13 +159,13 @@ def pose(
     scale_errors: Mapping[str, float] | None = None,
     judge_by: str | None = None,
 ) -> Problem:
-    """Gains to start from, bounds to search in, and recordings to judge by.
+    """Gains to start from, bounds to search in, and recordings to score by.
 
     Parameters
     ----------
     estimator : its name.
     scale_errors : relative [1], by output; see `recordings`. None: as the system says.
-    judge_by : estimator to judge by where no sensor does, see `with_reference`. None: as measured.
+    judge_by : estimator to score by where no sensor does, see `with_reference`. None: as measured.
 
     Raises
     ------
@@ -262,7 +262,7 @@ def tune(
     if not np.isfinite(before).all():
         raise FMUError(
             f"{problem.provenance['fmu']['file']}: the FMU fails, hangs or diverges with the "
-            "untuned gains, so there is nothing to start from; see 'python -m workbench simulate'"
+            "untuned gains, so there is nothing to start from; see 'workbench simulate'"
         )
     result = run.search(0, range(len(job.recordings)))
     if result is None:
@@ -451,7 +451,7 @@ def with_reference(cases: Sequence[Case], system: System, estimator: str) -> lis
         raise unknown_name(
             estimator,
             known,
-            where=f"estimator '{estimator}' to judge by",
+            where=f"estimator '{estimator}' to score by",
             found="none of this name that knows whole recordings",
             expected=f"one of {', '.join(known)}",
         )
@@ -462,7 +462,7 @@ def with_reference(cases: Sequence[Case], system: System, estimator: str) -> lis
             raise InputError(
                 where=str(case.source),
                 found=f"{estimator}: {run.ending.value} {run.message}".strip(),
-                expected="an estimate to judge by",
+                expected="an estimate to score by",
                 remedy="leave this case out of the tuning with --cases",
             )
         references = [name for name in system.objective.weights if name not in case.outputs]

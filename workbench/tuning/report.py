@@ -43,9 +43,9 @@ def headline(summary: Mapping[str, Any]) -> str:
     z, before = summary["z"], summary["z_reasoned"]
     moved = "falls" if z < before else "rises"
     result = (
-        f"z stays at {z:.4g}, because no candidate was better than the reasoned gains"
+        f"z stays at {z:.4g}, because no candidate was better than the model-based gains"
         if z == before
-        else f"z, the objective of the worst case, {moved} from {before:.4g} with the reasoned "
+        else f"z, the objective of the worst case, {moved} from {before:.4g} with the model-based "
         f"gains to {z:.4g} with the tuned ones ({100 * (z / before - 1):+.1f} %)"
     )
     worst, *others = _worst_first(summary)
@@ -79,11 +79,11 @@ def bad_news(summary: Mapping[str, Any]) -> list[str]:
         cases = ", ".join(
             f"{case['name']} ({case['z_k_reasoned']:.4g} to {case['z_k']:.4g})" for case in worse
         )
-        news.append(f"Worse than with the reasoned gains: {cases}.")
+        news.append(f"Worse than with the model-based gains: {cases}.")
     folds = _folds(summary)
     if missed := [fold for fold in folds if not fold["better"]]:
         news.append(
-            f"On cases they have not seen, tuned gains are not better than the reasoned ones in "
+            f"On cases they have not seen, tuned gains are not better than the model-based ones in "
             f"{len(missed)} of {len(folds)} folds: {'; '.join(_why(summary, f) for f in missed)}."
         )
     for entry in summary.get("beside", {}).values():
@@ -148,7 +148,7 @@ def _cases(summary: Mapping[str, Any]) -> Table:
         "failed; it is counted in the case where that showed first.",
         (
             "case",
-            Numbers(_z_k(", reasoned")),
+            Numbers(_z_k(", model-based")),
             Numbers("z_k, tuned", sorted="descending"),
             Numbers("change"),
             Numbers(
@@ -178,7 +178,7 @@ def _dots(summary: Mapping[str, Any]) -> Dots:
     cases = _worst_first(summary)
     pairs = (f"{case['name']} {case['z_k_reasoned']:.4f} to {case['z_k']:.4f}" for case in cases)
     return Dots(
-        finding=f"Objective of each case, reasoned to tuned: {', '.join(pairs)}.",
+        finding=f"Objective of each case, model-based to tuned: {', '.join(pairs)}.",
         axis="objective of the case, z_k [1]",
         rows=[
             (
@@ -190,11 +190,12 @@ def _dots(summary: Mapping[str, Any]) -> Dots:
         mark=(summary["z"], "z, tuned"),
         paired=True,
         caption=Markup(
-            "Objective of each case with the reasoned and with the tuned gains; the search lowers "
+            "Objective of each case with the model-based and with the tuned gains; the search "
+            "lowers "
             'the largest. Data and figure: <a href="summary.json">JSON</a>, '
             '<a href="cases.png">PNG</a>'
         ),
-        legend=((_REASONED, "reasoned gains (circle)"), (_TUNED, "tuned gains (diamond)")),
+        legend=((_REASONED, "model-based gains (circle)"), (_TUNED, "tuned gains (diamond)")),
     )
 
 
@@ -212,18 +213,19 @@ def _unseen(summary: Mapping[str, Any]) -> Table:
     below = f", below {summary['bandwidth']:g} Hz" if summary["bandwidth"] else ""
 
     def error(share: float | None) -> Cell:
-        return Cell("not judged", np.inf) if share is None else Cell(percent(share), share)
+        return Cell("not scored", np.inf) if share is None else Cell(percent(share), share)
 
     return Table(
         "fold-table",
-        "Gains tuned without some of the cases and judged on these, against the reasoned gains on "
+        "Gains tuned without some of the cases and scored on these, against the model-based gains "
+        "on "
         f"the same. The error of {reference} is the worst of the cases, rms over mean{below}.",
         (
             "left out",
-            Numbers("z, reasoned"),
+            Numbers("z, model-based"),
             Numbers("z, tuned without them", sorted="descending"),
             Numbers("z of the cases tuned on"),
-            Numbers(f"error of {reference}, reasoned"),
+            Numbers(f"error of {reference}, model-based"),
             Numbers(f"error of {reference}, tuned without them"),
             "worst of them",
             "verdict",
@@ -272,7 +274,7 @@ def _gains(summary: Mapping[str, Any], folder: Path) -> list[Block]:
     )
     caption = Markup(
         "Each gain, the range that was searched, and that of the last candidates that are {}, in "
-        "which all gains change at once: a wide one is made up for by others{}."
+        "which all gains change at once: others compensate for a wide one{}."
     ).format(good, changes)
     rows = []
     for name, gain in summary["gains"].items():
@@ -305,7 +307,7 @@ def _gains(summary: Mapping[str, Any], folder: Path) -> list[Block]:
         *([] if known else [interrupted]),
         Table("gain-table", caption, [*columns, "remark"], rows),
         use,
-        Source(f"python -m workbench simulate --gains {path}"),
+        Source(f"workbench simulate --gains {path}"),
     ]
 
 
@@ -331,11 +333,11 @@ def _convergence(summary: Mapping[str, Any]) -> Steps:
     best, reasoned = summary["convergence"], summary["z_reasoned"]
     return Steps(
         finding=f"Best z by generation: {best[0]:.4f} at first, {best[-1]:.4f} after "
-        f"{summary['work']['generations']} generations; {reasoned:.4f} with the reasoned gains.",
+        f"{summary['work']['generations']} generations; {reasoned:.4f} with the model-based gains.",
         axis="generation; 0 is the initial population",
         values=best,
         style=_TUNED,
-        mark=(reasoned, "reasoned gains"),
+        mark=(reasoned, "model-based gains"),
         caption=Markup(
             "z of the best candidate. Data and figure, with the work saved and the unstable "
             'candidates: <a href="summary.json">JSON</a>, <a href="convergence.png">PNG</a>'
@@ -373,14 +375,15 @@ def _terms(summary: Mapping[str, Any]) -> dict[str, str]:
     treatment = f"Each case as it is{scaled}."
     if (judge := provenance["judged_by"]) != "sensors":
         treatment += (
-            f" What no output of the model measures is judged by the {judge}, which knows the "
+            f" A quantity that no output of the model measures is scored by the {judge}, which "
+            "knows the "
             "whole recording, not by a sensor."
         )
     terms = {
         "Objective z": "The largest z_k of all cases, equations (11) and (12) of Schwarz, "
         "Brembeck, Heckmann (2018): z_k is the mean over the whole recording of "
         f"{weighed} in SI units{below}.",
-        "Recordings that are judged": treatment,
+        "Scored recordings": treatment,
     }
     observer = "L11" in summary["gains"]
     if observer and follows:
@@ -390,7 +393,7 @@ def _terms(summary: Mapping[str, Any]) -> dict[str, str]:
             "linearised model: they would have measured signals right while what is estimated "
             "drifts behind."
         )
-    terms["Reasoned gains"] = (
+    terms["Model-based gains"] = (
         "Those before tuning, from the linearised model or the noise of the sensors. The search "
         "starts around them."
     )
@@ -401,7 +404,7 @@ def _terms(summary: Mapping[str, Any]) -> dict[str, str]:
         )
     return terms | {
         "Bounds": "From the slowest loop that a recording shows to the fastest that its samples "
-        "carry; for levels of noise, a hundredth to a hundred times the reasoned ones. A gain "
+        "carry; for levels of noise, a hundredth to a hundred times the model-based ones. A gain "
         "within 1 % of its range from an end is at a bound: something better may lie beyond, or it "
         "does not matter.",
         "A little less, a little more": f"{100 * STEP:g} % of the searched range, on its "
@@ -507,9 +510,9 @@ def format_tuned(summary: Mapping[str, Any]) -> str:
         )
         verdict = "better" if tuned < reasoned else "not better"
         lines.append(
-            f"not seen: {', '.join(fold['cases'])}: z {tuned:.4f}, {verdict} than reasoned "
+            f"not seen: {', '.join(fold['cases'])}: z {tuned:.4f}, {verdict} than model-based "
             f"{reasoned:.4f}; seen: {fold['z']:.4f}; error of {summary['judged']} {error:.2%}, "
-            f"reasoned {untuned:.2%}"
+            f"model-based {untuned:.2%}"
         )
     return "\n".join(lines)
 
@@ -523,7 +526,7 @@ def tuning_answer(sentence: str, summary: Mapping[str, Any]) -> Answer:
     """
     headline = {
         "z, tuned": Measure(summary["z"], "1", "lower"),
-        "z, reasoned": Measure(summary["z_reasoned"], "1", "lower"),
+        "z, model-based": Measure(summary["z_reasoned"], "1", "lower"),
     }
     unseen = [fold["tuned"] for fold in summary["folds"]]
     if unseen:

@@ -50,7 +50,7 @@ def _clock(system: System, kind: str, name: str, signals: tuple[str, ...]) -> Ef
         slots=(),
         size=SKEW,
         matters=_MATTERS * system.comparison.least_skew,
-        text=f"a logger of {' and '.join(signals)} whose clock is late",
+        text=f"a logger of {' and '.join(signals)} with a time offset",
         separation="one signal that both loggers record",
         late=signals,
     )

@@ -134,9 +134,9 @@ def refuse_too_few(cases: Sequence[Case], system: System, held_out: int = 0) -> 
     if not cases or (len(cases) == 1 and (compare.tolerances or compare.begins is not None)):
         why = (
             "what [diagnosis.tolerances] says to differ from recording to recording "
-            f"({', '.join(compare.tolerances)}) cannot be told from a cause in one"
+            f"({', '.join(compare.tolerances)}) look the same as an effect in one"
             if compare.tolerances
-            else "a cause is judged on those it was not fitted to"
+            else "an effect is scored on those it was not fitted to"
         )
         raise InputError(
             where="recordings",
@@ -167,7 +167,7 @@ def refuse_too_short(
         lost = ", ".join(f"{reason}: {mask.sum()}" for reason, mask in excluded.items())
         raise InputError(
             where=str(case.source),
-            found=f"{seconds:.3g} s that count; samples set aside: {lost}",
+            found=f"{seconds:.3g} s are compared; excluded samples: {lost}",
             expected=f"{compare.least:g} s or more, because less does not tell noise from cause",
             remedy="leave this recording out, or repair it",
         )

@@ -71,16 +71,19 @@ class Certainty:
 
         >>> nothing = ((), np.zeros((0, 0)), {})
         >>> Certainty(*nothing, behind=(0.1, 0.0), tolerance=1.0).sentence
-        'Begun elsewhere, 2 of 2 fits ended the same.'
+        'Multi-start: 2 of 2 fits reached the same optimum.'
         >>> Certainty(*nothing, behind=(0.1, 812.0, None), tolerance=1.0).sentence
-        'Begun elsewhere, 1 of 3 fits ended the same, none lower.'
+        'Multi-start: 1 of 3 fits reached the same optimum, none lower.'
         >>> Certainty(*nothing, behind=(0.1, -40.0), tolerance=1.0).sentence
-        'Begun elsewhere, 1 of 2 fits ended the same, and one lower by 40: sizes may be others.'
+        'Multi-start: 1 of 2 fits reached the same optimum, and one lower by 40: sizes may be '
+        'others.'
         """
         all_the_same = self.same == len(self.behind)
         lower = f", and one lower by {self.lower:.0f}: sizes may be others"
         more = "" if all_the_same else lower if self.lower else ", none lower"
-        return f"Begun elsewhere, {self.same} of {len(self.behind)} fits ended the same{more}."
+        return (
+            f"Multi-start: {self.same} of {len(self.behind)} fits reached the same optimum{more}."
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """All of it as plain numbers and texts."""

@@ -81,8 +81,8 @@ class Fit:
             raise InputError(
                 where=recording.name,
                 found=f"one recording, {compare.block * len(recording.blocks):.3g} s that count",
-                expected=f"{2 * compare.lasting:g} s or more of one alone, because a cause is "
-                "judged on a part it was not fitted to",
+                expected=f"{2 * compare.lasting:g} s or more of one alone, because an effect is "
+                "scored on a part it was not fitted to",
                 remedy="give more recordings of this machine, or a longer one",
             )
 

@@ -49,14 +49,16 @@ class ShiftedLevel:
         declared = "" if self.declared is None else f", declared as ±{self.declared:.2g} of it"
         told = f"{self.name} ({self.choice})" if self.choice not in ("all", "sensor") else self.name
         text = (
-            f"{told} is {with_unit(self.value, self.unit)}, {by} {way} its sheet of "
+            f"{told} is {with_unit(self.value, self.unit)}, {by} {way} its data sheet of "
             f"{with_unit(self.sheet, self.unit)}{declared}"
         )
         if not self.hides:
-            return f"{text}. Check the sheet: no effect explains it as a calibrated level does."
+            return f"{text}. Check the data sheet: no effect explains it as this nuisance "
+            "parameter does."
         effects = " and ".join(self.hides)
         return (
-            f"{text}; {effects} cannot be told from it. Give its spread in [diagnosis.levels], or "
+            f"{text}; {effects} is indistinguishable from it. Give its spread in "
+            "[diagnosis.levels], or "
             f"take it out there, and diagnose again."
         )
 

@@ -87,8 +87,7 @@ PUBLISHED = PublishedSet(
     licence=LICENCE,
     recordings="Ten strokes each, at 1, 3, 5 and 7 bar, about 95 samples a second, unevenly. A "
     "machine is one seal: diagnose its recordings at 1, 3 and 7 bar, and hold out that at 5 bar. "
-    "Pressure and force are as the publisher converted them; force is that which pushes the piston "
-    "in.",
+    "Pressure and force are as the publisher converted them; the force pushes the piston in.",
     layouts=layouts(
         ("results_pneumatic-actuator/data/friction", _publisher_columns),
         (

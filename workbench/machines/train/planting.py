@@ -136,7 +136,7 @@ def virtual_rig(names: Sequence[str], model: Path | None) -> PlantedTrain:
         raise InputError(
             where=f"--reference {model}",
             found="a model",
-            expected="none: this virtual rig has equations of its own",
+            expected="none: this simulated rig has equations of its own",
             remedy="leave it out",
         )
     return PlantedTrain(tuple(stop for stop in USUAL if stop.name in names or not names))

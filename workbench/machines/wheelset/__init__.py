@@ -6,10 +6,10 @@ from workbench.system.plugins import Plugin
 
 PLUGIN = Plugin(
     commands={
-        "rig": (f"{__name__}.commands.rig", "make recordings on a virtual rig"),
+        "rig": (f"{__name__}.commands.rig", "make recordings on a simulated rig"),
         "accuracy": (
             f"{__name__}.commands.accuracy",
-            "judge estimators against the truth of the virtual rig",
+            "score estimators against the truth of the simulated rig",
         ),
     },
     summaries=f"{__name__}.schemas:SUMMARIES",

@@ -269,7 +269,7 @@ ROWS = (
     Row("oscillation at first pad contact", "oscillation"),
     Row("muDC, dry discs", "muDC", wet=False),
     Row("muDC, wet discs", "muDC", wet=True),
-    Row("muWR, 95 % of what is claimed", "muWR"),
+    Row("muWR, 95 % of valid samples", "muWR"),
 )
 
 

@@ -120,7 +120,7 @@ def _answer(system: System, stops: Sequence[StopAccuracy]) -> Answer:
     share = covered(stops, best, "Fx")
     held = ""
     if share is not None:
-        held = f"; its 95 % bands hold the truth in {100.0 * share:.1f} % of the time"
+        held = f"; its 95 % bands contain the truth in {100.0 * share:.1f} % of the time"
     sentence = (
         f"Nearest to the true force is the {label(best, system)}: its error is "
         f"{percent(force[best])} of the mean force in the worst of {len(stops)} stops{held}."
@@ -156,11 +156,11 @@ def format_accuracy(stops: Sequence[StopAccuracy]) -> str:
     lines.append("-" * len(header))
     if _have_bands(stops, names):
         lines += [
-            "Share of samples in which a 95 % band holds the truth, mean of all stops",
+            "Share of samples in which a 95 % band contains the truth, mean of all stops",
             header,
         ]
         lines += [f"{q:<{width}}{_covers(stops, names, q)}" for q in COVERED]
-        lines.append("The same of the stop in which it holds the truth least")
+        lines.append("The same of the stop in which it contains the truth least")
         lines += [f"{q:<{width}}{_covers(stops, names, q, least=True)}" for q in COVERED]
         lines.append("-" * len(header))
     return "\n".join(lines + _failures(stops, {name: name for name in names}))
@@ -277,7 +277,8 @@ def _bands(stops: Sequence[StopAccuracy], names: Mapping[str, str]) -> Table:
             rows.append((f"{quantity}, {'least' if least else 'mean'}", *cells))
     columns = ("quantity", *(Numbers(f"{name} [%]") for name in names.values()))
     caption = (
-        "Share of samples in which a 95 % band holds the truth: mean of all stops, and the stop in "
+        "Share of samples in which a 95 % band contains the truth: mean of all stops, and the "
+        "stop in "
         "which it does so least; far below 95 % the filter is overconfident there."
     )
     return Table("band-table", caption, columns, rows)

@@ -67,10 +67,9 @@ def read_truth(case: Case, system: System) -> Truth:
         raise InputError(
             where=str(case.source.parent),
             found="no truth.csv beside the recording",
-            expected="a case of the virtual rig, which writes the truth that estimators are "
-            "judged by",
-            remedy="make cases with 'python -m workbench rig --out DIR' and judge these; what has "
-            "no truth is for 'python -m workbench simulate'",
+            expected="a case of the simulated rig, which writes the truth that scores estimators",
+            remedy="make cases with 'workbench rig --out DIR' and score these; recordings without "
+            "truth are for 'workbench simulate'",
         )
     columns = _read_si(path)
     # The rig may have kept the truth of every Nth sample only.
@@ -98,7 +97,7 @@ def _read_si(path: Path) -> dict[str, Vector]:
                 where=f"{path}, line 1, column '{name}'",
                 found=f"unit [{columns[name].unit}]",
                 expected=f"[{unit}], as the rig writes it",
-                remedy="make the case anew with 'python -m workbench rig'",
+                remedy="make the case anew with 'workbench rig'",
             )
     return {name: column.values for name, column in columns.items()}
 

@@ -83,7 +83,7 @@ def time_sources(description: Description, points: NDArray[np.float64], step: fl
             where=str(description.path),
             found=run.stderr.strip() or f"exit status {run.returncode}",
             expected="calls that succeed and give what the plain calls give",
-            remedy="check the FMU with 'python -m workbench fmu check'",
+            remedy="check the FMU with 'workbench fmu check'",
         )
     rows = np.array([line.split() for line in run.stdout.splitlines()], float)
     inputs = len(description.names("input"))
@@ -109,6 +109,6 @@ def _compile(fmu: Path, folder: Path) -> Path:
             where=str(fmu),
             found=run.stderr.strip()[-2000:] if files else "no C sources",
             expected="C sources of FMI 2.0 that compile",
-            remedy="build the FMU with 'python -m workbench fmu build'",
+            remedy="build the FMU with 'workbench fmu build'",
         )
     return folder / "bench"

@@ -140,7 +140,7 @@ def _reader(path: Path, raw: bytes) -> _Reader:
         raise InputError(
             where=str(path),
             found=f"{called}, which the package '{package}' reads, and that is not installed",
-            expected="the extra [files], which holds what reads such files",
+            expected="the extra [files], which reads such files",
             remedy=installing("files"),
         ) from None
     reader = partial(_in_own_process if module in _NATIVE else _here, module)
@@ -211,6 +211,6 @@ def _read_whole(reader: _Reader, called: str, path: Path, raw: bytes) -> Content
         raise InputError(
             where=str(path),
             found=f"{called} that cannot be read ({type(error).__name__}: {error})",
-            expected="a whole file, as its recorder writes it",
+            expected="a whole file, as the logger wrote it",
             remedy="copy or export it again",
         ) from None

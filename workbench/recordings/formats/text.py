@@ -76,7 +76,7 @@ def _decode(path: Path, raw: bytes) -> tuple[str, str]:
         raise InputError(
             where=str(path),
             found="zero bytes, which no text has",
-            expected="a CSV, or a file of a recorder with its usual ending",
+            expected="a CSV, or a log file with its usual ending",
             remedy="give the file its own ending (.mf4, .tdms, .mat, .xlsx, .parquet), or export "
             "it as CSV",
         )

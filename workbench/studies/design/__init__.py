@@ -138,7 +138,7 @@ def _open(
             part = "cosine" if parameter == "amplitude" else parameter
             if not effects[effect].late and not variables(effects[effect], part):
                 raise InputError(
-                    where=f"the diagnosis, rivals, {effect}",
+                    where=f"the diagnosis, candidates, {effect}",
                     found=f"a size '{parameter}'",
                     expected="one that the effect has",
                     remedy="give the summary that 'workbench diagnose' wrote, as it wrote it",

@@ -41,7 +41,7 @@ class RankedExperiment:
         """What it would tell and cost, for people."""
         prediction, cost = self.prediction, f"cost {self.cost:.3g} {self.unit}"
         if len(prediction.pairwise) == 1:
-            return f"{_ratio(prediction):.2g} times as sure, {cost}"
+            return f"precision gain {_ratio(prediction):.2g}, {cost}"
         several = 1 < len(prediction.groups) < len(prediction.pairwise)
         group = " or its group" if several else ""
         apart = f"separation {prediction.separation:.1f} standard deviations"
@@ -122,19 +122,20 @@ class NextStop:
         best = self.tried[0]
         prediction = best.prediction
         if len(self.names) == 1:
-            sure = f"{_ratio(prediction):.2g} times as sure"
-            return f"Next: {best.text}. It makes {self.names[0]} {sure}."
+            gain = f"by a factor of {_ratio(prediction):.2g}"
+            return f"Next: {best.text}. It narrows the interval of {self.names[0]} {gain}."
         sentences = []
         if self.parts:
             sentences.append(
-                f"Next: {best.text}. It parts {self._groups(prediction)} by "
+                f"Next: {best.text}. It discriminates {self._groups(prediction)} by "
                 f"{prediction.separation:.1f} standard deviations."
             )
         for group in prediction.groups:
             if len(group) > 1:
                 names = " and ".join(self.names[i] for i in group)
                 sentences.append(
-                    f"No experiment here likely parts {names}, whichever is true{self._drowned}."
+                    f"No experiment here likely discriminates {names}, "
+                    f"whichever is true{self._drowned}."
                 )
         for sensor, experiment in self.sensors.items():
             groups = self._groups(experiment.prediction)

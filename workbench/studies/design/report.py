@@ -31,7 +31,7 @@ _TERMS = {
     "Separation": "How far apart two responses stay when each model is fitted again, in standard "
     "deviations: the least of all pairs that are parted, whichever is true.",
     "Chance": "That the right cause, or its group, is then named by the diagnosis.",
-    "Times as sure": "By how much the standard deviation of a size shrinks, when the recording is "
+    "Precision gain": "By how much the standard deviation of a size shrinks, when the recording is "
     "added to those that there are.",
 }
 
@@ -58,7 +58,7 @@ def design_answer(summary: Mapping[str, Any]) -> Answer:
         sure = f" The right one is then named with a chance of {whole_percent(best['chance'])}."
         return Answer(summary["sentence"] + sure * summary["parts"], headline)
     before, after = best["deviation"]["before"], best["deviation"]["after"]
-    headline["times as sure"] = Measure(before / after, "1", "higher")
+    headline["precision gain"] = Measure(before / after, "1", "higher")
     return Answer(summary["sentence"], headline)
 
 
@@ -107,8 +107,8 @@ def write_next_stop_page(proposal: NextStop, summary: Mapping[str, Any], out: Pa
     first, *others = zoomable(figures, summary, out)
     shown = (
         f"What each model would leave unexplained of the response, where {proposal.names[0]} is "
-        "true, in units of the noise of a block's mean. A model that leaves the grey band is told "
-        "apart."
+        "true, in units of the noise of a block's mean. A model that leaves the grey band is "
+        "discriminated."
     )
     parts = [
         Part("shown", "The recording to make next", [shown, first]),
@@ -141,7 +141,7 @@ def _figure(proposal: NextStop, experiment: RankedExperiment, place: int) -> Cas
         )
         band = Curve("raw", np.zeros(time.size), np.full(time.size, _BAND))
         reach = 1.1 * max(_BAND, *(float(np.abs(curve.values).max()) for curve in curves))
-        title = f"{capital(channel.label)} {channel.name}: what is left [noise]"
+        title = f"{capital(channel.label)} {channel.name}: prediction error [noise]"
         panels.append(Panel(title, "noise", -reach, reach, 1.0, (band, *curves)))
     legend = [("measured", "input"), ("raw", f"±{_BAND:g} standard deviations of the noise")]
     legend += list(zip(ESTIMATORS, proposal.names, strict=False))
@@ -160,7 +160,9 @@ def _experiments(summary: Mapping[str, Any]) -> Table:
     single = len(summary["rivals"]) == 1
     columns: list[object] = ["place", "experiment"]
     if single:
-        columns.append(Numbers("times as sure", "standard deviation of its size before over after"))
+        columns.append(
+            Numbers("precision gain", "standard deviation of its size before over after")
+        )
     else:
         columns += [Numbers("separation [standard deviations]"), Numbers("chance [%]")]
     columns.append(Numbers(f"cost [{summary['tried'][0]['cost']['unit']}]"))

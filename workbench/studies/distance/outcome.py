@@ -132,7 +132,7 @@ class Safety:
     Attributes
     ----------
     levels : by decade.
-    nominal : equivalent deceleration of the model as its sheet says it [m/s2].
+    nominal : equivalent deceleration of the model of the data sheet it [m/s2].
     stops : that were drawn; spent : processor time of each [s].
     """
 
@@ -183,7 +183,7 @@ class Distance:
     Attributes
     ----------
     ahead : its distribution.
-    nominal : distance of the model as its sheet says it [m].
+    nominal : distance of the model of the data sheet it [m].
     past : stops that were made.
     safety : None where it was not asked for, or interrupted early.
     plain : the same by plain samples; None where they were not asked for.
@@ -419,7 +419,7 @@ def _draw_distribution(axes: "Axes", result: Distance) -> None:
         at = result.ahead.quantile(share)
         axes.axvline(at, color=LIGHT["2"], linewidth=1.5 if share == 0.5 else 0.8)
         axes.text(at, top, f" {100 * share:g} %", fontsize=7, rotation=90, va="top", ha="right")
-    axes.axvline(result.nominal, color=LIGHT["1"], linestyle="--", label="model as its sheet says")
+    axes.axvline(result.nominal, color=LIGHT["1"], linestyle="--", label="model of the data sheet")
     axes.legend(fontsize=7, frameon=False)
     axes.set(title=result.sentence, xlabel="distance [m]", ylabel="density [1/m]")
     axes.title.set_fontsize(9)

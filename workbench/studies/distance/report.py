@@ -141,10 +141,10 @@ def _distribution(result: Distance) -> CaseFigure:
     return CaseFigure(
         name="The stop that was asked for",
         title=result.sentence.removesuffix("."),
-        finding=f"As its sheet says, the model goes {result.nominal:.1f} m.",
+        finding=f"With data-sheet values, the model goes {result.nominal:.1f} m.",
         time=at,
         window=ahead.band,
-        legend=(("2", _LESS), ("raw", "model as its sheet says")),
+        legend=(("2", _LESS), ("raw", "model of the data sheet")),
         panels=(panel,),
         axis=("distance", "m"),
     )

@@ -73,8 +73,9 @@ class Direction:
             first, second = self.parts.values()
             what = "product" if first * second < 0.0 else "ratio"
             sign = "*" if first * second < 0.0 else "/"
-            return f"{' and '.join(names)}: only their {what} {names[0]}{sign}{names[1]} is told"
-        return f"{', '.join(names)}: they make up for each other ({moves})"
+            return f"{' and '.join(names)}: only their {what} {names[0]}{sign}{names[1]} is "
+            "identifiable"
+        return f"{', '.join(names)}: they compensate each other ({moves})"
 
 
 @dataclass(frozen=True, eq=False)

@@ -44,7 +44,7 @@ __all__ = [
 ]
 
 RATE = 0.01
-"""Alarms per recording of a sound machine, all quantities together: one in a hundred stops."""
+"""Alarms per recording of a healthy machine, all quantities together: one in a hundred stops."""
 STATE = "state.sqlite"
 
 Reader = Callable[[Path, System], Case]

@@ -69,7 +69,7 @@ class MonitoringResult:
                 until = f", {alarms} alarms until {self.names[last.raised]}" * (alarms > 1)
                 sentences.append(
                     f"{track.label} ({_quantity_name(track)}): {self._size(track)} since "
-                    f"{self.names[first.last]}; told at {self.names[first.raised]}{until}"
+                    f"{self.names[first.last]}; reported at {self.names[first.raised]}{until}"
                 )
         return sentences
 

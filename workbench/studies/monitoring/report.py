@@ -35,13 +35,13 @@ _ENTRY = re.compile(r"(.+)\[(\d+)\]")
 _COLUMNS = 4  # of panels
 _EXPLAINED = (
     "One point for each recording, with a band that holds 95 %; the level that it is compared "
-    "with, red after a change that was told. The shaded recordings are where the last change was, "
+    "with, red after a reported change. The shaded recordings are where the last change was, "
     "with 95 %. Each quantity is compared with its own past; one of several that are alike against "
     "the others."
 )
 _TERMS = {
-    "Alarm": "A sum of how far estimates are off their past has passed a threshold, which a sound "
-    "machine passes at the stated rate of false alarms (Page 1954).",
+    "Alarm": "A sum of how far estimates are off their past has passed a threshold, which a "
+    "healthy machine passes at the stated rate of false alarms (Page 1954).",
     "Changed after": "The recording after which the change was most likely (Hinkley 1970).",
     "Against the others": "Less the mean of those that are alike: what moves all of them cancels.",
     "Standard error": "By the noise of the sensors and by the scatter that the past shows.",
@@ -122,7 +122,8 @@ def _figure(track: Track, result: MonitoringResult) -> CaseFigure:
     if track.changes:
         first, last = track.changes[0], track.changes[-1]
         finding = (
-            f"Changed by {_change_text(track, result)} after {result.names[first.last]}, told at "
+            f"Changed by {_change_text(track, result)} after {result.names[first.last]}, reported "
+            "at "
             f"{result.names[first.raised]}."
         )
     return CaseFigure(
@@ -149,7 +150,7 @@ def _levels(track: Track, count: int) -> tuple[Vector, Vector]:
 
 
 def _alarms(alarms: Sequence[Mapping[str, Any]]) -> Table:
-    texts = ("told at", "quantity", "changed after", "with 95 %, after")
+    texts = ("reported at", "quantity", "changed after", "with 95 %, after")
     numbers = map(Numbers, ("change", "95 % from", "to", "of nominal [%]"))
     columns = (*texts, *numbers, "unit")
     rows = []
@@ -167,7 +168,7 @@ def _alarms(alarms: Sequence[Mapping[str, Any]]) -> Table:
             alarm["unit"],
         )
         rows.append(row)
-    caption = "All alarms in their order: the recording at which each was told."
+    caption = "All alarms in their order: the recording at which each was reported."
     return Table("alarm-table", caption, columns, rows)
 
 
@@ -179,7 +180,7 @@ def _quantities(summary: Mapping[str, Any]) -> Table:
         Numbers("standard error"),
         Numbers("trend", "by recording, since the last change"),
         "unit",
-        Numbers("told in", "recordings that tell it"),
+        Numbers("reported in", "recordings that tell it"),
     )
     rows = [
         (

@@ -44,7 +44,7 @@ SHARES = {
 
 
 Separation = TypedDict("Separation", {"from": str, "predicted": float, "shown": float | None})
-"""How far a rival is from the planted effect, as predicted and as recordings show it [sigma]."""
+"""Separation of a candidate from the injected effect, predicted and shown by recordings [sigma]."""
 
 
 class FollowingRecording(TypedDict):
@@ -118,7 +118,7 @@ def follow_proposals(
     if not isinstance(study.rig, FollowingRig):
         raise InputError(
             where=f"{study.system.source}, the plugin's 'virtual_rig'",
-            found="a virtual rig that makes no experiments",
+            found="a simulated rig that makes no experiments",
             expected="one with the method 'following'",
             remedy="write it as workbench.studies.power.virtual_rig.FollowingRig says",
         )

@@ -97,7 +97,7 @@ def thresholds_check(results: Sequence[ThresholdSensitivity], usual: Mapping[str
 
 def sheet_check(rows: Sequence[Mapping[str, Any]]) -> Check:
     """Report verdicts on machines that differ from their sheet, and the number of wrong names."""
-    lines = [f"{'wrong in the sheet':<26} {'verdict':<12} causes"]
+    lines = [f"{'wrong in the data sheet':<26} {'verdict':<12} causes"]
     for row in rows:
         error = " ".join(f"{name}={gain:+g}" for name, gain in row["wrong"].items())
         causes = ", ".join(" or ".join(group) for group in row["causes"])
@@ -216,7 +216,8 @@ def oracle_check(rows: Sequence[EffectLimit]) -> Check:
     )
     headline = {"effects that can be shown": Measure(float(len(shown)), "1", "higher")}
     lines = [
-        f"{'effect':<30}{'one sigma':>18}{f'found by {SURE:.0%} from':>24}  told from the likest"
+        f"{'effect':<30}{'one sigma':>18}{f'found by {SURE:.0%} from':>24}  "
+        "discriminated from the most similar"
     ]
     for row in rows:
         if row.sigma is None or row.found is None:
@@ -262,7 +263,7 @@ def write_power_page(summary: Mapping[str, Any], out: Path) -> Path:
         warnings.append("Interrupted: the same command with --resume goes on from here.")
     if summary["failed"]:
         warnings.append(f"{len(summary['failed'])} diagnoses failed; they count as not right.")
-    machine = f"Recordings are made by {provenance.get('machine', 'a virtual rig')}."
+    machine = f"Recordings are made by {provenance.get('machine', 'a simulated rig')}."
     parts = [
         Part(
             "shown",
@@ -317,7 +318,8 @@ def _effects(summary: Mapping[str, Any]) -> Table:
         for name, effect in effects.items()
     ]
     caption = (
-        "Share of sets in which the planted effect, or a group that it is in, is named first, by "
+        "Fraction of sets in which the injected effect, or a group that it is in, is named first, "
+        "by "
         "its size over the least that is worth a finding; hits and sets in brackets."
     )
     return Table("effect-table", caption, columns, rows)
@@ -339,15 +341,15 @@ def _confusion_rows(summary: Mapping[str, Any]) -> Table:
         counts = (row.get(name, 0) for name in names)
         cells = (number(float(count), ".0f", count / of if of else 0.0) for count in counts)
         rows.append((planted, *cells))
-    caption = f"Sets by what was planted (rows, from size {VISIBLE:g} on) and what was named first."
+    caption = f"Sets by injected effect (rows, from size {VISIBLE:g} on) and what was named first."
     columns = ("planted", *(Numbers(name) for name in names))
     return Table("confusion-table", caption, columns, rows)
 
 
 _TERMS = {
-    "Set": "Recordings of one virtual machine, with tolerances of its own, in which one effect, "
-    "two, one that the catalogue lacks, or none was planted.",
-    "Right": "The effect that was planted is named first, or is in the group of those that the "
+    "Set": "Recordings of one simulated machine, with tolerances of its own, in which one effect, "
+    "two, one that the catalogue lacks, or none was injected.",
+    "Right": "The injected effect is named first, or is in the group of those that the "
     "data cannot tell from the one named.",
     "False alarm": "A cause is named, or something called unexplained, in a set without any.",
     "Hidden": "No recording of this kind can show it; it counts as neither right nor wrong.",
@@ -426,14 +428,14 @@ def _confusion(confusion: Mapping[str, Mapping[str, int]], names: Sequence[str])
         axes.set_xticks(range(len(columns)), columns, rotation=90)
         labels = [f"{name} ({sum(row.values())})" for name, row in confusion.items()]
         axes.set_yticks(range(len(confusion)), labels)
-        axes.set_xlabel("named first; twins under their own name")
-        axes.set_ylabel("planted (sets)")
+        axes.set_xlabel("named first; indistinguishable effects under their own name")
+        axes.set_ylabel("injected (sets)")
         sheet.suptitle(f"Named first [%], from size {VISIBLE:g} on")
     return sheet
 
 
 def _coverage(summary: Mapping[str, Any]) -> "Figure":
-    """Share of the 95 % intervals that hold the truth, by effect."""
+    """Share of the 95 % intervals that contain the truth, by effect."""
     rows = {name: effect["coverage"] for name, effect in summary["effects"].items()}
     rows = {name: row for name, row in rows.items() if row["of"]} | {"all": summary["coverage"]}
     with styled(7.5, 1.2 + 0.22 * len(rows), font_size=8) as sheet:
@@ -447,7 +449,7 @@ def _coverage(summary: Mapping[str, Any]) -> "Figure":
         axes.set_yticks(heights, [f"{name} ({row['of']})" for name, row in rows.items()])
         axes.invert_yaxis()
         axes.set_xlim(0.0, 101.0)
-        axes.set_xlabel("95 % intervals that hold the planted value [%]")
+        axes.set_xlabel("95 % intervals that contain the injected value [%]")
     return sheet
 
 
@@ -467,7 +469,7 @@ def format_power(summary: Mapping[str, Any]) -> str:
         f"both of a pair                      {_text(summary['pairs']['both'])}",
         f"... each of which is found alone    {_text(summary['pairs']['both_seen_alone'])}",
         f'unknown cause is "unexplained"      {_text(summary["unexplained"])}',
-        f"95 % intervals that hold the truth  {_text(summary['coverage'])}",
+        f"95 % intervals that contain the truth  {_text(summary['coverage'])}",
         "",
         header + f"{'coverage':>11}",
         "-" * (len(header) + 11),
@@ -505,7 +507,7 @@ def power_answer(summary: Mapping[str, Any]) -> Answer:
         "right cause and no other": summary["right_alone"],
         "both of a pair": summary["pairs"]["both"],
         "unknown cause is unexplained": summary["unexplained"],
-        "intervals that hold the truth": summary["coverage"],
+        "intervals that contain the truth": summary["coverage"],
     }
     headline = {"false alarms on clean sets": share_measure(summary["false_alarms"], "lower")}
     headline |= {name: share_measure(share, "higher") for name, share in shares.items()}
@@ -523,6 +525,6 @@ def power_answer(summary: Mapping[str, Any]) -> Answer:
         words.append(f"names one where there is none in {share_with_interval(false)}")
     if (hold := summary["coverage"])["of"]:
         words.append(
-            f"its 95 % intervals hold the truth in {share_with_interval(hold, 'intervals')}"
+            f"its 95 % intervals contain the truth in {share_with_interval(hold, 'intervals')}"
         )
     return Answer(f"{capital('; '.join(words) or 'too few sets for a share')}.", headline, details)

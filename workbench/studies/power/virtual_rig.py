@@ -113,7 +113,7 @@ def read_recorded_sets(system: System, folders: Sequence[Path]) -> RecordedSets:
             where=f"{system.source}, --recorded",
             found="no plugin that reads what is wrong in recorded sets",
             expected="a plugin with 'recorded_sets'",
-            remedy="leave --recorded out: sets are made on the virtual rig",
+            remedy="leave --recorded out: sets are made on the simulated rig",
         )
     sets: RecordedSets = read(folders)
     return sets

@@ -81,6 +81,6 @@ def _compile(path: Path) -> "ctypes._NamedFuncPointer":
                 where=str(path),
                 found=run.stderr.strip()[-2000:],
                 expected="C sources of FMI 2.0 that compile with c_loop.c",
-                remedy="build the FMU with 'python -m workbench fmu build'",
+                remedy="build the FMU with 'workbench fmu build'",
             )
         return ctypes.CDLL(str(library)).c_loop

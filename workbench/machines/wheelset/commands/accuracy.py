@@ -26,17 +26,18 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
     accuracy = commands.add_parser(
         "accuracy",
         help=text,
-        description="Judge estimators against the truth (truth.csv) that 'workbench rig' writes "
-        "beside each recording and no estimator reads: force in the contact, a slide, friction of "
-        "the pads. Prints the worst stops (dry discs, wet discs, stops whose truth has a slide); "
-        "writes every stop (accuracy.csv) and the same with the worst (accuracy.json), with what "
-        "95 % bands must be multiplied by to hold 95 % of the truth ('bands').",
+        description="Score estimators against the truth that 'workbench rig' writes beside each "
+        "recording (truth.csv): force in the contact, slides, friction of the pads. "
+        "No estimator reads it. Prints the worst stops (dry discs, wet discs, stops "
+        "with a slide). Writes every stop (accuracy.csv), and with the worst ones "
+        "accuracy.json. There, 'bands' has the factors with which 95 % bands contain "
+        "95 % of the truth.",
         epilog="examples:\n"
-        "  python -m workbench accuracy\n"
-        "  python -m workbench rig --seed 1 --out /tmp/rig\n"
-        "  python -m workbench accuracy /tmp/rig --out /tmp/accuracy\n"
-        "  python -m workbench accuracy /tmp/rig1 /tmp/rig2  # of two seeds, told apart by folder\n"
-        f"  python -m workbench accuracy {own} --estimator ekf --estimator ukf",
+        "  workbench accuracy\n"
+        "  workbench rig --seed 1 --out /tmp/rig\n"
+        "  workbench accuracy /tmp/rig --out /tmp/accuracy\n"
+        "  workbench accuracy /tmp/rig1 /tmp/rig2  # of two seeds, distinguished by folder\n"
+        f"  workbench accuracy {own} --estimator ekf --estimator ukf",
     )
     add_recordings(accuracy, out="results/accuracy")
     accuracy.add_argument(
@@ -44,7 +45,7 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         action="append",
         default=[],
         metavar="NAME",
-        help="judge this one, may be repeated (default: all)",
+        help="estimator to score, may be repeated (default: all)",
     )
     add_system(accuracy)
     add_pdf(accuracy)

@@ -42,15 +42,15 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         help=text,
         description="Make recordings by co-simulation of the multibody model with drive, brake, "
         "wheel-slide protection, pads and sensors. Each case folder also holds truth.csv and "
-        "truth.json, which no estimator reads. The same seed gives the same bytes. Of another "
-        "--system, its own virtual rig makes a set, with truth.json beside it.",
+        "truth.json, which no estimator reads. The same seed gives the same bytes. With another "
+        "--system, its own simulated rig makes a set, with truth.json beside it.",
         epilog="examples:\n"
-        "  python -m workbench rig --out /tmp/rig\n"
-        "  python -m workbench rig --list\n"
-        "  python -m workbench rig --case 15_locked_wheel --out /tmp/rig\n"
-        "  python -m workbench rig --pads constant --effect fx_gain=0.015 --seed 7 --out /tmp/rig\n"
-        "  python -m workbench rig --next results/next --out /tmp/rig\n"
-        "  python -m workbench rig --system train --effect 'pads[3]=0.15' --out /tmp/stops",
+        "  workbench rig --out /tmp/rig\n"
+        "  workbench rig --list\n"
+        "  workbench rig --case 15_locked_wheel --out /tmp/rig\n"
+        "  workbench rig --pads constant --effect fx_gain=0.015 --seed 7 --out /tmp/rig\n"
+        "  workbench rig --next results/next --out /tmp/rig\n"
+        "  workbench rig --system train --effect 'pads[3]=0.15' --out /tmp/stops",
     )
     add_out(rig, "results/rig")
     rig.add_argument("--list", action="store_true", help="list scenarios and effects, and end")
@@ -73,7 +73,7 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         action="append",
         default=[],
         metavar="NAME=VALUE",
-        help="plant an effect, or change one of the pads; may be repeated",
+        help="inject an effect, or change one of the pads; may be repeated",
     )
     rig.add_argument(
         "--pads",
