@@ -1,8 +1,10 @@
 """The documentation is true: its examples run, its site builds without network, its schemas fit."""
 
+import ast
 import json
 import re
 import tomllib
+from collections.abc import Iterator
 from pathlib import Path
 
 import jsonschema
@@ -296,6 +298,26 @@ def test_help_and_the_reference_of_keys_are_read_as_pages_are():
         assert home_made(text) == [], where
         long = [sentence for sentence in sentences(text) if words(sentence) > LONGEST]
         assert long == [], where
+
+
+def refusals(path: Path) -> Iterator[tuple[int, str]]:
+    """Line and text of each part of an InputError that a module raises; values are one word."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "InputError":
+            for part in (part for keyword in node.keywords for part in ast.walk(keyword.value)):
+                if isinstance(part, ast.JoinedStr):
+                    values = (getattr(value, "value", "X") for value in part.values)
+                    yield part.lineno, "".join(v if isinstance(v, str) else "X" for v in values)
+                elif isinstance(part, ast.Constant) and isinstance(part.value, str):
+                    yield part.lineno, part.value
+
+
+def test_refusals_are_short_and_in_words_of_the_glossary():
+    for path in sorted((ROOT / "workbench").rglob("*.py")):
+        for line, text in refusals(path):
+            where = f"{path.relative_to(ROOT)}, line {line}"
+            assert home_made(text) == [], where
+            assert max(map(words, sentences(text)), default=0) <= LONGEST, where
 
 
 def prose_of_keys(table: type) -> str:

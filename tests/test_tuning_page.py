@@ -191,7 +191,7 @@ def test_every_gain_is_shown_with_its_numbers_and_unit(page, summary):
     assert list(table.index) == list(summary["gains"])
     for name, gain in summary["gains"].items():
         row, effect = table.loc[name], summary["sensitivity"][name]
-        assert (row["tuned"], row["reasoned"]) == (gain["value"], gain["reasoned"])
+        assert (row["tuned"], row["model-based"]) == (gain["value"], gain["reasoned"])
         assert row["searched from, to"] == f"{gain['lower']:.4g}, {gain['upper']:.4g}"
         low, high = gain["as_good"]
         assert row["as good, from, to"] == f"{low:.4g}, {high:.4g}"

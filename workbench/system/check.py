@@ -99,8 +99,8 @@ def _check_corrections(system: System, model: Description) -> None:
             raise InputError(
                 where=f"{system.source}, [estimated.{quantity.name}] correction",
                 found=f"'{name}', which is {taken.get(name, own)}",
-                expected="an input of the model that only this correction sets, 0 by default, and "
-                f"that is added to {quantity.name}; or such a parameter that is tunable",
+                expected="an input or tunable parameter of the model, 0 by default, that only this "
+                f"correction sets and that is added to {quantity.name}",
                 remedy=f"give the model such an input, say 'd{quantity.name}', and name it",
             )
         taken[name] = "the correction of another quantity"

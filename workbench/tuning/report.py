@@ -296,7 +296,7 @@ def _gains(summary: Mapping[str, Any], folder: Path) -> list[Block]:
         if effect is not None:
             cells += [_change(effect[key]) for key in ("less", "more", "without")]
         rows.append((name, *cells, Cell(", ".join(remarks), warning=gain["at_bound"])))
-    columns: list[object] = ["gain", "what it does", Numbers("tuned"), Numbers("reasoned")]
+    columns: list[object] = ["gain", "what it does", Numbers("tuned"), Numbers("model-based")]
     columns += ["searched from, to", "as good, from, to", "unit"]
     if known:
         columns += [Numbers("z, less"), Numbers("z, more"), Numbers("z, without")]
@@ -468,7 +468,7 @@ def draw_cases(cases: Mapping[str, Mapping[str, float]], path: Path) -> None:
     figure = Figure(figsize=(8, 1.2 + 0.32 * len(names)), layout="constrained")
     axes = figure.subplots()
     rows = np.arange(len(names))
-    axes.barh(rows - 0.2, before, 0.4, label="reasoned", color="0.7")
+    axes.barh(rows - 0.2, before, 0.4, label="model-based", color="0.7")
     axes.barh(rows + 0.2, after, 0.4, label="tuned")
     axes.axvline(max(after), color="0.3", linestyle=":", label="z, tuned")
     axes.set_yticks(rows, names)

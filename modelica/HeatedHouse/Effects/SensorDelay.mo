@@ -1,5 +1,5 @@
 within HeatedHouse.Effects;
-model SensorDelay "readings whose clock is late or early"
+model SensorDelay "readings with a time offset"
   extends Common.Signals.Delay(window=60.0, delay(min=-300.0, max=300.0));
   annotation (
     __Workbench(effect(

@@ -1,5 +1,5 @@
 within TrainRig.Effects;
-model WheelRadius "a wheel radius that is not what the sheet says"
+model WheelRadius "a wheel radius that differs from the data sheet"
   extends Slots.PartialAxles;
   parameter Real deviation[n](each unit="m", each min=-0.02, each max=0.02) = zeros(n) "True minus sheet";
 equation

@@ -133,8 +133,8 @@ def refuse_too_few(cases: Sequence[Case], system: System, held_out: int = 0) -> 
     compare = system.comparison
     if not cases or (len(cases) == 1 and (compare.tolerances or compare.begins is not None)):
         why = (
-            "what [diagnosis.tolerances] says to differ from recording to recording "
-            f"({', '.join(compare.tolerances)}) look the same as an effect in one"
+            f"differences within [diagnosis.tolerances] ({', '.join(compare.tolerances)}) look the "
+            "same as an effect in one"
             if compare.tolerances
             else "an effect is scored on those it was not fitted to"
         )

@@ -434,8 +434,8 @@ class _Solver:
                 found=f"a nonlinear loop: equations that cannot be solved for {', '.join(names)}"
                 + more,
                 expected="equations that are linear in what they are solved for",
-                remedy="solve them by hand, make one of these variables a state that follows "
-                "quickly, or export the model as an FMU from a tool that iterates",
+                remedy="solve them by hand, make one of these variables a fast state, or export "
+                "the model as an FMU from a tool that iterates",
             )
         right_hand = -ca.substitute(residual, unknowns, ca.SX.zeros(unknowns.shape))
         rates = {self.rates[name].name() for name in self.states}

@@ -346,8 +346,8 @@ class DisturbanceObserver(Estimator):
                 where=f"{fmu.place}, {cls.name}",
                 found=f"{hidden}, which the outputs do not show, or not apart, at the design point",
                 expected="a model whose outputs show all that is estimated",
-                remedy="choose a [points.design] where each of them moves an output in its own "
-                "way, leave out what nothing shows, or estimate with a filter: --estimator ekf",
+                remedy="choose a [points.design] where each moves an output in its own way, leave "
+                "out quantities that no output shows, or use --estimator ekf",
             ) from None
         gain = process[:, None] * (covariance @ C.T) / measurement
         L = np.hstack([gain, np.zeros_like(gain)])
