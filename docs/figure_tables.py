@@ -20,7 +20,7 @@ ASKED = {
     "right cause first, above noise": "95 %",
     "both of a pair": "80 %",
     "unknown cause is unexplained": "80 %",
-    "intervals that hold the truth": "90 %",
+    "intervals that contain the truth": "90 %",
 }
 # What the rig plants in the stops of `cases` (`ORDINARY_PADS`), as a laboratory says it.
 PLANTED = {
@@ -122,7 +122,7 @@ def verdict(summary: Summary) -> str:
 
 def causes(summary: Summary) -> Table:
     """Causes in the order in which they were named, with their sizes."""
-    rows: Table = [["cause", "planted", "estimate, 95 % interval"]]
+    rows: Table = [["effect", "injected", "estimate, 95 % interval"]]
     for cause in summary["causes"]:
         rows.append([cause["effect"], PLANTED.get(cause["effect"], "nothing"), sizes(cause)])
     return rows
@@ -136,7 +136,7 @@ def labelled(sets: Mapping[str, str], *summaries: Summary) -> Table:
     sets : what was planted, by name.
     """
     error = "error in cross-validation, times the noise"
-    rows: Table = [["recordings", "what is said", "planted", "estimate, 95 % interval", error]]
+    rows: Table = [["recordings", "verdict", "injected", "estimate, 95 % interval", error]]
     for (name, planted), summary in zip(sets.items(), summaries, strict=True):
         found, gain = summary["causes"], summary["gain"]
         change = f"{gain['before']:.3g} → {gain['after']:.2g}" if gain else ""
@@ -182,7 +182,7 @@ def shares(summary: Summary) -> Table:
 
 def followed(summary: Summary) -> Table:
     """What two stops leave together, the third one that is proposed, and what all three say."""
-    header = ["planted, by the least size that matters", "said of two stops", "the best one"]
+    header = ["injected, by the least size that matters", "verdict on two stops", "the best one"]
     rows: Table = [[*header, "said of three", "drawn ones that part them"]]
     alike: dict[tuple[str, str], list[tuple[str, bool]]] = {}
     for one in summary["sets"]:
@@ -202,10 +202,12 @@ def followed(summary: Summary) -> Table:
         planted = ", ".join(name for name, _ in sets)
         with_it = f"; with a sensor of {sensor}" * bool(sensor)
         said = f"its own cause {sum(parts for _, parts in sets)} of {len(sets)} times"
-        rows.append([planted, group, f"none parts it{with_it}", said if sensor else "", ""])
+        rows.append([planted, group, f"none discriminates{with_it}", said if sensor else "", ""])
     names = ("foreseen", "never", "sensed", "answered", "drawn")
     seen, never, sensed, answered, drawn = (_of(summary[name]) for name in names)
-    ends = f"parts: {seen}; where none was foreseen to, {never}, with a named sensor {sensed}"
+    ends = (
+        f"discriminates: {seen}; where none was foreseen to, {never}, with a named sensor {sensed}"
+    )
     return [*rows, ["all", "", "", f"{ends}; together {answered}", drawn]]
 
 
@@ -215,7 +217,7 @@ def _of(summary: Summary) -> str:
 
 def laws(summary: Summary) -> Table:
     """What is said of a cause that nothing else explains, and which law is proposed for it."""
-    rows: Table = [["planted", "without a law", "proposed", "where the cause acts"]]
+    rows: Table = [["injected", "without a law", "proposed", "where the effect acts"]]
     rows[0] = [*rows[0], "error in cross-validation, times the noise", "with the true form"]
     rows[0] = [*rows[0], "off what the cause does"]
     for one in summary["sets"]:
@@ -336,7 +338,7 @@ def timed_horizon(summary: Summary) -> Table:
 
 def said_of_errors(summary: Summary) -> Table:
     """Verdict on sets of a rig that differs from its sheet."""
-    rows: Table = [["wrong in the sheet", "what is said"]]
+    rows: Table = [["wrong in the data sheet", "verdict"]]
     for one in summary["sets"]:
         wrong = ", ".join(
             f"{name.replace('_', ' ')} {100.0 * size:+.3g} %" for name, size in one["wrong"].items()

@@ -92,7 +92,7 @@ def predicted(*summaries: Summary) -> Table:
 
 def monitored(history: Summary, cause: Summary, healthy: Summary) -> Table:
     """What is told of two machines over their recordings."""
-    rows: Table = [["recordings", "planted", "used", "what is told"]]
+    rows: Table = [["recordings", "injected", "used", "reported"]]
     for name, planted, one in (("history", LOSS, history), ("healthy", "nothing", healthy)):
         used, refused = one["recordings"], len(one["refused"])
         told = "; ".join(one["sentences"]) or "no alarms"
@@ -109,7 +109,7 @@ def _share(summary: Summary) -> str:
 
 def named(summary: Summary) -> Table:
     """How often faults of the virtual train are named, all places of one kind together."""
-    rows: Table = [["planted", "right, with its place or group (95 %)", "said of the others"]]
+    rows: Table = [["injected", "right, with its place or group (95 %)", "verdict on the others"]]
     effects, wrong = sorted(summary["effects"].items()), 0
     for kind, some in groupby(effects, lambda item: item[0].partition("[")[0]):
         places = dict(some)
@@ -127,8 +127,8 @@ def named(summary: Summary) -> Table:
     sound = summary["false_alarms"]
     rows += [
         ["all faults", _share(summary["right_first"]), f"{wrong} a wrong name"],
-        ["sound trains: false alarms", _share(sound), ""],
-        ["95 % intervals that hold what was planted", _share(summary["coverage"]), ""],
+        ["healthy trains: false alarms", _share(sound), ""],
+        ["95 % intervals that contain the injected size", _share(summary["coverage"]), ""],
     ]
     return rows
 

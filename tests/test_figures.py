@@ -101,11 +101,11 @@ def test_the_next_stop_stands_beside_what_was_said_before_it_and_after():
     both = "FxGain or DriveTorqueGain"
     assert len(header) == len(last)
     assert first == ["FxGain x 8", both, "a step", "FxGain", "1 of 2"]
-    assert second == ["FxGain x 8", "DriveTorqueGain or FxGain", "none parts it", "", ""]
-    named = "none parts it; with a sensor of the arms"
+    assert second == ["FxGain x 8", "DriveTorqueGain or FxGain", "none discriminates", "", ""]
+    named = "none discriminates; with a sensor of the arms"
     assert third[0] == "FxGain x 8, FxGain x 8"
     assert third[2:] == [named, "its own cause 1 of 2 times", ""]
-    ends = "parts: 1 of 1; where none was foreseen to, 0 of 3, with a named sensor 1 of 2"
+    ends = "discriminates: 1 of 1; where none was foreseen to, 0 of 3, with a named sensor 1 of 2"
     assert last[3:] == [f"{ends}; together 2 of 4", "1 of 6"]
 
 

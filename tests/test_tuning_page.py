@@ -286,12 +286,12 @@ def test_folds_are_shown_and_lost_ones_are_bad_news(page, summary, changed, tmp_
         assert row["z, model-based"] == fold["reasoned"]
         assert row["z, tuned without them"] == fold["tuned"]
         assert row["z of the cases tuned on"] == fold["z"]
-        assert row["error of Fx, reasoned"] == fold["error_reasoned"]
+        assert row["error of Fx, model-based"] == fold["error_reasoned"]
         assert row["error of Fx, tuned without them"] == fold["error"]
     better, lost = changed["folds"]
     better["tuned"], lost["tuned"] = 0.9 * better["reasoned"], float("inf")
     one_lost = written(changed, tmp_path)
-    assert "not better than the reasoned ones in 1 of 2 folds" in news(one_lost)
+    assert "not better than the model-based ones in 1 of 2 folds" in news(one_lost)
     case = changed["cases"][lost["worst"]]
     case["z_k"] = 0.9 * case["z_k_reasoned"]
     assert "asks of the gains what no case asks" in news(written(changed, tmp_path))
@@ -403,7 +403,7 @@ def test_other_estimators_are_compared_and_better_ones_are_bad_news(page, change
     }
     beside = written(changed, tmp_path)
     table = data(beside, "beside-table")
-    order = ["extended Kalman filter", f"{name}, tuned", f"{name}, reasoned", "direct inversion"]
+    order = ["extended Kalman filter", f"{name}, tuned", f"{name}, model-based", "direct inversion"]
     assert list(table.index) == order
     assert list(table["z"]) == [0.5 * z, z, changed["z_reasoned"], 9.0 * z]
     assert table.at["direct inversion", "worst case"] == HOSTILE

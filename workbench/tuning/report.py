@@ -250,7 +250,7 @@ def _comparison(summary: Mapping[str, Any]) -> Table | None:
     name, cases = summary["label"], summary["cases"]
     rows = [
         (f"{name}, {how}", summary[z], max(cases, key=lambda case: cases[case][z_k]))
-        for how, z, z_k in (("tuned", "z", "z_k"), ("reasoned", "z_reasoned", "z_k_reasoned"))
+        for how, z, z_k in (("tuned", "z", "z_k"), ("model-based", "z_reasoned", "z_k_reasoned"))
     ]
     rows += [(other["label"], other["z"], other["worst"]) for other in summary["beside"].values()]
     rows.sort(key=lambda row: np.inf if row[1] is None else row[1])
@@ -487,9 +487,9 @@ def format_tuned(summary: Mapping[str, Any]) -> str:
     """Table for the terminal: cases, and what is to be said of gains and folds."""
     cases = summary["cases"]
     width = max(map(len, cases))
-    lines = [f"{'case':<{width}} {'reasoned':>9} {'tuned':>9}  z_k, worst first"]
+    lines = [f"{'case':<{width}} {'model-based':>11} {'tuned':>9}  z_k, worst first"]
     for name, case in sorted(cases.items(), key=lambda item: -item[1]["z_k"]):
-        lines.append(f"{name:<{width}} {case['z_k_reasoned']:>9.4f} {case['z_k']:>9.4f}")
+        lines.append(f"{name:<{width}} {case['z_k_reasoned']:>11.4f} {case['z_k']:>9.4f}")
     work = summary["work"]
     lines.append(
         f"z = {summary['z']:.5f} after {work['generations']} generations, {work['candidates']} "
