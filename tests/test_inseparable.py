@@ -52,7 +52,7 @@ def test_a_mass_and_an_efficiency_that_act_as_their_quotient_are_guesses(tmp_pat
     assert result.inseparable["m", "e"] > 0.999
     assert not result.runs["ekf"].claimed["m"].any()
     assert not result.runs["ekf"].claimed["e"].any()
-    said = "m and e cannot be told apart by this recording"
+    said = "m and e are indistinguishable in this recording"
     assert said in format_table(result.system, [result]).splitlines()[1]
     assert result.to_dict()["doubts"][-1].startswith(said)
 
@@ -77,7 +77,7 @@ def test_observability_names_what_cannot_be_told_apart(tmp_path, capsys):
     ran(tmp_path / "pair", "m", "e")
     options = ["--system", str(tmp_path / "pair"), "--out", str(tmp_path / "out"), "--workers", "1"]
     assert main(["observability", str(tmp_path / "pair" / "run.csv"), *options]) == 0
-    said = "m and e cannot be told apart by this recording"
+    said = "m and e are indistinguishable in this recording"
     assert said in capsys.readouterr().out.splitlines()[0]
     summary = json.loads((tmp_path / "out" / "observability.json").read_text())
     assert summary["answer"]["sentence"].startswith(said)
