@@ -26,7 +26,7 @@ PAGES.append(ROOT / "tutorials" / "README.md")
 # Home-made words, and the term of docs/glossary.md in the place of each.
 BANNED = {
     r"\btold\b": "report",
-    r"\bplant(ed|ing)\b|\bplants? (an?|the|what|its)\b": "injected effect",
+    r"\bplant(ed|ing)\b|\bplants? (an?|the|what|its)\b|\bto plant\b": "injected effect",
     r"\bvirtual (rig|train|stop)s?\b": "simulated rig",
     r"\bsound (machine|train|set|rig|recording|axle|one)s?\b": "healthy machine",
     r"\brecorders?\b": "logger, log file",

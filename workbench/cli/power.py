@@ -93,8 +93,8 @@ def _add_sets(parser: argparse.ArgumentParser) -> None:
         type=Path,
         default=[],
         metavar="FOLDER",
-        help="sets that were recorded, each with a truth.json of what is wrong in them, in place "
-        "of sets of the simulated rig",
+        help="recorded sets, each with a truth.json of its faults, in place of sets of the "
+        "simulated rig",
     )
     parser.add_argument(
         "--case",
@@ -113,7 +113,7 @@ def _add_checks(parser: argparse.ArgumentParser) -> None:
         (
             "--thresholds",
             "halve and double each threshold of the diagnosis on the same recordings, "
-            "and tell what changes (into OUT/thresholds)",
+            "and report what changes (into OUT/thresholds)",
         ),
         (
             "--leave-out-effect",
@@ -137,8 +137,8 @@ def _add_checks(parser: argparse.ArgumentParser) -> None:
         ),
         (
             "--sheet-error",
-            "make recordings of a rig that differs from its data sheet in --repeats "
-            "sets of each error, and tell what is said (into OUT/sheet_error)",
+            "make recordings of a rig that differs from its data sheet in --repeats sets of each "
+            "error, and report the verdicts (into OUT/sheet_error)",
         ),
     ):
         checks.add_argument(
