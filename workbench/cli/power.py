@@ -64,7 +64,7 @@ def add(commands: arguments.Commands, text: str) -> argparse.ArgumentParser:
 
 def _add_sets(parser: argparse.ArgumentParser) -> None:
     """Add which sets of recordings are made."""
-    arguments.add_effects(parser, "plant, also those that the catalogue lacks, by the rig's names")
+    arguments.add_effects(parser, "inject, also those that the catalogue lacks, by the rig's names")
     for option, default, text in (
         ("--clean", 50, "sets without an effect"),
         ("--repeats", 3, "sets of each effect at each size"),
