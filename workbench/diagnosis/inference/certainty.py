@@ -75,11 +75,10 @@ class Certainty:
         >>> Certainty(*nothing, behind=(0.1, 812.0, None), tolerance=1.0).sentence
         'Multi-start: 1 of 3 fits reached the same optimum, none lower.'
         >>> Certainty(*nothing, behind=(0.1, -40.0), tolerance=1.0).sentence
-        'Multi-start: 1 of 2 fits reached the same optimum, and one lower by 40: sizes may be '
-        'others.'
+        'Multi-start: 1 of 2 fits reached the same optimum, one lower by 40: sizes may be others.'
         """
         all_the_same = self.same == len(self.behind)
-        lower = f", and one lower by {self.lower:.0f}: sizes may be others"
+        lower = f", one lower by {self.lower:.0f}: sizes may be others"
         more = "" if all_the_same else lower if self.lower else ", none lower"
         return (
             f"Multi-start: {self.same} of {len(self.behind)} fits reached the same optimum{more}."
