@@ -26,7 +26,7 @@ def names(system) -> set[str]:
         *system.signals,
         *system.reported,
         *(signal.reading for signal in system.signals.values()),
-        *(one.name for one in (*system.derived, *system.estimated, *system.conditions)),
+        *(key.name for key in (*system.derived, *system.estimated, *system.conditions)),
         *system.corrections,
         *system.comparison.tolerances,
         *(name for condition in system.conditions for name in condition.parameters),

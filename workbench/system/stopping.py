@@ -174,7 +174,9 @@ class Stopping:
         otherwise="never",
     )
     nominal: Nominal | None = key("how standards correct measured distances", absent=None)
-    rating: Rating | None = key("brake percentage that corresponds to a distance", absent=None)
+    rating: Rating | None = key(
+        "percentage of a standard that corresponds to a distance", absent=None
+    )
 
     def check(self, table: Table, scope: Scope) -> None:
         """Refuse stops that are not asked for a speed."""
