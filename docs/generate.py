@@ -250,7 +250,7 @@ def catalogue(systems: list[System]) -> str:
         every = read_effects(library, system.models[OBSERVER].name)
         effects = [one for one in every if one.place <= 1]  # one class in all its places
         text += ["", f"## {system.name}", "", f"{system.title}.", ""]
-        text += ["| effect | what it is | size | matters from | what tells it from its twins |"]
+        text += ["| effect | what it is | size | matters from | experiment that discriminates it |"]
         text += ["| --- | --- | --- | --- | --- |"]
         for effect in effects:
             unit = _unit(library, effect)
@@ -371,7 +371,7 @@ def case_files(systems: list[System]) -> str:
 
 
 _CASE = """
-A recording is a folder with this file and a CSV, or a recorder's own file; see [Your
+A recording is a folder with this file and a CSV, or a log file; see [Your
 recordings](recordings.md) and [Recordings as they are](import.md). What is
 asked for beyond `title` and `[measurement]` follows from the conditions of the
 [system](system-file.md#conditions). Editors that know JSON Schema for TOML (such as Even Better

@@ -54,7 +54,7 @@ def read_cases(
     columns: Mapping[str, str] | None = None,
     sample_rate: str | None = None,
 ) -> list[Case]:
-    """Read case folders, folders of case folders, and files of recorders.
+    """Read case folders, folders of case folders, and log files.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ def prepare_cases(which: str, source: str | Path, out: str | Path) -> tuple[list
 
     Returns
     -------
-    fitted, held_out : recordings, those to judge a fit by apart.
+    fitted, held_out : recordings; those that score a fit come separately.
 
     Raises
     ------
@@ -198,7 +198,7 @@ def tune(
     Parameters
     ----------
     population : candidates per gain.
-    judge_by : estimator to judge by where no sensor does, "smoother"; by what is measured if None.
+    judge_by : estimator to score by if no sensor does, "smoother"; by measured signals if None.
     workers : processes, one per processor unless another number is given.
     report : takes a line on each generation.
 
@@ -312,7 +312,7 @@ def monitor(
     history : folder that holds a folder for each recording of one machine.
     out : folder of the state, from which the next call goes on; a temporary one unless another is
         given.
-    false_alarms : alarms by recording that a sound machine may raise, all quantities together.
+    false_alarms : false alarms per recording of a healthy machine, all quantities together.
     workers : processes, one per processor unless another number is given.
 
     Raises

@@ -45,7 +45,7 @@ def _printable(character: str) -> str:
 
 
 class FMUError(RuntimeError):
-    """A call into an FMU failed; the message holds what the FMU logged."""
+    """A call into an FMU failed; the message includes the log of the FMU."""
 
 
 class WorkerError(RuntimeError):

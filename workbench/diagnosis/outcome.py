@@ -68,7 +68,7 @@ class Outcome:
         (value, unit).
     deviations : by recording and parameter, in standard deviations of its tolerance.
     set_aside : number of samples by recording and reason.
-    observers : by observer and recording, error of the judged signal (rms over mean [1]) with the
+    observers : by observer and recording, error of the scored signal (rms over mean [1]) with the
         model before and after; empty where nothing was extended or it was not measured, and for
         effects that turn with a shaft, whose phase an observer does not know.
     errors : of the nominal and of the last model, by recording and channel.

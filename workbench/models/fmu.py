@@ -505,7 +505,7 @@ class FMU:
     start_time : at which the model starts [s], see `begin_at`.
     event_signs : (z,) whether event indicators were above 0 at the last start.
     time : (1,) that the FMU was set to last [s].
-    next_event : (1,) time of the next time event [s], told at the last start; infinite for none.
+    next_event : (1,) time of the next time event [s], of the last start; infinite for none.
 
     Raises
     ------

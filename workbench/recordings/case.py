@@ -146,7 +146,7 @@ class Case:
     date : when it was recorded, ISO 8601 in UTC where it says its zone; empty: unknown.
     counts_from : s, time before which samples only lead a simulation to those that are compared.
     model_time : s, of the model at the first sample; None: the start time of its FMU.
-    doubts : what is unlikely in the recording, in words.
+    doubts : sentences on what is unlikely in the recording.
     """
 
     name: str
@@ -248,7 +248,7 @@ def sign(case: Case, system: System) -> float:
 def read_cases(
     paths: Sequence[Path], system: System, options: RecordingOptions = _NOTHING
 ) -> list[Case]:
-    """Read case folders, folders of case folders, and files of recorders.
+    """Read case folders, folders of case folders, and log files.
 
     A folder that holds `case.toml` is a case. Of any other folder the sub-folders are read,
     sorted by name: those that hold `case.toml`, and those named `NN_...`, which ought to. A file is

@@ -64,7 +64,7 @@ class TuningResult:
     Attributes
     ----------
     search : the best gains, and how they were found.
-    before : (k,) z_k with the reasoned gains.
+    before : (k,) z_k with the model-based gains.
     sensitivities : of each gain; empty after an interruption, and so are the next two.
     beside : (k,) z_k of methods that were not tuned, by name.
     folds : those that were finished.

@@ -40,26 +40,26 @@ class Thresholds:
     ----------
     significant : standard deviations of a size; the largest of all candidates' by chance.
     fall : of chi-squared on held-out recordings; likewise, its square.
-    immaterial : standard deviations from zero to a size that matters, of a companion too small to;
-        of one effect alone, what is significant.
+    immaterial : standard deviations from zero to a size that matters, of a second effect too small
+        to; of one effect alone, what is significant.
     tied : chi-squared by which fits are equals: odds that chance turns at the rate.
     wrong : variance of errors that last, over noise, from which on much is wrong. Chance makes 1.5
         of a hundred means, and 4.3 of five; laws that differ a little in form may make as much.
-    form : chi-squared that a rival may owe to its form, since laws are simplified.
+    form : chi-squared that a candidate may owe to its form, since laws are simplified.
     form_share : the same, as a share of what the effect explains: laws agree to some 3 %, squared.
-    twin : one less cosine of signatures within which an effect is fitted in full, to be told apart.
+    twin : one less cosine of signatures within which an effect is fitted in full.
         The scatter of a candidate is then 5 times that alone; it costs time only.
-    near : share of the best score from which on an effect is a rival: scores are linearised, and
+    near : share of the best score from which on an effect is a candidate: scores are linear, and
         laws bend.
     behind : times the chi-squared of the best from which on a fit that has begun is not finished.
     idle : share of the explainable below which an effect beside others is no cause, but bends to
         what their forms leave.
-    left : share of lasting errors that a right cause may leave, by its form; wrong ones leave more.
+    left : share of systematic errors that a right effect leaves by its form; wrong ones leave more.
     excess : of the mean square of white errors over 1, which an estimate of noise may leave: a
         tenth of the deviation is a fifth of it, and block means keep some ringing.
     worse : of deviance, which no step of a fit is worth: a thirtieth of what is significant.
     furthest : standard deviations that no tolerance goes beyond; chance makes 4 of thirty.
-    furthest_level : the same of levels, which differ by nature and by more; beyond 3 a friction may
+    furthest_level : the same of levels, which differ by more; beyond 3 a friction may
         be none.
     most : causes; more than that is not a diagnosis.
     rivals : effects that are fitted in full before one is named; it costs time only.
@@ -119,8 +119,8 @@ def thresholds(candidates: int, rate: float = RATE, left: float = Thresholds.lef
     -----
     A size is normal about zero. Fitted, its square is by what chi-squared falls, of one degree of
     freedom (S. S. Wilks, 1938, Ann. Math. Stat. 9, 60-62); on held-out recordings it falls by less.
-    An immaterial companion exceeds what matters at the rate. Of two fits with as many unknowns, a
-    difference D of chi-squared stands for odds of exp(D/2).
+    An immaterial second effect exceeds what matters at the rate. Of two fits with as many unknowns,
+    a difference D of chi-squared stands for odds of exp(D/2).
 
     >>> usual = thresholds(28)
     >>> round(usual.significant, 2), round(usual.fall, 1), round(usual.tied, 1)

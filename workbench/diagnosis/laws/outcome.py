@@ -114,7 +114,7 @@ class Proposal:
         )
 
     def said(self, cause: Cause) -> str:
-        """A law in words, with those that are as good."""
+        """A law in a sentence, with those that are as good."""
         alike = [
             f"{form.law.short}, {form.form.text}"
             for name, form in self.forms.items()

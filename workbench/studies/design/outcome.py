@@ -108,12 +108,12 @@ class NextStop:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The rivals, by their causes."""
+        """The candidates, by their effects."""
         return tuple(" with ".join(model.effects) for model in self.rivals.models)
 
     @property
     def parts(self) -> bool:
-        """Whether the best one likely parts any of the rivals."""
+        """Whether the best one likely discriminates any of the candidates."""
         return len(self.tried[0].prediction.groups) > 1
 
     @property
@@ -185,7 +185,7 @@ class NextStop:
         }
 
     def plot(self) -> "Figure":
-        """Figure of the best experiments, and of what each rival leaves of the first in them."""
+        """Figure of the best experiments, and of what each candidate leaves of the first."""
         from workbench.studies.design.report import responses_figure
 
         return responses_figure(self)

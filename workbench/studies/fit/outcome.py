@@ -186,7 +186,7 @@ class FitOutcome:
         return pd.DataFrame([{"label": value.label, **vars(value)} for value in self.values])
 
     def correlations(self) -> list[tuple[str, str, float]]:
-        """Pairs of identified values whose errors go together, strongest first.
+        """Pairs of identified values with correlated errors, strongest first.
 
         From 0.9 on: alone, each would be known more than twice as well, 1/sqrt(1 - 0.9^2).
         """

@@ -31,7 +31,7 @@ class MonitoringResult:
     names, dates : (n,) of the recordings that count.
     dated : whether their order is that of dates; else it is that of names.
     tracks : of the watched quantities.
-    threshold : of the sums that raise alarms, for `rate` alarms per recording of a sound machine.
+    threshold : of the sums that raise alarms, for `rate` alarms per recording of a healthy machine.
     work : (n, w) of friction [J], by the system's `work`.
     counted : (n,) time that the estimates rest on [s].
     refused : why a recording is not used, by name.
@@ -54,7 +54,7 @@ class MonitoringResult:
 
     @property
     def changes(self) -> list[tuple[Track, LevelChange]]:
-        """All that were told, in their order."""
+        """All that were reported, in their order."""
         changes = [(track, change) for track in self.tracks for change in track.changes]
         return sorted(changes, key=lambda entry: entry[1].raised)
 
