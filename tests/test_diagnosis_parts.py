@@ -547,7 +547,7 @@ def test_derivatives_of_the_errors_are_those_of_central_differences():
     with simulating(SimulatorSetup(MINIMAL, SYSTEM, (samples,))) as simulator:
         with FMU(MINIMAL) as fmu:
             nominal = {name: fmu.defaults[name] for name in steps} | point
-        slopes = simulator.derivatives(0, nominal, [Variation((name,)) for name in steps])
+        slopes, _ = simulator.derivatives(0, nominal, [Variation((name,)) for name in steps])
         slopes = np.column_stack([simulator.at(0, nominal).jacobian, slopes])
         for j, (name, step) in enumerate({delay("Fx"): 1e-3, **steps}.items()):
             sides = [
@@ -618,8 +618,8 @@ def test_states_of_effects_that_are_absent_change_no_derivative(everything):
     samples = ready(simulated(everything, present))
     with simulating(SimulatorSetup(everything, SYSTEM, (samples,))) as simulator:
         values = {delay("Fx"): 0.002, **present}
-        every = simulator.derivatives(0, values, columns)
-        less = simulator.derivatives(0, values, columns, None, sizes_by_component(EFFECTS))
+        every, _ = simulator.derivatives(0, values, columns)
+        less, _ = simulator.derivatives(0, values, columns, None, sizes_by_component(EFFECTS))
         # What the others add to the motion is zero, but for rounding; the fade is there.
         apart = np.abs(less - every).max(axis=0)
         assert (apart < 1e-10 * np.abs(every).max(axis=0)).all()

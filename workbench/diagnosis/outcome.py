@@ -12,6 +12,7 @@ import pandas as pd
 
 from workbench.arrays import Matrix, Vector
 from workbench.diagnosis.data.counting import FAULTY, MISSING
+from workbench.diagnosis.effects.extension import variables
 from workbench.diagnosis.inference.certainty import Certainty
 from workbench.diagnosis.inference.residuals import Dependence, Residuals
 from workbench.diagnosis.inference.rivals import Rivals
@@ -79,6 +80,8 @@ class Outcome:
         cause was found, or the search was interrupted.
     one_law : what a single law is that explains as much as several causes with less; empty if none
         does, or there are not several.
+    unsure : of a model that is simulated freely, shares by which derivatives may be wrong, by
+        variable; None of any other.
     """
 
     system: System
@@ -96,6 +99,7 @@ class Outcome:
     rivals: Rivals | None
     certainty: Certainty | None
     one_law: str = ""
+    unsure: Mapping[str, float] | None = None
 
     @property
     def channels(self) -> tuple[Channel, ...]:
@@ -123,6 +127,10 @@ class Outcome:
             f" Without a measured {signal.label}, fewer effects can be discriminated."
             for signal in self.missing
         )
+        if self.unsure is not None:
+            alone = not self.system.library.is_file()
+            cost += " All figures are of free simulations of the FMU, which nothing corrects"
+            cost += f"{'; terms beside its rates are no candidates' * alone}."
         if found.verdict == "nothing":
             return f"Nothing significant is missing: what remains is noise and tolerance.{cost}"
         if found.verdict == "unexplained":
@@ -194,7 +202,17 @@ class Outcome:
                 f"One law explains as much as {names} with less: {self.one_law}. Ask for its form "
                 "with --propose before you trust several causes.",
             )
-        shifted = [level.text for level in found.shifted]
+        named = {name for cause in found.causes for name in variables(cause.effect, "")}
+        shifted = [
+            *(level.text for level in found.shifted),
+            *(
+                f"Derivatives by {name} differ by {share:.0%} between steps of their difference, "
+                "as events or the FMU's own solver make them rough: its interval may be wrong by "
+                "as much."
+                for name, share in (self.unsure or {}).items()
+                if name in named
+            ),
+        ]
         if found.noise_alone or found.gain is None:
             return [*limits, *shifted]
         return [

@@ -11,7 +11,7 @@ from workbench.diagnosis.data.clocks import case_in_time, late_signals
 from workbench.diagnosis.data.counting import refuse_too_few
 from workbench.diagnosis.data.motion import ModelSource
 from workbench.diagnosis.data.sensors import case_by_sensors, sensor_errors
-from workbench.diagnosis.effects.candidates import rate_terms, with_starts
+from workbench.diagnosis.effects.candidates import COEFFICIENT, rate_terms, with_starts
 from workbench.diagnosis.effects.catalogue import Effect
 from workbench.diagnosis.effects.extension import ExtendedModel, build, parameter_of
 from workbench.diagnosis.inference.certainty import assess
@@ -27,7 +27,7 @@ from workbench.diagnosis.simulation.simulator import delay, simulating
 from workbench.errors import InputError
 from workbench.models.added import write_extended
 from workbench.models.description import MODEL_EXCHANGE
-from workbench.models.fmu import FMU
+from workbench.models.fmu import FMU, EventError
 from workbench.models.modelica import Library
 from workbench.observers.estimators.disturbance import DisturbanceObserver
 from workbench.observers.estimators.kalman import ExtendedKalmanFilter
@@ -37,7 +37,7 @@ from workbench.runtime.engine import Engine
 from workbench.runtime.files import write_whole
 from workbench.runtime.progress import ProgressReporter
 from workbench.system.reader import with_model
-from workbench.system.registry import open_model
+from workbench.system.registry import open_file, open_model
 from workbench.system.system import OBSERVER, System
 
 EVERYTHING, EXTENDED = "AllEffects", "Extended"
@@ -62,11 +62,35 @@ def diagnose(
         compiled, or the model is none of this library.
     """
     refuse_too_few(problem.cases, problem.system, len(problem.held_out))
+    try:
+        return _diagnosed(problem, engine, every_platform, certainty, free=False)
+    except EventError:
+        if problem.library is not None:
+            raise
+        engine.report("events of the model at other values: whole simulations instead")
+        return _diagnosed(problem, engine, every_platform, certainty, free=True)
+
+
+def _diagnosed(
+    problem: Problem, engine: Engine, every_platform: bool, certainty: bool, *, free: bool
+) -> Outcome:
+    """A diagnosis; `free` if nothing is to correct the simulations."""
     with tempfile.TemporaryDirectory() as scratch:
         problem, everything = _with_model(problem, Path(scratch), engine.report)
         system, effects, report = problem.system, problem.effects, engine.report
         source = ModelSource(everything, system, given_values(everything, system))
-        with ResidualModel(source, problem.cases, engine) as simulations:
+        with ResidualModel(source, problem.cases, engine, free=free) as simulations:
+            if simulations.free and problem.library is None:
+                # Terms of several forms explain a run that nothing corrects as one parameter does.
+                effects = [effect for effect in effects if effect.size != COEFFICIENT]
+                problem = replace(problem, effects=effects)
+                if not effects:
+                    raise InputError(
+                        where=f"{system.source}, [candidates]",
+                        found="only terms beside rates, of an FMU that runs freely",
+                        expected="parameters or sensors",
+                        remedy="choose some of 'workbench diagnose --list'",
+                    )
             fit = Fit(simulations, effects)
             diagnosis = conclude(fit, effects, report)
             base, best = diagnosis.base, diagnosis.best
@@ -108,6 +132,7 @@ def diagnose(
                 if diagnosis.rivals
                 else None,
                 certainty=assessed,
+                unsure=dict(simulations.unsure) if simulations.free else None,
             )
 
 
@@ -164,7 +189,7 @@ def given_values(everything: Path, system: System) -> dict[str, float]:
     InputError
         If the model is no observer model of this library.
     """
-    with FMU(everything, system.names) as extended, open_model(system) as diagnosed:
+    with open_file(everything, system, {}) as extended, open_model(system) as diagnosed:
         compare = system.comparison
         asked = [*compare.tolerances, *compare.levels, *sorted(system.constants)]
         if missing := [name for name in asked if name not in diagnosed.defaults]:
@@ -304,7 +329,7 @@ class _Found:
         report = self.engine.report
         turning = any(effect.order_locked for effect in best.active)
         scored = all(system.objective.signal in case for case in cases)
-        if extension is None or turning or not scored:
+        if extension is None or turning or not scored or self.simulations.free:
             return {}
         report("observers with both models")
         gains = {}

@@ -178,8 +178,8 @@ class Description:
                 + (", whose states an observer can set" if interface == MODEL_EXCHANGE else ""),
                 remedy=f"export the model for {interface}"
                 + (
-                    "; what Co-Simulation alone will do for is the open loop: workbench simulate "
-                    "--estimator open_loop"
+                    "; with Co-Simulation alone these run: workbench simulate --estimator "
+                    "open_loop, workbench fit, workbench diagnose"
                     if CO_SIMULATION in self.interfaces
                     else ""
                 ),

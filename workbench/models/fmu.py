@@ -94,8 +94,8 @@ def co_simulation_alone(description: Description, found: str) -> InputError:
         where=str(description.path),
         found=f"{offered}, without {found}",
         expected="Model Exchange, which lets states be set and says their derivatives",
-        remedy="export the model for Model Exchange. With Co-Simulation alone the open loop runs: "
-        "workbench simulate --estimator open_loop",
+        remedy="export the model for Model Exchange. With Co-Simulation alone these run: workbench "
+        "simulate --estimator open_loop, workbench fit, workbench diagnose",
     )
 
 
@@ -785,8 +785,8 @@ class FMU:
         return EventError(
             f"{self.path.name}: an event of the model by {self.time[0]:.6g} s of its time, or in "
             "the step after: an event indicator changes its sign, a time event is due, or the "
-            "model asks for Event Mode. Only the open loop goes through events; results of other "
-            "estimators would be wrong from there on. "
+            "model asks for Event Mode. Only the open loop, fit and diagnose go through events; "
+            "results of other estimators would be wrong from there on. "
             "Replace jumps of the model by smooth functions, or cut the recording before the event"
         )
 
@@ -1006,3 +1006,14 @@ class CoSimulation(FMU):
             raise self._loaded.end_error()
         self._t += h
         return self.get(self._state_variables).copy()
+
+
+def open_fmu(
+    path: Path,
+    names: Mapping[str, str] | None = None,
+    parameters: Mapping[str, float] | None = None,
+) -> FMU:
+    """Open a model file for Model Exchange, or for Co-Simulation where it has no more."""
+    interfaces = read_description(path).interfaces
+    alone = CO_SIMULATION in interfaces and MODEL_EXCHANGE not in interfaces
+    return (CoSimulation if alone else FMU)(path, names, parameters)

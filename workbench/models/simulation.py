@@ -65,6 +65,14 @@ class Derivatives:
     unsure: Vector
 
 
+def needs_simulation(fmu: FMU, inputs: Sequence[str], outputs: Sequence[str]) -> bool:
+    """Whether a compiled loop cannot step an FMU: Co-Simulation alone, types that are not Real."""
+    if isinstance(fmu, CoSimulation):
+        return True
+    real = all(map(fmu.is_real, (*fmu.states, *outputs)))
+    return not real or not all(map(fmu.is_continuous, inputs))
+
+
 class Simulation:
     """A model along recordings, one whole simulation after the other with the same instance.
 

@@ -5,8 +5,8 @@ from pathlib import Path
 
 from workbench.errors import InputError
 from workbench.models import fmu_cache
-from workbench.models.description import CO_SIMULATION, MODEL_EXCHANGE, read_description
-from workbench.models.fmu import FMU, CoSimulation
+from workbench.models.description import read_description
+from workbench.models.fmu import FMU, open_fmu
 from workbench.models.modelica import read_library
 from workbench.system.installed import system_path
 from workbench.system.parts import Model
@@ -91,10 +91,14 @@ def open_model(system: System, role: str = OBSERVER) -> FMU:
     return open_file(path, system)
 
 
-def open_file(path: Path, system: System) -> FMU:
-    """Open a model file as one of a system; Co-Simulation, where it has no more."""
-    description = read_description(path).renamed(system.names)
-    alone = CO_SIMULATION in description.interfaces and MODEL_EXCHANGE not in description.interfaces
-    parameters = description.names("parameter")
-    given = {name: value for name, value in system.given.items() if name in parameters}
-    return (CoSimulation if alone else FMU)(path, system.names, given)
+def open_file(path: Path, system: System, given: Mapping[str, float] | None = None) -> FMU:
+    """Open a model file as one of a system; Co-Simulation, where it has no more.
+
+    Parameters
+    ----------
+    given : values of parameters; by default those of this machine that the model has.
+    """
+    if given is None:
+        parameters = read_description(path).renamed(system.names).names("parameter")
+        given = {name: value for name, value in system.given.items() if name in parameters}
+    return open_fmu(path, system.names, given)

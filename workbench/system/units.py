@@ -225,7 +225,7 @@ def with_unit(value: float, unit: str) -> str:
     ('4 % per 100 K', '2 %', '150 N')
     """
     (shown,), name = in_spoken_unit([value], unit)
-    return f"{shown:.3g} {name}"
+    return f"{shown:.3g} {name}".rstrip()
 
 
 def with_interval(value: float, low: float, high: float, unit: str) -> str:
@@ -236,4 +236,5 @@ def with_interval(value: float, low: float, high: float, unit: str) -> str:
     """
     (middle, first, last), shown = in_spoken_unit([value, low, high], unit)
     further = f", {3.6 * value:.3g} km/h" if unit == "m/s" else ""
-    return f"{middle:.3g} {shown} (95 %: {first:.3g} to {last:.3g}{further})"
+    shown = f"{shown} " * bool(shown)
+    return f"{middle:.3g} {shown}(95 %: {first:.3g} to {last:.3g}{further})"

@@ -17,9 +17,12 @@ from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, expm, solve_discrete_are
 
 from workbench.arrays import Matrix, Vector
+from workbench.errors import FMUError, InputError
 from workbench.models.fmu import FMU
+from workbench.models.simulation import needs_simulation
 from workbench.observers.layout import rolling_ratio
 from workbench.observers.operating import corrected_states, linearised
+from workbench.system.registry import open_file
 from workbench.system.system import System
 
 # Share of a state's size by which it is uncertain from sample to sample at least: what makes the
@@ -68,18 +71,30 @@ class OpenModel:
 
     Attributes
     ----------
-    motion : of the model at its design point.
+    motion : of the model at its design point; None of an FMU that can only be simulated as a
+        whole: Co-Simulation alone, other types than Real, events where it should be linearised.
     """
 
     fmu: FMU
-    motion: Motion
+    motion: Motion | None
 
 
 @contextmanager
 def opened(source: ModelSource) -> Iterator[OpenModel]:
     """Open an FMU."""
-    with FMU(source.path, source.system.names, source.given) as fmu:
-        yield OpenModel(fmu, motion(fmu, source.system))
+    system = source.system
+    with open_file(source.path, system, source.given) as fmu:
+        inputs = [signal.name for signal in system.inputs]
+        readings = [signal.reading for signal in system.signals.values()]
+        seen = [name for name in readings if name in fmu.outputs]
+        along = None
+        if not needs_simulation(fmu, inputs, seen):
+            try:
+                along = motion(fmu, system)
+            except (InputError, FMUError):
+                if not fmu.has_events:
+                    raise
+        yield OpenModel(fmu, along)
 
 
 @dataclass(frozen=True, eq=False)

@@ -299,14 +299,16 @@ def _led(
     system: System,
     signals: tuple[str, ...],
     counted: CountedSamples,
-    motion: Motion,
+    motion: Motion | None,
 ) -> tuple[Vector, Lead | None, NDArray[np.float64]]:
     """Gain of the led output (n,), or how all lead; covariance of what they led, (n, c, c)."""
     time, clean, deviation = case.time, counted.clean, counted.deviation
     h, steps = float(np.median(np.diff(time))), np.diff(time)
     leading = system.comparison.leading
+    ahead = np.zeros((time.size, len(signals), len(signals)))
+    if motion is None:
+        return np.zeros(time.size), None, ahead
     if leading is None:
-        ahead = np.zeros((time.size, len(signals), len(signals)))
         inputs, outputs = (noise_of(part, deviation) for part in (case.inputs, case.outputs))
         lead = led_by(motion, inputs, outputs, h)
         count = len(case.outputs)
@@ -343,8 +345,8 @@ def _at_rest(
     return means, deviations
 
 
-def _begin(system: System, measured: dict[str, float], motion: Motion) -> dict[str, float]:
+def _begin(system: System, measured: dict[str, float], motion: Motion | None) -> dict[str, float]:
     """What is known of states at the start: as measured, but a follower rolls along."""
-    if system.rolling is None or system.rolling.leader not in measured:
+    if motion is None or system.rolling is None or system.rolling.leader not in measured:
         return measured
     return {**measured, system.rolling.follower: motion.ratio * measured[system.rolling.leader]}

@@ -17,7 +17,7 @@ from workbench.diagnosis.effects.catalogue import Effect
 from workbench.errors import unknown_name
 from workbench.models.added import CONSTANT, COULOMB, QUADRATIC, VISCOUS, RateTerm
 from workbench.models.description import Variable
-from workbench.models.fmu import FMU
+from workbench.models.fmu import FMU, CoSimulation
 from workbench.observers.operating import start_spreads
 from workbench.system.parts import Signal, StateNoise
 from workbench.system.system import System
@@ -95,7 +95,7 @@ def rate_terms(model: FMU) -> tuple[RateTerm, ...]:
     A state that another state is the rate of, as a position is of a speed, has none: what moves it
     acts on the speed. None for an FMU around which no other can be built.
     """
-    if model.version != "2.0" or sys.platform == "win32":
+    if model.version != "2.0" or sys.platform == "win32" or isinstance(model, CoSimulation):
         return ()
     model.start({})
     x, scale = model.get_states(), _scales(model)
@@ -140,9 +140,12 @@ def _rates(model: FMU, states: Vector) -> Vector:
 
 
 def with_starts(system: System, model: FMU) -> System:
-    """The system with an uncertain start of each state that no output shows."""
+    """The system with an uncertain start of each state that no output shows and that may be set."""
     known = {state.name: state for state in system.state_noise}
     spreads = dict(zip(model.states, start_spreads(model, system), strict=True))
+    if isinstance(model, CoSimulation):  # which sets nothing that it calculates
+        able = {v.name for v in model.description.variables if v.initial in ("exact", "approx")}
+        spreads = {name: spread for name, spread in spreads.items() if name in able}
     for name, spread in spreads.items():
         state = known.get(name, StateNoise(name, name, None, None))
         if name not in system.signals and state.spread is None:

@@ -36,6 +36,7 @@ from workbench.diagnosis.simulation.prediction import Variation
 from workbench.diagnosis.simulation.residual_model import Item, ResidualModel, Result
 from workbench.diagnosis.simulation.simulator import WhitenedResiduals
 from workbench.errors import FMUError, InputError
+from workbench.models.fmu import EventError
 from workbench.recordings.case import Case
 
 # A single recording is held out in tenths. R. Kohavi (1995), Proc. 14th IJCAI, 1137-1143.
@@ -186,6 +187,11 @@ class Fit:
         )
 
     @property
+    def free(self) -> bool:
+        """Whether whole simulations are fitted, which nothing corrects."""
+        return self._simulations.free
+
+    @property
     def restarted(self) -> list[int]:
         """Recordings of which samples count where states are restarted, and a law is simplified."""
         residuals = self._simulations.recordings
@@ -214,10 +220,18 @@ class Fit:
         self._simulations.count_restarted(numbers, counting=counting)
 
     def tried(self, point: Point) -> LinearizedPoint | None:
-        """As `at`; None where the model cannot be evaluated: a tank that is more than empty."""
+        """As `at`; None where the model cannot be evaluated: a tank that is more than empty.
+
+        Raises
+        ------
+        EventError
+            If an FMU alone passes an event, through which whole simulations go.
+        """
         try:
             return self.at(point)
-        except FMUError:
+        except FMUError as error:
+            if isinstance(error, EventError) and not self._simulations.system.library.is_file():
+                raise
             return None
 
     def linearise(
@@ -237,7 +251,8 @@ class Fit:
         columns = {(_LOCAL, name): Variation((name,)) for name in names}
         for effect in active:
             for parameter in (*effect.sizes, *(name for name, _ in effect.shapes)):
-                columns[effect.name, parameter] = Variation(variables(effect, parameter))
+                size = effect.matters if parameter in effect.sizes else 0.0
+                columns[effect.name, parameter] = Variation(variables(effect, parameter), size=size)
         for effect, shape in candidates:
             setting = {
                 name: value
@@ -245,7 +260,7 @@ class Fit:
                 for name in variables(effect, parameter)
             }
             for parameter in effect.sizes:
-                column = Variation(variables(effect, parameter), setting)
+                column = Variation(variables(effect, parameter), setting, effect.matters)
                 columns[variant(effect, shape), parameter] = column
         missing = {key: column for key, column in columns.items() if key not in lin.keys}
         if not missing:

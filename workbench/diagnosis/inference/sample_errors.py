@@ -103,7 +103,9 @@ def held_out_errors(
     errors : of both models.
     starts : of the last model, by recording, see `Unknowns.starts`.
     """
-    with ResidualModel(fitted.source, cases, Engine(workers), restarting=False) as simulations:
+    with ResidualModel(
+        fitted.source, cases, Engine(workers), restarting=False, free=fitted.free
+    ) as simulations:
         fit = Fit(simulations, effects, beside=fitted.cases)
 
         def apart(model: FittedModel) -> LinearizedPoint:

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import pairwise
 from typing import TypeVar
 
 import numpy as np
@@ -26,6 +27,7 @@ Result = TypeVar("Result")
 
 BEGUN = 3  # rounds after which a rival that is far behind is given up
 _SIZES = tuple(10.0 ** (0.5 * k) for k in range(9))  # times what matters, where derivatives fail
+_SHARES = (0.125, 0.25, 0.5, 1.0)  # of a recording, over which runs are compared
 _VARIANTS, _HALVINGS = 4, 2  # of shapes, and of the size, that a fit begins with
 ROUNDS = 12  # of Gauss-Newton, most
 
@@ -109,9 +111,19 @@ def _step(
 ) -> Step | None:
     """One more effect, or none if the data do not ask for it; of equals the usual one."""
     scores = tuple(score for score in trial.scores() if score.effect in catalogue)
-    rivals = _rivals(scores, best, fit.decides) if len(best.active) < fit.decides.most else []
+    rivals: list[list[CandidateScore]] = []
     if len(best.active) < fit.decides.most:
-        rivals += _misjudged(fit, best, scores, [variants[0].effect for variants in rivals])
+        rivals = _rivals(scores, best, fit.decides)
+        if fit.free and not rivals:
+            rivals = _predicting(scores, best, fit.decides)
+        # Of a run that nothing corrects, sizes are far from where derivatives point.
+        ranked = [variants[0].effect for variants in rivals]
+        starts = _misjudged(fit, best, scores, [] if fit.free else ranked)
+        for start in starts:
+            if start.effect in ranked:
+                rivals[ranked.index(start.effect)].insert(0, start)
+            else:
+                rivals.append([start])
     if not rivals:
         return None
     report(f"fitting {', '.join(variants[0].effect.name for variants in rivals)}")
@@ -128,7 +140,7 @@ def _misjudged(
     best: FittedModel,
     scores: Sequence[CandidateScore],
     judged: Collection[Effect],
-) -> list[list[CandidateScore]]:
+) -> list[CandidateScore]:
     """Effects of which the linearised score says nothing, each where its fit should begin.
 
     While errors are large, derivatives at the point may hold nowhere near the size that is asked
@@ -146,7 +158,7 @@ def _misjudged(
         if score.effect not in judged and not score.effect.order_locked:
             first.setdefault(score.effect.name, score)
     starts = fit.together(partial(_simulated_start, fit, best), list(first.values()))
-    return [[start] for start in starts if start is not None]
+    return [start for start in starts if start is not None]
 
 
 def _simulated_start(fit: Fit, best: FittedModel, score: CandidateScore) -> CandidateScore | None:
@@ -189,6 +201,8 @@ def _simulated_start(fit: Fit, best: FittedModel, score: CandidateScore) -> Cand
         )
     if held:
         return None
+    if fit.free:
+        return _grown_start(fit, best, score)
     tried = [
         float(np.clip(way * effect.matters * step, low, high)) for way in ways for step in _SIZES
     ]
@@ -201,6 +215,38 @@ def _simulated_start(fit: Fit, best: FittedModel, score: CandidateScore) -> Cand
         return None
     size = min(deviances, key=lambda size: deviances[size])
     return replace(score, size=size) if deviances[size] < lin.deviance else None
+
+
+def _grown_start(fit: Fit, best: FittedModel, score: CandidateScore) -> CandidateScore | None:
+    """The size at which runs are nearest to longer and longer parts of the recordings.
+
+    What switches earlier each time is soon out of step, and errors of whole runs have many minima.
+    Over a short part there is one; a part twice as long tells the size within a third of before.
+    """
+    low, high = fit.unknowns.bounds(score.effect, score.effect.size)
+    weight = 1.0 / np.sqrt(best.linearised.spread)
+    runs: dict[float, LinearizedPoint | None] = {0.0: best.linearised}
+
+    def misfit(size: float, share: float) -> float:
+        if size not in runs:
+            runs[size] = fit.tried(joined(best.point, replace(score, size=size)))
+        if (run := runs[size]) is None:
+            return np.inf
+        parts = [own.errors[: max(1, round(share * len(own.errors)))] for own in run.residuals]
+        return float(sum(np.square(part * weight).sum() for part in parts))
+
+    steps = score.effect.matters * np.array(_SIZES)
+    sizes, size = np.unique(np.clip([0.0, *steps, *-steps], low, high)), 0.0
+    for share in _SHARES:
+        if sizes.size < 2:  # bounds that allow no change
+            return None
+        at = int(np.argmin([misfit(float(size), share) for size in sizes]))
+        size = float(sizes[at])
+        around = pairwise(sizes[max(0, at - 1) : at + 2])
+        sizes = np.unique(np.concatenate([np.linspace(*ends, 4) for ends in around]))
+    run = runs[size]
+    better = size != 0.0 and run is not None and run.deviance < best.linearised.deviance
+    return replace(score, size=size) if better else None
 
 
 def _gains(fit: Fit, before: FittedModel, after: FittedModel) -> bool:
@@ -397,6 +443,23 @@ def joined(point: Point, rival: CandidateScore) -> Point:
     if rival.effect.order_locked:
         phases[name] = rival.phases
     return Point(sizes, point.levels, point.deviations, phases)
+
+
+def _predicting(
+    scores: Sequence[CandidateScore], best: FittedModel, decides: Thresholds
+) -> list[list[CandidateScore]]:
+    """Effects that explain each recording from the others, while much is wrong, best first.
+
+    Errors of runs that nothing corrects last as long as these: of all that is wrong few means are
+    independent, beside which no size is significant. The fit decides.
+    """
+    if best.linearised.variance_factors.max() <= decides.wrong:
+        return []
+    first: dict[str, CandidateScore] = {}
+    for score in scores:
+        if abs(score.size) >= score.effect.matters and score.held_out.min() > 0.0:
+            first.setdefault(score.effect.name, score)
+    return [[score] for score in first.values()][: decides.rivals]
 
 
 def _rivals(

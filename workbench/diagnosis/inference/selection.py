@@ -104,6 +104,7 @@ def select(
         base = anew(fit, begun.base.point, ())
     earlier = 0 if begun is None else len(begun.steps)
     validation, dropped = CrossValidation(fit), set[Effect]()
+    exchanged = set[frozenset[Effect]]()
     while True:
         met = (base, *(step.before for step in steps[earlier:]))
         known = {frozenset(model.active): model for model in met}
@@ -126,10 +127,17 @@ def select(
             for effect, row in ((e, cosines[names.index(e.name)]) for e in less)
         }
         alike = {e: _alike(fit, e, best, less[e], steps, similar[e]) for e in less}
-        replaced = [fit for fits in alike.values() for fit in fits.values()]
+        # What was taken in exchange and dropped since would be dropped again.
+        replaced = [
+            fit
+            for fits in alike.values()
+            for fit in fits.values()
+            if frozenset(fit.active) not in exchanged
+        ]
         better = min(replaced, key=lambda model: beyond(model, best), default=best)
         if interrupted or beyond(best, better) < fit.decides.needed:
             break
+        exchanged.add(frozenset(better.active))
         report(f"{better.active[-1].name} explains more than what it replaces")
         best, trial, interrupted = forward_selection(fit, catalogue, better, steps, dropped, report)
     twins = {

@@ -135,7 +135,7 @@ class Unknowns:
         does not forget that unless it is led.
         """
         system, begin = self._simulations.system, self._simulations.begin[0]
-        led = self._compare.leading is not None
+        led = self._compare.leading is not None and not self._simulations.free
         # What rolls along a measured state may have no sensor of its own.
         seen = [] if led else [name for name in begin if name in system.signals]
         shown = {name: ALONG * system.signals[name].noise_at_scale for name in seen}
@@ -147,8 +147,9 @@ class Unknowns:
         return "s" if key[1] == SENSOR else self._simulations.units.get(key[0], "1")
 
     def unit(self, effect: Effect, parameter: str) -> str:
-        """Unit of a parameter, "1" if it has none."""
-        return self._simulations.units.get(variables(effect, parameter)[0], "1")
+        """Unit of a parameter, "1" if it has none; "" of an FMU's own that says none."""
+        none = "" if effect.parameter else "1"
+        return self._simulations.units.get(variables(effect, parameter)[0], none)
 
     def bounds(self, effect: Effect, parameter: str) -> tuple[float, float]:
         """Least and greatest value of a parameter, SI."""

@@ -204,10 +204,12 @@ class Variation:
     variables : of the FMU that take its value; of a state it is the start.
     setting : other variables that are set while it is varied, such as the shape of an effect that
         is absent otherwise.
+    size : a typical change; 0 where its value tells.
     """
 
     variables: tuple[str, ...]
     setting: Mapping[str, float] = field(default_factory=dict)
+    size: float = 0.0
 
 
 class Predictor:

@@ -8,6 +8,7 @@ import threading
 from collections.abc import Callable, Collection, Mapping, Sequence
 from concurrent.futures import CancelledError, ThreadPoolExecutor, wait
 from contextlib import ExitStack, nullcontext
+from dataclasses import replace
 from typing import Any, Self, TypeVar
 
 import numpy as np
@@ -28,7 +29,7 @@ from workbench.diagnosis.simulation.simulator import (
     simulating,
 )
 from workbench.errors import InputError
-from workbench.models.fmu import FMU
+from workbench.models.fmu import FMU, EventError
 from workbench.recordings.case import Case
 from workbench.runtime.engine import ALONE, Engine
 from workbench.runtime.pool import Pool
@@ -47,6 +48,7 @@ class ResidualModel:
     engine : is told now and then how many simulations were made.
     sound : which samples count.
     restarting : whether samples count where states can be restarted.
+    free : whether nothing is to correct the simulations.
     model : the same, where it is open already; it must outlive the simulations.
 
     Attributes
@@ -54,6 +56,9 @@ class ResidualModel:
     source, system, given : the model, whose it is, and its values.
     nominal, units, bounds : value, unit, (least, greatest) value by variable of the FMU.
     begin : start values of states by recording, as measured.
+    free : whether the model is simulated as a whole, and nothing corrects it: it passes events, has
+        Co-Simulation alone, or other types than Real.
+    unsure : shares by which derivatives may be wrong, by variable; only of free simulations.
     simulated : what its simulators are made from.
     cases, recordings : as recorded, and made ready.
     """
@@ -66,6 +71,7 @@ class ResidualModel:
         sound: Soundness = SOUND,
         *,
         restarting: bool = True,
+        free: bool = False,
         model: OpenModel | None = None,
     ) -> None:
         self._pace = ProgressReporter(engine.report, "simulations")
@@ -77,13 +83,21 @@ class ResidualModel:
         # Of each, where what is restarted does not count, or why there is none.
         self._without: list[int | InputError] = []
         self._interrupted = threading.Event()
+        self.unsure: dict[str, float] = {}
         with ExitStack() as stack:
             self._model = model or stack.enter_context(opened(source))
             self._tell(self._model.fmu)
-            self.recordings = [self._ready(case, restarting=restarting) for case in cases]
-            coarse = SimulatorSetup(source.path, self.system, tuple(self.recordings))
-            parts = settled_parts(self._simulator(coarse), self.nominal)
-            self.simulated = coarse._replace(parts=parts)
+            if free:
+                self._model = replace(self._model, motion=None)
+            self.free = self._model.motion is None
+            self.simulated = self._prepared(restarting=restarting and not self.free)
+            if not self.free:
+                try:
+                    parts = settled_parts(self._simulator(self.simulated), self.nominal)
+                    self.simulated = self.simulated._replace(parts=parts)
+                except EventError:
+                    self._model, self.free = replace(self._model, motion=None), True
+                    self.simulated = self._prepared(restarting=False)
             self._forms = self._weighed([*self.recordings, *self._lesser()])
             every = self.simulated._replace(recordings=tuple(form for form, _ in self._forms))
             self._pool = stack.enter_context(self._workers_with(every))
@@ -122,6 +136,12 @@ class ResidualModel:
             self.units[name] = "1" if size == GAIN else self.system.signals[signal].unit
             # A gain keeps the sign of its signal; a zero is off by the size of the signal at most.
             self.bounds[name] = (-0.9, 9.0) if size == GAIN else (-typical, typical)
+
+    def _prepared(self, *, restarting: bool) -> SimulatorSetup:
+        """Make all recordings ready."""
+        self.recordings = [self._ready(case, restarting=restarting) for case in self.cases]
+        recordings = tuple(self.recordings)
+        return SimulatorSetup(self.source.path, self.system, recordings, free=self.free)
 
     def _simulator(self, given: SimulatorSetup) -> Simulator:
         """One in this process, with the FMU that is open."""
@@ -213,7 +233,9 @@ class ResidualModel:
                 for k in self._order
             }
         )
-        return [results[k] for k in range(len(self.recordings))]
+        for _, unsure in results.values():
+            self.unsure |= {n: max(share, self.unsure.get(n, 0.0)) for n, share in unsure.items()}
+        return [results[k][0] for k in range(len(self.recordings))]
 
     def responses(
         self,
@@ -228,7 +250,7 @@ class ResidualModel:
                 for k in self._order
             }
         )
-        return [results[k] for k in range(len(self.recordings))]
+        return [results[k][0] for k in range(len(self.recordings))]
 
     def along(self, points: Sequence[Mapping[str, float]], watched: Sequence[str]) -> list[Matrix]:
         """Variables of the FMU at the samples of every recording, each (n, w); see `at`."""

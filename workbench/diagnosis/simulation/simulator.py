@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from workbench.arrays import Matrix, Vector
 from workbench.diagnosis.data.clocks import in_time, late_signals, lateness, mirrored, moved
@@ -22,14 +23,17 @@ from workbench.diagnosis.data.sensors import (
     starts,
 )
 from workbench.diagnosis.inference.thresholds import Thresholds
+from workbench.diagnosis.simulation.free import FreeDerivatives, FreePredictor
 from workbench.diagnosis.simulation.prediction import Predictor, Variation
 from workbench.errors import FMUError
 from workbench.models.fmu import FMU
+from workbench.system.registry import open_file
 from workbench.system.system import System
 
 _DELAY_STEP = 1e-3  # of the difference, over the delay's spread; errors are linear in the delay
 _DIFFERENCE = 1e-4  # step over a typical size: far above rounding, far below what bends
 _FINEST = 32  # steps of a sample time
+_DRAWS = 12  # of the noise of inputs: their variance is known to two fifths
 
 
 def delay(signal: str) -> str:
@@ -74,6 +78,7 @@ class SimulatorSetup(NamedTuple):
     system: System
     recordings: tuple[Samples, ...]
     parts: int = 1  # steps of a sample time
+    free: bool = False  # whether by whole simulations, see `FreePredictor`
 
 
 class Simulator:
@@ -82,9 +87,9 @@ class Simulator:
     def __init__(self, given: SimulatorSetup, fmu: FMU) -> None:
         self._fmu = fmu
         self._recordings = given.recordings
-        self._system, self._parts = given.system, given.parts
+        self._system, self._parts, self._free = given.system, given.parts, given.free
         signals = given.recordings[0].signals
-        self._predictor = Predictor(fmu, given.system, signals, given.parts)
+        self._predictor = self._predictor_of(signals)
         self._delays = {
             j: (delay(signals[j]), mode.late) for j, mode in given.recordings[0].modes.items()
         }
@@ -92,7 +97,7 @@ class Simulator:
         self._clocks = late_signals(given.system)
         self._sensors = sensor_errors(given.system)
         self._typical = {name: size for name, (_, _, size) in self._sensors.items()}
-        if not given.system.library.is_file():
+        if not given.system.library.is_file() and not given.free:
             # An FMU of another tool need not take a parameter while it runs: each is set before.
             self._typical |= {
                 v.name: abs(fmu.defaults.get(v.name, 0.0)) or v.nominal or 1.0
@@ -104,9 +109,15 @@ class Simulator:
         """The same FMU in other steps, so many to a sample time."""
         other = copy(self)
         other._parts = parts
-        signals = self._recordings[0].signals
-        other._predictor = Predictor(self._fmu, self._system, signals, parts)
+        other._predictor = other._predictor_of(self._recordings[0].signals)
         return other
+
+    def _predictor_of(
+        self, signals: Sequence[str], watched: Sequence[str] = ()
+    ) -> Predictor | FreePredictor:
+        if self._free:
+            return FreePredictor(self._fmu, self._system, signals, watched)
+        return Predictor(self._fmu, self._system, signals, self._parts, watched)
 
     @property
     def parameters(self) -> set[str]:
@@ -121,7 +132,7 @@ class Simulator:
     def along(self, number: int, values: Mapping[str, float], watched: Sequence[str]) -> Matrix:
         """Variables of the FMU at each sample of one recording, (n, w)."""
         recording = self._in_time(number, values)
-        predictor = Predictor(self._fmu, self._system, recording.signals, self._parts, watched)
+        predictor = self._predictor_of(recording.signals, watched)
         return predictor.along(recording, self._known(values))
 
     def free_run(self, number: int, values: Mapping[str, float]) -> Matrix:
@@ -174,8 +185,10 @@ class Simulator:
         columns: Sequence[Variation],
         courses: Matrix | None = None,
         sizes: Mapping[str, Sequence[str]] | None = None,
-    ) -> Matrix:
+    ) -> tuple[Matrix, Mapping[str, float]]:
         """Derivatives of one recording's [errors, rest] by the columns, (b*c + q, p).
+
+        Beside them shares by which they may be wrong, by variable, of those that are unsure.
 
         Parameters
         ----------
@@ -187,6 +200,7 @@ class Simulator:
         recording, fmu = self._in_time(number, values), self._fmu
         blocks = len(recording.blocks) * len(recording.slopes)
         jacobian = np.zeros((blocks + recording.rest.size, len(columns)))
+        unsure: dict[str, float] = {}
         differing = {*self._clocks, *self._typical}
         beside = [j for j, column in enumerate(columns) if column.variables[0] in differing]
         if beside:
@@ -200,14 +214,16 @@ class Simulator:
             _, along = self._predictor.derivatives(*given)
             by = self._whitened(number, self._late(number, along.errors, values))
             jacobian[:blocks, part] = by.reshape(-1, len(part))
-            if recording.rest.size and courses is None:
+            if isinstance(along, FreeDerivatives):
+                unsure |= along.unsure
+            elif recording.rest.size and courses is None:
                 place = self._rest.references
                 slopes = fmu.jacobian(place, fmu.variables(fmu.states)) @ along.states  # (q, part)
                 for j, column in enumerate(varied):
                     acting = [name for name in column.variables if name not in fmu.states]
                     slopes[:, j] += fmu.jacobian(place, fmu.variables(acting)).sum(axis=1)
                 jacobian[blocks:, part] = -slopes / recording.rest_noise[:, None]
-        return jacobian
+        return jacobian, unsure
 
     def _absent(
         self,
@@ -265,20 +281,21 @@ class Simulator:
         """
         recording = self._recordings[number]
         compare = self._system.comparison
-        if recording.restarts is None and not compare.wander:
+        shaken = self._free and not all(signal.exact for signal in self._system.inputs)
+        if recording.restarts is None and not compare.wander and not shaken:
             return recording
         values = {**dict.fromkeys((name for name, _ in self._delays.values()), 0.0), **values}
-        nominal, moved = self._means(number, recording.y, values), []
+        nominal, moved = self._means(number, recording, values), []
 
         def shifted(name: str, share: float) -> Matrix:
             value = (1.0 + share) * values.get(name, self._fmu.defaults[name])
-            return self._means(number, recording.y, {**values, name: value}) - nominal
+            return self._means(number, recording, {**values, name: value}) - nominal
 
         if recording.restarts is not None:
             for name, noise in recording.restarts.noise.items():
                 y, read = recording.y.copy(), np.flatnonzero(recording.restarts.at) - 1
                 y[read, recording.signals.index(name)] += noise[read]
-                moved.append(self._means(number, y, values) - nominal)
+                moved.append(self._means(number, replace(recording, y=y), values) - nominal)
             moved.extend(
                 shifted(name, share) for name, share in recording.restarts.uncertain.items()
             )
@@ -286,14 +303,41 @@ class Simulator:
             shifted(name, by.share) * max(1.0, 2.0 * by.over / compare.block) ** 0.5
             for name, by in compare.wander.items()
         ]
+        if shaken:
+            moved.extend(self._shaken(number, values, nominal))
         return recording.loosened(moved, alone)
 
-    def _means(self, number: int, y: Matrix, values: Mapping[str, float]) -> Matrix:
-        """Errors of the blocks, by channel (b, c), where restarts read `y` (n, c)."""
-        recording = self._recordings[number]
-        errors = self._predictor.errors(replace(recording, y=y), self._known(values)) - (
-            y - recording.y
+    def _shaken(
+        self, number: int, values: Mapping[str, float], nominal: Matrix
+    ) -> NDArray[np.float64]:
+        """What noise of the inputs adds up to in a run that nothing corrects, (draws, b, c).
+
+        The covariance of block means S is that of draws d, S = sum(d d') / draws. Errors that last
+        are one error and not b: with the greatest eigenvalue of S beyond what draws of white errors
+        have, s (1 + sqrt(b / draws))^2, each block counts as the less.
+        Source: V. A. Marchenko, L. A. Pastur (1967), Math. USSR Sbornik 1, 457-483.
+        """
+        recording, rng = self._recordings[number], np.random.default_rng(number)
+        deviations = np.column_stack(
+            [signal.deviation(recording.u[:, j]) for j, signal in enumerate(self._system.inputs)]
         )
+        draws = np.empty((_DRAWS, *nominal.shape))
+        for k in range(_DRAWS):
+            u = recording.u + deviations * rng.standard_normal(recording.u.shape)
+            draws[k] = self._means(number, replace(recording, u=u), values) - nominal
+        blocks = len(nominal)
+        for c in range(nominal.shape[1]):
+            total = float(np.square(draws[:, :, c]).sum())
+            greatest = float(np.linalg.norm(draws[:, :, c], 2) ** 2)
+            white = total / blocks * (1.0 + np.sqrt(blocks / _DRAWS)) ** 2
+            draws[:, :, c] *= np.sqrt(max(1.0, blocks * (greatest - white) / max(total, 1e-300)))
+        by_draw: NDArray[np.float64] = draws / np.sqrt(_DRAWS)
+        return by_draw
+
+    def _means(self, number: int, recorded: Samples, values: Mapping[str, float]) -> Matrix:
+        """Errors of the blocks, by channel (b, c), of a recording that was read otherwise."""
+        recording = self._recordings[number]
+        errors = self._predictor.errors(recorded, self._known(values)) - (recorded.y - recording.y)
         return recording.channels(self._read(number, errors, values))
 
     def _simulated(self, number: int, values: Mapping[str, float]) -> tuple[Matrix, Vector]:
@@ -376,7 +420,7 @@ def _compatible(columns: Sequence[Variation], left: Collection[int]) -> list[lis
 @contextmanager
 def simulating(given: SimulatorSetup) -> Iterator[Simulator]:
     """Open an FMU and simulate with it."""
-    with FMU(given.path, given.system.names) as fmu:
+    with open_file(given.path, given.system, {}) as fmu:
         yield Simulator(given, fmu)
 
 

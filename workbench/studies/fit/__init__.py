@@ -239,7 +239,7 @@ def _run(case: Case, system: System, description: Description) -> _Run:
     counted &= ~np.column_stack([saturated(case[o.name], o) for o in system.outputs])
     able = set(description.states)
     if MODEL_EXCHANGE not in description.interfaces:
-        able &= {v.name for v in description.variables if v.initial in ("exact", "approx")}
+        able = {v.name for v in description.variables if v.initial in ("exact", "approx")}
     starts = {
         output.name: first_value(case.time, case[output.name], output.noise)
         for output in system.outputs
@@ -265,7 +265,8 @@ def _unknowns(
     names = [entry.name for entry in entries]
     shown = [replace(_FREE, name=name) for name in runs[0].starts if name not in names]
     for entry in (*entries, *shown):
-        variable, is_state = variables[entry.name], entry.name in description.states
+        variable = variables[entry.name]
+        is_state = entry.name in description.states or entry.name in runs[0].starts
         low, high = entry.range
         low = max(low, -np.inf if variable.minimum is None else variable.minimum)
         high = min(high, np.inf if variable.maximum is None else variable.maximum)
@@ -276,7 +277,7 @@ def _unknowns(
             start, prior = nominal, entry.prior
             size = abs(nominal) or (high - low if np.isfinite(high - low) else 1.0)
             if is_state:
-                size = spreads[entry.name]
+                size = spreads.get(entry.name, size)
                 if number is not None and entry.name in runs[number].starts:
                     start = runs[number].starts[entry.name]
                     size = _MOVES * noise[entry.name]

@@ -12,7 +12,7 @@ import numpy as np
 
 from workbench.errors import FMUError
 from workbench.models.archive import DESCRIPTION, opened
-from workbench.models.fmu import FMU
+from workbench.models.fmu import open_fmu
 from workbench.pages.answer import Answer, Measure, with_answer
 from workbench.pages.figures import CaseFigure, Curve, Panel
 from workbench.pages.parts import (
@@ -267,7 +267,7 @@ def _with_starts(xml: bytes, values: Mapping[str, float]) -> bytes:
 def defaults_in_binary(path: Path, values: Mapping[str, float]) -> bool:
     """Whether an FMU starts with these values by itself: binaries may hold their own defaults."""
     try:
-        with FMU(path) as fmu:
+        with open_fmu(path) as fmu:
             fmu.start({})
             held = fmu.get(fmu.variables(list(values)))
     except FMUError:
