@@ -97,7 +97,7 @@ def share_with_interval(counts: Mapping[str, Any], of: str = "sets") -> str:
 
 def unit_suffix(unit: str) -> str:
     """A unit behind a number; nothing where it has none."""
-    return "" if unit == "1" else f" {unit}"
+    return "" if unit in ("", "1") else f" {unit}"
 
 
 def whole_percent(share: float) -> str:
