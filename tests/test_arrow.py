@@ -83,7 +83,9 @@ def rolling(train) -> Iterator[FMU]:
 
 def made(fmu: FMU, system: System) -> tuple[ExtendedKalmanFilter, BlockKalmanFilter]:
     gains = ExtendedKalmanFilter.default_gains(fmu, system)
-    return ExtendedKalmanFilter(fmu, system, gains), BlockKalmanFilter(fmu, system, gains)
+    plain = ExtendedKalmanFilter(fmu, system, gains)
+    plain.steps[0].weight[0] = 0.0  # nothing ends Euler's steps, which those of blocks are
+    return plain, BlockKalmanFilter(fmu, system, gains)
 
 
 def recording(system: System, samples: int) -> tuple[Vector, Matrix, Matrix]:

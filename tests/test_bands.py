@@ -167,19 +167,19 @@ def swing(folder: Path, samples: int, mistuned: float = 1.0) -> CaseResult:
     place = 0.5 * np.cos(2.0 * np.pi * mistuned * time) + noise
     columns = {"time [s]": time, "f [m/s2]": 0.0 * time, "s [m]": place}
     case = case_from_frame(system, pd.DataFrame(columns), name="swing")
-    return prepare(system, choose(system, ["open_loop"])).run(case)
+    return prepare(system, choose(system, ["open_loop", "disturbance_observer"])).run(case)
 
 
-def test_an_error_that_steps_make_is_not_put_down_to_the_model(tmp_path):
+def test_coarse_steps_are_told_of_estimators_that_have_no_others(tmp_path):
     result = swing(tmp_path / "coarse", samples=200)
-    # Euler's implicit step of a swing: a period of n samples leaves exp(-2 pi^2 / n) of it.
-    time = result.case.time
-    left = 0.5 * (np.exp(-2.0 * np.pi**2 * time / 200.0) - 1.0) * np.cos(2.0 * np.pi * time)
-    assert result.runs["open_loop"].signal("s") - 0.5 * np.cos(2.0 * np.pi * time) == pytest.approx(
-        left, abs=0.02
-    )
+    # Euler's implicit step of a swing: a period of n samples leaves exp(-2 pi^2 / n) of it, an
+    # error of 0.26 m at the end of ten. The open loop has no more than what a sensor of 1 mm tells.
+    exact = 0.5 * np.cos(2.0 * np.pi * result.case.time)
+    start = result.case["s"][0] - 0.5  # where the swing begins as measured, it stays off by that
+    assert result.runs["open_loop"].signal("s") - exact == pytest.approx(0.0, abs=abs(start) + 1e-4)
     assert result.step_share > 0.9
-    (said,) = [text for text in result.warnings() if "steps, not by the model" in text]
+    (said,) = [text for text in result.warnings() if "damps what swings" in text]
+    assert said.startswith("disturbance_observer: one step")
     assert said in format_table(result.system, [result])
 
 

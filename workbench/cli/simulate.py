@@ -215,9 +215,7 @@ def _unsure(results: Sequence[CaseResult]) -> list[str]:
     ]
     damped = [result.case.name for result in results if result.step_share > MOSTLY]
     if damped:
-        texts.append(
-            f"steps make the open loop's error in {', '.join(damped)}, not the model; see above"
-        )
+        texts.append(f"coarse steps, not the model, make errors in {', '.join(damped)}; see above")
     return texts
 
 

@@ -544,6 +544,18 @@ class FMU:
         self._references = {v.name: v.reference for v in self.description.variables}
         self._real_names = {v.name for v in self.description.variables if v.real}
         self._calculated = {v.name for v in self.description.variables if v.initial == "calculated"}
+        # What states are calculated from: a reset does not restore it in FMUs of some tools.
+        self._origins = {
+            v.name: float(v.start)
+            for v in self.description.variables
+            if v.initial == "exact"
+            and v.real
+            and v.causality == "local"
+            and v.variability == "continuous"
+            and v.start is not None
+            and not v.array
+            and self._calculated.intersection(self.states)
+        }
         self._whole = [
             v
             for v in self.description.variables
@@ -735,7 +747,7 @@ class FMU:
         parameters : values of parameters; others keep their defaults.
         """
         begin = {name: value for name, value in states.items() if name not in self._calculated}
-        given = {**self._given, **(parameters or {}), **begin}
+        given = {**self._origins, **self._given, **(parameters or {}), **begin}
         whole = [(v, given.pop(v.name)) for v in self._whole if v.name in given]
         variables = self.variables(list(given))
         values = np.array(list(given.values()))

@@ -13,6 +13,7 @@ from workbench.errors import InputError
 from workbench.models.description import CO_SIMULATION
 from workbench.models.fmu import FMU
 from workbench.models.native import Instance, instance, raise_on_failure, read_only
+from workbench.observers.estimators.step import Step
 from workbench.observers.gains import Gains, SearchSpace
 from workbench.observers.layout import layout, rolling_ratio
 from workbench.observers.operating import start_spreads
@@ -91,6 +92,7 @@ class Estimator(ABC):
     co_simulates : whether it runs on a model that has Co-Simulation alone.
     modes : what it weighs models by, in columns and figures; none if it runs on one model.
     finds : conditions that it finds out by itself.
+    coarse_steps : whether it takes one step of first order from sample to sample, whatever swings.
     aided : whether samples may be missing, so that it takes aids as outputs, too.
     bands : (w,) what the law's standard deviations are multiplied by, see `System.bands`.
 
@@ -112,6 +114,7 @@ class Estimator(ABC):
     tuned_as: ClassVar[str] = ""
     sticks: ClassVar[bool] = False
     co_simulates: ClassVar[bool] = False
+    coarse_steps: ClassVar[bool] = False
     aided: ClassVar[bool] = False
     modes: tuple[str, ...] = ()
     finds: frozenset[str] = frozenset()
@@ -233,6 +236,11 @@ class Estimator(ABC):
         """Settings and state of the step."""
 
     @property
+    def steps(self) -> tuple[Step, ...]:
+        """Steps that are Euler's until that shows, see `estimators.step`; none if they stay so."""
+        return ()
+
+    @property
     def parts(self) -> Parts:
         """The compiled step and what it takes."""
         settings, state = self._arguments()
@@ -275,6 +283,8 @@ class Estimator(ABC):
             self.fmu.start({**begin, **shown}, held)
         self._model_time = self.fmu.start_time
         self._model.u[:] = 0.0
+        for step in self.steps:
+            step.accurate[0] = 0.0
         self._begin(u, y)
 
     def _shown_states(self, u: Vector, y: Vector, begun: Set[str]) -> dict[str, float]:

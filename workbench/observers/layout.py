@@ -203,6 +203,12 @@ def lag(layout, x):  # type: ignore[no-untyped-def]
 
 
 @inlined
+def near_rest(layout, x):  # type: ignore[no-untyped-def]
+    """Whether what rolls along is so slow that less than half of the feedback is left."""
+    return layout.follower >= 0 and abs(layout.lead * x[layout.leader]) < layout.half
+
+
+@inlined
 def stick(layout, x, before):  # type: ignore[no-untyped-def]
     """Let the follower roll where a step would take it past its leader close to standstill.
 
@@ -213,8 +219,7 @@ def stick(layout, x, before):  # type: ignore[no-untyped-def]
     ----------
     before : `lag` before the step.
     """
-    rolls = layout.follower >= 0 and abs(layout.lead * x[layout.leader]) < layout.half
-    if rolls and before * lag(layout, x) < 0.0:
+    if near_rest(layout, x) and before * lag(layout, x) < 0.0:
         x[layout.follower] = layout.ratio * x[layout.leader]
 
 

@@ -82,7 +82,7 @@ class CaseResult:
     untold : estimated quantities that it does not show, whatever others are.
     doubts : what is said of its start, and of its samples beside the model's time constants.
     resolved : whether its samples resolve the model, see `sampling_doubt` and `time_doubt`.
-    step_share : of the open loop's error that is its step's, see `step_doubt`; 0 where it did not
+    step_share : of an open loop's error that coarse steps make, see `step_doubt`; 0 if it did not
         run.
     """
 
@@ -290,10 +290,27 @@ class Simulation:
         """All estimators on one case, in this process."""
         with self.estimators() as estimators:
             runs = {name: replay(case, estimator) for name, estimator in estimators.items()}
+            rough = {
+                name: int(max((step.coarse[0] for step in estimator.steps), default=0.0))
+                for name, estimator in estimators.items()
+            }
         scores = {name: score(case, run, self.system) for name, run in runs.items()}
         result = CaseResult(self.system, case, runs, scores, self._reference(case, runs))
         narrow = any(test.narrow for tests in result.contradictions.values() for test in tests)
-        result = replace(result, **self._knowledge(case, narrow, runs.get(OpenLoop.name)))
+        coarse = [name for name in runs if self.kinds[name].coarse_steps]
+        result = replace(result, **self._knowledge(case, narrow, runs.get(OpenLoop.name), coarse))
+        result = replace(
+            result,
+            doubts=(
+                *result.doubts,
+                *(
+                    f"{name} takes {count} of its steps less accurately than noise allows: the "
+                    "model moves too fast there. Record more often"
+                    for name, count in rough.items()
+                    if count
+                ),
+            ),
+        )
         guessed = {name: np.zeros(case.time.size, bool) for name in result.guessed}
         marked = {
             name: replace(run, claimed={**run.claimed, **guessed}) for name, run in runs.items()
@@ -308,7 +325,11 @@ class Simulation:
         return CaseResult(self.system, case, {}, {}, None, **self._knowledge(case)).warnings()
 
     def _knowledge(
-        self, case: Case, narrow: bool = False, open_loop: Run | None = None
+        self,
+        case: Case,
+        narrow: bool = False,
+        open_loop: Run | None = None,
+        coarse: Sequence[str] = (),
     ) -> dict[str, Any]:
         """What a recording tells, by the model alone, as fields of the result.
 
@@ -318,6 +339,7 @@ class Simulation:
         ----------
         narrow : whether bands are too narrow, so that samples may be too far apart.
         open_loop : its run, where its error is shown.
+        coarse : estimators whose steps may not do, see `step_doubt`.
         """
         try:
             with open_model(self.system) as fmu:
@@ -328,7 +350,7 @@ class Simulation:
                 sampling = sampling_doubt(fmu, self.system, case) if narrow else ""
                 share, step = 0.0, ""
                 if open_loop is not None:
-                    share, step = step_doubt(fmu, self.system, case, open_loop)
+                    share, step = step_doubt(fmu, self.system, case, open_loop, coarse)
         except (InputError, FMUError, np.linalg.LinAlgError):
             return {}
         return {

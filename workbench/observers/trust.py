@@ -7,7 +7,7 @@ Sources: Y. Bar-Shalom, X.-R. Li, T. Kirubarajan, Estimation with Applications t
 Navigation, Wiley 2001, section 5.4; R. K. Mehra (1970), IEEE Trans. Autom. Control 15, 175-184.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -326,40 +326,45 @@ def _finer(case: Case, system: System) -> tuple[Vector, Matrix, Matrix]:
     return np.cumsum(steps), np.vstack([case.u[:1], between]), np.vstack([case.y[:1], y])
 
 
-def step_doubt(fmu: FMU, system: System, case: Case, run: Run) -> tuple[float, str]:
-    """Share of the open loop's error that is its step's, not the model's, and what is said of it.
+def step_doubt(
+    fmu: FMU, system: System, case: Case, run: Run, coarse: Sequence[str]
+) -> tuple[float, str]:
+    """Share of an open loop's error that one Euler step from sample to sample makes, in words, too.
 
-    A step of first order in N parts errs by an N-th: e(h) - e(h/N) is (1 - 1/N) of e(h). Below a
-    tenth of the sensor's noise it is nothing. A model with events is integrated otherwise.
-    Source: L. F. Richardson (1911), Philosophical Transactions A 210, 307-357.
+    The open loop takes such steps where they are borne; estimators that have no others are named
+    where they are not. A model with events is integrated otherwise.
 
     Parameters
     ----------
     run : of the open loop on the case.
+    coarse : estimators with such steps.
     """
-    if run.ending is not Ending.OK:
+    if run.ending is not Ending.OK or not coarse:
         return 0.0, ""
     estimator = OpenLoop(fmu, system, OpenLoop.default_gains(fmu, system))
     estimator.set_conditions(case.conditions)
     fmu.begin_at(case.model_time)
-    estimator.start(case.u[0], case.y[0])
-    if fmu.has_events:
+    estimator.run(case.time, case.u, case.y)
+    (step,) = estimator.steps
+    if not step.accurate[0]:
         return 0.0, ""
-    fine = np.asarray(estimator.run(*_finer(case, system)).values)[::_FINE]
+    estimator.start(case.u[0], case.y[0])
+    estimator.advance(np.zeros(1), case.u[:1], case.y[:1])
+    step.allowed[:] = np.inf  # nothing ends Euler's steps
+    values = estimator.advance(np.diff(case.time), case.u[1:], case.y[1:]).values
     share, sentence = 0.0, ""
     for output in system.outputs:
         column = list(system.columns).index(output.name)
-        values, measured = run.estimate[:, column], case[output.name]
+        euler, measured = np.asarray(values)[:, column], case[output.name][1:]
         known = np.isfinite(measured)
-        off = _rms(values - fine[:, column]) * _FINE / (_FINE - 1.0)
-        error = _rms((values - measured)[known]) if known.any() else 0.0
+        off = _rms(euler - run.estimate[1:, column])
+        error = _rms((euler - measured)[known]) if known.any() else 0.0
         if off > _NOTED * output.noise_at_scale and off > max(_NOTED, share) * error > 0.0:
             share = min(off / error, 1.0)
             sentence = (
-                f"{100 * share:.0f} % of the open loop's error of {output.name} is made by its "
-                f"steps, not by the model: {off:.3g} {output.unit} rms with one step from sample "
-                "to sample. Such steps damp what swings, also in observers without bands. Record "
-                "more often"
+                f"{' and '.join(coarse)}: one step of first order from sample to sample "
+                f"damps what swings: an open loop with it errs by {off:.3g} {output.unit} rms in "
+                f"{output.name}. Rely on open_loop and Kalman filters, or record more often"
             )
     return share, sentence
 

@@ -210,6 +210,7 @@ class DisturbanceObserver(Estimator):
 
     name = "disturbance_observer"
     label = "disturbance observer"
+    coarse_steps = True
     rank = 20
     meaning = (
         "L: rows states, then corrections of quantities; columns dy, integral of dy. T [1/s]: "

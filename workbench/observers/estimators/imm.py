@@ -24,6 +24,7 @@ from workbench.observers.estimators.kalman import (
     reset,
     update,
 )
+from workbench.observers.estimators.step import Step
 from workbench.observers.gains import Gains
 from workbench.system.system import System
 
@@ -96,6 +97,7 @@ class BankState(NamedTuple):
     expected: Vector  # (k,) probability before the sample
     change: Matrix  # (k, 2 k) on the right transition within a step, on the left shares of mixing
     z: Matrix  # (k, n + q)
+    errors: Matrix  # (k, n + q) of steps
     P: Matrix  # (k, n + q, n + q)
     estimates: Matrix  # (k, 2 w + 1) estimates of the members
     evidence: Vector  # (k,) logarithm of the likelihood of a sample
@@ -113,6 +115,7 @@ def _mix(settings, state, h):  # type: ignore[no-untyped-def]
     for i in range(count):
         for a in range(size):
             state.z[i, a] = members[i].z[a]
+            state.errors[i, a] = members[i].step.error[a]
             for b in range(size):
                 state.P[i, a, b] = members[i].P[a, b]
         for j in range(count):
@@ -132,9 +135,10 @@ def _mix(settings, state, h):  # type: ignore[no-untyped-def]
         for i in range(count):
             change[i, j] = change[i, count + j] * state.probability[i] / total
         for a in range(size):
-            z[a] = 0.0
+            z[a] = members[j].step.error[a] = 0.0
             for i in range(count):
                 z[a] += change[i, j] * state.z[i, a]
+                members[j].step.error[a] += change[i, j] * state.errors[i, a]
         for a in range(size):
             for b in range(size):
                 P[a, b] = 0.0
@@ -193,6 +197,7 @@ def _step(models, settings, state, h, u, y, estimate):  # type: ignore[no-untype
             status = status or forecast(model, own, filter_, h, u, y)
             if status:
                 return status
+            filter_.step.weight[0] = state.expected[j]  # steps of what is not so matter as little
             state.evidence[j] = update(model, own, filter_, h, y, estimates[j])
         status = status or finish(model, own, filter_, estimates[j])
     if h > 0.0:
@@ -258,10 +263,16 @@ class InteractingMultipleModel(ExtendedKalmanFilter):
             expected=np.zeros(k),
             change=np.zeros((k, 2 * k)),
             z=np.zeros((k, size)),
+            errors=np.zeros((k, size)),
             P=np.zeros((k, size, size)),
             estimates=np.zeros((k, 2 * len(self.system.columns) + 1)),
             evidence=np.zeros(k),
         )
+
+    @property
+    def steps(self) -> tuple[Step, ...]:
+        """See Estimator."""
+        return tuple(step for member in self._filters for step in member.steps)
 
     @property
     def models(self) -> tuple[FMU, ...]:

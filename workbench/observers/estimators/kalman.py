@@ -15,26 +15,30 @@ from workbench.models.fmu import FMU
 from workbench.models.native import (
     compiled,
     evaluate,
-    implicit,
     inlined,
     linearise,
     read,
     set_inputs,
-    solve,
 )
 from workbench.observers.contract import Estimator
+from workbench.observers.estimators.step import (
+    Step,
+    advance,
+    begin_interval,
+    follow_error,
+    judge_sample,
+    model_step,
+    restart,
+)
 from workbench.observers.gains import Gains, SearchSpace, noise_space
 from workbench.observers.layout import (
     Layout,
-    act,
     assign,
     clip,
     fading,
-    lag,
     measure,
     put,
     report,
-    stick,
 )
 from workbench.observers.operating import start_spreads, walks
 from workbench.system.system import System
@@ -204,11 +208,13 @@ def measurement_update(model, settings, state, y, estimate):  # type: ignore[no-
 
     Returns the logarithm of the determinant of the innovations' covariance.
     """
-    z, P, layout, v = state.z, state.P, settings.layout, state.column
+    z, P, layout, v, error = state.z, state.P, settings.layout, state.column, state.step.error
     size, n, volume = z.size, model.x.size, 0.0
+    state.step.seen[0] = state.step.seen[1] = 0.0
     estimate[estimate.size - 1] = 0.0
     for i in range(size):
         state.change[i] = 0.0
+        error[i] = state.step.predicted[i]
     for j in range(y.size):
         if np.isnan(y[j]):  # not measured: its level stays
             state.levels.scatter[j] = state.levels.sample[j]
@@ -218,10 +224,10 @@ def measurement_update(model, settings, state, y, estimate):  # type: ignore[no-
             innovation = y[j] - z[at] - state.change[at]
             for i in range(size):
                 v[i] = P[i, at]
-            total = v[at]
+            total, off = v[at], error[at]
         else:
             innovation = y[j] - model.y[-1 - at]
-            total = 0.0
+            total = off = 0.0
             for i in range(size):
                 v[i] = 0.0
                 for k in range(size):
@@ -229,14 +235,18 @@ def measurement_update(model, settings, state, y, estimate):  # type: ignore[no-
             for i in range(size):
                 total += model.jacobian[i, n - 1 - at] * v[i]
                 innovation -= model.jacobian[i, n - 1 - at] * state.change[i]
+                off += model.jacobian[i, n - 1 - at] * error[i]
         total += note(state.levels, j, innovation, total, state.levels.noise[j])
         volume += np.log(total)
         inverse = 1.0 / total
         estimate[estimate.size - 1] += innovation * innovation * inverse
+        state.step.seen[0] += off * off * inverse
+        state.step.seen[1] += 1.0
         # (I - K C) P (I - K C)' + K R K', with the best gain K = v / total
         for i in range(size):
             gain = v[i] * inverse
             state.change[i] += gain * innovation
+            error[i] -= gain * off
             for k in range(i + 1):
                 P[i, k] -= gain * v[k]
                 P[k, i] = P[i, k]
@@ -253,6 +263,7 @@ def update(model, settings, state, h, y, estimate):  # type: ignore[no-untyped-d
             levels.before[i, k] = state.P[i, k]
     volume = measurement_update(model, settings, state, y, estimate)
     nis = estimate[estimate.size - 1]
+    judge_sample(state.step, state.P, fade, state.step.seen[0], state.step.seen[1], nis)
     if settings.learning.within == np.inf:
         for i in range(z.size):
             z[i] += state.change[i]
@@ -262,7 +273,8 @@ def update(model, settings, state, h, y, estimate):  # type: ignore[no-untyped-d
         learn(settings, state, fade, h)
     elif levels.surprised[0] == 0.0:
         levels.surprised[0] = 1.0
-        loosen(state, state.spread[:, model.x.size :], z.size - 1, 0.0)
+        loosen(state, state.step.F, z.size - 1, 0.0)
+        assign(state.step.error, state.step.predicted)
         return -0.5 * (surprise + volume)
     else:
         levels.surprised[0] = 0.0
@@ -286,7 +298,7 @@ def follow_jump(model, settings, state, h, y, estimate):  # type: ignore[no-unty
     Returns the logarithm of the determinant of the innovations' covariance.
     """
     n, last, surprise = model.x.size, estimate.size - 1, settings.learning.surprise
-    F, best, chosen, size = state.spread[:, n:], np.inf, state.z.size - 1, 0.0
+    F, best, chosen, size = state.step.F, np.inf, state.z.size - 1, 0.0
     for q in range(n, state.z.size):
         if settings.walk[q] == 0.0:
             continue  # nothing to begin with, and it does not move
@@ -388,58 +400,17 @@ class FilterSettings(NamedTuple):
 class FilterState(NamedTuple):
     """What the laws remember: z (n + q,) states and deviations, P their covariance; work space.
 
-    `least` holds the variances of a step of the states, (n,), see `drive`; `inputs` the sample
-    before, and `acting` what acts in the step, (m,), see `act`.
+    `least` holds the variances of a step of the states, (n,), see `drive`.
     """
 
     z: Vector
     P: Matrix
-    system: Matrix  # (n, n + 1) of the step of the mean, with its right-hand side
-    spread: Matrix  # (n, n + n + q) of the derivatives of a step, see `transition`
+    step: Step
     product: Matrix  # (n, n + q), see `carry`
     least: Vector
     change: Vector
     column: Vector
     levels: Levels
-    inputs: Vector
-    acting: Vector
-
-
-@compiled
-def predict(model, settings, state, z, h):  # type: ignore[no-untyped-def]
-    """Advance z by one linearly implicit step, in which quantities stay; returns a status."""
-    n, system = model.x.size, state.system
-    status = put(model, z) or evaluate(model)
-    for i in range(n):
-        system[i, n] = h * model.dx[i]
-    status = status or linearise(model, n)
-    implicit(model, h, system)
-    status = status or solve(system)
-    before = lag(settings.layout, z)
-    for i in range(n):
-        z[i] += system[i, n]
-    stick(settings.layout, z, before)
-    return status
-
-
-@compiled
-def transition(model, system, h):  # type: ignore[no-untyped-def]
-    """Derivatives of the step that `predict` took, by states and quantities; returns a status.
-
-    Parameters
-    ----------
-    system : (n, n + n + q) whose last columns take the rows of states, (I - hA)^-1 [I, hB]; the
-        rows of quantities are those of a unit matrix.
-    """
-    n, size = model.x.size, model.jacobian.shape[0]
-    implicit(model, h, system)
-    for i in range(n):
-        for j in range(n):
-            system[i, n + j] = 0.0
-        system[i, n + i] = 1.0
-        for j in range(n, size):
-            system[i, n + j] = h * model.jacobian[j, i]
-    return solve(system)
 
 
 @compiled
@@ -448,7 +419,7 @@ def carry(F, P, work):  # type: ignore[no-untyped-def]
 
     Parameters
     ----------
-    F : (n, s) rows of states, see `transition`.
+    F : (n, s) derivatives of a step, rows of states.
     """
     n, size = F.shape
     for i in range(n):
@@ -515,26 +486,26 @@ def begin(model, settings, state, u, y):  # type: ignore[no-untyped-def]
         at = layout.seen[j]
         if at >= 0 and not np.isnan(y[j]):
             state.P[at, at] = variance(settings, fade, y, j)
-    assign(state.inputs, u)
+    restart(state.step, u)
     return measure(model, u)
 
 
 @compiled
 def forecast(model, settings, state, h, u, y):  # type: ignore[no-untyped-def]
     """Predict mean and covariance of a sample, with what `update` reads; returns a status."""
-    layout, P, size = settings.layout, state.P, state.z.size
-    act(layout, state.inputs, u, state.acting)
-    status = drive(model, settings, state, state.z, state.acting, h)
-    status = status or predict(model, settings, state, state.z, h)
+    layout, P, size, step = settings.layout, state.P, state.z.size, state.step
+    status = put(model, state.z) or begin_interval(model, layout, step, state.z, u, h)
+    status = status or drive(model, settings, state, state.z, step.end, h)
+    status = status or advance(model, layout, step, state.z, h, True)
     # Model noise enters before the step, whose implicit form damps it as it damps the state.
     fade = fading(layout, y)
     for i in range(size):
         P[i, i] += process_noise(settings, state, fade, h, i)
     for j in range(y.size):
         state.levels.noise[j] = variance(settings, fade, y, j)
-    status = status or transition(model, state.spread, h)
-    carry(state.spread[:, model.x.size :], P, state.product)
-    assign(state.inputs, u)
+    follow_error(step)
+    carry(step.F, P, state.product)
+    assign(step.inputs, u)
     status = status or measure(model, u)
     if layout.columns > model.x.size:
         status = status or put(model, state.z) or read(model)
@@ -607,10 +578,16 @@ class ExtendedKalmanFilter(Estimator):
             driven=learnt * np.array([signal.noise for signal in system.inputs]),
             driven_relative=learnt * np.array([signal.relative_noise for signal in system.inputs]),
         )
-        self._state: Any = filter_state(n, system, n + q)
+        step = model_step(fmu, of_states, len(system.inputs), n + q)
+        self._state: Any = filter_state(step, len(system.outputs), n + q)
 
     def _arguments(self) -> tuple[Any, Any]:
         return self._settings, self._state
+
+    @property
+    def steps(self) -> tuple[Step, ...]:
+        """See Estimator."""
+        return (self._state.step,)
 
     @property
     def covariance(self) -> Matrix:
@@ -677,25 +654,21 @@ def _share(gains: Gains, output: str) -> float:
     return gains[name] if name in gains.names else 0.0
 
 
-def filter_state(n: int, system: System, column: int) -> FilterState:
-    """State of a filter on a model with n states, in which everything is zero.
+def filter_state(step: Step, outputs: int, column: int) -> FilterState:
+    """State of a filter with so many outputs, in which everything is zero.
 
     Parameters
     ----------
     column : size of a work space.
     """
-    q, m, outputs = len(system.estimated), len(system.inputs) + 1, len(system.outputs)
-    size = n + q
+    n, size = step.F.shape
     return FilterState(
         z=np.zeros(size),
         P=np.zeros((size, size)),
-        system=np.zeros((n, n + 1)),
-        spread=np.zeros((n, n + size)),
+        step=step,
         product=np.zeros((n, size)),
         least=np.zeros(n),
         change=np.zeros(size),
         column=np.zeros(column),
         levels=levels(size, outputs),
-        inputs=np.zeros(m),
-        acting=np.zeros(m),
     )

@@ -8,53 +8,76 @@ from workbench.arrays import Matrix, Vector
 from workbench.models.description import MODEL_EXCHANGE
 from workbench.models.fmu import FMU, CoSimulation
 from workbench.models.hybrid import CoSimulationRun, HybridSimulation
-from workbench.models.native import (
-    compiled,
-    evaluate,
-    implicit,
-    inlined,
-    linearise,
-    set_states,
-    solve,
+from workbench.models.native import compiled, inlined, set_states
+from workbench.observers.contract import Estimate, Estimator
+from workbench.observers.estimators.step import (
+    Step,
+    advance,
+    begin_interval,
+    euler,
+    judge,
+    model_step,
+    restart,
+    unbearable,
 )
-from workbench.observers.contract import Estimator
 from workbench.observers.gains import Gains
-from workbench.observers.layout import Layout, act, assign, measure, report, write_estimate
+from workbench.observers.layout import Layout, assign, measure, output, report, write_estimate
 from workbench.system.system import System
 
 
-class _State(NamedTuple):
-    system: Matrix  # (n, n + 1) of the step, with its right-hand side
-    inputs: Vector  # the sample before, and what acts in the step, see `act`
-    acting: Vector
+class _Settings(NamedTuple):
+    layout: Layout
+    noise: Vector  # (l,) standard deviation of a sample of each output
 
 
 @inlined
-def _step(model, layout, state, h, u, y, estimate):  # type: ignore[no-untyped-def]
-    """One linearly implicit Euler step of the model; y is not used."""
-    n, system = model.x.size, state.system
-    status = 0
-    if h > 0.0:
-        act(layout, state.inputs, u, state.acting)
-        status = measure(model, state.acting) or evaluate(model)
-        for i in range(n):
-            system[i, n] = h * model.dx[i]
-        status = status or linearise(model, n)
-        implicit(model, h, system)
-        status = status or solve(system)
-        if status:
-            return status
-        for i in range(n):
-            model.x[i] += system[i, n]
-        status = set_states(model)
-    assign(state.inputs, u)
-    return status or measure(model, u) or report(model, layout, estimate)
+def _step(model, settings, step, h, u, y, estimate):  # type: ignore[no-untyped-def]
+    """Take the step of the model; y only tells how much of the error is the step's."""
+    layout, status = settings.layout, 0
+    if h == 0.0:
+        restart(step, u)
+        return measure(model, u) or report(model, layout, estimate)
+    assign(step.x, model.x)
+    status = begin_interval(model, layout, step, step.x, u, h) or measure(model, step.end)
+    if step.accurate[0] > 0.0:
+        status = status or advance(model, layout, step, step.x, h, False)
+    else:
+        # The error goes on as W (error + g) with this step; g of this one follows with the next.
+        for i in range(step.x.size):
+            step.system[i, step.x.size + 1] = step.error[i] + step.left[i]
+        status = status or euler(model, layout, step, step.x, h, False)
+        for i in range(step.x.size):
+            step.error[i] = step.system[i, step.x.size + 1]
+    assign(model.x, step.x)
+    assign(step.inputs, u)
+    status = status or set_states(model) or measure(model, u) or report(model, layout, estimate)
+    if step.accurate[0] == 0.0:
+        _judge(model, settings, step, y)
+    return status
+
+
+@inlined
+def _judge(model, settings, step, y):  # type: ignore[no-untyped-def]
+    """Compare what steps have made of the outputs with noise, and with what is measured."""
+    shown, allowed, n = 0.0, 0.0, model.x.size
+    for j in range(y.size):
+        at, noise = settings.layout.seen[j], settings.noise[j]
+        if noise == 0.0:
+            continue
+        off = step.error[at] if at >= 0 else 0.0
+        if at < 0:
+            for i in range(n):
+                off += model.jacobian[i, n - 1 - at] * step.error[i]
+        distance = 0.0 if np.isnan(y[j]) else (y[j] - output(model, settings.layout, j)) / noise
+        shown += (off / noise) ** 2
+        allowed += max(1.0, distance * distance)
+    judge(step, 0, shown, allowed)
 
 
 @compiled
-def _loop(model, layout, state, steps, u, y, estimates):  # type: ignore[no-untyped-def]
+def _loop(model, settings, state, steps, u, y, estimates):  # type: ignore[no-untyped-def]
     for k in range(steps.size):
-        status = _step(model, layout, state, steps[k], u[k], y[k], estimates[k])
+        status = _step(model, settings, state, steps[k], u[k], y[k], estimates[k])
         if status:
             return status
     return 0
@@ -73,7 +96,7 @@ class OpenLoop(Estimator):
 
     def __init__(self, fmu: FMU, system: System, gains: Gains) -> None:
         super().__init__(fmu, system, gains)
-        n, m = len(fmu.states), len(system.inputs) + 1
+        n = len(fmu.states)
         self._simulation: HybridSimulation | CoSimulationRun | None = None
         unseen = [output.name for output in system.outputs if output.name not in fmu.states]
         self._read = fmu.typed([*system.reported, *unseen])
@@ -83,10 +106,28 @@ class OpenLoop(Estimator):
             and all(fmu.is_continuous(signal.name) for signal in system.inputs)
             and all(map(fmu.is_real, fmu.states))
         )
-        self._state = _State(np.zeros((n, n + 1)), np.zeros(m), np.zeros(m))
+        noise = np.array([output.noise_at_scale for output in system.outputs])
+        # Nothing rolls along in a model alone.
+        self._settings = _Settings(self._layout._replace(follower=-1), noise)
+        step = model_step(fmu, np.zeros(n), len(system.inputs), n, self._layout.columns)
+        self._state = step._replace(system=np.zeros((n, n + 2)))
 
-    def _arguments(self) -> tuple[Layout, Any]:
-        return self._layout, self._state
+    @property
+    def steps(self) -> tuple[Step, ...]:
+        """See Estimator."""
+        return (self._state,)
+
+    def _arguments(self) -> tuple[Any, Any]:
+        return self._settings, self._state
+
+    def run(self, time: Vector, u: Matrix, y: Matrix) -> Estimate:
+        """See Estimator; accurate steps, where they turn out to be needed, begin at the start."""
+        estimate = super().run(time, u, y)
+        if not unbearable(self._state):
+            return estimate
+        self.start(u[0], y[0])
+        self._state.accurate[0] = 1.0
+        return self.advance(np.diff(time, prepend=time[0]), u, y)
 
     def _begin(self, u: Vector, y: Vector) -> None:
         if self.fmu.interface == MODEL_EXCHANGE:

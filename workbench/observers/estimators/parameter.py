@@ -135,6 +135,7 @@ class ParameterEstimator(Estimator):
 
     name = "parameter_estimator"
     label = "parameter estimator"
+    coarse_steps = True
     role = FULL
     rank = 30
     meaning = "L: rows corrections of quantities; columns dy, integral of dy"

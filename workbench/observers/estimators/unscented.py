@@ -6,7 +6,7 @@ import numpy as np
 
 from workbench.arrays import Matrix, Vector
 from workbench.models.fmu import FMU
-from workbench.models.native import compiled, read
+from workbench.models.native import compiled, linearise, read
 from workbench.observers.estimators.kalman import (
     ExtendedKalmanFilter,
     Levels,
@@ -17,14 +17,20 @@ from workbench.observers.estimators.kalman import (
     finish,
     learn,
     note,
-    predict,
     process_noise,
     reset,
     surprises,
     variance,
 )
+from workbench.observers.estimators.step import (
+    Step,
+    advance,
+    begin_interval,
+    follow_error,
+    judge_sample,
+)
 from workbench.observers.gains import Gains
-from workbench.observers.layout import act, assign, clip, fading, measure, put
+from workbench.observers.layout import assign, clip, fading, measure, put
 from workbench.system.system import System
 
 # Distance of sigma points, as a share of the cubature rule's: a quantity that nothing is known of
@@ -41,16 +47,14 @@ class PointsState(NamedTuple):
 
     z: Vector
     P: Matrix
-    system: Matrix
-    spread: Matrix
+    step: Step
     product: Matrix
     least: Vector
     change: Vector
     column: Vector
     levels: Levels
-    inputs: Vector
-    acting: Vector
     start: Vector  # z before the step
+    off: Vector  # (l,) error of steps in the outputs
     root: Matrix
     points: Matrix  # (2 size, size)
     seen: Matrix  # (2 size, l) outputs at the points
@@ -125,10 +129,10 @@ def _spread(model, settings, state, spread, h, u):  # type: ignore[no-untyped-de
                 point[j] = z[j] + (1 - 2 * side) * spread * root[i, j]
             for j in range(size - n):
                 point[n + j] = clip(point[n + j], layout.low[j], layout.high[j])
-            status = status or predict(model, settings, state, point, h)
+            status = status or advance(model, layout, state.step, point, h, False)
             if layout.columns > n:
                 status = status or measure(model, u) or put(model, point) or read(model)
-                status = status or measure(model, state.acting)
+                status = status or measure(model, state.step.end)
             for j in range(layout.seen.size):
                 at = layout.seen[j]
                 state.seen[2 * i + side, j] = point[at] if at >= 0 else model.y[-1 - at]
@@ -137,6 +141,27 @@ def _spread(model, settings, state, spread, h, u):  # type: ignore[no-untyped-de
         for i in range(2 * size):
             total += points[i, j]
         z[j] = total / (2 * size)
+    return status
+
+
+@compiled
+def _lead(model, settings, state, h, u):  # type: ignore[no-untyped-def]
+    """Take the step of the mean, for its error, or for its parts, which points take; a status."""
+    layout, step, point, n = settings.layout, state.step, state.change, model.x.size
+    assign(point, state.z)
+    if step.accurate[0] > 0.0:
+        return advance(model, layout, step, point, h, False)
+    status = advance(model, layout, step, point, h, True)
+    follow_error(step)
+    if layout.columns > n:
+        status = status or measure(model, u) or put(model, point)
+        status = status or linearise(model, layout.columns) or measure(model, step.end)
+    for j in range(layout.seen.size):
+        at = layout.seen[j]
+        state.off[j] = step.predicted[at] if at >= 0 else 0.0
+        if at < 0:
+            for i in range(point.size):
+                state.off[j] += model.jacobian[i, n - 1 - at] * step.predicted[i]
     return status
 
 
@@ -188,11 +213,31 @@ def _absorb(settings, state, spread, fade, y, estimate):  # type: ignore[no-unty
         estimate[estimate.size - 1] += white * white
         for i in range(size):
             state.change[i] += triangle[j, outputs + i] * white
+    follow_sample(state, triangle, y)
     for i in range(size):
         z[i] += state.change[i]
     for i in range(size):
         for j in range(size):
             state.root[i, j] = triangle[outputs + i, outputs + j]
+
+
+@compiled
+def follow_sample(state, triangle, y):  # type: ignore[no-untyped-def]
+    """Carry the error of steps on by a sample, as its gain does with every innovation."""
+    error, off, shown, count = state.step.error, state.off, 0.0, 0.0
+    outputs = y.size
+    if state.step.accurate[0] > 0.0:
+        return
+    for j in range(outputs):
+        white = 0.0 if np.isnan(y[j]) else off[j]
+        count += 0.0 if np.isnan(y[j]) else 1.0
+        for i in range(j):
+            white -= triangle[i, j] * off[i]
+        off[j] = white / triangle[j, j]
+        shown += off[j] * off[j]
+        for i in range(error.size):
+            error[i] -= triangle[j, outputs + i] * off[j]
+    state.step.seen[0], state.step.seen[1] = shown, count
 
 
 @compiled
@@ -210,8 +255,8 @@ def _step(model, settings, state, h, u, y, estimate):  # type: ignore[no-untyped
         status = ekf_step(model, settings, state, h, u, y, estimate)
         _covariance_to_root(state)
         return status
-    act(layout, state.inputs, u, state.acting)
-    status = drive(model, settings, state, z, state.acting, h)
+    status = put(model, z) or begin_interval(model, layout, state.step, z, u, h)
+    status = status or drive(model, settings, state, z, state.step.end, h)
     for i in range(size):
         # Model noise enters before the step, whose implicit form damps it as it damps the state.
         moves = np.sqrt(process_noise(settings, state, fade, h, i))
@@ -221,7 +266,10 @@ def _step(model, settings, state, h, u, y, estimate):  # type: ignore[no-untyped
             stack[size + i, j] = moves if j == i else 0.0
     triangularise(stack[: 2 * size, :size], root)
     spread = POINT_DISTANCE * np.sqrt(1.0 * size)
+    status = status or _lead(model, settings, state, h, u)
+    state.step.given[0] = 1.0
     status = status or _spread(model, settings, state, spread, h, u)
+    state.step.given[0] = 0.0
     if status:
         return status
     _absorb(settings, state, spread, fade, y, estimate)
@@ -233,9 +281,11 @@ def _step(model, settings, state, h, u, y, estimate):  # type: ignore[no-untyped
             _covariance_to_root(state)
             return status
         state.levels.surprised[0] = 0.0
-    assign(state.inputs, u)
+    assign(state.step.inputs, u)
+    seen, nis = state.step.seen, estimate[estimate.size - 1]
     status = measure(model, u)
     _root_to_covariance(state)
+    judge_sample(state.step, state.P, fade, seen[0], seen[1], nis)
     if settings.learning.within < np.inf:
         learn(settings, state, fade, h)
     return status or finish(model, settings, state, estimate)
@@ -275,8 +325,9 @@ class UnscentedKalmanFilter(ExtendedKalmanFilter):
         super().__init__(fmu, system, gains)
         size, outputs = len(self._settings.walk), len(self.system.outputs)
         self._state = PointsState(
-            *filter_state(len(fmu.states), self.system, max(size, 2 * outputs)),
+            *filter_state(self._state.step, outputs, max(size, 2 * outputs)),
             start=np.zeros(size),
+            off=np.zeros(outputs),
             root=np.zeros((size, size)),
             points=np.zeros((2 * size, size)),
             seen=np.zeros((2 * size, outputs)),

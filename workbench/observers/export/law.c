@@ -44,6 +44,10 @@ static inline int plant_set_sample(LawModelView *model, const double *u) {
     return plant_set_inputs(model, 0, LAW_INPUTS);
 }
 
+static inline int plant_set_point(LawModelView *model, const double *u) {
+    return plant_set_sample(model, u);
+}
+
 static inline int plant_set_states(LawModelView *model) {
     for (int k = 0; k < PLANT_NX; k++) {
         if (!isfinite(model->x[k])) {

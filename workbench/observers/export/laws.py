@@ -43,7 +43,15 @@ _HERE = Path(__file__).parent
 _SOURCES = {"integrator.c": _HERE / "law.c", "memory.h": _HERE / "law.h"}
 
 # Functions of the kernel that call the FMU, by the number of their arguments; law.c has them.
-_CALLS = {"set_sample": 2, "set_inputs": 3, "set_states": 1, "place": 1, "evaluate": 1, "read": 1}
+_CALLS = {
+    "set_sample": 2,
+    "set_point": 2,
+    "set_inputs": 3,
+    "set_states": 1,
+    "place": 1,
+    "evaluate": 1,
+    "read": 1,
+}
 _CALLS |= {"differentiate": 3, "linearise": 2}
 
 

@@ -39,6 +39,7 @@ from workbench.observers.estimators.block_filter.block_slopes import slope, slop
 from workbench.observers.estimators.block_filter.block_step import predict
 from workbench.observers.estimators.block_filter.blocks import Blocks, blocks, widths
 from workbench.observers.estimators.kalman import ExtendedKalmanFilter, FilterSettings, variance
+from workbench.observers.estimators.step import Step
 from workbench.observers.gains import Gains
 from workbench.observers.layout import Layout, act, assign, clip, fading, measure, put, report
 from workbench.system.system import System
@@ -208,6 +209,7 @@ class BlockKalmanFilter(ExtendedKalmanFilter):
 
     name = "arrow"
     label = "block Kalman filter"
+    coarse_steps = True
     rank = 42
     standard = False
     tunable = False
@@ -231,6 +233,11 @@ class BlockKalmanFilter(ExtendedKalmanFilter):
         self._step, self._loop = arrow_step, _loop
         self._settings = ArrowSettings(self._settings, self._blocks)
         self._state = _state(self._blocks, self._layout, len(self.fmu.states))
+
+    @property
+    def steps(self) -> tuple[Step, ...]:
+        """See Estimator."""
+        return () if isinstance(self._state, ArrowState) else super().steps
 
     def _begin(self, u: Vector, y: Vector) -> None:
         if not isinstance(self._state, ArrowState):

@@ -18,10 +18,8 @@ from workbench.observers.estimators.kalman import (
     finish,
     learn,
     note,
-    predict,
     reset,
     room,
-    transition,
     trust,
     variance,
 )
@@ -34,8 +32,16 @@ from workbench.observers.estimators.moving_horizon.window import (
 )
 from workbench.observers.estimators.moving_horizon.window_bounds import bound
 from workbench.observers.estimators.moving_horizon.window_cost import cost, reweigh
+from workbench.observers.estimators.step import (
+    Step,
+    advance,
+    begin_interval,
+    follow_error,
+    interval,
+    judge_sample,
+)
 from workbench.observers.gains import Gains
-from workbench.observers.layout import Layout, act, assign, assign_rows, fading, measure, put
+from workbench.observers.layout import Layout, assign, assign_rows, fading, measure, put
 from workbench.system.system import System
 
 HORIZON = 20  # samples
@@ -94,7 +100,7 @@ def _append(settings, state, h, u, y):  # type: ignore[no-untyped-def]
             held[j] = y[j]
     fade = fading(settings.layout, held)
     window.steps[k] = h
-    assign(window.inputs[k], state.filter.acting)
+    assign(window.inputs[k], state.filter.step.inputs)
     assign(window.reached[k], u)
     assign(window.samples[k], y)
     for j in range(y.size):
@@ -117,15 +123,13 @@ def _append(settings, state, h, u, y):  # type: ignore[no-untyped-def]
 def expand(model, settings, state, k):  # type: ignore[no-untyped-def]
     """Take and linearise the step from a node, and the outputs there; returns a status."""
     window, layout, n = state.window, settings.layout, model.x.size
-    arrived, h = window.arrived[k], window.steps[k]
+    arrived, step = window.arrived[k], state.filter.step
     for i in range(arrived.size):
         arrived[i] = window.nodes[k, i]
-    status = measure(model, window.inputs[k])
-    status = status or predict(model, settings, state.filter, arrived, h)
-    status = status or transition(model, state.filter.spread, h)
-    for i in range(n):
-        for j in range(arrived.size):
-            window.F[k, i, j] = state.filter.spread[i, n + j]
+    interval(layout, step, window.inputs[k], window.reached[k])
+    status = measure(model, step.end)
+    status = status or advance(model, layout, step, arrived, window.steps[k], True)
+    assign_rows(window.F[k], step.F)
     if layout.columns > n:
         status = status or measure(model, window.reached[k])
         status = status or put(model, arrived) or read(model) or linearise(model, layout.columns)
@@ -198,6 +202,29 @@ def _solve(settings, state, new, estimate):  # type: ignore[no-untyped-def]
 
 
 @compiled
+def _follow_sample(settings, state, nis):  # type: ignore[no-untyped-def]
+    """Carry the error of steps on by the last sample, as its gain does with every innovation."""
+    window, step, seen = state.window, state.filter.step, settings.layout.seen
+    k, shown, count = window.filled[0] - 1, 0.0, 0.0
+    if step.accurate[0] > 0.0:
+        return
+    for j in range(seen.size):
+        total, off = window.total[k, j], 0.0
+        if total == 0.0:
+            continue
+        if seen[j] >= 0:
+            off = step.error[seen[j]]
+        else:
+            for i in range(step.error.size):
+                off += window.slopes[k, j, i] * step.error[i]
+        for i in range(step.error.size):
+            step.error[i] -= window.gain[k, j, i] / total * off
+        shown += off * off / total
+        count += 1.0
+    judge_sample(step, state.filter.P, fading(settings.layout, state.held), shown, count, nis)
+
+
+@compiled
 def move(model, settings, state, share):  # type: ignore[no-untyped-def]
     """Move the nodes by a share of their change and take the steps from there; a status."""
     window, status = state.window, 0
@@ -240,14 +267,18 @@ def horizon_step(model, settings, state, h, u, y, estimate):  # type: ignore[no-
         assign(window.mean, state.filter.z)
         assign_rows(window.covariance, state.filter.P)
         return status or finish(model, settings, state.filter, estimate)
-    act(settings.layout, state.filter.inputs, u, state.filter.acting)
-    status = drive(model, settings, state.filter, state.filter.z, state.filter.acting, h)
+    step, z = state.filter.step, state.filter.z
+    status = put(model, z) or begin_interval(model, settings.layout, step, z, u, h)
+    status = status or drive(model, settings, state.filter, z, step.end, h)
     _append(settings, state, h, u, y)
     status = status or expand(model, settings, state, window.filled[0] - 1)
+    follow_error(step)
     for iteration in range(settings.iterations):
         _solve(settings, state, iteration == 0, estimate)
+        if iteration == 0:
+            _follow_sample(settings, state, estimate[estimate.size - 1])
         status = status or _relinearise(model, settings, state)
-    assign(state.filter.inputs, u)
+    assign(step.inputs, u)
     return status or measure(model, u) or finish(model, settings, state.filter, estimate)
 
 
@@ -311,6 +342,11 @@ class MovingHorizonEstimator(ExtendedKalmanFilter):
             held=np.zeros(outputs),
             window=window(round(samples), n, len(system.inputs) + 1, outputs, low, high),
         )
+
+    @property
+    def steps(self) -> tuple[Step, ...]:
+        """See Estimator."""
+        return (self._state.filter.step,)
 
     @property
     def window(self) -> Window:

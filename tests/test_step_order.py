@@ -1,0 +1,220 @@
+"""The step of estimators: of its order, damped as it must be, as accurate as sensors need."""
+
+import shutil
+
+import numpy as np
+import pandas as pd
+import pytest
+from numpy.testing import assert_allclose
+from scipy.integrate import solve_ivp
+from scipy.stats import chi2
+
+from workbench import case_from_frame
+from workbench.arrays import Matrix, Vector
+from workbench.models.fmu import FMU
+from workbench.models.native import instance
+from workbench.observers import estimators_of
+from workbench.observers.estimators import step as method
+from workbench.observers.estimators.step import advance, model_step, restart
+from workbench.observers.layout import layout
+from workbench.observers.replay import replay
+from workbench.recordings.case import Case
+from workbench.system.registry import load_system, open_model
+from workbench.system.system import System
+
+from .built import MACHINES
+from .test_export_laws import assert_same, run_fmu, run_python, write_fmu
+
+pytest.importorskip("rumoca", reason="needs the extra [compiler]")
+pytest.importorskip("ziglang", reason="needs the extra [compiler]")
+
+H, NOISE, OMEGA = 0.01, 1e-3, np.sqrt(10.0)
+
+
+@pytest.fixture(scope="module")
+def spring(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("swing")
+    for path in (MACHINES / "motions").iterdir():
+        shutil.copy(path, folder)
+    return load_system(folder)
+
+
+@pytest.fixture(scope="module")
+def fmu(spring):
+    with open_model(spring) as model:
+        yield model
+
+
+def swing() -> tuple[Vector, Vector, Vector]:
+    """Time, force, held between samples, and positions of 20 s of the undamped mass, exactly."""
+    time = H * np.arange(2001)
+    force = np.sign(np.sin(0.7 * time))
+    places, s, v = [], 1.0, 0.0
+    for F in force:
+        places.append(s)
+        rest = 1.0 + F / 10.0
+        a, b = s - rest, v / OMEGA
+        c, d = np.cos(OMEGA * H), np.sin(OMEGA * H)
+        s, v = rest + a * c + b * d, OMEGA * (b * c - a * d)
+    return time, force, np.array(places)
+
+
+def recorded(system: System, noise: float) -> Case:
+    time, force, places = swing()
+    scatter = noise * np.random.default_rng(3).standard_normal(time.size)
+    scatter[0] = 0.0
+    table = {"time [s]": time, "F [N]": force, "s [m]": places + scatter}
+    return case_from_frame(system, pd.DataFrame(table))
+
+
+def test_a_linear_model_takes_a_step_of_order_three_that_forgets_what_is_stiff():
+    def R(z: complex) -> complex:
+        W = 1.0 / (1.0 - method._G * z)
+        return W + (W - 1.0) * (method._C + method._D * W) * W
+
+    errors = [abs(R(z) - np.exp(z)) for z in (0.02j, 0.01j)]
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(4.0, abs=0.05)  # of a step: order + 1
+    assert abs(R(-1e9)) < 1e-8
+    assert max(abs(R(1j * y)) for y in np.linspace(0.0, 1e3, 20001)) <= 1.0 + 1e-12
+
+
+def test_a_swing_does_not_fade_without_feedback(spring, fmu):
+    kind = estimators_of(spring)["open_loop"]
+    run = replay(recorded(spring, 0.0), kind(fmu, spring, kind.default_gains(fmu, spring)))
+    # 1e-4 of the range after 20 s, what is asked of an integrator with a tolerance of 1e-8.
+    places = swing()[2]
+    assert_allclose(run.signal("s"), places, rtol=0.0, atol=1e-4 * np.ptp(places))
+
+
+@pytest.mark.parametrize("name", ["ekf", "ukf", "mhe", "imm", "smoother"])
+def test_filters_of_an_exact_model_err_by_less_than_a_sensor(spring, fmu, name):
+    kind = estimators_of(spring)[name]
+    run = replay(recorded(spring, NOISE), kind(fmu, spring, kind.default_gains(fmu, spring)))
+    errors = (run.signal("s") - swing()[2])[200:]
+    assert np.sqrt(np.mean(errors**2)) < 0.5 * NOISE
+    # The mean of 1800 values with one degree of freedom, of which 3 standard deviations are 0.1; a
+    # filter whose states may walk, which these do not, expects a little more than there is.
+    assert 0.85 < np.mean(run.nis[200:]) < 1.1
+
+
+def stepped(fmu: FMU, system: System, walk: float, h: float, count: int) -> Matrix:
+    """States after each of `count` steps of h [s], (count, n), of a filter with a random walk."""
+    fmu.start({})
+    model, n = instance(fmu, ["F"], [], []), len(fmu.states)
+    work, places = model_step(fmu, np.full(n, walk), 1, n), layout(fmu, system)
+    z, states = fmu.get_states(), []
+    restart(work, np.zeros(2))
+    work.accurate[0] = 1.0
+    for k in range(count):
+        work.begin[:] = [0.0, k * h]
+        work.end[:] = [0.0, (k + 1) * h]
+        assert advance(model, places, work, z, h, False) == 0
+        states.append(z.copy())
+    assert work.coarse[0] == 0.0
+    return np.array(states)
+
+
+@pytest.fixture(scope="module")
+def relaxation(spring):
+    return load_system(spring.library.parent / "relaxation.toml")
+
+
+def lienard(mu: float, time: Vector) -> Matrix:
+    """Both states of Van der Pol's equation by Radau at 1e-10, (n, 2)."""
+
+    def rates(t: float, x: Vector) -> list[float]:
+        return [mu * (x[0] - x[0] ** 3 / 3.0 - x[1]), x[0] / mu]
+
+    span = 0.0, float(time[-1])
+    states: Matrix = solve_ivp(rates, span, [2.0, 0.0], "Radau", time, rtol=1e-10, atol=1e-12).y.T
+    return states
+
+
+def test_a_step_alone_is_of_order_two_at_least(relaxation):
+    end, errors = 0.5, []
+    with open_model(relaxation) as fmu:
+        for count in (4000, 8000):
+            h = end / count
+            # So large a walk allows any error: no step is taken in parts.
+            states = stepped(fmu, relaxation, 1e30, h, count)
+            time = h * np.arange(count + 1)
+            errors.append(np.abs(states[-1] - lienard(1000.0, time)[-1]).max())
+    assert np.log2(errors[0] / errors[1]) > 1.9
+
+
+def test_a_stiff_relaxation_jumps_when_it_should(relaxation):
+    """A step of 10 s meets jumps of microseconds, and takes them in parts."""
+    time = 10.0 * np.arange(201)
+    with open_model(relaxation) as fmu:
+        states = stepped(fmu, relaxation, 0.0, 10.0, 200)
+    # A jump in between is a matter of microseconds; samples lie beside it.
+    assert_allclose(states, lienard(1000.0, time)[1:], rtol=0.0, atol=1e-4 * 4.0)
+
+
+def test_reactions_of_robertson_go_as_they_should(spring):
+    system = load_system(spring.library.parent / "robertson.toml")
+
+    def rates(t: float, x: Vector) -> list[float]:
+        there, back = 0.04 * x[0], 1e4 * x[1] * x[2]
+        return [back - there, there - back - 3e7 * x[1] ** 2, 3e7 * x[1] ** 2]
+
+    time = 0.4 * np.arange(101)
+    exact = solve_ivp(rates, (0.0, 40.0), [1.0, 0.0, 0.0], "Radau", time, rtol=1e-10, atol=1e-14)
+    with open_model(system) as fmu:
+        states = stepped(fmu, system, 0.0, 0.4, 100)
+    # 1e-4 of the largest size of each, the second of which is 4e-5.
+    assert (np.abs(states - exact.y.T[1:]) < 1e-4 * np.abs(exact.y.T).max(axis=0)).all()
+
+
+@pytest.mark.parametrize("name", ["ekf", "ukf"])
+def test_innovations_of_an_exact_swing_pass_chi_squared(spring, fmu, name):
+    """A hundred swings whose start, states and mass scatter by as much as the filter is told."""
+    kind = estimators_of(spring)[name]
+    estimator = kind(fmu, spring, kind.default_gains(fmu, spring))
+    walk, spread = estimator._settings.walk, estimator._settings.spread
+    time, count = H * np.arange(1001), 0
+    low, high = chi2.interval(0.95, time.size - 1)
+    for seed in range(100):
+        rng = np.random.default_rng(seed)
+        s, v, dm = np.array([1.0, 0.0, 0.0]) + spread * rng.standard_normal(3)
+        places = []
+        for _ in time:
+            places.append(s)
+            s, v, dm = np.array([s, v, dm]) + np.sqrt(H) * walk * rng.standard_normal(3)
+            omega = np.sqrt(10.0 / (1.0 + dm))
+            a, c, d = s - 1.0, np.cos(omega * H), np.sin(omega * H)
+            s, v = 1.0 + a * c + v / omega * d, v * c - omega * a * d
+        y = np.array(places) + NOISE * rng.standard_normal(time.size)
+        nis = estimator.run(time, np.zeros((time.size, 1)), y[:, None]).nis
+        count += low < np.nansum(nis[1:]) < high
+    # Of a hundred runs that pass with 95 % each, fewer than 89 do so once in a hundred times.
+    assert count >= 89
+
+
+def test_a_slow_motion_keeps_the_step_of_first_order(spring, fmu):
+    """At rest there is nothing that a step of first order damps: results stay what they were."""
+    time = H * np.arange(400)
+    places = 1.0 + NOISE * np.random.default_rng(4).standard_normal(time.size)
+    places[0] = 1.0
+    table = {"time [s]": time, "F [N]": 0.0 * time, "s [m]": places}
+    case = case_from_frame(spring, pd.DataFrame(table))
+    for name in ("open_loop", "ekf", "ukf"):
+        kind = estimators_of(spring)[name]
+        estimator = kind(fmu, spring, kind.default_gains(fmu, spring))
+        replay(case, estimator)
+        assert [step.accurate[0] for step in estimator.steps] == [0.0]
+
+
+@pytest.mark.parametrize("name", ["ekf", "ukf", "mhe"])
+def test_samples_one_by_one_and_exported_filters_take_the_same_steps(spring, fmu, tmp_path, name):
+    case = recorded(spring, NOISE).part(slice(0, 600))
+    kind = estimators_of(spring)[name]
+    estimator = kind(fmu, spring, kind.default_gains(fmu, spring))
+    rows = [estimator.init(case.time[0], case.u[0], case.y[0])]
+    for k in range(1, case.time.size):
+        rows.append(estimator.step(case.time[k], case.u[k], case.y[k]))
+    assert estimator.steps[0].accurate[0] == 1.0
+    expected = run_python(estimator, case.time, case.u, case.y)
+    assert_allclose([row.values for row in rows], expected[:, : rows[0].values.size], rtol=1e-12)
+    path = write_fmu(tmp_path / "estimator.fmu", estimator)
+    assert_same(run_fmu(path, case.time, case.u, case.y), expected)
