@@ -160,6 +160,8 @@ LEAST = Interval(-0.2, -math.inf, -0.18, "1", "least")
     [
         (ESTIMATE, "0.01 N.m (95 %: 0.009 to 0.011)"),
         (GREATEST, "at its limit of 0.0133 N.m, which is no estimate: larger may fit better"),
+        (replace(ESTIMATE, unit="1"), "1 % (95 %: 0.9 to 1.1)"),
+        (replace(ESTIMATE, unit="1", plain=True), "0.01 (95 %: 0.009 to 0.011)"),
         (LEAST, "at its limit of -20 %, which is no estimate: smaller may fit better"),
         (BETTER, "no estimate: 0.015 N.m, beyond it, fits better"),
         (ALONE, "no estimate: 0.015 N.m, beyond it, fits better, alone"),

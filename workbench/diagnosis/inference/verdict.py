@@ -9,6 +9,7 @@ import numpy as np
 from scipy.stats import bootstrap
 
 from workbench.arrays import Matrix, Vector
+from workbench.diagnosis.effects.candidates import GAIN
 from workbench.diagnosis.effects.catalogue import Effect
 from workbench.diagnosis.inference.discrepancy import correlated_deviations, share_by_form
 from workbench.diagnosis.inference.fit import Fit
@@ -61,6 +62,7 @@ class Interval:
     limit : that bound, "least" or "greatest": then the value is no estimate.
     beyond : where a fit ends that may pass the bound and leaves clearly less; NaN if none does.
     alone : whether that fit needs no other cause.
+    plain : whether it is a number in a unit that nobody states, and no share.
     """
 
     value: float
@@ -70,13 +72,14 @@ class Interval:
     limit: str = ""
     beyond: float = np.nan
     alone: bool = False
+    plain: bool = False
 
     @property
     def text(self) -> str:
         """For people."""
         if not self.limit:
-            return with_interval(self.value, self.low, self.high, self.unit)
-        value = with_unit(self.value, self.unit)
+            return with_interval(self.value, self.low, self.high, self._spoken)
+        value = with_unit(self.value, self._spoken)
         return f"at its limit of {value}, which is no estimate: {self.better}"
 
     @property
@@ -84,9 +87,13 @@ class Interval:
         """What is known of values beyond the limit."""
         if np.isfinite(self.beyond):
             alone = ", alone" * self.alone
-            return f"{with_unit(self.beyond, self.unit)}, beyond it, fits better{alone}"
+            return f"{with_unit(self.beyond, self._spoken)}, beyond it, fits better{alone}"
         more = "smaller" if self.limit == "least" else "larger"
         return f"{more} may fit better" if self.open else f"nothing is {more}"
+
+    @property
+    def _spoken(self) -> str:
+        return "" if self.plain else self.unit
 
     @property
     def open(self) -> bool:
@@ -587,15 +594,18 @@ def _cause(fit: Fit, chosen: Selection, effect: Effect, *, noise_alone: bool) ->
         reach = float(BAND * np.hypot(noise, form))
         limit = binding_bound(fit, best, effect, key[1])
         unit = unknowns.unit(effect, parameter)
+        # A parameter or a zero without a unit may be of any size: 2 is not 200 % of anything.
+        own = bool(effect.parameter or effect.sensor) and effect.size != GAIN
+        plain = own and unit in ("", "1")
         least, greatest = max(value - reach, low), min(value + reach, high)
         further = (np.nan, False)
         # A value at a bound says nothing of the side beyond.
-        if limit and not _set_by_nature(value, unit):
+        if limit and not _set_by_nature(value, "" if plain else unit):
             least = -np.inf if limit == "least" else least
             greatest = np.inf if limit == "greatest" else greatest
             further = _passed(fit, best, effect, key[1], limit)
         ends = float(least), float(greatest)
-        parameters[key[1]] = Interval(value, *ends, unit, limit, *further)
+        parameters[key[1]] = Interval(value, *ends, unit, limit, *further, plain=plain)
     return Cause(
         effect=effect,
         parameters=parameters,
