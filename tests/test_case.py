@@ -102,6 +102,13 @@ def test_columns_may_stand_in_any_order_and_have_other_names(tmp_path):
     assert_same(read(write(tmp_path / "a", lines, toml)), read(write(tmp_path / "b")))
 
 
+def test_names_may_have_brackets_as_those_of_models_do(tmp_path):
+    header = LINES[0].replace("pB", "cylinder[1].p").replace("Fx", "F[2]")
+    toml = TOML + '[measurement.columns]\npB = "cylinder[1].p"\nFx = "F[2]"\n'
+    case = read(write(tmp_path / "a", [header, *LINES[1:]], toml))
+    assert_same(case, read(write(tmp_path / "b")))
+
+
 @pytest.mark.parametrize("separator", [",", ";", "\t"])
 @pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
 def test_separators_line_ends_and_blank_last_lines_do_not_matter(tmp_path, separator, end):

@@ -124,6 +124,48 @@ def test_an_output_that_no_channel_can_be_is_asked_for_by_name(tmp_path, fmu, ca
     assert main([*command, "--column", "T=Sonde 3 [degC]", "--column", "P=Leistung", "--yes"]) == 0
 
 
+# --- units with a zero of their own ---
+
+
+@pytest.fixture(scope="module")
+def ice(tmp_path_factory) -> Path:
+    return build_text(tmp_path_factory.mktemp("ice"), machine_file("ice/Ice.mo"))
+
+
+def ice_log(path: Path, header: str, zero: float = 0.0) -> Path:
+    rows = [
+        f"{t},{zero + 20.0:.2f},{zero + 20.0 - 16.0 * np.exp(-0.01 * t):.3f}" for t in range(99)
+    ]
+    path.write_text("\n".join([header, *rows]))
+    return path
+
+
+def test_kelvin_is_no_reading_of_a_variable_in_degrees_celsius(tmp_path, ice, capsys):
+    log = ice_log(tmp_path / "log.csv", "time [s],room [K],box [K]", 273.15)
+    command = ["new", str(tmp_path / "box"), "--fmu", str(ice), "--recordings", str(log)]
+    assert main([*command, "--yes"]) == 2
+    assert "box: 'box' is in [K], the model's variable in [degC]" in capsys.readouterr().err
+    assert main([*command, "--column", "box=box [K]", "--yes"]) == 2
+    assert "[degC], which the workbench does not convert" in capsys.readouterr().err
+
+
+def test_a_unit_that_nobody_states_is_asked_about_where_it_has_a_zero_of_its_own(tmp_path, ice):
+    log = ice_log(tmp_path / "log.csv", "time [s],room [degC],box")
+    main(["new", str(tmp_path / "box"), "--fmu", str(ice), "--recordings", str(log), "--yes"])
+    text = (tmp_path / "box" / "system.toml").read_text()
+    assert "# QUESTION: box: no unit in the file, [degC] of the model is taken" in text
+    assert "# QUESTION: room" not in text
+
+
+def test_a_signal_a_thousand_times_its_start_is_asked_about(tmp_path, ice):
+    log = ice_log(tmp_path / "log.csv", "time [s],room [degC],box [degC]", 2e4)
+    main(["new", str(tmp_path / "box"), "--fmu", str(ice), "--recordings", str(log), "--yes"])
+    text = (tmp_path / "box" / "system.toml").read_text()
+    assert (
+        "# QUESTION: box: its largest sample, 2.001e+04, is 5e+03 times the model's start" in text
+    )
+
+
 # --- a tank to begin with ---
 
 

@@ -17,7 +17,7 @@ from workbench.runtime.files import read_text
 if TYPE_CHECKING:
     import pandas as pd
 
-_HEADER_CELL = re.compile(r"(?P<name>[^\[]*?)\s*(?:\[\s*(?P<unit>[^\]]*?)\s*\])?")
+_HEADER_CELL = re.compile(r"(?P<name>.*?)\s*(?:\[\s*(?P<unit>[^\[\]]*?)\s*\])?")
 _NUMBER_CHARACTERS = frozenset("0123456789+-eE., ")
 _NUMBER = re.compile(r" *[+-]?[0-9.,]*[0-9][0-9.,]*([eE][+-]?[0-9]+)? *")
 _THOUSANDS = re.compile(r" *[+-]?[1-9][0-9]{0,2}[.,][0-9]{3} *")
@@ -46,6 +46,8 @@ def header(cell: str) -> tuple[str, str | None]:
 
     >>> header("pressure [kPa]")
     ('pressure', 'kPa')
+    >>> header("tank[1].level [m]")
+    ('tank[1].level', 'm')
     """
     match = _HEADER_CELL.fullmatch(cell.strip())
     return (match["name"], match["unit"] or None) if match else (cell, None)

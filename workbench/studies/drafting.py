@@ -134,7 +134,8 @@ def draft_system(
         outputs = description.names("output") or description.states
         raise InputError(
             where=where,
-            found=f"no channel that is an output of the model: {listed(left)}",
+            found=f"no channel that is an output of the model: {listed(left)}"
+            + "".join(f"; {name}: {unmatched[name]}" for name in outputs if name in unmatched),
             expected=f"one of {listed(list(outputs))}",
             remedy="name it, --column 'VARIABLE=CHANNEL [unit]'",
         )
@@ -174,6 +175,7 @@ def _match(
         if not role or not variable.holds_number or variable.array:
             continue
         if channel := named.get(own):
+            _refuse_unconverted(own, variable, channel, places)
             unit = spell_unit(variable.unit or "") or channel.unit or "1"
             unit = unit if _is_known(unit) else "1"
             signals[own] = DraftSignal(own, variable, role, unit, channel, "named by you")
@@ -227,6 +229,23 @@ def _match(
     return list(signals.values()), unmatched, left
 
 
+def _refuse_unconverted(
+    name: str, variable: Variable, channel: NamedChannel, places: Mapping[str, PlacedChannel]
+) -> None:
+    """Refuse a channel in another unit than a variable whose unit has a zero of its own."""
+    own = spell_unit(variable.unit or "")
+    place = places.get(channel.channel)
+    stated = channel.unit or (place.channel.unit if place else "")
+    if own and not _is_known(own) and stated not in ("", "1", own):
+        raise InputError(
+            where=f"column '{channel.channel}'",
+            found=f"[{stated}], and [{own}] in the model's variable '{variable.name}'",
+            expected=f"[{own}], which the workbench does not convert",
+            remedy=f"convert the column to [{own}] before, and name it --column '{name}="
+            f"{channel.channel} [{own}]'",
+        )
+
+
 def _is_time(channel: FileChannel) -> bool:
     """Whether a channel is one of times: `T [degC]` is not."""
     timely = not channel.unit or conversion(channel.unit, "s") is not None
@@ -255,6 +274,8 @@ def _candidate(
         if stated not in ("", own):
             return None, f"'{place.channel.name}' is in [{stated}], the model's variable in [{own}]"
         why += f"; the workbench does not convert [{own}], values are taken as they are"
+        if not stated:
+            doubt = doubt or f"{name}: no unit in the file, [{own}] of the model is taken"
         unit = read_in = "1"
     elif own and stated and conversion(stated, own) is None:
         return None, f"'{place.channel.name}' is in [{stated}], the model's variable in [{own}]"
@@ -277,14 +298,23 @@ def _candidate(
     )
     if np.nanmax(values) < low or np.nanmin(values) > high:
         return None, f"no sample of '{place.channel.name}' is within {low:g} to {high:g}"
-    size, nominal = float(np.nanmax(np.abs(values))), abs(variable.nominal or 0.0)
-    if nominal and size and not 1 / 300.0 < size / nominal < 300.0:
+    size = float(np.nanmax(np.abs(values)))
+    typical, of = abs(variable.nominal or 0.0), "nominal"
+    if not typical:
+        typical, of = abs(_start(variable)), "start"
+    if typical and size and not 1 / 300.0 < size / typical < 300.0:
         doubt = doubt or (
-            f"{name}: its largest sample, {size:.4g}, is {size / nominal:.3g} times the model's "
-            f"nominal value {nominal:g} [{unit}]"
+            f"{name}: its largest sample, {size:.4g}, is {size / typical:.3g} times the model's "
+            f"{of} value {typical:g} [{unit}]"
         )
     channel = NamedChannel(place.channel.name, read_in)
     return DraftSignal(name, variable, role, unit, channel, why, doubt), ""
+
+
+def _start(variable: Variable) -> float:
+    """Start value as a number, of which a Boolean has two; 0 where there is none."""
+    text = variable.start or "0"
+    return float(text == "true") if text in ("true", "false") else float(text)
 
 
 def _without_unit(variable: Variable, values: Vector, stated: str) -> tuple[str, str, bool]:
@@ -292,7 +322,7 @@ def _without_unit(variable: Variable, values: Vector, stated: str) -> tuple[str,
     base = next((si for si, others in USUAL_UNITS.items() if stated in others), stated)
     if base == stated:
         return stated, f"the model says no unit, [{stated}] of the file is taken", True
-    typical = abs(variable.nominal or float(variable.start or 0.0))
+    typical = abs(variable.nominal or _start(variable))
     fitting = []
     for unit, way in ((base, conversion(stated, base)), (stated, conversion(stated, stated))):
         # A unit with a zero of its own, as degC, is that of a plain number.
@@ -417,7 +447,7 @@ def _signal_table(draft: Draft, signal: DraftSignal) -> list[str]:
         lines += ["held = true  # it stays as it is from sample to sample, and jumps"]
     else:
         lines += _noise(samples, unit, float(high - low), may_be_exact=signal.role == "inputs")
-    scale, why = largest or abs(float(variable.start or 0.0)) or 1.0, "largest sample"
+    scale, why = largest or abs(_start(variable)) or 1.0, "largest sample"
     if variable.nominal and 0.1 < largest / abs(variable.nominal) < 10.0:
         scale, why = abs(variable.nominal), "nominal value of the model"
     lines += [_entry("scale", _quantity(scale, unit), why)]
@@ -473,7 +503,7 @@ def _missing(draft: Draft) -> list[str]:
 
 
 def _states(draft: Draft) -> list[str]:
-    """Where states begin that no recording shows."""
+    """Where states begin that no recording has the name of."""
     variables = {v.name: v for v in draft.description.variables}
     measured = {signal.variable.name for signal in draft.signals}
     hidden = [name for name in draft.description.states if name not in measured]
@@ -485,8 +515,9 @@ def _states(draft: Draft) -> list[str]:
     ]
     return [
         "",
-        f"# States that no recording shows begin as the model says: {listed(begins)}.",
-        "# [states.NAME] spread says how far from there one may begin; else its nominal value.",
+        f"# Unless an output shows them, states begin as the model says: {listed(begins)}.",
+        "# [states.NAME] spread says how far from there one may begin; else its nominal value, or",
+        "# its start value if the model states none.",
     ]
 
 

@@ -74,9 +74,13 @@ def check_model(system: System, model: Description) -> None:
         if name not in model.names("parameter"):
             raise InputError(
                 where=f"{system.source}, [parameters] {name}",
-                found="no such parameter of the model",
+                found=f"a variable of causality {variables[name].causality}"
+                if name in variables
+                else "no such parameter of the model",
                 expected=f"a parameter of {model.name}{closest(name, model.names('parameter'))}",
-                remedy="correct the name",
+                remedy="set the parameters that it follows from"
+                if name in variables
+                else "correct the name",
             )
 
 
