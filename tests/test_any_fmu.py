@@ -266,7 +266,13 @@ def test_parameters_are_set_by_their_type_where_references_repeat(build):
         fmu.start({})
         assert fmu.get_states()[0] == 291.0
         assert fmu.derivatives()[0] == pytest.approx((3000.0 - 50.0 * 11.0) / 1e5 + 1.0)
-        for name, value in (("mode", 0.5), ("flag", 2.0)):
+        # 2^32 + 1 would be 1 in 32 bits.
+        for name, value in (
+            ("mode", 0.5),
+            ("flag", 2.0),
+            ("mode", 2.0**32 + 1.0),
+            ("mode", np.nan),
+        ):
             with pytest.raises(InputError, match=f"variable '{name}'.*found the value"):
                 fmu.start({}, {name: value})
         with pytest.raises(InputError, match="found a variable of type Integer"):

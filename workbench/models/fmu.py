@@ -87,6 +87,17 @@ _CLASSES = {
 }
 
 
+def _limits(type_name: str) -> tuple[float, float]:
+    """Least and greatest number that a type holds; ctypes would wrap others around."""
+    if type_name == "Boolean":
+        return 0.0, 1.0
+    if type_name in ("Float32", "Float64"):
+        largest = float(np.finfo(type_name.lower()).max)
+        return -largest, largest
+    integer = np.iinfo("int32" if type_name in ("Integer", "Enumeration") else type_name.lower())
+    return float(integer.min), float(integer.max)
+
+
 def co_simulation_alone(description: Description, found: str) -> InputError:
     """The refusal of an FMU whose states nobody can set or differentiate."""
     offered = ", ".join(description.interfaces)
@@ -358,23 +369,18 @@ class FMUInstance:
         InputError
             If the type does not hold the number.
         """
-        type_name = variable.type
-        number = (
-            bool(value)
-            if type_name == "Boolean"
-            else value
-            if type_name in ("Float32", "Float64")
-            else int(value)
-        )
-        if number != value:
+        low, high = _limits(variable.type)
+        whole = variable.type not in ("Float32", "Float64")
+        if not low <= value <= high or (whole and value != int(value)):
             raise InputError(
                 where=f"{self._description.path}, variable '{variable.name}'",
                 found=f"the value {value:g}",
                 expected="0 or 1, of a Boolean"
-                if type_name == "Boolean"
-                else f"a whole number, of {type_name}",
+                if variable.type == "Boolean"
+                else f"a {'whole ' * whole}number from {low:.4g} to {high:.4g}, of {variable.type}",
                 remedy="correct the value",
             )
+        number = bool(value) if variable.type == "Boolean" else int(value) if whole else value
         values = self._whole_values(variable) if variable.of else [number]
         values[variable.element] = number
         try:
