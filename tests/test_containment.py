@@ -152,7 +152,7 @@ def test_a_sound_fmu_is_tried_once_and_remembered_by_its_hash(hostile_path, tmp_
 def test_an_fmu_is_not_sound_because_another_says_so(forged, hostile_path, tmp_path, tried):
     known = tmp_path / "cache" / "known"
     known.mkdir(parents=True, mode=0o700)
-    for suffix in ("", "-me"):
+    for suffix in ("", "-exchange"):
         (known / f"{read_description(hostile_path).sha256}{suffix}").write_bytes(forged)
     FMU(hostile_path).close()
     assert tried == ["evil.fmu"]

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.testing import assert_array_equal
+from numpy.testing import assert_allclose, assert_array_equal
 
 from workbench.__main__ import main
 from workbench.errors import InputError
@@ -168,6 +168,22 @@ def test_wrong_derivative_is_named_with_both_values(minimal_path, tmp_path):
     found = re.search(r"is (\S+) by the FMU, (\S+) by differences", reason)
     # Six digits are printed.
     assert float(found[1]) == pytest.approx(-float(found[2]), rel=1e-4)
+
+
+@needs_compiler
+def test_an_fmu_with_wrong_derivatives_is_differentiated_by_differences(minimal_path, tmp_path):
+    """Its own would be wrong steps of each estimator, and nothing in the results would show it."""
+    _, old, new = FAULTS["directional derivative has the wrong sign"]
+    with (
+        FMU(faulty(minimal_path, tmp_path / "faulty.fmu", old, new)) as wrong,
+        FMU(rewritten(minimal_path, tmp_path / "right.fmu", lambda folder: None)) as right,
+    ):
+        assert not wrong.has_directional_derivatives
+        assert right.has_directional_derivatives
+        for fmu in (wrong, right):
+            fmu.start({})
+        # Central differences, whose steps are 6e-6 of a value.
+        assert_allclose(wrong.state_jacobian(), right.state_jacobian(), rtol=1e-5, atol=1e-6)
 
 
 @needs_compiler

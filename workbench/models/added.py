@@ -18,6 +18,7 @@ from workbench.errors import InputError
 from workbench.models import fmu_cache
 from workbench.models.archive import DESCRIPTION
 from workbench.models.description import MODEL_EXCHANGE, Description, read_description
+from workbench.models.trial import derivatives_hold
 
 COULOMB, VISCOUS, QUADRATIC, CONSTANT = "coulomb", "viscous", "quadratic", "constant"
 _IDENTIFIER, _INNER = "Extended", "inner"
@@ -109,7 +110,8 @@ def write_extended(
         described = _described(text, token, description, terms, coefficients, parameters)
         (folder / DESCRIPTION).write_bytes(described)
         pack(folder, out)
-    fmu_cache.remember(digest_file(out))
+    if derivatives_hold(description):  # else they are tried again, around this one
+        fmu_cache.remember(digest_file(out))
 
 
 def refuse_unfit(description: Description) -> None:

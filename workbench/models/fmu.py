@@ -31,7 +31,7 @@ from workbench.models.description import (
     Variable,
     read_description,
 )
-from workbench.models.trial import require_trial
+from workbench.models.trial import derivatives_hold, require_trial
 from workbench.runtime.files import TemporaryFolder, own_umask
 
 _FUNCTIONS = {
@@ -568,7 +568,6 @@ class FMU:
             if v.type in _ACCESSORS and not v.array and not v.real
         ]
         self._rates = np.array([self._references[r] for r in self.description.rates], np.uint32)
-        self.has_directional_derivatives = offered.directional_derivatives
         self.needs_completed_steps = offered.completed_steps
         self._x = np.zeros(len(self.states))
         self._dx = np.zeros(len(self.states))
@@ -578,6 +577,10 @@ class FMU:
         self.time = np.full(1, self.start_time)
         self.next_event = np.full(1, np.inf)
         self._loaded = FMUInstance(self.description, self.interface)
+        # Wrong ones would be wrong steps of a model, and nothing would show it.
+        self.has_directional_derivatives = offered.directional_derivatives and derivatives_hold(
+            self.description
+        )
         self._variants: list[FMU] = []
 
     @cached_property

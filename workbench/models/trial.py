@@ -59,7 +59,7 @@ def require_trial(description: Description, interface: str, folder: Path) -> Non
     FMUError
         If it answers a call with an error.
     """
-    built, borne = _marks(description, interface)
+    built, borne, _ = _marks(description, interface)
     if description.sha256 in _packaged() or fmu_cache.is_known(built):
         return
     limits = usual_limits()
@@ -79,11 +79,20 @@ def unpacked(description: Description, interface: str) -> Iterator[Path]:
         yield folder
 
 
-def _marks(description: Description, interface: str) -> tuple[str, str]:
-    """Names under which an FMU is remembered, that was built here, and that bore its calls."""
+def derivatives_hold(description: Description) -> bool:
+    """Whether an FMU that was tried has the directional derivatives that differences show."""
+    return not fmu_cache.is_known(_marks(description, MODEL_EXCHANGE)[2])
+
+
+def _marks(description: Description, interface: str) -> tuple[str, str, str]:
+    """Names under which an FMU is remembered.
+
+    That was built here; that bore its calls; whose directional derivatives are wrong.
+    """
     # Co-Simulation brings a solver, which Model Exchange does not run.
-    kind = "cs" if interface == CO_SIMULATION else "me"
-    return description.sha256, f"{description.sha256}-{kind}"
+    kind = "cs" if interface == CO_SIMULATION else "exchange"
+    mark = description.sha256
+    return mark, f"{mark}-{kind}", f"{mark}-differences"
 
 
 @cache
@@ -152,6 +161,8 @@ def run_trial(description: Description, interface: str, folder: Path, limits: Li
         raise ContainedError(
             f"{where}: wrote to a file that another had opened, which destroys results. {tried}"
         )
+    if last["contradicted"]:
+        fmu_cache.remember(_marks(description, interface)[2])
     if not last["partly"]:
         fmu_cache.remember(_marks(description, interface)[1])
     return f"{where}: {last['refused']}. {tried}" if last["refused"] else ""

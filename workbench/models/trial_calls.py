@@ -11,7 +11,7 @@ import json
 import os
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any
 
 try:
@@ -21,6 +21,9 @@ except ImportError:  # Windows: the time of an answer is all that is limited
     resource = None  # type: ignore[assignment]
 
 _ROUNDS = 10  # of set and get, as an observer goes through them sample by sample
+_STEP, _LEAST = 6e-6, 1e-3  # relative step of differences, cube root of eps; and the least size
+_EPSILON = sys.float_info.epsilon
+_BENDS, _WRONG = 0.01, 0.1  # shares of a derivative: more is a bend, or no derivative of that rate
 _OK, _WARNING, _DISCARD, _FATAL = 0, 1, 2, 4
 _STATUS = {_DISCARD: "discard", 3: "error", _FATAL: "fatal", 5: "pending"}
 _DIE_WITH_PARENT, _ADOPT = 1, 36  # PR_SET_PDEATHSIG, PR_SET_CHILD_SUBREAPER
@@ -238,7 +241,7 @@ def _step(call: _Calls, t: float, h: float) -> None:
     call("DoStep", _DOUBLE(t), _DOUBLE(h), ctypes.c_bool(False), *flags, last)
 
 
-def _differentiate(call: _Calls, unknowns: list[int], known: int) -> None:
+def _differentiate(call: _Calls, unknowns: list[int], known: int) -> list[float]:
     rows, single = _SIZE(len(unknowns)), _SIZE(1)
     result, seed = (_DOUBLE * len(unknowns))(), (_DOUBLE * 1)(1.0)
     references = (
@@ -249,6 +252,57 @@ def _differentiate(call: _Calls, unknowns: list[int], known: int) -> None:
     )
     tail = (seed, single, result, rows) if call.three else (seed, result)
     call("GetDirectionalDerivative", *references, *tail)
+    return list(result)
+
+
+def _contradicted(call: _Calls, task: dict[str, Any]) -> bool:
+    """Whether directional derivatives are not those of rates and outputs where the FMU is."""
+    return any(
+        _is_wrong(call, task, rows, columns, j)
+        for rows, columns in task["directional"]
+        for j in range(min(len(columns), _ROUNDS))
+    )
+
+
+def _is_wrong(
+    call: _Calls, task: dict[str, Any], rows: list[int], columns: list[int], j: int
+) -> bool:
+    """Whether a derivative by state or input j is wrong.
+
+    An entry d is, if (f(x + h) - f(x)) / h and (f(x) - f(x - h)) / h agree with each other, beyond
+    rounding, and not with d. Where f bends, they do not agree, and nothing is said.
+    """
+    n = task["states"]
+    states, values = (_DOUBLE * n)(), (_DOUBLE * len(rows))()
+    if n:
+        call("GetContinuousStates", states, _SIZE(n))
+
+    def moved(value: float) -> list[float]:
+        if columns == task["inputs"]:
+            call.reals("Set", [columns[j]], (_DOUBLE * 1)(value))
+        else:
+            states[j] = value
+            call("SetContinuousStates", states, _SIZE(n))
+        if rows == task["outputs"]:
+            call.reals("Get", rows, values)
+        else:
+            rate = "GetContinuousStateDerivatives" if call.three else "GetDerivatives"
+            call(rate, values, _SIZE(n))
+        return list(values)
+
+    x = (_DOUBLE * 1)()
+    call.reals("Get", [columns[j]], x)
+    h = _STEP * max(abs(x[0]), _LEAST)
+    above, below, at = (moved(x[0] + step) for step in (h, -h, 0.0))
+    stated = _differentiate(call, rows, columns[j])
+    for d, f, g, b in zip(stated, above, at, below, strict=True):
+        ahead, behind = (f - g) / h, (g - b) / h
+        size = max(abs(d), abs(ahead), abs(behind))
+        rounding = 64.0 * _EPSILON * max(abs(f), abs(g), abs(b)) / h
+        agree = abs(ahead - behind) <= _BENDS * size + rounding
+        if agree and abs(d - (ahead + behind) / 2.0) > _WRONG * size + rounding:
+            return True
+    return False
 
 
 def _roll_back(call: _Calls) -> None:
@@ -259,9 +313,20 @@ def _roll_back(call: _Calls) -> None:
     call(f"Free{name}", ctypes.byref(saved))
 
 
-def _try(task: dict[str, Any], tell: Callable[[str], None]) -> str:
-    """Make the calls; returns what the FMU refused that not everybody needs."""
-    call = _Calls(task, tell)
+def _try(task: dict[str, Any], tell: Callable[[str], None]) -> tuple[str, bool]:
+    """Make the calls.
+
+    Returns
+    -------
+    What the FMU refused that not everybody needs, and whether differences contradict its
+    directional derivatives.
+
+    Raises
+    ------
+    _RefusedError
+        If it refuses another call.
+    """
+    call, contradicted = _Calls(task, tell), False
     try:
         call.instantiate()
         _initialise(call, task)
@@ -273,6 +338,9 @@ def _try(task: dict[str, Any], tell: Callable[[str], None]) -> str:
             call("Reset")
             _initialise(call, task)
             _go(call, task)
+        # Last, and without a word where it is refused: nobody else moves states so.
+        with suppress(_RefusedError):
+            contradicted = call.component is not None and _contradicted(call, task)
     except _RefusedError as error:
         if call.component is None or error.status != _DISCARD or task["exchange"]:
             raise
@@ -280,7 +348,7 @@ def _try(task: dict[str, Any], tell: Callable[[str], None]) -> str:
     finally:
         call.free()
     call.unload()
-    return "; ".join(call.refused)
+    return "; ".join(call.refused), contradicted
 
 
 def _work(task: dict[str, Any], report: int) -> None:
@@ -296,15 +364,15 @@ def _work(task: dict[str, Any], report: int) -> None:
     if resource is not None:
         signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # Python ignores it
     limit_sizes(task["file"], task["memory"])
-    refused = ""
+    refused, contradicted = "", False
     try:
-        partly = _try(task, tell)
+        partly, contradicted = _try(task, tell)
     except _RefusedError as error:
         partly = refused = str(error)
     except (OSError, AttributeError) as error:
         tell("not loaded", error=str(error))
         os._exit(0)
-    tell("end", refused=refused, partly=partly)
+    tell("end", refused=refused, partly=partly, contradicted="yes" * contradicted)
     os._exit(0)
 
 
