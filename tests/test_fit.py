@@ -99,6 +99,24 @@ def test_values_and_deviations_are_those_of_curve_fit_on_the_closed_form(
     )
 
 
+def test_a_state_that_an_output_shows_under_another_name_starts_there(tmp_path: Path) -> None:
+    """In mK and without a nominal value: from the model's 0 the start would be 4000 sizes away."""
+    block = machine_file("heated_block/Block.mo")
+    hidden = block.replace("output Real T(", "Real x(").replace(", nominal=20.0", "")
+    hidden = hidden.replace('unit="K", start', 'unit="mK", start').replace("der(T)", "1e-3*der(x)")
+    hidden = hidden.replace("equation", 'output Real T(unit="K") = 1e-3*x;\nequation')
+    build_text(tmp_path, hidden)
+    (tmp_path / "system.toml").write_text(machine_file("heated_block/system.toml"))
+    columns = {"time [s]": TIME, "P [W]": power(1), "T [K]": measured(1)}
+    write_case(tmp_path / "cases" / "day1", columns, "Day 1")
+    system = wb.load_system(tmp_path)
+    outcome = fitted(system, wb.read_cases(tmp_path / "cases", system), "C", "G")
+    assert outcome.reliable, outcome.doubts
+    (start,) = (value for value in outcome.values if value.name == "x")
+    assert start.value == pytest.approx(4000.0, abs=4.0 * 1e3 * NOISE)
+    assert outcome["C"].value == pytest.approx(C, abs=4.0 * (outcome["C"].deviation or 0.0))
+
+
 def test_intervals_hold_the_truth_and_nothing_speaks_against_a_right_model(
     system: System, cases: list[Case]
 ) -> None:

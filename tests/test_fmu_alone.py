@@ -114,6 +114,22 @@ def test_on_forty_sets_the_wrong_value_is_named_and_nothing_else(tank, tmp_path)
     assert right >= 0.95 * 30
 
 
+def test_a_start_far_from_the_models_is_no_missing_effect(tmp_path):
+    """The level in mm, without limits: an FMU that states no nominal value leaves it at 1 mm."""
+    text = machine_file("tank_alone/Tank.mo").replace(
+        'x(unit="m", start=1.0, fixed=true, min=0.0, max=3.0)', "x(start=1000.0)"
+    )
+    text = text.replace("= x;", "= 1e-3*x;").replace("der(x)", "1e-3*der(x)")
+    text = text.replace('A(unit="m2", ', "A(").replace("sqrt(x^2", "sqrt(1e-6*x^2")
+    build_text(tmp_path, text)
+    (tmp_path / "system.toml").write_text(SYSTEM + '[candidates]\nonly = ["A", "c"]\n')
+    (cause,) = diagnosed(load_system(tmp_path), tmp_path, seed=2, area=0.55).diagnosis.causes
+    change = cause.parameters["change"]
+    assert (cause.effect.name, cause.confusable_with) == ("A", ())
+    assert change.low < 0.05 < change.high
+    assert re.fullmatch(r"0\.0\d+ \(95 %: .*", change.text)  # no share, which would be 5 %
+
+
 def test_candidates_are_parameters_and_sensors_of_a_stated_size(tank):
     names = [effect.name for effect in catalogue(tank, None)]
     # A leak of zero without bounds or nominal value has no size that a change can be small to.

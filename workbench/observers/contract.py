@@ -2,7 +2,7 @@
 
 import warnings
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Set
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
@@ -10,18 +10,15 @@ import numpy as np
 
 from workbench.arrays import Matrix, Vector
 from workbench.errors import InputError
-from workbench.models.description import CO_SIMULATION
 from workbench.models.fmu import FMU
 from workbench.models.native import Instance, instance, raise_on_failure, read_only
 from workbench.observers.estimators.step import Step
 from workbench.observers.gains import Gains, SearchSpace
 from workbench.observers.layout import layout, rolling_ratio
-from workbench.observers.operating import start_spreads
+from workbench.observers.operating import shown_states
 from workbench.recordings.case import Value
 from workbench.system.check import check_model
 from workbench.system.system import OBSERVER, System
-
-_NEGLIGIBLE = 1e-6  # share of an output that differences of an FMU leave of what does not act on it
 
 _RENAMED = {"reasoned": "default_gains", "tell": "set_conditions", "_law": "_step"}
 
@@ -279,56 +276,14 @@ class Estimator(ABC):
         # Samples of a wrong size are refused when they are fed.
         held |= dict(zip((signal.name for signal in self.system.inputs), u, strict=False))
         self.fmu.start(begin, held)
-        if shown := self._shown_states(u, y, begin.keys()):
-            self.fmu.start({**begin, **shown}, held)
+        samples = {o.name: v for o, v in zip(self.system.outputs, self._measured(y), strict=True)}
+        if shown := shown_states(self.fmu, self.system, u, samples, begin.keys()):
+            self.fmu.start({**begin, **{name: s.value for name, s in shown.items()}}, held)
         self._model_time = self.fmu.start_time
         self._model.u[:] = 0.0
         for step in self.steps:
             step.accurate[0] = 0.0
         self._begin(u, y)
-
-    def _shown_states(self, u: Vector, y: Vector, begun: Set[str]) -> dict[str, float]:
-        """Values of states that outputs show under other names, such as in another unit.
-
-        An output that follows one state alone, and no estimated quantity, shows its value if the
-        model then says what was measured, within the noise; one that bends does not. A start whose
-        deviation the system file says stays. The FMU is left elsewhere than at the start.
-        """
-        fmu, system = self.fmu, self.system
-        unseen = [
-            (output, value)
-            for output, value in zip(system.outputs, self._measured(y), strict=True)
-            if output.name not in fmu.states and np.isfinite(value) and fmu.is_real(output.name)
-        ]
-        inputs = [signal.name for signal in system.inputs]
-        alone = fmu.interface == CO_SIMULATION
-        settable = all(map(fmu.is_continuous, inputs)) and all(map(fmu.is_real, fmu.states))
-        if not unseen or not fmu.states or alone or not settable:
-            return {}
-        fmu.set(fmu.variables(inputs), u)
-        outputs = fmu.variables([output.name for output, _ in unseen])
-        knowns = (fmu.variables(names) for names in (fmu.states, system.corrections))
-        # What a state or a quantity moves each output by, if it is off by what is not known of it.
-        by_states, by_quantities = (fmu.jacobian(outputs.references, known) for known in knowns)
-        spreads = np.maximum(start_spreads(fmu, system), np.finfo(float).tiny)
-        unknown = np.array([quantity.spread for quantity in system.estimated])
-        begin = fmu.get_states()
-        shown: dict[str, float] = {}
-        for j, (output, value) in enumerate(unseen):
-            moves = np.abs(by_states[j]) * spreads
-            at, noise = int(moves.argmax()), output.deviation(value)
-            others = np.delete(moves, at).sum() + np.abs(by_quantities[j]) @ unknown
-            name = fmu.states[at]
-            known = moves[at] <= noise or name in {*begun, *shown, *system.spreads}
-            if known or others > _NEGLIGIBLE * moves[at]:
-                continue
-            fmu.set_states(begin)
-            x = begin.copy()
-            x[at] += (value - fmu.get(outputs)[j]) / by_states[j, at]
-            fmu.set_states(x)
-            if abs(fmu.get(outputs)[j] - value) <= noise:
-                shown[name] = float(x[at])
-        return shown
 
     def init(self, t: float, u: Vector, y: Vector) -> Estimate:
         """Start at time t [s] with the first sample: measured states, nominal quantities."""

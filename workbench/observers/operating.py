@@ -1,16 +1,20 @@
 """Where models are linearised, and what gains follow from there."""
 
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from workbench.arrays import Matrix, Vector
+from workbench.models.description import CO_SIMULATION
 from workbench.models.fmu import FMU
 from workbench.observers.layout import layout
 from workbench.system.parts import OperatingPoint
 from workbench.system.system import System
 
 _STEPS = 400  # of implicit Euler, which takes any model to rest
+_NEGLIGIBLE = 1e-6  # share of an output that differences of an FMU leave of what does not act on it
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,18 +150,86 @@ def walks(fmu: FMU, system: System) -> Vector:
 def start_spreads(fmu: FMU, system: System) -> Vector:
     """Standard deviation of the states at the start, (n,), where no sample shows them [unit].
 
-    Declared, or the nominal value, which says of what size a state is; never more than that of any
-    value between the limits that the model has. A walk says nothing of a start.
+    Declared, or the nominal value, which says of what size a state is; where the model states none,
+    1 or the size of its start, whichever is larger. Never more than that of any value between the
+    limits that the model has. A walk says nothing of a start.
     """
     variables = {variable.name: variable for variable in fmu.description.variables}
     spreads = []
     for name in fmu.states:
-        size = abs(variables[name].nominal or 1.0)
+        # FMI's nominal value of 1 would make a pressure of 1e5 Pa sure to a pascal.
+        size = abs(variables[name].nominal or max(1.0, abs(fmu.defaults.get(name, 0.0))))
         low, high = variables[name].minimum, variables[name].maximum
         if low is not None and high is not None:
             size = min(size, (high - low) / np.sqrt(12.0))
         spreads.append(system.spreads.get(name, size))
     return np.array(spreads)
+
+
+class ShownStart(NamedTuple):
+    """Where a state begins as an output shows it, and the deviation of that [unit of the state]."""
+
+    value: float
+    deviation: float
+
+
+def shown_states(
+    fmu: FMU,
+    system: System,
+    u: Vector,
+    samples: Mapping[str, float],
+    begun: Collection[str],
+) -> dict[str, ShownStart]:
+    """Starts of states that outputs show under other names, such as in another unit.
+
+    An output that follows one state alone, and no estimated quantity, shows its value if the model
+    then says what was measured, within the noise; one that bends does not. A start whose deviation
+    the system file says stays. The FMU was started, and is left elsewhere.
+
+    Parameters
+    ----------
+    u : (m,) measured inputs at the start.
+    samples : of the outputs at the start; NaN where there is none.
+    begun : states that begin as they are to.
+    """
+    unseen = [
+        (output, samples[output.name])
+        for output in system.outputs
+        if output.name not in fmu.states
+        and np.isfinite(samples.get(output.name, np.nan))
+        and fmu.is_real(output.name)
+    ]
+    inputs = [signal.name for signal in system.inputs]
+    alone = fmu.interface == CO_SIMULATION
+    settable = all(map(fmu.is_continuous, inputs)) and all(map(fmu.is_real, fmu.states))
+    if not unseen or not fmu.states or alone or not settable:
+        return {}
+    fmu.set(fmu.variables(inputs), u)
+    outputs = fmu.variables([output.name for output, _ in unseen])
+    knowns = (fmu.variables(names) for names in (fmu.states, system.corrections))
+    # What a state or a quantity moves each output by, if it is off by what is not known of it.
+    by_states, by_quantities = (fmu.jacobian(outputs.references, known) for known in knowns)
+    spreads = np.maximum(start_spreads(fmu, system), np.finfo(float).tiny)
+    unknown = np.array([quantity.spread for quantity in system.estimated])
+    begin, shown = fmu.get_states(), dict[str, ShownStart]()
+    # Of others nobody says how far off they may be, and so not that noise is more than that.
+    sized = {v.name for v in fmu.description.variables if v.nominal}
+    for j, (output, value) in enumerate(unseen):
+        moves = np.abs(by_states[j]) * spreads
+        at, noise = int(moves.argmax()), output.deviation(value)
+        others = np.delete(moves, at).sum() + np.abs(by_quantities[j]) @ unknown
+        name = fmu.states[at]
+        less = moves[at] == 0.0 or (moves[at] <= noise and name in sized)
+        known = less or name in {*begun, *shown, *system.spreads}
+        if known or others > _NEGLIGIBLE * moves[at]:
+            continue
+        fmu.set_states(begin)
+        x = begin.copy()
+        x[at] += (value - fmu.get(outputs)[j]) / by_states[j, at]
+        fmu.set_states(x)
+        if abs(fmu.get(outputs)[j] - value) <= noise:
+            shown[name] = ShownStart(float(x[at]), float(noise / abs(by_states[j, at])))
+    return shown
 
 
 def loops(model: LinearModel) -> tuple[Matrix, Matrix]:

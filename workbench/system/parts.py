@@ -408,7 +408,8 @@ class StateNoise:
         "standard deviation at the start, where no output shows it",
         unit=lambda scope, _: unit_in_model(scope, scope.own["name"]),
         absent=None,
-        otherwise="its nominal value, or that of any value from its `min` to its `max`, if less",
+        otherwise="its nominal value, without one its start value, 1 at least; or that of any "
+        "value from its `min` to its `max`, if less",
     )
 
 

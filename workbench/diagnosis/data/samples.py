@@ -26,8 +26,11 @@ from workbench.diagnosis.data.motion import (
 )
 from workbench.diagnosis.data.restarts import Restarts, restarts_of
 from workbench.diagnosis.data.whitening import whitening
+from workbench.diagnosis.effects.candidates import without_guesses
 from workbench.diagnosis.inference.thresholds import SOUND, Soundness
 from workbench.errors import InputError
+from workbench.models.fmu import FMU
+from workbench.observers.operating import shown_states
 from workbench.recordings.case import Case
 from workbench.system.comparison import Channel, Comparison
 from workbench.system.parts import Mode
@@ -57,7 +60,7 @@ class Samples:
     lead : how all outputs correct the states, or None where one leads alone.
     restarts : where states are set as measured, or None if nowhere.
     held : (m,) whether an input is held from a sample to the next; else it goes there.
-    begin : outputs, and what rolls along, at the start.
+    begin : outputs, what rolls along, and states that outputs show under other names, at the start.
     rest : (q,) means of inputs at rest, before they are applied; rest_noise : (q,) standard
         deviations, infinite of one that is never at rest before it is applied.
     blocks : (b, 2) first sample and end of each block that counts.
@@ -256,6 +259,7 @@ def prepare(
     rest, rest_noise = _at_rest(system.comparison, clean, counted.applied)
     start = slice(0, max(1, round(_STARTING * system.sample_time / h)))
     first = {n: first_value(time[start], clean[n][start], deviation[n]) for n in case.outputs}
+    begin = _begin(system, first, model.motion)
     modes = {j: m for j, n in enumerate(signals) if (m := system.signals[n].mode) is not None}
     return Samples(
         name=case.name,
@@ -273,7 +277,7 @@ def prepare(
         lead=lead,
         restarts=restarts_of(system, counted),
         held=np.array([signal.held for signal in system.inputs]),
-        begin=_begin(system, first, model.motion),
+        begin={**_shown(case, system, model.fmu, begin), **begin},
         rest=rest,
         rest_noise=rest_noise,
         blocks=blocks,
@@ -350,3 +354,20 @@ def _begin(system: System, measured: dict[str, float], motion: Motion | None) ->
     if motion is None or system.rolling is None or system.rolling.leader not in measured:
         return measured
     return {**measured, system.rolling.follower: motion.ratio * measured[system.rolling.leader]}
+
+
+def _shown(case: Case, system: System, fmu: FMU, begin: Mapping[str, float]) -> dict[str, float]:
+    """Starts of states of an FMU alone that outputs show under other names.
+
+    How far from there one may begin stays as `with_starts` says: the sensor may err. A library says
+    itself how its states begin.
+    """
+    if system.library.is_file():
+        return {}
+    given = {**system.given, **system.set_by(case.conditions)}
+    own = {name: value for name, value in begin.items() if name in fmu.states}
+    u = np.array([case[name][0] for name in case.inputs])
+    fmu.begin_at(case.model_time)
+    fmu.start(own, {**given, **dict(zip(case.inputs, u, strict=True))})
+    shown = shown_states(fmu, without_guesses(system, fmu), u, begin, own)
+    return {name: start.value for name, start in shown.items()}

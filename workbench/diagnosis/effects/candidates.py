@@ -153,6 +153,16 @@ def with_starts(system: System, model: FMU) -> System:
     return replace(system, state_noise=tuple(known.values()))
 
 
+def without_guesses(system: System, model: FMU) -> System:
+    """The system with those deviations of starts alone that `with_starts` did not guess."""
+    names = {state.name: state for state in system.state_noise}
+    guesses = start_spreads(model, replace(system, state_noise=()))
+    for name, guess in zip(model.states, guesses, strict=True):
+        if name in names and names[name].spread == guess:
+            names[name] = replace(names[name], spread=None)
+    return replace(system, state_noise=tuple(names.values()))
+
+
 def _parameters(model: FMU, system: System) -> Iterator[Effect]:
     compare = system.comparison
     fitted = {*compare.levels, *compare.tolerances, *system.corrections}

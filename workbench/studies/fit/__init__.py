@@ -19,8 +19,9 @@ from workbench.arrays import Matrix, Vector
 from workbench.diagnosis.data.cleaning import first_value, saturated
 from workbench.errors import FMUError, InputError, unknown_name
 from workbench.models.description import MODEL_EXCHANGE, Description, read_description
+from workbench.models.fmu import FMU
 from workbench.models.simulation import Drive, Simulation
-from workbench.observers.operating import start_spreads
+from workbench.observers.operating import ShownStart, shown_states, start_spreads
 from workbench.recordings.case import Case
 from workbench.runtime.engine import Engine
 from workbench.runtime.pool import Pool
@@ -110,7 +111,12 @@ class _Run(NamedTuple):
     sigma: Matrix
     counted: np.ndarray
     given: Mapping[str, float]
-    starts: Mapping[str, float]
+    starts: Mapping[str, ShownStart]
+
+    @property
+    def begin(self) -> dict[str, float]:
+        """Values of `starts`."""
+        return {name: start.value for name, start in self.starts.items()}
 
 
 def fit(
@@ -145,7 +151,7 @@ def fit(
     entries = resolve_parameters(system, description, parameters)
     with open_model(system) as fmu:
         spreads = dict(zip(fmu.states, start_spreads(fmu, system), strict=True))
-    runs = [_run(case, system, description) for case in (*cases, *held_out)]
+        runs = [_run(case, system, fmu) for case in (*cases, *held_out)]
     unknowns = _unknowns(entries, description, system, runs[: len(cases)], spreads)
     workers = min(engine.workers, max(len(cases), len(unknowns)))
     with Pool(workers, _simulation, system) as pool:
@@ -227,7 +233,7 @@ def resolve_parameters(
     return list(entries.values())
 
 
-def _run(case: Case, system: System, description: Description) -> _Run:
+def _run(case: Case, system: System, fmu: FMU) -> _Run:
     y = np.column_stack([case[output.name] for output in system.outputs])
     sigma = np.column_stack(
         [
@@ -237,18 +243,24 @@ def _run(case: Case, system: System, description: Description) -> _Run:
     )
     counted = np.isfinite(y) & (case.time >= case.counts_from)[:, None]
     counted &= ~np.column_stack([saturated(case[o.name], o) for o in system.outputs])
-    able = set(description.states)
-    if MODEL_EXCHANGE not in description.interfaces:
-        able = {v.name for v in description.variables if v.initial in ("exact", "approx")}
-    starts = {
+    able = set(fmu.description.states)
+    if MODEL_EXCHANGE not in fmu.description.interfaces:
+        able = {v.name for v in fmu.description.variables if v.initial in ("exact", "approx")}
+    first = {
         output.name: first_value(case.time, case[output.name], output.noise)
         for output in system.outputs
-        if output.name in able and output.reading == output.name
+        if output.reading == output.name
     }
+    noise = {output.name: output.noise for output in system.outputs}
+    starts = {name: ShownStart(first[name], noise[name]) for name in first if name in able}
     inputs = [case[signal.name] for signal in system.inputs]
     u = np.column_stack(inputs) if inputs else np.empty((case.time.size, 0))
-    drive = Drive(case.time, u, case.model_time)
-    return _Run(case, drive, y, sigma, counted, system.set_by(case.conditions), starts)
+    drive, given = Drive(case.time, u, case.model_time), system.set_by(case.conditions)
+    fmu.begin_at(case.model_time)
+    held = dict(zip((signal.name for signal in system.inputs), u[0], strict=True))
+    run = _Run(case, drive, y, sigma, counted, given, starts)
+    fmu.start(run.begin, {**given, **held})
+    return run._replace(starts={**shown_states(fmu, system, u[0], first, starts), **starts})
 
 
 def _unknowns(
@@ -260,13 +272,13 @@ def _unknowns(
 ) -> list[_Unknown]:
     """All that is fitted, in the order in which it is told: parameters before starts."""
     variables = {v.name: v for v in description.variables}
-    noise = {output.name: output.noise for output in system.outputs}
     unknowns = []
     names = [entry.name for entry in entries]
-    shown = [replace(_FREE, name=name) for name in runs[0].starts if name not in names]
+    started = dict.fromkeys(name for run in runs for name in run.starts)
+    shown = [replace(_FREE, name=name) for name in started if name not in names]
     for entry in (*entries, *shown):
         variable = variables[entry.name]
-        is_state = entry.name in description.states or entry.name in runs[0].starts
+        is_state = entry.name in description.states or entry.name in started
         low, high = entry.range
         low = max(low, -np.inf if variable.minimum is None else variable.minimum)
         high = min(high, np.inf if variable.maximum is None else variable.maximum)
@@ -279,10 +291,10 @@ def _unknowns(
             if is_state:
                 size = spreads.get(entry.name, size)
                 if number is not None and entry.name in runs[number].starts:
-                    start = runs[number].starts[entry.name]
-                    size = _MOVES * noise[entry.name]
+                    start, deviation = runs[number].starts[entry.name]
+                    size = _MOVES * deviation
                     if not runs[number].counted[0].any():  # else its sample is a residual
-                        prior = prior or (start, noise[entry.name])
+                        prior = prior or (start, deviation)
             if np.isnan(size) or not size > 0.0:
                 size = abs(variable.nominal or start) or 1.0
             start = min(max(start, low), high)
@@ -356,7 +368,7 @@ class _Problem:
         """Values that a recording runs with."""
         return {
             **self.runs[number].given,
-            **self.runs[number].starts,
+            **self.runs[number].begin,
             **{
                 unknown.name: float(value)
                 for unknown, value in zip(self.unknowns, x * self.size, strict=True)
@@ -737,7 +749,7 @@ def _with_held_out(outcome: FitOutcome, problem: _Problem, runs: Sequence[_Run])
     nominal = {u.name: u.nominal for u in problem.unknowns}
     tasks = [
         [
-            problem.pool.submit(_simulate, run.drive, {**run.given, **values, **run.starts})
+            problem.pool.submit(_simulate, run.drive, {**run.given, **values, **run.begin})
             for values in (nominal, fitted)
         ]
         for run in runs
