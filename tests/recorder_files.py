@@ -2,16 +2,21 @@
 
 import datetime
 import gzip
+import json
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 
 import h5py
 import numpy as np
 import openpyxl
+import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
+import xlwt
 from asammdf import MDF
 from asammdf import Signal as Logged
+from matio import save_to_mat
 from nptdms import ChannelObject, TdmsWriter
 from scipy.io import savemat
 
@@ -118,6 +123,40 @@ def workbook(path: Path, columns: Columns) -> None:
     book.save(path)
 
 
+def old_workbook(path: Path, columns: Columns) -> None:
+    """A sheet of Excel 97 with dates, and units in a second row."""
+    book = xlwt.Workbook()
+    sheet = book.add_sheet("Daten")
+    days = columns["Zeit"][1] / 86400.0 + 45352.0
+    dates = xlwt.easyxf(num_format_str="YYYY-MM-DD HH:MM:SS.000")
+    for j, (name, (unit, values)) in enumerate(columns.items()):
+        sheet.write(0, j, name)
+        sheet.write(1, j, "" if name == "Zeit" else unit)
+        for i, value in enumerate(days if name == "Zeit" else values):
+            sheet.write(i + 2, j, float(value), *([dates] if name == "Zeit" else []))
+    book.save(str(path))
+
+
+def json_of_records(path: Path, columns: Columns) -> None:
+    """A record for each sample, with the units beside them."""
+    table = zip(*(values.tolist() for _, values in columns.values()), strict=True)
+    records = [dict(zip(columns, row, strict=True)) for row in table]
+    units = {name: unit for name, (unit, _) in columns.items()}
+    path.write_text(json.dumps({"units": units, "records": records}))
+
+
+def timetable(path: Path, columns: Columns) -> None:
+    """A timetable of MATLAB, with durations."""
+    times = pd.Index(pd.to_timedelta(columns["Zeit"][1], unit="s").to_numpy(), name="Zeit")
+    others = {name: column for name, column in columns.items() if name != "Zeit"}
+    held = {
+        f"{name} [{unit}]".replace("ä", "ae"): values for name, (unit, values) in others.items()
+    }
+    frame = pd.DataFrame(held, index=times)
+    with warnings.catch_warnings(action="ignore"):  # of the units that durations have in MATLAB
+        save_to_mat(path, {"T": frame}, version="v7", do_compression=False)
+
+
 def parquet(path: Path, columns: Columns) -> None:
     """Units in the metadata of the columns, times in milliseconds."""
     fields = [
@@ -194,6 +233,9 @@ FORMATS = {
     "midnight.csv": csv_with_days_and_clocks,
     "indices.csv": csv_of_indices,
     "workbook.xlsx": workbook,
+    "old.xls": old_workbook,
+    "records.json": json_of_records,
+    "timetable.mat": timetable,
     "table.parquet": parquet,
     "structures.mat": mat_5,
     "new.mat": mat_73,

@@ -141,10 +141,11 @@ def test_what_a_library_warns_of_is_noted(tmp_path, stop, system):
     assert any("Duplicate variable name" in note for note in read_recorded_file(path).notes)
 
 
-@pytest.mark.parametrize("package", ["openpyxl", "pyarrow", "h5py", "asammdf", "nptdms"])
+@pytest.mark.parametrize("package", ["openpyxl", "xlrd", "pyarrow", "h5py", "asammdf", "nptdms"])
 def test_a_missing_reader_names_the_extra(tmp_path, monkeypatch, package):
     begins = {
         "openpyxl": b"PK\x03\x04",
+        "xlrd": b"\xd0\xcf\x11\xe0",
         "pyarrow": b"PAR1",
         "h5py": b"MATLAB 7.3 MAT-file",
         "asammdf": b"MDF     ",
@@ -168,7 +169,9 @@ def test_a_missing_reader_names_the_extra(tmp_path, monkeypatch, package):
         (b"MATLAB 7.3 MAT-file" + b"x" * 999, "a MAT 7.3 or HDF5 file that cannot be read"),
         (b"MATLAB 5.0 MAT-file" + b"x" * 999, "a MAT file that cannot be read"),
         (b"\x1f\x8b" + b"x" * 99, "damaged gzip"),
-        (b"\xd0\xcf\x11\xe0", r"save it as \.xlsx"),
+        (b"\xd0\xcf\x11\xe0", r"a workbook of Excel 97 to 2003 \(\.xls\) that cannot"),
+        (b'[{"t": 0, "p": 1},\n{"t": 1, "p": ]', "line 2: found text that is no JSON"),
+        (b'{"title": "no samples"}', "JSON without a channel of numbers"),
         (b"\0\1\2", "zero bytes, which no text has"),
         (b"hello\nworld\n", "found no columns"),
         (b"t;p;v\n0;1.234;5\n1;1.234;5\n2;1.234;6\n", "'1.234', which can be read with"),

@@ -399,3 +399,22 @@ def test_a_recording_has_the_date_of_its_first_sample(tmp_path, tank, form, date
     (case,) = read_cases([tmp_path / "cases"], tank)
     assert case.date.startswith(date[:19] if not date.endswith("T00:00:00.000000") else date[:10])
     assert bool(case.date) == bool(date)
+
+
+@pytest.mark.parametrize(
+    ("begin", "form"),
+    [
+        (datetime(2024, 2, 27), "%d.%m.%Y %H:%M"),
+        (datetime(2024, 2, 27), "%y-%m-%d %I:%M %p"),
+        (datetime(2024, 10, 26, tzinfo=BERLIN), "%Y-%m-%d %H:%M:%S"),
+    ],
+)
+def test_rows_with_the_newest_first_are_turned_and_told(tmp_path, tank, begin, form):
+    stamps = local(begin if begin.tzinfo else begin.replace(tzinfo=UTC), 300, form)
+    path = table(tmp_path / "a.csv", stamps)
+    head, *rows = path.read_text().split("\n")
+    path.write_text("\n".join([head, *rows[::-1]]))
+    recorded = read_recorded_file(path)
+    assert any("newest first" in note for note in recorded.notes)
+    assert_allclose(clock(path, tank).times, QUARTER * np.arange(300))
+    assert recorded.groups[0].channels[-1].values[0] == 20.0  # of the earliest row

@@ -10,6 +10,8 @@ import openpyxl
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+import xlwt
+from nptdms import ChannelObject, TdmsWriter
 from numpy.testing import assert_allclose
 
 from workbench.errors import InputError
@@ -99,7 +101,6 @@ def test_a_row_for_each_value_is_read_by_tags(tmp_path):
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        (b'[{"time": 0, "h": 1}]', "text of JSON"),
         (b"<html><table></table></html>", "text of HTML or XML"),
         (b"\x93NUMPY\x01\0v\0", r"an array of NumPy \(.npy\)"),
         (b"SQLite format 3\0", "a database of SQLite"),
@@ -112,7 +113,9 @@ def test_a_format_that_nobody_reads_is_called_by_its_name(tmp_path, content, wor
     if words == "an archive":
         with zipfile.ZipFile(path, "w") as archive:
             archive.writestr("x.csv", "time;h")
-    with pytest.raises(InputError, match=rf"found {words}.*expected a recording as CSV, .xlsx"):
+    with pytest.raises(
+        InputError, match=rf"found {words}.*expected a recording as CSV, JSON, .xlsx"
+    ):
         read_recorded_file(path)
 
 
@@ -199,3 +202,49 @@ def test_a_censored_cell_is_no_sample_and_is_told(tmp_path):
     recorded = read_recorded_file(table(tmp_path / "a.csv", ["time [s];h [mm]", *rows]))
     assert recorded.groups[0].channels[1].censored == (30,)
     assert "below or above another, the first '<0.01' in line 32" in recorded.notes[0]
+
+
+def test_channels_have_the_names_that_a_preamble_gives_their_numbers(tmp_path):
+    """As portable recorders write them: CH1 above the samples, its name among the settings."""
+    settings = ["CH,Signal name,Input,Range", "CH1,inflow,DC,10V", "CH2,level in,DC,2V"]
+    head = [*settings, "Number,Date&Time,CH1,CH2", "NO.,Time,l/s,mm"]
+    rows = [f"{k},2025/06/06 08:00:{k:02d},4.{k},90{k % 10}.5" for k in range(60)]
+    (group,) = read_recorded_file(table(tmp_path / "a.csv", [*head, *rows])).groups
+    labels = {channel.name: channel.about for channel in group.channels}
+    assert labels == {"Date&Time": "", "Number": "", "CH1": "inflow", "CH2": "level in"}
+
+
+def test_a_workbook_of_excel_97_has_sheets_dates_and_gaps(tmp_path):
+    path = tmp_path / "a.xls"
+    book = xlwt.Workbook()
+    sheet = book.add_sheet("Rig")
+    sheet.write_merge(0, 0, 1, 2, "tank")
+    for j, cell in enumerate(["Time", "inflow [l/s]", "h [mm]"]):
+        sheet.write(1, j, cell)
+    dates = xlwt.easyxf(num_format_str="YYYY-MM-DD HH:MM:SS")
+    for k in range(60):
+        sheet.write(k + 2, 0, 45352.25 + k / 86400.0, dates)
+        sheet.write(k + 2, 1, 4 + k)
+        sheet.write(k + 2, 2, "OL" if k == 30 else 900.5 + k)
+    book.save(str(path))
+    (group,) = read_recorded_file(path).groups
+    clock, flow, level = group.channels
+    assert (group.name, flow.unit, level.unit) == ("Rig", "l/s", "mm")
+    assert iso(clock.start) == "2024-03-01T06:00:00.000000"
+    assert_allclose(clock.values, np.arange(60.0), atol=1e-6)
+    assert_allclose(flow.values, 4.0 + np.arange(60))
+    assert np.flatnonzero(np.isnan(level.values)).tolist() == [30]
+
+
+def test_a_waveform_begins_with_those_beside_it(tmp_path):
+    """Some recorders state only of the first one when it began."""
+    began = {"wf_start_time": np.datetime64("2025-06-06T08:00:00")}
+    with TdmsWriter(tmp_path / "a.tdms") as file:
+        file.write_segment(
+            [
+                ChannelObject("Rig", name, np.arange(50.0), {"wf_increment": 0.5, **stated})
+                for name, stated in (("inflow", began), ("h", {}))
+            ]
+        )
+    (group,) = read_recorded_file(tmp_path / "a.tdms").groups
+    assert [channel.name for channel in group.channels] == ["inflow", "h"]

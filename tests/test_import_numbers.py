@@ -436,6 +436,15 @@ def test_a_marker_in_a_recording_of_the_workbench_is_refused(tmp_path, tank):
         wb.read_cases(tmp_path, tank)
 
 
+def test_an_impossible_value_that_stands_alone_may_be_declared_a_marker(tmp_path, tank):
+    path = write(
+        tmp_path / "a.csv", np.where(np.arange(200) % 50 == 20, -250.0, 10.0 * LEVEL - 8100.0)
+    )
+    (problem,) = proposed(path, tank).problems
+    assert "if -250 is no sample, say --column 'h=h missing -250'" in problem
+    assert not proposed(path, tank, "h=h missing -250").problems
+
+
 def test_a_unit_that_is_wrong_by_a_thousand_is_asked_about(tmp_path, tank):
     path = write(tmp_path / "a.csv", LEVEL, "um")
     (doubt,) = proposed(path, tank).doubts
@@ -493,3 +502,11 @@ def test_milliseconds_declared_as_seconds_are_refused(tmp_path, tank):
     match = r"a sample every 500 s, 1000 times as far apart.*the unit of the time"
     with pytest.raises(InputError, match=match):
         wb.read_cases(tmp_path, tank)
+
+
+@pytest.mark.parametrize("begin", [1013.25, 2013.25, 2900.0])
+def test_numbers_with_three_decimals_are_no_days_of_a_year(tmp_path, begin):
+    rows = [f"{k};{begin + 0.001 * k:.3f}" for k in range(60)]
+    (held,) = read_recorded_file(table(tmp_path / "a.csv", ["time [s];p [mbar]", *rows])).groups
+    assert_allclose(held.channels[1].values, begin + 0.001 * np.arange(60))
+    assert held.channels[1].unit == "mbar"

@@ -1,15 +1,19 @@
-"""MAT files as people of identification, Simulink and Modelica tools write them."""
+"""MAT and JSON files as people of identification, Simulink and Modelica tools write them."""
 
+import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal
 
 import h5py
 import numpy as np
+import pandas as pd
 import pytest
+from matio import save_to_mat
 from numpy.testing import assert_allclose
 from scipy.io import savemat
 
+from workbench.errors import InputError
 from workbench.recordings.formats import Group, read_recorded_file
 from workbench.recordings.formats.stamps import iso
 
@@ -135,6 +139,92 @@ def test_a_table_of_inputs_beside_an_output_is_not_lost(tmp_path):
     assert [channel.name for channel in recorded.channels] == ["u(1)", "u(2)", "y"]
 
 
+@pytest.mark.parametrize("version", ["v7", "v7.3"])
+@pytest.mark.filterwarnings("ignore:duration_to_mat")
+def test_timetables_and_dates_of_matlab_are_read(tmp_path, version):
+    dates = np.datetime64("2024-03-05T10:00:00") + (TIME * 1e3).astype("timedelta64[ms]")
+    frame = pd.DataFrame({"inflow": FLOW, "h": LEVEL}, index=pd.Index(dates, name="Time"))
+    save_to_mat(tmp_path / "a.mat", {"rig": {"T": frame, "note": "first"}}, version=version)
+    save_to_mat(tmp_path / "b.mat", {"t": dates, "h": column(LEVEL)}, version=version)
+    for name in ("a.mat", "b.mat"):
+        (held,) = read_recorded_file(tmp_path / name).groups
+        channels = {channel.name: channel for channel in held.channels}
+        assert_allclose(channels["h"].values, LEVEL)
+        clock = channels["Time" if name == "a.mat" else "t"]
+        assert_allclose(clock.values, TIME)
+        assert iso(clock.start) == "2024-03-05T10:00:00.000000"
+
+
+def test_a_signal_without_a_label_has_the_name_of_its_structure(tmp_path):
+    logged = struct(time=TIME, signals=struct(values=column(FLOW), unit="l/s"))
+    recorded = group(tmp_path / "a.mat", {"inflow": logged})
+    assert [c.name for c in recorded.channels] == ["time", "inflow"]
+
+
+STAMPS = [f"2024-03-05T10:00:{t:06.3f}Z" for t in TIME]
+
+
+@pytest.mark.parametrize(
+    "document",
+    [
+        [{"time": s, "h [mm]": h} for s, h in zip(STAMPS, LEVEL, strict=True)],
+        {"values": [{"time": s, "h": h} for s, h in zip(STAMPS, LEVEL, strict=True)]}
+        | {"units": {"h": "mm"}},
+        [{"time": s, "h": {"value": h, "unit": "mm"}} for s, h in zip(STAMPS, LEVEL, strict=True)],
+        {"time": STAMPS, "h": LEVEL.tolist(), "units": {"h": "mm"}},
+        {"columns": ["h [mm]"], "index": STAMPS, "data": LEVEL.reshape(-1, 1).tolist()},
+        {"h [mm]": dict(zip(STAMPS, LEVEL, strict=True)), "b": dict.fromkeys(STAMPS, 1.0)},
+        {s: {"h [mm]": h, "b": 1.0} for s, h in zip(STAMPS, LEVEL, strict=True)},
+        {
+            "result": {
+                "rig": "A",
+                "series": [{"t": s, "h [mm]": h} for s, h in zip(STAMPS, LEVEL, strict=True)],
+            }
+        },
+        {
+            "signals": {
+                "h": {"unit": "mm", "gain": 1, "zero": 0},
+                "b": {"unit": "", "gain": 1, "zero": 0},
+            }
+        }
+        | {"time": STAMPS, "h": LEVEL.tolist(), "units": {"h": "mm"}},
+        {"channels": [{"name": "h", "unit": "mm", "time": STAMPS, "values": LEVEL.tolist()}]},
+    ],
+    ids=[
+        "records",
+        "nested",
+        "values with units",
+        "columns",
+        "split",
+        "by column",
+        "by row",
+        "deep",
+        "described",
+        "x, y",
+    ],
+)
+def test_json_has_channels_units_and_dates(tmp_path, document):
+    (tmp_path / "a.json").write_text(json.dumps(document))
+    (held,) = read_recorded_file(tmp_path / "a.json").groups
+    clock, level = (
+        next(c for c in held.channels if c.stamp),
+        next(c for c in held.channels if c.name == "h"),
+    )
+    assert (level.unit, iso(clock.start)) == ("mm", "2024-03-05T10:00:00.000000")
+    assert_allclose(level.values, LEVEL)
+    assert_allclose(clock.values, TIME)
+
+
+def test_json_of_lines_is_read_and_a_cut_line_is_named(tmp_path):
+    lines = [json.dumps({"t": t, "h": None if t == TIME[3] else t}) for t in TIME.tolist()]
+    (tmp_path / "a.json").write_text("\n".join(lines))
+    (held,) = read_recorded_file(tmp_path / "a.json").groups
+    assert np.isnan(held.channels[1].values[3])
+    (tmp_path / "a.json").write_text("\n".join([*lines[:7], lines[7][:9], *lines[8:]]))
+    with pytest.raises(InputError, match="line 8: found text that is no JSON"):
+        read_recorded_file(tmp_path / "a.json")
+
+
 def test_times_may_be_texts(tmp_path):
     stamps = np.array([f"2024-03-05 10:00:{t:06.3f}" for t in TIME], dtype=object)
     recorded = group(tmp_path / "a.mat", {"t": stamps, "h": column(LEVEL)})
@@ -169,7 +259,7 @@ def test_hdf5_is_read_with_what_its_attributes_say(tmp_path):
     assert a.step == 0.5
     assert [channel.name for channel in b.channels] == ["time", "h"]
     assert iso(c.channels[1].start) == "2024-03-05T10:00:00.000000"
-    assert "'d' is an object of MATLAB (timetable), which only MATLAB reads" in recorded.notes[0]
+    assert "'d' is an object of MATLAB (timetable)" in recorded.notes[0]
 
 
 def texts(rows: list[str], *, turned: bool) -> np.ndarray:

@@ -115,6 +115,17 @@ def test_nothing_is_asked_of_a_recording_in_its_units(tmp_path):
     )
 
 
+def test_an_input_without_a_start_says_nothing_of_the_unit_of_its_column(tmp_path):
+    """The FMU begins it at 0 K, which no model means."""
+    outside = '    input Real Ta(unit="K") "Outside";\n    input Real dG'
+    model = ROOM.replace("    input Real dG", outside).replace("T - 273.15)", "T - Ta)")
+    signal = 'inputs.Ta = { unit = "K", noise = "0.1 K", scale = "300 K" }\noutputs.T'
+    system = declare(tmp_path / "room", model, ROOM_FILE.replace("outputs.T", signal))
+    recorded = recorded_room()
+    recorded["Ta [K]"] = 273.15 + 0.1 * np.random.default_rng(7).standard_normal(len(recorded))
+    assert not case_from_frame(system, recorded).doubts
+
+
 @pytest.mark.parametrize("factor", [1e3, 1e-6])
 def test_times_in_another_unit_are_asked_about_by_the_models_time_constants(tmp_path, factor):
     """Though `sample_time` is wrong with them: the room forgets in 2000 s."""

@@ -175,7 +175,8 @@ def _sizes(signals: Mapping[str, Vector], system: System, origin: Origin) -> Ite
             high = np.inf if variable.maximum is None else variable.maximum
             outside = np.flatnonzero((values < low - noise) | (values > high + noise))
             begins = float(np.median(values[:_FEW]))
-            if factor := _other_unit(begins, variable.start, signal):
+            unset = variable.causality == "input" and float(variable.start or 0.0) == 0.0
+            if not unset and (factor := _other_unit(begins, variable.start, signal)):
                 finding = (
                     f"{_value_text(signal, begins)} at the start, {factor} that of the model",
                     f"about {_value_text(signal, float(variable.start or 0.0))}",

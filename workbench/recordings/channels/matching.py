@@ -234,7 +234,12 @@ def _candidate(
     if not np.isfinite(values).any():
         return None, f"'{channel.name}' holds no numbers"
     if np.nanmin(values) < low or np.nanmax(values) > high:
-        return None, _impossible_value(channel.name, unit, values, signal)
+        words = _impossible_value(channel.name, unit, values, signal)
+        beyond = np.unique(samples[(values < low) | (values > high)])
+        if beyond.size == 1:
+            marker = f"{beyond[0]:.15g}"
+            words += f"; if {marker} is no sample, say --column '{column} missing {marker}'"
+        return None, words
     reason = "name and unit" if likeness else "the only one of its unit"
     doubt = ""
     if concluded:

@@ -19,6 +19,8 @@ from pathlib import Path
 
 from workbench.errors import InputError
 from workbench.recordings.formats.contents import Contents, FileChannel, Group, RecordedFile
+from workbench.recordings.formats.json_text import is_json
+from workbench.recordings.formats.json_text import read as read_as_json
 from workbench.recordings.formats.text import read as read_as_text
 from workbench.runtime.files import read_bytes
 from workbench.runtime.pool import Pool
@@ -32,6 +34,7 @@ _MOST = 4 << 30  # [byte] unpacked: an hour of a hundred channels at 1 kHz
 # Packages that read a format, by the module here, and what people call its files.
 _PACKAGES = {
     "excel": ("openpyxl", "an Excel workbook"),
+    "excel97": ("xlrd", "a workbook of Excel 97 to 2003 (.xls)"),
     "parquet": ("pyarrow", "a Parquet file"),
     "matlab5": ("scipy", "a MAT file"),
     "hdf5": ("h5py", "a MAT 7.3 or HDF5 file"),
@@ -43,7 +46,6 @@ _NATIVE = frozenset({"hdf5", "matlab5", "mdf", "parquet"})
 _MAT_4 = struct.Struct("<5i")  # type, rows, columns, imaginary, length of the name
 _START, _RATE = 60.0, 1e6  # [s] and [byte/s], a twentieth of what they read on a busy machine
 _UNREAD = {  # how files begin that are told, and not read
-    b"\xd0\xcf\x11\xe0": "a workbook of Excel 97 to 2003 (.xls)",
     b"ARROW1": "a table of Arrow or Feather",
     b"\x93NUMPY": "an array of NumPy (.npy)",
     b"\x80\x04\x95": "an object of Python (pickle)",
@@ -52,9 +54,8 @@ _UNREAD = {  # how files begin that are told, and not read
     b"7z\xbc\xaf": "an archive (.7z)",
     b"%PDF": "a PDF",
     b"<": "text of HTML or XML",
-    b"{": "text of JSON",
-    b"[{": "text of JSON",
 }
+_HDF5 = b"\x89HDF\r\n\x1a\n"
 _BEGINS = {  # how files begin, whatever their ending
     b"PAR1": "parquet",
     b"MDF     ": "mdf",
@@ -62,8 +63,9 @@ _BEGINS = {  # how files begin, whatever their ending
     b"TDSm": "tdms",
     b"MATLAB 5.0 MAT-file": "matlab5",
     b"MATLAB 7.3 MAT-file": "hdf5",
-    b"\x89HDF\r\n\x1a\n": "hdf5",
+    _HDF5: "hdf5",
     b"PK\x03\x04": "excel",
+    b"\xd0\xcf\x11\xe0": "excel97",
 }
 
 
@@ -129,10 +131,12 @@ def _unpack(path: Path, raw: bytes) -> bytes:
 def _reader(path: Path, raw: bytes) -> _Reader:
     """The reader of a format, by how the file begins."""
     module = next((name for start, name in _BEGINS.items() if raw.startswith(start)), "")
+    module = "hdf5" if raw[512:520] == _HDF5 else module  # behind a header of MATLAB
     module = module or "matlab5" * _is_mat_4(raw)
     _refuse_unread(path, raw, is_workbook=module == "excel")
     if not module:
-        return read_as_text
+        is_document = is_json(raw)
+        return partial(_read_whole, read_as_json, "JSON") if is_document else read_as_text
     package, called = _PACKAGES[module]
     try:
         import_module(package)
@@ -160,10 +164,8 @@ def _refuse_unread(path: Path, raw: bytes, *, is_workbook: bool) -> None:
         raise InputError(
             where=str(path),
             found=format_name,
-            expected="a recording as CSV, .xlsx, .mat, .h5, .parquet, .tdms or .mf4",
-            remedy="save it as .xlsx"
-            if ".xls)" in format_name
-            else "unpack it, or save or export the recording in one of these formats",
+            expected="a recording as CSV, JSON, .xlsx, .xls, .mat, .h5, .parquet, .tdms or .mf4",
+            remedy="unpack it, or save or export the recording in one of these formats",
         )
 
 

@@ -163,7 +163,7 @@ def _step(content: Mapping[str, Any], outer: float) -> float:
     unit = next((v for k, v in content.items() if k.lower() in _TIME_UNITS), "s")
     scale = conversion(spell_unit(unit), "s") if isinstance(unit, str) else None
     for key, value in content.items():
-        if isinstance(value, Mapping | str | list) or np.size(value) != 1:
+        if np.size(value) != 1 or np.asarray(value).dtype.kind not in "fiu":
             continue
         number = float(np.ravel(value)[0])
         if key.lower() in _RATES and number > 0.0:
@@ -202,6 +202,9 @@ def _time_series(name: str, content: Mapping[str, Any]) -> Group | None:
     """A structure with times and values of one channel, such as a time series."""
     key, times = _entry(content, _TIMES)
     channel = _single(name, content)
+    stamps = read_stamps(key, times) if isinstance(times, list) else None
+    if channel is not None and stamps is not None and stamps.values.size == channel.values.size:
+        return Group(name, (stamps, channel))
     if channel is None or not isinstance(times, np.ndarray):
         return None
     if times.size != channel.values.size or times.size < 2:
@@ -222,7 +225,7 @@ def _simulink(name: str, content: Mapping[str, Any]) -> Group | None:
         values = signal.get("values") if isinstance(signal, Mapping) else None
         if not isinstance(values, np.ndarray):
             return None
-        label = str(signal.get("label") or "").strip() or key
+        label = str(signal.get("label") or "").strip() or (key if len(held) > 1 else name)
         own, unit = name_and_unit(label)
         unit = unit or (spell_unit(entry) if isinstance(entry := signal.get("unit"), str) else "")
         channels += [replace(channel, about=key) for channel in _columns(own, unit, values, {})]

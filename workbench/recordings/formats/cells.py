@@ -23,6 +23,7 @@ from workbench.recordings.formats.numbers import (
 )
 from workbench.recordings.formats.spelling import is_unit, name_and_unit, spell_unit
 from workbench.recordings.formats.stamps import (
+    goes_on,
     has_day,
     has_day_alone,
     has_fraction,
@@ -57,6 +58,7 @@ _DIGITS = frozenset("0123456789+-.,eE")
 _HEADER_ROWS = 5  # of names, units and kinds
 _MOST_TURNED = 500  # rows of a table whose channels are rows
 _FEWEST = 3  # samples one after the other
+_FEW = 50  # rows that tell whether times go back
 # Labels of rows: of names, of units; and of a column that holds remarks.
 _NAME_ROW = re.compile(
     r"((channel|kanal|signal|trace|sensor)[ _]?)?(names?|bezeichnung)\W*|kanal|channel|signal",
@@ -119,6 +121,7 @@ class Cells:
     lines : of the file, from 1, on which they stand.
     head : lines above the samples, as text.
     names, units : cells of the header; empty where there is none.
+    about : what a row of the preamble says of each column, which begins with its name.
     """
 
     rows: list[list[str]]
@@ -126,6 +129,7 @@ class Cells:
     head: tuple[str, ...]
     names: tuple[str, ...]
     units: tuple[str, ...]
+    about: tuple[str, ...] = ()
 
 
 def find_table(rows: Sequence[Sequence[str]], lines: Sequence[int], where: str) -> Cells:
@@ -166,8 +170,11 @@ def find_table(rows: Sequence[Sequence[str]], lines: Sequence[int], where: str) 
         _refuse_narrow(names, units, body, f"{where}, above line {lines[first]}")
     else:
         names = [f"column {i + 1}" for i in range(width)]
-    filled = (tuple((row + [""] * width)[:width]) for row in (names, units))
-    return Cells(body, [lines[i] for i in kept], head, *filled)
+    own_names, own_units = (tuple((row + [""] * width)[:width]) for row in (names, units))
+    # Recorders of portable kind name channels CH1 above samples, and say further up what they are.
+    listed = {row[0].strip(): row[1].strip() for row in rows[:first] if len(row) > 2}
+    about = tuple(said if (said := listed.get(name, "")) not in names else "" for name in names)
+    return Cells(body, [lines[i] for i in kept], head, own_names, own_units, about)
 
 
 def _samples(
@@ -394,6 +401,11 @@ def read_group(
     numbers: dict[int, list[str]] = {}
     notes: list[str] = []
     labels = [_label(table, i) for i in range(len(columns))]
+    about = {name: text for (name, _), text in zip(labels, table.about, strict=False)}
+    if turned := _newest_first(columns):
+        columns = [cells[::-1] for cells in columns]
+        table = replace(table, lines=table.lines[::-1])
+        notes.append(f"rows with the newest first were turned, by {turned}")
     labels, columns = _with_parts(*_join_day_and_clock(*_join_date_parts(labels, columns)))
     left: list[FileChannel] = []
     for i, cells in enumerate(columns):
@@ -428,7 +440,8 @@ def read_group(
                 f"'{labels[i][0]}': {len(bad)} cells that are no numbers are gaps, the first "
                 f"{columns[i][bad[0]]!r} in line {table.lines[bad[0]]}"
             )
-        channels.append(FileChannel(*labels[i], values, censored=tuple(beyond)))
+        said = about.get(labels[i][0], "")
+        channels.append(FileChannel(*labels[i], values, said, censored=tuple(beyond)))
     step, doubt = stated_step(table.head)
     within = (name,) if name else ()
     group = Group(
@@ -441,6 +454,23 @@ def read_group(
         begun=stated_begin(table.head),
     )
     return group, reading, notes
+
+
+def _newest_first(columns: Sequence[Sequence[str]]) -> str:
+    """The time stamp of the first row, where they go back from row to row; empty: they do not."""
+    for cells in columns:
+        few = cells[:_FEW]
+        if not _mostly(few, is_stamp) or _is_ordered(few) or not _is_ordered(few[::-1]):
+            continue
+        if _is_ordered(cells[::-1]):
+            return f"'{next(filter(None, cells))}' in the first"
+    return ""
+
+
+def _is_ordered(cells: Sequence[str]) -> bool:
+    """Whether time stamps go on from cell to cell."""
+    stamps = read_stamps("", cells)
+    return stamps is not None and not stamps.doubt and goes_on(stamps.values)
 
 
 def _numbers_within(cells: Sequence[str], unit: str) -> tuple[list[str], str] | None:

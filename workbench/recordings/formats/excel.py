@@ -1,6 +1,7 @@
 """Workbooks of Excel: each sheet that holds a table is a group."""
 
 import io
+from collections.abc import Collection, Mapping, Sequence
 from datetime import date, datetime, time, timedelta
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from workbench.recordings.formats.contents import Contents, Group
 
 _HOUR = timedelta(hours=1)
 _MOST = 1_048_576  # rows of a sheet of Excel
+_WHOLE = 2.0**53  # below which doubles hold whole numbers
 
 
 def read(path: Path, raw: bytes) -> Contents:
@@ -26,6 +28,19 @@ def read(path: Path, raw: bytes) -> Contents:
     book = openpyxl.load_workbook(io.BytesIO(raw), read_only=True, data_only=True)
     sheets = {sheet.title: list(sheet.iter_rows(values_only=True)) for sheet in book.worksheets}
     hidden = {sheet.title for sheet in book.worksheets if sheet.sheet_state != "visible"}
+    return read_sheets(path, "Excel", sheets, hidden)
+
+
+def read_sheets(
+    path: Path, called: str, sheets: Mapping[str, Sequence[Sequence[Any]]], hidden: Collection[str]
+) -> Contents:
+    """Kind, groups and notes of rows of cells, by sheet.
+
+    Raises
+    ------
+    InputError
+        If no sheet holds a table.
+    """
     groups: list[Group] = []
     notes: list[str] = []
     refusal: InputError | None = None
@@ -50,7 +65,7 @@ def read(path: Path, raw: bytes) -> Contents:
             notes.append(f"sheet '{title}': {left} rows that are no samples were left out")
     if refusal is not None and not groups:
         raise refusal
-    return Contents(f"Excel, {_count_text(len(groups), 'sheet')} with samples", groups, notes)
+    return Contents(f"{called}, {_count_text(len(groups), 'sheet')} with samples", groups, notes)
 
 
 def _count_text(count: int, noun: str) -> str:
@@ -63,6 +78,8 @@ def _text(cell: Any) -> str:
         case None:
             return ""
         case bool():
+            return str(int(cell))
+        case float() if cell.is_integer() and abs(cell) < _WHOLE:
             return str(int(cell))
         case float() | int():
             return repr(cell)

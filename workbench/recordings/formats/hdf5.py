@@ -10,6 +10,7 @@ import numpy as np
 
 from workbench.recordings.formats.arrays import Opaque, by_place, read_groups
 from workbench.recordings.formats.contents import Contents
+from workbench.recordings.formats.matlab_objects import read_objects
 
 _CLASS = "MATLAB_class"
 _DECODED = "MATLAB_object_decode"
@@ -22,8 +23,15 @@ def read(path: Path, raw: bytes) -> Contents:
     """Kind, groups and notes of a file."""
     with h5py.File(io.BytesIO(raw), "r") as file:
         content = _members(file, file)
+    if raw.startswith(b"MATLAB") and _holds_object(content):
+        content = read_objects(raw)
     groups, notes = read_groups(content)
     return Contents("MAT 7.3" if raw.startswith(b"MATLAB") else "HDF5", groups, notes)
+
+
+def _holds_object(value: Any) -> bool:
+    inner = value.values() if isinstance(value, Mapping) else ()
+    return isinstance(value, Opaque) or any(map(_holds_object, inner))
 
 
 def _members(group: h5py.Group, file: h5py.File) -> dict[str, Any]:
@@ -96,10 +104,7 @@ def _class_of(item: Any) -> str:
 def _value(item: h5py.Dataset, file: h5py.File) -> Any:
     matlab_class = _class_of(item)
     if _DECODED in item.attrs:
-        return Opaque(
-            f"an object of MATLAB ({matlab_class}), which only MATLAB reads: save it as a "
-            "structure, table2struct(X, 'ToScalar', true), or as CSV, writetable or writetimetable"
-        )
+        return Opaque(f"an object of MATLAB ({matlab_class})")
     if item.dtype.names:  # rows of a table
         rows = item[()]
         return {name: rows[name] for name in item.dtype.names if rows[name].dtype.kind in "fiub"}

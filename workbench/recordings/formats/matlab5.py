@@ -12,13 +12,10 @@ from scipy.io.matlab import MatlabOpaque
 
 from workbench.recordings.formats.arrays import Opaque, by_place, read_groups
 from workbench.recordings.formats.contents import Contents, FileChannel, Group
+from workbench.recordings.formats.matlab_objects import read_objects
 from workbench.recordings.formats.spelling import spell_unit
 
 _UNIT = re.compile(r".*\[([^\[\]|]*)(\|[^\[\]]*)?\]\s*")  # of a description: Level [m|cm]
-_OBJECT = (
-    "an object that only MATLAB reads, such as a table or a timetable: save it as a structure, or "
-    "as CSV or Parquet"
-)
 _RESULT = frozenset({"Aclass", "name", "dataInfo", "data_2"})
 
 
@@ -32,15 +29,22 @@ def read(path: Path, raw: bytes) -> Contents:
             return _result(plain)
         stream.seek(0)
     content = loadmat(stream, simplify_cells=True, chars_as_strings=True)
-    held = {
-        name: Opaque(_OBJECT) if isinstance(value, MatlabOpaque) else _plain(value)
-        for name, value in content.items()
-        if not name.startswith("__")
-    }
+    members = {name: value for name, value in content.items() if not str(name).startswith("__")}
+    if any(map(_holds_object, members.values())):
+        held = read_objects(raw)
+    else:
+        held = {name: _plain(value) for name, value in members.items()}
     groups, notes = read_groups(held)
     if not groups and any(isinstance(value, Opaque) for value in held.values()):
         raise ValueError("; ".join(notes))
     return Contents(words, groups, notes)
+
+
+def _holds_object(value: Any) -> bool:
+    if isinstance(value, dict):
+        return any(map(_holds_object, value.values()))
+    cells = isinstance(value, np.ndarray) and value.dtype == object
+    return isinstance(value, MatlabOpaque) or (cells and any(map(_holds_object, value.flat)))
 
 
 def _plain(value: Any) -> Any:

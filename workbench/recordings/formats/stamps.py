@@ -46,7 +46,8 @@ _WEEKDAYS = (
 _WEEKDAY = rf"((?:{_WEEKDAYS})[^\W\d]{{0,8}}\.?,?\s+)?"
 _DAY = re.compile(
     rf"{_WEEKDAY}((?P<year>\d{{4}})(?P<by>[-/.:_\s])(?P<month>\d{{1,2}})(?P=by)(?P<day>\d{{1,2}})"
-    r"|(?P<ordinal_year>\d{4})[-/.](?P<ordinal>\d{3})"
+    # Behind a point, three figures alone are decimals: 1013.250.
+    r"|(?P<ordinal_year>(?:19|20)\d\d)(?:[-/]|\.(?=\d{3}\D))(?P<ordinal>[0-3]\d\d)"
     rf"|(?P<of>\d{{1,2}})[-/.\s]{{1,2}}{_CALLED}\.?[-/\s](?P<in>\d{{4}}|\d\d)"
     r"|(?P<one>\d{1,2})(?P<mark>[-/.])(?P<two>\d{1,2})[-/.](?P<last>\d{4}|\d\d))"
     rf"(([T,;_\s-]+|:){_CLOCK_OF_DATE}{_ZONE})?",
@@ -348,7 +349,7 @@ def _choose_reading(
     matches: Sequence[re.Match[str] | None],
 ) -> FileChannel | None:
     """The reading with which times go on evenly; a doubt where several do and differ."""
-    going = {order: channel for order, channel in readings.items() if _goes_on(channel.values)}
+    going = {order: channel for order, channel in readings.items() if goes_on(channel.values)}
     left = going or readings
     even = {order: channel for order, channel in left.items() if _is_even(channel.values)}
     # Nobody records on one day of each year, where another reading has days that follow.
@@ -386,7 +387,8 @@ def _moment(seconds: float) -> datetime:
     return _START + timedelta(seconds=seconds)
 
 
-def _goes_on(times: Vector) -> bool:
+def goes_on(times: Vector) -> bool:
+    """Whether times never go back; NaN where there is none."""
     steps = np.diff(times[np.isfinite(times)])
     return bool((steps >= 0.0).all())
 

@@ -63,6 +63,11 @@ def _groups(held: Any, notes: list[str]) -> list[Group]:
             continue
         key = values.size, step, offset, -1.0 if np.isnan(start) else start
         by_times.setdefault(key, []).append(channel)
+    for key in [key for key in by_times if key[-1] < 0.0]:
+        # Some state only of the first of several waveforms when it began.
+        dated = [other for other in by_times if other[:-1] == key[:-1] and other[-1] >= 0.0]
+        if len(dated) == 1 and key[1] > 0.0:
+            by_times[dated[0]] += by_times.pop(key)
     groups = []
     for (size, step, offset, start), channels in by_times.items():
         if size < 2:
