@@ -73,7 +73,9 @@ def test_a_single_recording_without_a_cause_lacks_nothing(heater, tmp_path):
 def test_a_single_recording_is_refused_where_recordings_differ(tmp_path):
     differing = system(tmp_path / "heaters", "[diagnosis.tolerances]\nGc = 0.05")
     recordings = cases(differing, [simulated(k, LOSS, 0.0) for k in range(4)])
-    with pytest.raises(InputError, match=r"two or more to fit, because what .*tolerances.*Gc"):
+    with pytest.raises(
+        InputError, match=r"two or more to fit, because differences .*tolerances.*Gc"
+    ):
         diagnosed(differing, recordings[:1], tmp_path)
     with pytest.raises(InputError, match="1 to fit, beside 3 held out"):
         diagnosed(differing, recordings[:1], tmp_path, recordings[1:])
