@@ -138,8 +138,10 @@ def _solve(window: Window, fmu: FMU, system: System) -> tuple[list[float], float
     spread = window.covariance + np.diag(window.noise[0] * window.wider[0])
     root = np.linalg.cholesky(np.linalg.inv(spread))
     terms = [root.T @ (nodes[:, 0] - window.mean)]
+    held = [signal.held for signal in system.inputs]
     for k in range(N):
-        end, seen = step(nodes[:, k], window.inputs[k, : len(system.inputs)], window.steps[k])
+        before, after = window.inputs[k, : len(held)], window.reached[k, : len(held)]
+        end, seen = step(nodes[:, k], np.where(held, before, after), window.steps[k])
         terms.append((window.samples[k] - seen) / np.sqrt(window.levels[k]))
         if k + 1 < N:
             noise = np.sqrt(window.noise[k + 1] * window.wider[k + 1])
