@@ -8,6 +8,7 @@ import platform
 import sys
 import tempfile
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -146,6 +147,10 @@ def _inspect_cache() -> Inspection:
     except InputError as error:
         remedy = "set XDG_CACHE_HOME to a folder that can be written"
         return Inspection("cache", "wrong", f"{folder}: {error.found}", remedy)
-    files = [path for path in folder.rglob("*") if path.is_file()]
-    size = sum(path.stat().st_size for path in files) / 1e6
-    return Inspection("cache", "ok", f"{folder}: {len(files)} files, {size:.0f} MB; may be deleted")
+    sizes = []
+    for parent, _, names in os.walk(folder):
+        for name in names:
+            with suppress(FileNotFoundError):  # other programs keep and delete files meanwhile
+                sizes.append(Path(parent, name).stat().st_size)
+    size = f"{len(sizes)} files, {sum(sizes) / 1e6:.0f} MB"
+    return Inspection("cache", "ok", f"{folder}: {size}; may be deleted")
