@@ -22,6 +22,7 @@ from workbench.__main__ import main
 from workbench.arrays import Matrix, Vector
 from workbench.errors import InputError
 from workbench.pages.provenance import run_of
+from workbench.recordings.case import read_case
 from workbench.runtime.files import check_checksum, with_checksum
 from workbench.studies.monitoring import STATE, MonitoringResult
 from workbench.studies.monitoring.cause import known_from_before, recordings_after
@@ -226,10 +227,15 @@ def test_pads_that_have_lost_friction_are_told_with_their_axle(usual):
     assert "pad friction of axle 3" in sentence
 
 
-def test_work_of_friction_is_what_pads_take_from_the_train(usual):
-    """Of 96 t at 20 m/s, 19.2 MJ; resistances and bearings take some 3 %, wheelsets hold 4 %."""
+def test_work_of_friction_is_what_pads_take_from_the_train(usual, history, train):
+    """Of 96 t at 20 m/s, 19.2 MJ, less what it has at the end, 0.3 to 1 %.
+
+    Resistances and bearings take some 3 %, wheelsets hold 4 %.
+    """
+    stops = [read_case(path, train) for path in sorted(history.iterdir())[:8]]
+    ends = 0.46 * np.array([stop[train.outputs[0].name][-1] for stop in stops])
     sums = usual.work[:8].sum(axis=1)
-    assert_allclose(sums, 0.5 * 96e3 * 20.0**2, rtol=0.08)
+    assert_allclose(sums, 0.5 * 96e3 * (20.0**2 - ends**2), rtol=0.08)
     worn = usual.to_dict()["work"]
     assert min(worn, key=lambda name: worn[name]["of_the_mean"]) == "pads[3]"
 
