@@ -63,12 +63,14 @@ TIME_DERIVATIVES = CheckResult("time of states and derivatives", limit=SAMPLE, u
 TIME_STEP = CheckResult("time of states and step", limit=SAMPLE, unit="us")
 
 # Every estimator sets states and steps by the Jacobian; none rolls back, so far. What makes many
-# instances are tuning and diagnosis; what rolls back are other tools.
+# instances are tuning, fit and diagnosis, the last two of which simulate through events; what rolls
+# back are other tools.
 _OBSERVING = (START, EVENTS, RESET, INJECTION, DERIVATIVES)
 _USES = {
     "open loop": (START, RESET),
     "observers on recordings": _OBSERVING,
-    "tuning and diagnosis": (*_OBSERVING, INSTANCES, LOADS, MEMORY),
+    "tuning": (*_OBSERVING, INSTANCES, LOADS, MEMORY),
+    "fit and diagnosis": (START, RESET, INJECTION, DERIVATIVES, INSTANCES, LOADS, MEMORY),
     "observers beside a running rig": (
         *_OBSERVING,
         TIME_GET,
