@@ -186,7 +186,7 @@ end P;
         ("package P\n  model A\n  Real x = ;\n  end A;\nend P;", 3, "rest of an expression"),
         ("package P\n  model A\n  Real x(min=0;\n  end A;\nend P;", 3, "expected ','"),
         ("package P\n  model A\n  Real x = f(1;\n  end A;\nend P;", 3, r"found ';'; expected '\)'"),
-        ("package P\n  model extends A end A;\nend P;", 2, "found 'extends'"),
+        ("package P\n  model extends A end A;\nend P;", 2, "found 'model extends A'"),
         ("package P\nend P;\npackage Q\nend Q;", 3, "one class in a file"),
         ("within Q;\npackage P\nend P;", 1, "no 'within'"),
         ("package P\n  model A end A;\n  model A end A;\nend P;", 3, "a second class P.A"),

@@ -184,7 +184,7 @@ def flatten(package: Path, model: str) -> FlatModel:
             expected=f"schema {SCHEMA}",
             remedy="install the rumoca release that the extra [compiler] pins",
         )
-    return _Reader(dae, source, model).flat_model()
+    return _Reader(dae, library, source, model).flat_model()
 
 
 @contextlib.contextmanager
@@ -300,9 +300,12 @@ def _own_lines(source: Class) -> list[str]:
 class _Reader:
     """Reads variables and equations around the arena of expressions."""
 
-    def __init__(self, dae: Mapping[str, Any], source: Class, model: str) -> None:
+    def __init__(self, dae: Mapping[str, Any], library: Library, source: Class, model: str) -> None:
         self.source = source
         self.model = model
+        own = library.components(source.name)
+        # The front end calls parts of a record local, whose declaration is an input or output.
+        self.interface = {name for name, c in own.items() if c.prefixes & {"input", "output"}}
         self.storage = dae["storage"]
         self.variables: list[dict[str, Any]] = self.storage["variables"]
         self.arena = Arena(dae, source.where)
@@ -312,7 +315,7 @@ class _Reader:
         """Read variables, then equations."""
         self._refuse_events()
         for number, entry in enumerate(self.variables):
-            if number not in self.arena.defined or _is_interface(entry):
+            if number not in self.arena.defined or self._interface_causality(entry):
                 self._refuse_type(entry)
             shape = tuple(self.arena.types[entry["value_type"]]["dimensions"])
             symbol: Value = np.empty(shape, object)
@@ -335,9 +338,7 @@ class _Reader:
                 input_equations += equations
             scalars = self._scalars(number, substitute, numeric)
             groups[role] += scalars
-            attributes = entry["attributes"]
-            top_level = len(attributes["component_ref"]["parts"]) == 1
-            if top_level and attributes["causality"] == "output":
+            if self._interface_causality(entry) == "output":
                 outputs += [v.name for v in scalars]
         parameters = [v for n in free for v in self._scalars(n, substitute, numeric)]
         _refuse_outside(parameters)
@@ -369,6 +370,15 @@ class _Reader:
             assertions=[(substitute(c), text) for c, text in self._assertions()],
             notes=tuple(self.notes),
         )
+
+    def _interface_causality(self, entry: Mapping[str, Any]) -> str:
+        """What a variable is of the model itself, input or output; empty: neither."""
+        attributes = entry["attributes"]
+        top, *parts = attributes["component_ref"]["parts"]
+        if parts and top["ident"] not in self.interface:
+            return ""
+        causality = str(attributes["declared_causality" if parts else "causality"])
+        return causality if causality in ("input", "output") else ""
 
     def _bound_input(self, number: int) -> list[tuple[ca.SX, str]]:
         """Equations of an input whose value varies: `extends Lag(u=pressure)` leaves none free."""
@@ -617,13 +627,6 @@ class _Reader:
                     remedy="write the number",
                 ) from None
         return numbers
-
-
-def _is_interface(entry: Mapping[str, Any]) -> bool:
-    """Whether a variable is an input or output of the model itself."""
-    attributes = entry["attributes"]
-    top_level = len(attributes["component_ref"]["parts"]) == 1
-    return top_level and attributes["causality"] in ("input", "output")
 
 
 def _assertion(kind: Mapping[str, Any]) -> bool:

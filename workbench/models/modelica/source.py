@@ -87,6 +87,15 @@ class Reader(Cursor):
         if kind == "operator" and self.token.text in ("function", "record"):
             kind = self.advance().text
         where, place = self.where, len(self._found)
+        if self.sees("extends"):
+            raise InputError(
+                where=where,
+                found=f"'{kind} extends {self.following.text}', which takes what it redeclares as "
+                "its base",
+                expected="a class that stands by itself",
+                remedy=f"write it whole, 'redeclare {kind} {self.following.text}', with what it "
+                "inherited",
+            )
         short = self.identifier()
         name = f"{enclosing}.{short}" if enclosing else short
         outer, self._owner = self._owner, name
