@@ -13,6 +13,7 @@ from workbench.__main__ import main
 from workbench.cli import doctor
 from workbench.cli.extras import PURPOSES
 from workbench.cli.parser import command_line, parsers
+from workbench.models.fmu_cache import cache_folder
 
 from .processes import python
 
@@ -178,6 +179,17 @@ def test_a_sound_installation_has_nothing_wrong(capsys):
     assert found["fmus/fmi2/Reference.fmu"]["state"] == "ok"
     if found["extra [compiler]"]["state"] == "ok":
         assert found["compiler"]["found"] == "compiled and ran a model with the state x"
+
+
+def test_a_cached_file_that_is_gone_does_not_end_the_report(tmp_path, monkeypatch, capsys):
+    """As where another program deletes it meanwhile: it is listed, but cannot be measured."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    folder = cache_folder()
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "gone").symlink_to(tmp_path / "nothing")
+    findings = document(["doctor"], capsys)["result"]["findings"]
+    (state,) = (finding["state"] for finding in findings if finding["name"] == "cache")
+    assert state == "ok"
 
 
 def test_a_changed_fmu_and_a_cache_out_of_reach_are_told_with_what_to_do(
