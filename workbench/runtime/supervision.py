@@ -167,36 +167,18 @@ def memory_limit() -> int | None:
     return machine if hard == resource.RLIM_INFINITY else min(machine, hard)
 
 
-def limit_memory(size: int) -> None:
+def limit_memory(size: int) -> tuple[int, int] | None:
     """Limit what this process takes from now on [bytes], if it belongs to a command.
 
-    Raises
-    ------
-    OSError
-        If the system does not say what the process has.
-    """
-    _limit(size)
-
-
-@contextmanager
-def limited_memory(size: int) -> Iterator[None]:
-    """Limit what this process takes meanwhile [bytes], if it belongs to a command.
+    Returns
+    -------
+    limits : of before, soft and hard; None where nothing is limited.
 
     Raises
     ------
     OSError
         If the system does not say what the process has.
     """
-    before = _limit(size)
-    try:
-        yield
-    finally:
-        if before is not None:
-            resource.setrlimit(resource.RLIMIT_DATA, before)
-
-
-def _limit(size: int) -> tuple[int, int] | None:
-    """Limit what this process takes from now on; the limits before, None where none is set."""
     if resource is None or sys.platform != "linux":
         return None
     soft, hard = resource.getrlimit(resource.RLIMIT_DATA)
@@ -206,6 +188,17 @@ def _limit(size: int) -> tuple[int, int] | None:
     held = int(status.partition("VmData:")[2].split()[0]) << 10
     resource.setrlimit(resource.RLIMIT_DATA, (min(held + size, hard), hard))
     return soft, hard
+
+
+@contextmanager
+def limited_memory(size: int) -> Iterator[None]:
+    """Limit what this process takes meanwhile, see `limit_memory`."""
+    before = limit_memory(size)
+    try:
+        yield
+    finally:
+        if before is not None:
+            resource.setrlimit(resource.RLIMIT_DATA, before)
 
 
 def supervised(
