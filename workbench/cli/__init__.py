@@ -22,6 +22,7 @@ COMMANDS = {
     "systems": "list the systems that are installed",
     "import": "turn log files into case folders",
     "prepare": "turn published recordings of a system into case folders",
+    "check": "check that a library of effects is fit for a diagnosis",
     "new": "write a system of one's own to begin with",
     "doctor": "say what is installed, what is missing, and what to do",
     "completion": "print what a shell needs to complete commands",
