@@ -473,6 +473,14 @@ def test_the_open_loop_runs_on_co_simulation_alone(integrator):
     assert compare_with_fmpy(integrator / "Alone.fmu").verdict == RIGHT
 
 
+def test_co_simulation_alone_takes_means_of_the_time_before(integrator):
+    """From 1: three seconds whose means are 1, 0 and 0."""
+    drive = Drive(np.arange(4.0), np.array([[0.0], [1.0], [0.0], [0.0]]))
+    with CoSimulation(integrator / "Alone.fmu") as fmu:
+        simulated = Simulation(fmu, ["u"], ["x"], [-1.0]).run(drive, {})
+    np.testing.assert_allclose(simulated[:, 0], [1, 2, 2, 2])
+
+
 def test_whole_simulations_of_co_simulation_alone_have_derivatives(integrator):
     """x = x0 + 3 s of an input of 1: each output moves as its start does."""
     drive = Drive(np.arange(4.0), np.ones((4, 1)))

@@ -1,6 +1,7 @@
 """Bands are checked by innovations, and what contradicts them is said at the top."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import fmpy
@@ -10,8 +11,13 @@ import pytest
 from numpy.testing import assert_allclose
 
 from workbench import case_from_frame
+from workbench.diagnosis.data.motion import OpenModel, motion
+from workbench.diagnosis.data.samples import prepare as prepare_samples
+from workbench.diagnosis.simulation.prediction import Predictor, Variation
+from workbench.errors import InputError
 from workbench.models.compiler import native
 from workbench.models.fmu import FMU
+from workbench.models.simulation import Drive, Simulation
 from workbench.observers import choose, estimators_of
 from workbench.observers.export import build_observer
 from workbench.observers.replay import replay
@@ -232,6 +238,58 @@ def test_a_switched_pump_is_integrated_exactly_and_nothing_is_made_of_the_switch
     assert_allclose(run.signal("leak"), 0.0, atol=1e-12)
     # What a sensor sees at a sample is the input from there on.
     assert_allclose(run.signal("through"), filled["through"], rtol=0.0, atol=1e-12)
+
+
+# --- inputs whose samples are means of the time before ---
+
+
+def metered(vessel: System, held: bool | str) -> System:
+    return replace(vessel, inputs=tuple(replace(flow, held=held) for flow in vessel.inputs))
+
+
+@pytest.fixture(scope="module")
+def counted(vessel) -> Case:
+    """A pump that runs from the first sample on; a meter gives the mean since the last second."""
+    time = np.arange(21.0)
+    flow = np.where(time > 0.0, 0.5e-3, 0.0)
+    columns = {"q [m3/s]": flow, "V [m3]": 0.5e-3 * time, "through [m3/s]": flow}
+    return case_from_frame(vessel, pd.DataFrame({"time [s]": time, **columns}))
+
+
+@pytest.mark.parametrize("name", ESTIMATORS)
+def test_means_of_a_meter_are_integrated_exactly(vessel, fmu, counted, name):
+    system, cls = metered(vessel, "before"), estimators_of(vessel)[name]
+    run = replay(counted, cls(fmu, system, cls.default_gains(fmu, system)))
+    assert_allclose(run.signal("V"), counted["V"], rtol=0.0, atol=1e-12)
+    assert_allclose(run.signal("leak"), 0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize(("held", "litres"), [("before", 10.0), (False, 9.75), (True, 9.5)])
+def test_ten_litres_are_ten_where_means_are_declared_as_what_they_are(
+    vessel, fmu, counted, held, litres
+):
+    """By an open loop, a whole simulation, and the prediction of a diagnosis with derivatives."""
+    system, cls = metered(vessel, held), estimators_of(vessel)["open_loop"]
+    run = replay(counted, cls(fmu, system, cls.default_gains(fmu, system)))
+    assert run.signal("V")[-1] == pytest.approx(1e-3 * litres)
+    drive = Drive(counted.time, counted.u)
+    simulated = Simulation(fmu, ["q"], ["V"], system.holds).run(drive, {})
+    assert simulated[-1, 0] == pytest.approx(1e-3 * litres)
+    system = replace(system, comparison=replace(system.comparison, least=10.0))
+    ready = prepare_samples(counted, system, ("V", "through"), OpenModel(fmu, motion(fmu, system)))
+    columns = [Variation(("leak",))]
+    errors, by = Predictor(fmu, system, ready.signals).derivatives(ready, {}, columns)
+    assert errors[-1, 0] == pytest.approx(1e-3 * (10.0 - litres), abs=1e-9)
+    assert by.errors[-1, 0, 0] == pytest.approx(20.0)
+
+
+def test_a_sensor_that_is_a_mean_is_refused(tmp_path):
+    package, text = machine("vessel")
+    noisy = 'noise = "1e-5 m3"'
+    with pytest.raises(InputError, match=r"V.* held.*only inputs may be means"):
+        declare(tmp_path / "meter", package, text.replace(noisy, f'{noisy}, held = "before"'))
+    with pytest.raises(InputError, match="true, false or before"):
+        declare(tmp_path / "typo", package, text.replace("held = true", 'held = "after"'))
 
 
 def test_an_exported_observer_holds_the_input_too(vessel, fmu, filled, tmp_path):

@@ -96,6 +96,22 @@ def test_an_input_that_is_held_stays_until_its_next_sample(system):
     assert_array_equal(measured.signals["pB"], 1e5 * before)
 
 
+def test_means_of_the_time_before_keep_what_they_add_up_to(system):
+    inputs = tuple(replace(variable, held="before") for variable in system.inputs)
+    changed = replace(system, inputs=inputs)
+    fast, slow = np.arange(0.0, 5.0, 0.01), np.arange(0.0, 5.0, 0.04)
+    pulses = np.where(np.arange(fast.size) % 4 == 1, 1e5, 0.0)  # a quarter of each slow interval
+    held = file(
+        group("slow", slow, **rolling(system, slow, np.full(slow.size, 20.0))),
+        group("fast", fast, pB=pulses),
+    )
+    measured = merge([held], propose([held], changed, {}), changed)
+    assert_allclose(measured.signals["pB"][1:], 0.25e5)
+    assert any("pB: averaged from samples" in note for note in measured.notes) or (
+        measured.time.size == slow.size
+    )
+
+
 def test_loggers_are_brought_together_by_their_time_stamps(system):
     time = np.arange(0.0, 5.0, 0.01)
     first = group("", time, 1000.0, **rolling(system, time, 20.0 + time))

@@ -138,10 +138,9 @@ def _solve(window: Window, fmu: FMU, system: System) -> tuple[list[float], float
     spread = window.covariance + np.diag(window.noise[0] * window.wider[0])
     root = np.linalg.cholesky(np.linalg.inv(spread))
     terms = [root.T @ (nodes[:, 0] - window.mean)]
-    held = [signal.held for signal in system.inputs]
     for k in range(N):
-        before, after = window.inputs[k, : len(held)], window.reached[k, : len(held)]
-        end, seen = step(nodes[:, k], np.where(held, before, after), window.steps[k])
+        before, after = window.inputs[k, :-1], window.reached[k, :-1]
+        end, seen = step(nodes[:, k], np.where(system.holds > 0.0, before, after), window.steps[k])
         terms.append((window.samples[k] - seen) / np.sqrt(window.levels[k]))
         if k + 1 < N:
             noise = np.sqrt(window.noise[k + 1] * window.wider[k + 1])

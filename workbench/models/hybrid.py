@@ -9,7 +9,6 @@ Source: FMI 2.0.4, section 3.2; FMI 3.0, sections 2.5 and 3.
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import RK45, Radau
 
 from workbench.arrays import Matrix, Vector
@@ -32,18 +31,19 @@ class HybridSimulation:
     ----------
     fmu : after its start, whose inputs have the values of the first sample.
     inputs : what drives it, (m,), of any types that hold numbers.
-    held : (m,) whether an input stays until the next sample; others go there in a straight line.
-        Discrete ones stay, and jump in Event Mode.
+    holds : (m,) 1 of an input that stays until the next sample, -1 of one whose sample is the mean
+        since the one before; others go on in a straight line. Discrete ones stay, and jump in
+        Event Mode.
     """
 
-    def __init__(self, fmu: FMU, inputs: TypedVariables, held: NDArray[np.bool_]) -> None:
+    def __init__(self, fmu: FMU, inputs: TypedVariables, holds: Vector) -> None:
         self._fmu, self._inputs = fmu, inputs
         variability = {v.name: v.variability for v in fmu.description.variables}
         moving = [variability[name] == "continuous" for name in inputs.real.names]
         self._continuous_at = inputs.real_at[moving]
         self._continuous = fmu.variables([inputs.names[i] for i in self._continuous_at])
-        self._held = np.ones(held.size, np.bool_)
-        self._held[self._continuous_at] = held[self._continuous_at]
+        self._holds = np.where(holds == 0.0, 1.0, holds)
+        self._holds[self._continuous_at] = holds[self._continuous_at]
         self._t = float(fmu.time[0])
         self._x = fmu.get_states()
         self._nominal = fmu.nominals()
@@ -65,9 +65,10 @@ class HybridSimulation:
         FMUError
             If the FMU refuses a call, asks to end, cannot be integrated, or its events pile up.
         """
-        self._begin, self._end = self._t, t
-        self._after = np.where(self._held, self._before, u)
         self._events, self._piled = 0, self._t
+        self._jump(np.where(self._holds < 0.0, u, self._before))
+        self._begin, self._end = self._t, t
+        self._after = np.where(self._holds > 0.0, self._before, u)
         while self._t < t:
             self._go_on(t)
             while self._fmu.next_event[0] <= self._t:
@@ -230,12 +231,14 @@ class CoSimulationRun:
     ----------
     fmu : after its start, whose inputs have the values of the first sample.
     inputs : what drives it, (m,).
-    held : (m,) whether an input stays until the next sample; of others the mean of a step acts.
+    holds : (m,) 1 of an input that stays until the next sample, -1 of one whose sample is the mean
+        since the one before; of others the mean of a step acts.
     """
 
-    def __init__(self, fmu: CoSimulation, inputs: TypedVariables, held: NDArray[np.bool_]) -> None:
-        self._fmu, self._inputs, self._held = fmu, inputs, held.copy()
-        self._held[inputs.others_at] = True
+    def __init__(self, fmu: CoSimulation, inputs: TypedVariables, holds: Vector) -> None:
+        self._fmu, self._inputs, self._holds = fmu, inputs, holds.copy()
+        others = inputs.others_at
+        self._holds[others] = np.where(holds[others] == 0.0, 1.0, holds[others])
         self._states = fmu.typed(fmu.states)
         self._t = fmu.start_time
         self._before = fmu.get_typed(inputs)
@@ -254,8 +257,8 @@ class CoSimulationRun:
             If the FMU refuses the step, or asks to end.
         """
         if t > self._t:
-            mean = 0.5 * (self._before + u)
-            self._fmu.set_typed(self._inputs, np.where(self._held, self._before, mean))
+            acting = 0.5 * ((1.0 + self._holds) * self._before + (1.0 - self._holds) * u)
+            self._fmu.set_typed(self._inputs, acting)
             self._fmu.step(t - self._t)
             self._t = t
         self._fmu.set_typed(self._inputs, u)

@@ -4,7 +4,7 @@ For models that no compiled loop steps: those with events, and Co-Simulation alo
 a model is integrated at a tolerance of 1e-8 and goes through its events; see `hybrid`.
 
     with open_file(path, system) as fmu:
-        simulation = Simulation(fmu, inputs=["Ta"], outputs=["T"], held=[False])
+        simulation = Simulation(fmu, inputs=["Ta"], outputs=["T"], holds=[0.0])
         drive = Drive(time, u)
         y = simulation.run(drive, {"G": 55.0, "T": 291.0})                   # (n, l)
         by = simulation.derivatives(drive, {"G": 55.0}, [("G",), ("T",)])  # .values (n, l, 2)
@@ -82,15 +82,15 @@ class Simulation:
     ----------
     fmu : Model Exchange, with events or without, or Co-Simulation; it must outlive this.
     inputs, outputs : variables of the FMU of any types that hold numbers, m and l.
-    held : (m,) whether an input stays until the next sample; else it goes there in a straight line.
+    holds : (m,) see `HybridSimulation`; 0: a straight line from sample to sample.
     """
 
     def __init__(
-        self, fmu: FMU, inputs: Sequence[str], outputs: Sequence[str], held: ArrayLike
+        self, fmu: FMU, inputs: Sequence[str], outputs: Sequence[str], holds: ArrayLike
     ) -> None:
         self._fmu = fmu
         self._inputs, self._outputs = fmu.typed(inputs), fmu.typed(outputs)
-        self._held = np.array(held, np.bool_)
+        self._holds = np.array(holds, float)
         self._variables = {v.name: v for v in fmu.description.variables}
         self._resets: bool | None = None  # not known before the first run
         self._set: set[str] = set()
@@ -126,7 +126,7 @@ class Simulation:
         fmu = self._fmu
         self._start(drive, values)
         make = CoSimulationRun if isinstance(fmu, CoSimulation) else HybridSimulation
-        along = make(fmu, self._inputs, self._held)  # type: ignore[arg-type]
+        along = make(fmu, self._inputs, self._holds)  # type: ignore[arg-type]
         along.begin(drive.u[0])
         outputs = np.empty((drive.time.size, len(self._outputs.names)))
         outputs[0] = fmu.get_typed(self._outputs)

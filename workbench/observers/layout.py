@@ -29,8 +29,8 @@ class Layout(NamedTuple):
     ratio : of follower over leader while it rolls [1]; lead : coefficient of the leader in `pace`.
     reported : number of the model's outputs that estimates hold.
     columns : of the Jacobian that laws need: rates, and all outputs if one that is fed is no state.
-    held : (m + 1,) 1 of an input that stays as it was sampled until the next sample, else 0, as of
-        the time.
+    holds : (m + 1,) 1 of an input that stays as it was sampled until the next sample, -1 of one
+        whose sample is the mean since the one before, else 0, as of the time.
     """
 
     seen: NDArray[np.intp]
@@ -47,7 +47,7 @@ class Layout(NamedTuple):
     lead: float
     reported: int
     columns: int
-    held: Vector
+    holds: Vector
 
 
 def layout(fmu: FMU, system: System) -> Layout:
@@ -88,7 +88,7 @@ def layout(fmu: FMU, system: System) -> Layout:
         lead=float(sum(p for p, at in zip(pace, seen, strict=True) if at == leader)),
         reported=len(system.reported),
         columns=len(states) + (len(system.reported) + unseen if unseen else 0),
-        held=np.array([*(float(signal.held) for signal in system.inputs), 0.0]),
+        holds=np.array([*system.holds, 0.0]),
     )
 
 
@@ -240,14 +240,14 @@ def assign_rows(target, source):  # type: ignore[no-untyped-def]
 
 @inlined
 def act(layout, before, u, acting):  # type: ignore[no-untyped-def]
-    """Write the inputs that act in a step, and its time, (m + 1,): u + held (before - u).
+    """Write the inputs that act in a step of Euler's, and its time, (m + 1,).
 
     Parameters
     ----------
     before, u : (m + 1,) inputs and time at the beginning of the step, and at its end.
     """
     for j in range(acting.size):
-        acting[j] = before[j] if layout.held[j] > 0.0 else u[j]
+        acting[j] = before[j] if layout.holds[j] > 0.0 else u[j]
 
 
 @inlined

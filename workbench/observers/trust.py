@@ -315,11 +315,12 @@ def sampling_doubt(fmu: FMU, system: System, case: Case) -> str:
 
 def _finer(case: Case, system: System) -> tuple[Vector, Matrix, Matrix]:
     """Time [s], inputs, outputs with some steps in place of each; nothing is measured between."""
-    held = np.array([signal.held for signal in system.inputs], bool)
     share = np.tile(np.arange(1, _FINE + 1) / _FINE, case.time.size - 1)[:, None]
     before, after = (np.repeat(side, _FINE, axis=0) for side in (case.u[:-1], case.u[1:]))
     # A held input has its new value from the sample on, where the last of the steps ends.
-    between = np.where(held & (share < 1.0), before, before + share * (after - before))
+    line = before + share * (after - before)
+    between = np.where((system.holds > 0.0) & (share < 1.0), before, line)
+    between = np.where(system.holds < 0.0, after, between)
     y = np.full((between.shape[0], case.y.shape[1]), np.nan)
     y[_FINE - 1 :: _FINE] = case.y[1:]
     steps = np.append(0.0, np.repeat(np.diff(case.time) / _FINE, _FINE))

@@ -7,7 +7,7 @@ from typing import Any
 from workbench.errors import InputError
 from workbench.system.declaration import Scope, Unit, declared, key, table_name
 from workbench.system.expression import Expression
-from workbench.system.parts import STATE, Condition, Ranged, Signal, names_of, refuse_without_noise
+from workbench.system.parts import STATE, Condition, Ranged, Signal, names_of, refuse_no_sensor
 from workbench.system.tables import Table
 from workbench.system.units import quantity
 
@@ -196,7 +196,7 @@ class Experiments:
     sensors: tuple[Signal, ...] = key(
         "validation sensors that could be added",
         absent=(),
-        check=refuse_without_noise,
+        check=refuse_no_sensor,
     )
 
     @property

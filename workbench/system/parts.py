@@ -199,10 +199,12 @@ class Signal:
         "s",
         (),
     )
-    held: bool = key(
-        "true: an input is constant between samples. false: it is interpolated linearly, which "
-        "attenuates an oscillation of nine samples a period by 4 %",
+    held: bool | str = key(
+        "true: an input keeps the value of a sample until the next one. `before`: a sample is the "
+        "mean since the sample before, as of cyclers and energy meters. false: it is interpolated "
+        "linearly, which attenuates an oscillation of nine samples a period by 4 %",
         absent=False,
+        choices=("before",),
     )
     resolution: float = key(
         "quantisation step of the reading",
@@ -248,6 +250,14 @@ class Signal:
         return self.noise + self.relative_noise * np.abs(values)
 
     @property
+    def hold(self) -> float:
+        """When a sample of an input acts: 1: until the next one, -1: since the one before.
+
+        0: on a straight line to the next one.
+        """
+        return -1.0 if self.held == "before" else float(self.held)
+
+    @property
     def exact(self) -> bool:
         """Whether it is known without an error, as a command is."""
         return self.noise == 0.0 and self.relative_noise == 0.0 and self.resolution == 0.0
@@ -263,13 +273,18 @@ class Signal:
         return self.noise + self.relative_noise * self.scale
 
 
-def refuse_without_noise(
-    signals: tuple[Signal, ...], table: Table, name: str, scope: Scope
-) -> None:
-    """Refuse what corrects estimates, or scores them, and is exactly known."""
+def refuse_no_sensor(signals: tuple[Signal, ...], table: Table, name: str, scope: Scope) -> None:
+    """Refuse what corrects estimates, or scores them, and is exactly known, or a mean."""
     for signal in signals:
+        own = table.table(name).table(signal.name)
         if signal.noise == 0.0:
-            raise table.table(name).table(signal.name).wrong("noise", _NOISY)
+            raise own.wrong("noise", _NOISY)
+        if signal.held == "before":
+            raise own.wrong(
+                "held",
+                "a value at the sample: only inputs may be means of the time before; a sensor's "
+                "mean needs an output of the model that forms it",
+            )
 
 
 @declared

@@ -269,6 +269,9 @@ class _Item:
             return self._unit()
         if kind is float:
             return self._numbers([self.table.content.get(self.name)])[0]
+        if kind is bool and str in kinds and isinstance(self.table.content[self.name], str):
+            (text,) = self._choices([self.table.take(self.name, str)], "true, false or ")
+            return text
         if kind in (bool, int):
             return self.table.take(self.name, kind)
         if kind is Path:

@@ -98,8 +98,8 @@ def _of_type(hint: Any, declared: Key) -> Schema:
     if is_table(kind):
         described = [schema(other) for other in kinds]
         return described[0] if len(kinds) == 1 else {"anyOf": described}
-    if kind is str and declared.choices:
-        return {"enum": list(declared.choices)}
+    if kind in (str, bool) and declared.choices:
+        return {"enum": [*([True, False] if kind is bool else []), *declared.choices]}
     if origin is tuple and is_table(kinds_of(inside[0])[0]):
         item = _of_type(inside[0], declared)
         if table_name_of(kinds_of(inside[0])[0]):
@@ -185,6 +185,8 @@ def _words(hint: Any, declared: Key) -> str:
         return f"{_words(inside[1], declared)} by name"
     if kind is float:
         return _number(declared)
+    if kind is bool and declared.choices:
+        return f"true, false, {', '.join(f'`{choice}`' for choice in declared.choices)}"
     named = {Expression: "formula", bool: "true or false", int: "whole number", Path: "folder"}
     return named.get(kind, "name" if declared.of else "text")
 

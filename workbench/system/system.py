@@ -41,7 +41,7 @@ from workbench.system.parts import (
     View,
     columns_of,
     names_of,
-    refuse_without_noise,
+    refuse_no_sensor,
     unit_in_model,
     units_of,
 )
@@ -72,7 +72,7 @@ def _refuse_no_outputs(signals: tuple[Signal, ...], table: Table, name: str, sco
             expected="measured outputs, which correct the model",
             remedy=f"add a table [{name}.NAME] for each",
         )
-    refuse_without_noise(signals, table, name, scope)
+    refuse_no_sensor(signals, table, name, scope)
 
 
 def _samples(table: Table, name: str, _: Scope) -> int:
@@ -188,14 +188,14 @@ class System:
         name="judged",
         aliases=("reference_signals",),
         absent=(),
-        check=refuse_without_noise,
+        check=refuse_no_sensor,
     )
     intermittent: tuple[Signal, ...] = key(
         "outputs that are measured at times; they correct Kalman filters only",
         name="aids",
         aliases=("intermittent",),
         absent=(),
-        check=refuse_without_noise,
+        check=refuse_no_sensor,
     )
     derived: tuple[DerivedSignal, ...] = key(
         "signals computed from measured ones and parameters", absent=()
@@ -324,6 +324,11 @@ class System:
             signal.name: signal
             for signal in (*self.inputs, *self.outputs, *self.reference_signals, *self.intermittent)
         }
+
+    @property
+    def holds(self) -> Vector:
+        """When samples of each input act, (m,); see `Signal.hold`."""
+        return np.array([signal.hold for signal in self.inputs])
 
     @property
     def corrections(self) -> tuple[str, ...]:

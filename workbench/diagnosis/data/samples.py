@@ -59,7 +59,7 @@ class Samples:
     gain : (n,) [1] of the correction of the led output, 0 where that was not measured.
     lead : how all outputs correct the states, or None where one leads alone.
     restarts : where states are set as measured, or None if nowhere.
-    held : (m,) whether an input is held from a sample to the next; else it goes there.
+    holds : (m,) when samples of inputs act, see `Signal.hold`.
     begin : outputs, what rolls along, and states that outputs show under other names, at the start.
     rest : (q,) means of inputs at rest, before they are applied; rest_noise : (q,) standard
         deviations, infinite of one that is never at rest before it is applied.
@@ -84,7 +84,7 @@ class Samples:
     gain: Vector
     lead: Lead | None
     restarts: Restarts | None
-    held: NDArray[np.bool_]
+    holds: Vector
     begin: Mapping[str, float]
     rest: Vector
     rest_noise: Vector
@@ -276,7 +276,7 @@ def prepare(
         gain=gain,
         lead=lead,
         restarts=restarts_of(system, counted),
-        held=np.array([signal.held for signal in system.inputs]),
+        holds=system.holds,
         begin={**_shown(case, system, model.fmu, begin), **begin},
         rest=rest,
         rest_noise=rest_noise,

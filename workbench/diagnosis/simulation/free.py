@@ -50,8 +50,7 @@ class FreePredictor:
         self._fmu, self._signals = fmu, tuple(signals)
         inputs = [signal.name for signal in system.inputs]
         readings = [*(system.signals[name].reading for name in signals), *watched]
-        held = [signal.held for signal in system.inputs]
-        self._simulation = Simulation(fmu, inputs, readings, held)
+        self._simulation = Simulation(fmu, inputs, readings, system.holds)
         self._scales = {name: signal.scale for name, signal in system.signals.items()}
         self._scales |= {name: spread for name, spread in system.spreads.items() if spread > 0.0}
 

@@ -111,7 +111,7 @@ class _Run(NamedTuple):
 
     Attributes
     ----------
-    time : (n,) [s] of the samples; u : (n, m) inputs; held : (m,) whether one is held.
+    time : (n,) [s] of the samples; u : (n, m) inputs; holds : (m,), see `Signal.hold`.
     y : (n, c) measured.
     gain : (n,) of the correction by what leads alone.
     anew : (n,) whether states are set as measured before a sample.
@@ -121,7 +121,7 @@ class _Run(NamedTuple):
 
     time: Vector
     u: Matrix
-    held: NDArray[np.bool_]
+    holds: Vector
     y: Matrix
     gain: Vector
     led: _Led
@@ -145,7 +145,7 @@ def _predict(model, state, args):  # type: ignore[no-untyped-def]
     e_k = y_k - g(x_k, u_k), and x_k+1 = F(x_k + K_k e_k, u_k, u_k+1): F steps the model from one
     sample to the next, K_k is the gain of what leads; where states restart, they are set to y_k.
     """
-    time, u, held, y, led = args.time, args.u, args.held, args.y, args.led
+    time, u, holds, y, led = args.time, args.u, args.holds, args.y, args.led
     errors, work, tangent = state.errors, state.work, state.tangent
     varied = tangent.states.shape[1] > 0
     for i in range(args.x0.size):
@@ -154,9 +154,9 @@ def _predict(model, state, args):  # type: ignore[no-untyped-def]
         model.u[j] = u[0, j]
     if place(model):
         return 1
-    holds = False
-    for j in range(held.size):
-        holds = holds or held[j]
+    stays = ends = False  # whether inputs jump at samples, and at the begin of steps
+    for j in range(holds.size):
+        stays, ends = stays or holds[j] > 0.0, ends or holds[j] < 0.0
     for k in range(time.size):
         if k > 0:
             before = k - 1 if varied else 0
@@ -167,12 +167,18 @@ def _predict(model, state, args):  # type: ignore[no-untyped-def]
             )
             if set_states(model):
                 return 1
+            for j in range(u.shape[1]):
+                if holds[j] < 0.0:
+                    model.u[j] = u[k, j]
+            if ends and (set_inputs(model, 0, u.shape[1]) or (varied and renew(model, tangent))):
+                return 1
             interval = time[k] - time[k - 1]
             count = max(1, math.ceil(interval / args.longest - 1e-6))
             for i in range(1, count + 1):
                 for j in range(u.shape[1]):
-                    moved = 0.0 if held[j] else (u[k, j] - u[k - 1, j]) * i / count
-                    work.to[j] = u[k - 1, j] + moved
+                    begin = u[k, j] if holds[j] < 0.0 else u[k - 1, j]
+                    moved = 0.0 if holds[j] > 0.0 else (u[k, j] - begin) * i / count
+                    work.to[j] = begin + moved
                 status = step(model, work, interval / count)
                 if varied and not status:
                     share(tangent, k, i / count)
@@ -181,7 +187,7 @@ def _predict(model, state, args):  # type: ignore[no-untyped-def]
                     return status
             for j in range(u.shape[1]):
                 model.u[j] = u[k, j]
-            if holds and set_inputs(model, 0, u.shape[1]):
+            if stays and set_inputs(model, 0, u.shape[1]):
                 return 1
         status = check_state_events(model) or read(model)
         if status:
@@ -189,7 +195,7 @@ def _predict(model, state, args):  # type: ignore[no-untyped-def]
         for i in range(y.shape[1]):
             errors[k, i] = y[k, i] - model.y[i]
         if varied:
-            if (k == 0 or holds) and renew(model, tangent):
+            if (k == 0 or stays) and renew(model, tangent):
                 return 1
             tell(tangent, k)
     return 0
@@ -310,7 +316,7 @@ class Predictor:
         run = _Run(
             time=samples.time[:end],
             u=samples.u,
-            held=samples.held,
+            holds=samples.holds,
             y=samples.y,
             gain=samples.gain,
             led=self._led(samples),

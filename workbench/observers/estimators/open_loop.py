@@ -133,12 +133,11 @@ class OpenLoop(Estimator):
         if self.fmu.interface == MODEL_EXCHANGE:
             self._model.x[:] = self.fmu.get_states()
         self._simulation = None
-        held = np.array([signal.held for signal in self.system.inputs], np.bool_)
         inputs = self.fmu.typed([signal.name for signal in self.system.inputs])
         if isinstance(self.fmu, CoSimulation):
-            self._simulation = CoSimulationRun(self.fmu, inputs, held)
+            self._simulation = CoSimulationRun(self.fmu, inputs, self.system.holds)
         elif self.fmu.has_events or not self._plain:
-            self._simulation = HybridSimulation(self.fmu, inputs, held)
+            self._simulation = HybridSimulation(self.fmu, inputs, self.system.holds)
         if self._simulation is not None:
             self._simulation.begin(u)
 

@@ -224,8 +224,8 @@ def restart(step, u):  # type: ignore[no-untyped-def]
 def interval(layout, step, before, u):  # type: ignore[no-untyped-def]
     """Set inputs at the beginning and the end of a step between two samples, (m + 1,)."""
     for j in range(u.size):
-        step.begin[j] = before[j]
-        step.end[j] = before[j] if layout.held[j] > 0.0 else u[j]
+        step.begin[j] = u[j] if layout.holds[j] < 0.0 else before[j]
+        step.end[j] = before[j] if layout.holds[j] > 0.0 else u[j]
 
 
 @inlined
@@ -241,7 +241,11 @@ def begin_interval(model, layout, step, z, u, h):  # type: ignore[no-untyped-def
             z[i] += step.error[i]
             step.error[i] = step.predicted[i] = 0.0
         return OK
-    status = evaluate(model)
+    status = 0
+    for j in range(u.size):
+        if layout.holds[j] < 0.0 and step.begin[j] != step.inputs[j] and not status:
+            status = set_point(model, step.begin)
+    status = status or evaluate(model)
     for i in range(step.rates.size):
         step.rates[i] = h * model.dx[i]
     return status

@@ -106,7 +106,7 @@ def merge(
             values = np.where(near, values, np.nan)
         signals[track.signal.name] = values
         if not np.isin(time, track.times).all():
-            way = "held" if track.signal.held else "interpolated"
+            way = {1.0: "held", -1.0: "averaged"}.get(track.signal.hold, "interpolated")
             notes.append(f"{track.signal.name}: {way} from samples every {track.step:.6g} s")
     if gone := int((~known).sum()):
         notes.append(f"{gone} samples in gaps of more than {limit:g} s were left out")
@@ -202,7 +202,12 @@ def _at(track: _Track, time: Vector, limit: float) -> tuple[Vector, np.ndarray]:
     near &= (time >= track.times[0]) & (time <= track.times[-1])
     lowest, highest = (np.searchsorted(track.censored, track.times[k]) for k in (before, after))
     near &= lowest == highest
-    values = (
-        track.values[before] if track.signal.held else np.interp(time, track.times, track.values)
-    )
-    return values, near
+    if track.signal.hold > 0.0:
+        return track.values[before], near
+    if track.signal.hold < 0.0:
+        # A sample is the mean since the one before: what it integrates to is kept.
+        summed = np.cumsum(track.values * np.diff(track.times, prepend=track.times[0]))
+        within = np.diff(np.interp(time, track.times, summed))
+        means = np.append(track.values[after[0]], within / np.diff(time))
+        return means, near
+    return np.interp(time, track.times, track.values), near

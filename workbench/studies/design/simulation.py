@@ -37,7 +37,7 @@ def predict_recording(
 
     Inputs that a controller makes follow from the model's variables, anew in each of the blocks
     whose means are compared; those that a profile makes go from sample to sample in a line, of
-    which a step of the model has the middle, unless they are held.
+    which a step of the model has the middle, unless they are `held`.
 
     Parameters
     ----------
@@ -93,7 +93,6 @@ def _simulate(
     u, y = np.zeros((time.size, len(names))), np.zeros((time.size, len(readings)))
     for profile in candidate.profiles:
         u[:, names.index(profile.input.name)] = profile.signal(time)
-    held = np.array([signal.held for signal in system.inputs], np.bool_)
     size = max(1, round(system.comparison.block / h))
     model.set(model.variables(names), u[0])
     running = co_simulation_instance(model, names, readings)
@@ -105,21 +104,22 @@ def _simulate(
         ends = experiments.ends
         if ends is not None and abs(float(ends.formula(feels))) < ends.below:
             return u[:k], y[:k]
-        raise_on_failure(step_block(running, h, held, u[block], y[block]), model)
+        raise_on_failure(step_block(running, h, system.holds, u[block], y[block]), model)
     return u, y
 
 
 @compiled
-def step_block(model, h, held, u, y):  # type: ignore[no-untyped-def]
+def step_block(model, h, holds, u, y):  # type: ignore[no-untyped-def]
     """Write readings y (n, c) for inputs u (n, m), samples h [s] apart; returns a status.
 
-    A step from sample k - 1 to k is driven by (u_{k-1} + u_k) / 2, or by u_{k-1} if held.
+    A step from sample k - 1 to k is driven by (u_{k-1} + u_k) / 2 where holds, (m,), is 0, by
+    u_{k-1} where it is 1, by u_k where it is -1.
     """
     m = u.shape[1]
     for k in range(len(u)):
         if k > 0:
             for j in range(m):
-                model.u[j] = u[k - 1, j] if held[j] else 0.5 * (u[k - 1, j] + u[k, j])
+                model.u[j] = 0.5 * ((1.0 + holds[j]) * u[k - 1, j] + (1.0 - holds[j]) * u[k, j])
             if set_inputs(model, 0, m) or do_step(model, h):
                 return REFUSED
         for j in range(m):

@@ -182,9 +182,8 @@ def fit(
 def _simulation(system: System) -> Iterator[Simulation]:
     """A worker: the system's model, opened once."""
     outputs = [output.reading for output in system.outputs]
-    held = [signal.held for signal in system.inputs]
     with open_model(system) as fmu:
-        yield Simulation(fmu, [signal.name for signal in system.inputs], outputs, held)
+        yield Simulation(fmu, [signal.name for signal in system.inputs], outputs, system.holds)
 
 
 def resolve_parameters(

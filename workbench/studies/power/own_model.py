@@ -156,11 +156,10 @@ class OwnModel:
     ) -> Matrix:
         """Readings at all samples, (n, c)."""
         u, y = np.ascontiguousarray(recording.u), np.zeros((recording.time.size, len(outputs)))
-        held = np.array([signal.held for signal in self.system.inputs], np.bool_)
-        running = co_simulation_instance(model, inputs, outputs)
+        running, holds = co_simulation_instance(model, inputs, outputs), self.system.holds
         for k, h in enumerate(np.diff(recording.time)):
             pair = slice(k, k + 2)
-            raise_on_failure(step_block(running, float(h), held, u[pair], y[pair]), model)
+            raise_on_failure(step_block(running, float(h), holds, u[pair], y[pair]), model)
         return y
 
     def _description(self, case: Case) -> str:

@@ -305,6 +305,6 @@ def _state(parts: Blocks, layout: Layout, n: int) -> ArrowState:
         told=np.zeros(s + m),
         measured=np.zeros((outputs, m + s)),
         reported=np.zeros((size, layout.reported)),
-        inputs=np.zeros(layout.held.size),
-        acting=np.zeros(layout.held.size),
+        inputs=np.zeros(layout.holds.size),
+        acting=np.zeros(layout.holds.size),
     )
