@@ -106,8 +106,9 @@ def test_an_option_takes_the_same_everywhere():
                 form = (type(action).__name__, action.type, action.nargs)
                 meant.setdefault(option, set()).add(form)
     twice = {option: kinds for option, kinds in meant.items() if len(kinds) > 1}
-    # An exported observer is one; a run has several.
-    assert set(twice) == {"--estimator"}
+    # An exported observer is one; a run has several. 'power' has sets that are clean of effects,
+    # 'doctor' a cache to be cleaned.
+    assert set(twice) == {"--estimator", "--clean"}
     assert {form[1:] for form in twice["--estimator"]} == {(None, None)}
 
 
@@ -190,6 +191,22 @@ def test_a_cached_file_that_is_gone_does_not_end_the_report(tmp_path, monkeypatc
     findings = document(["doctor"], capsys)["result"]["findings"]
     (state,) = (finding["state"] for finding in findings if finding["name"] == "cache")
     assert state == "ok"
+
+
+def test_the_cache_is_measured_by_part_and_deleted_on_demand(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    folder = cache_folder()
+    for part, size in (("fmus", 2_000_000), ("0123456789abcdef", 3_000_000)):
+        (folder / part / "deeper").mkdir(parents=True)
+        (folder / part / "deeper" / "file").write_bytes(bytes(size))
+    monkeypatch.setattr(doctor, "missing_packages", lambda extra: ["casadi"] * bool(extra))
+    assert main(["doctor"]) == 0
+    said = capsys.readouterr().out
+    assert f"{folder}: 5 MB (FMUs 2 MB, compiled loops 3 MB)" in said
+    assert main(["doctor", "--clean"]) == 0
+    said = capsys.readouterr().out
+    assert f"{folder}: 5 MB deleted" in said
+    assert list(folder.iterdir()) == []
 
 
 def test_a_changed_fmu_and_a_cache_out_of_reach_are_told_with_what_to_do(

@@ -157,13 +157,13 @@ def test_a_figure_that_cannot_be_written_costs_no_numbers(root, tmp_path, monkey
     name = "01_dry_80_1.5"
     for suffix in ("png", "svg"):  # a folder stands where a figure is to be
         (tmp_path / f"{name}.{suffix}" / "mine").mkdir(parents=True)
-    arguments = ["simulate", f"cases/{name}", "--estimator", "open_loop", "--workers", "1"]
+    arguments = ["simulate", f"cases/{name}", "--estimator", "open_loop", "--figures"]
     assert main([*arguments, "--out", str(tmp_path)]) == 0
     printed = capsys.readouterr()
     assert printed.err.count("warning: ") == 2
     assert "open_loop" in printed.out
     written = sorted(path.name for path in tmp_path.iterdir() if path.is_file())
-    assert written == [f"{name}.csv", "index.html", "summary.json"]
+    assert written == [f"{name}.npz", "index.html", "summary.json"]
 
 
 def test_what_fills_the_disk_leaves_no_half_of_a_file(tmp_path):

@@ -24,7 +24,7 @@ from .page_rules import check_page, script
 from .processes import LONGEST, python
 
 CASES = ("02_dry_100_2.7", "07_wet_80_1.5", "09_wet_160_4.2_wsp")
-FILES = (".csv", ".png", ".svg")
+FILES = (".npz", ".csv", ".png", ".svg")
 UNJUDGED = '15 vehicle "A&B" <50 %>'  # a name that every quoting has to survive
 
 
@@ -42,7 +42,8 @@ def results(tmp_path_factory, root) -> Path:
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(root)
         cases = [f"cases/{name}" for name in CASES]
-        assert main(["simulate", *cases, str(vehicle), "--out", str(out)]) == 0
+        command = ["simulate", *cases, str(vehicle), "--csv", "--figures", "--out", str(out)]
+        assert main(command) == 0
     return out
 
 
@@ -84,7 +85,7 @@ def test_every_picture_states_its_finding(page, summary):
 
 def test_each_recording_has_links_to_its_files(page):
     links = [address for address in page.xpath("//a/@href") if address.endswith(FILES)]
-    assert len(links) == 3 * (len(CASES) + 1)
+    assert len(links) == len(FILES) * (len(CASES) + 1)
 
 
 def test_numbers_are_those_of_the_summary(page, summary, system):

@@ -7,10 +7,14 @@ import shutil
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import pandas as pd
 import pytest
+from numpy.testing import assert_allclose
 
 from workbench.__main__ import main
 from workbench.errors import InputError
+from workbench.pages.columns import pack_estimates, read_estimates
 from workbench.pages.runs import compare_runs, differences, read_runs
 
 CASE = "01_dry_80_1.5"
@@ -54,12 +58,57 @@ def test_a_folder_says_command_date_version_system_answer_and_files(results, roo
     assert (entry["run"]["command"], entry["run"]["system"]) == ("simulate", "wheelset")
     measured = (root / "cases" / CASE / "measured.csv").read_bytes()
     assert entry["run"]["data"] == {CASE: hashlib.sha256(measured).hexdigest()}
-    assert entry["files"] == {"csv": 1, "png": 1, "svg": 1, "html": 1, "json": 1}
+    assert entry["files"] == {"npz": 1, "html": 1, "json": 1}
     assert main(["results", str(results.parent)]) == 0
     said = capsys.readouterr().out
     assert f"{100 * error:.4g} %" in said
     assert entry["run"]["date"][:10] in said
     assert summary["answer"]["sentence"] in said
+
+
+def test_estimates_come_back_to_six_digits(tmp_path):
+    """Of the median of a column; the time, and what no such grid holds, to the last bit."""
+    noise = np.random.default_rng(1).standard_normal(500)
+    noise[7] = np.nan
+    diverging = np.exp(np.linspace(-700.0, 700.0, 500))
+    table = pd.DataFrame(
+        {"time [s]": 1e6 + 0.005 * np.arange(500), "a [m/s]": noise, "b": 1e-6 * noise}
+        | {"c": diverging, "d": np.where(noise > 2.0, np.inf, noise), "e": np.nan, "f": 0.0}
+    )
+    path = tmp_path / "estimates.npz"
+    pack_estimates(table, path)
+    back = read_estimates(path)
+    assert list(back) == list(table)
+    assert (np.isnan(back) == np.isnan(table)).all(axis=None)
+    for name in ("a [m/s]", "b"):
+        assert (back[name] - table[name]).abs().max() <= 2**-21 * table[name].abs().median()
+    for name in ("c", "d", "f"):
+        assert (back[name].dropna() == table[name].dropna()).all()
+    assert_allclose(back["time [s]"], table["time [s]"], rtol=2e-15, atol=0.0)
+
+
+def test_estimates_become_csv_on_demand(results, root, tmp_path, capsys):
+    """Where there is none; one that 'simulate' wrote has a digit more, and goes with its run."""
+    case = ["simulate", str(root / "cases" / CASE), "--estimator", "ekf", "--out", str(tmp_path)]
+    assert main([*case, "--csv", "--figures"]) == 0
+    files = [tmp_path / f"{CASE}.{suffix}" for suffix in ("csv", "png", "svg")]
+    asked = pd.read_csv(files[0])
+    assert all(file.is_file() for file in files)
+    written = files[0].stat().st_mtime_ns
+    assert main(["results", str(tmp_path), "--csv"]) == 0
+    assert files[0].stat().st_mtime_ns == written
+    assert main(case) == 0
+    assert not any(file.exists() for file in files)
+    assert main(["results", str(tmp_path), "--csv"]) == 0
+    made = pd.read_csv(files[0])
+    assert list(made) == list(asked)
+    # Half of the quantum of each column, and of the seventh digit of both files.
+    assert ((made - asked).abs().max() <= 1.5e-6 * asked.abs().max()).all()
+    (tmp_path / f"{CASE}.npz").write_bytes(b"PK")
+    files[0].unlink()
+    capsys.readouterr()
+    assert main(["results", str(tmp_path), "--csv"]) == 2
+    assert "or run 'workbench simulate' again" in capsys.readouterr().err
 
 
 def test_a_run_compared_with_itself_is_unchanged(results):

@@ -20,6 +20,7 @@ from workbench.errors import InputError
 from workbench.models.checks import check, is_fit
 from workbench.models.fmu import FMU, CoSimulation
 from workbench.observers.operating import corrected_states
+from workbench.pages.columns import read_estimates
 from workbench.recordings.case import check_recording, read_cases
 from workbench.system.registry import load_system, open_model
 from workbench.system.system import System
@@ -110,7 +111,7 @@ def test_estimators_find_the_stiffness_without_a_state(balance, tmp_path):
     options = ["--system", str(balance), "--out", str(tmp_path), "--workers", "1"]
     # The pivot rubs, which the model lacks: bands cannot hold, and the status says so.
     assert main(["simulate", str(balance / "recordings" / "00_pull"), *options]) == 1
-    estimates = pd.read_csv(tmp_path / "00_pull.csv")
+    estimates = read_estimates(tmp_path / "00_pull.npz")
     # The smoother is the reference: nothing there is only to judge by.
     for name in ("disturbance_observer", "parameter_estimator", "ekf", "ukf", "smoother"):
         # Friction is 5 % of the spring's force there at most, and changes its sign.
@@ -187,7 +188,7 @@ def test_a_correction_has_the_sign_by_which_the_output_shows_it(balance, tmp_pat
     )
     options = ["--system", str(folder), "--out", str(tmp_path), "--workers", "1"]
     assert main(["simulate", str(folder / "recordings"), *options]) == 1  # as above
-    estimates = pd.read_csv(tmp_path / "00_press.csv")
+    estimates = read_estimates(tmp_path / "00_press.npz")
     pressed = estimates["measured.F [N]"] < -8.0
     for name in ("disturbance_observer", "parameter_estimator"):
         estimate = estimates[f"{name}.c [N/m]"][pressed].mean()
@@ -200,7 +201,7 @@ def test_a_correction_has_the_sign_by_which_the_output_shows_it(balance, tmp_pat
 def test_estimators_follow_a_leak_without_an_input(bottle, tmp_path):
     options = ["--system", str(bottle), "--out", str(tmp_path), "--workers", "1"]
     assert main(["simulate", str(bottle / "recordings" / "00_leak"), *options]) == 0
-    estimates = pd.read_csv(tmp_path / "00_leak.csv")
+    estimates = read_estimates(tmp_path / "00_leak.npz")
     for name in ("disturbance_observer", "ekf", "ukf"):
         estimate = estimates[f"{name}.k [1/s]"].iloc[100:].mean()
         assert estimate == pytest.approx(LEAK, rel=0.05)

@@ -28,6 +28,7 @@ if TYPE_CHECKING:  # The public names. Each is imported from here when it is fir
     from workbench.models.fmu import FMU as FMU
     from workbench.observers import Gains as Gains
     from workbench.observers.run import Run as Run
+    from workbench.pages.columns import read_estimates as read_estimates
     from workbench.recordings.case import Case as Case
     from workbench.studies.design import NextStop as NextStop
     from workbench.studies.distance import Distance as Distance

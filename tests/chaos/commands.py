@@ -22,7 +22,7 @@ def commands(folder: Path) -> tuple[Command, ...]:
         Command("power", ("tests.chaos.power",), (), _verdicts),
         Command(
             "simulate",
-            ("workbench", "simulate", str(folder), "--estimator", "ekf", "--out"),
+            ("workbench", "simulate", str(folder), "--estimator", "ekf", "--csv", "--out"),
             (),
             _tables,
         ),

@@ -5,6 +5,7 @@ import hashlib
 import json
 import os
 import platform
+import shutil
 import sys
 import tempfile
 from collections.abc import Iterator
@@ -35,15 +36,23 @@ end Small;
 
 def add(commands: Commands, text: str) -> argparse.ArgumentParser:
     """Add the command to the parser; `text` is its line in the list of all."""
-    return commands.add_parser(
+    parser = commands.add_parser(
         "doctor",
         help=text,
         description="Say what is installed, what is missing, and what each extra is for. Check "
         "the FMUs against their manifest, compile and run a small model, and inspect "
         "the cache. Say what to do. Exit status: 0 sound, "
         "1 something does not work as it is.",
-        epilog="examples:\n  workbench doctor\n  workbench doctor --json",
+        epilog="examples:\n  workbench doctor\n  workbench doctor --json\n"
+        "  workbench doctor --clean",
     )
+    parser.add_argument(
+        "--clean",
+        action="store_true",
+        help="delete the cache first: compiled loops, built FMUs, findings of 'fmu check'. "
+        "Commands make again what they need, which takes up to a minute",
+    )
+    return parser
 
 
 @dataclass(frozen=True)
@@ -65,6 +74,8 @@ class Inspection:
 def run(options: argparse.Namespace, output: Output) -> CommandResult:
     """Inspect the installation."""
     findings = []
+    if options.clean:
+        output.result(_clean())
     for finding in _inspect():
         findings.append(finding)
         output.result(f"{finding.state:<8} {finding.name:<20} {finding.found}")
@@ -147,10 +158,34 @@ def _inspect_cache() -> Inspection:
     except InputError as error:
         remedy = "set XDG_CACHE_HOME to a folder that can be written"
         return Inspection("cache", "wrong", f"{folder}: {error.found}", remedy)
-    sizes = []
+    parts = {"fmus": "FMUs", "known": "hashes", "findings": "findings"}
+    sizes: dict[str, int] = {}
+    for path, size in _cached(folder):
+        part = parts.get(path.relative_to(folder).parts[0], "compiled loops")
+        sizes[part] = sizes.get(part, 0) + size
+    each = ", ".join(f"{part} {size / 1e6:.0f} MB" for part, size in sorted(sizes.items()))
+    total = f"{sum(sizes.values()) / 1e6:.0f} MB" + (f" ({each})" if each else "")
+    return Inspection("cache", "ok", f"{folder}: {total}; 'workbench doctor --clean' deletes it")
+
+
+def _cached(folder: Path) -> Iterator[tuple[Path, int]]:
+    """Files of the cache and their sizes [byte]."""
     for parent, _, names in os.walk(folder):
-        for name in names:
+        for path in (Path(parent, name) for name in names):
             with suppress(FileNotFoundError):  # other programs keep and delete files meanwhile
-                sizes.append(Path(parent, name).stat().st_size)
-    size = f"{len(sizes)} files, {sum(sizes) / 1e6:.0f} MB"
-    return Inspection("cache", "ok", f"{folder}: {size}; may be deleted")
+                yield path, path.stat().st_size
+
+
+def _clean() -> str:
+    """Delete what the cache holds. Other programs work on: they make anew what they miss."""
+    from workbench.models.fmu_cache import cache_folder
+
+    folder = cache_folder()
+    before = sum(size for _, size in _cached(folder))
+    for path in folder.iterdir() if folder.is_dir() else ():
+        if path.is_dir() and not path.is_symlink():
+            shutil.rmtree(path, ignore_errors=True)
+        else:
+            path.unlink(missing_ok=True)
+    after = sum(size for _, size in _cached(folder))
+    return f"cleaned  {folder}: {(before - after) / 1e6:.0f} MB deleted"

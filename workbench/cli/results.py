@@ -25,6 +25,7 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         "folders with several runs, those of the same place are compared.",
         epilog="examples:\n"
         "  workbench results results\n"
+        "  workbench results results/simulate --csv\n"
         "  workbench results results/before results/after\n"
         "  workbench results results/before results/after --json",
     )
@@ -33,6 +34,11 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
     )
     parser.add_argument(
         "other", type=Path, nargs="?", metavar="OTHER", help="to compare with, after the change"
+    )
+    parser.add_argument(
+        "--csv",
+        action="store_true",
+        help="write NAME.csv for each NAME.npz of estimates in FOLDER, where there is none",
     )
     return parser
 
@@ -48,6 +54,8 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
     )
 
     runs = read_runs(options.folder, warn)
+    if options.csv:
+        _write_csv(options.folder, output)
     if options.other is None:
         output.result(format_runs(runs))
         return CommandResult({"runs": [run.to_dict() for run in runs]})
@@ -64,6 +72,17 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
             }
         )
     return CommandResult({"comparisons": comparisons})
+
+
+def _write_csv(folder: Path, output: Output) -> None:
+    from workbench.observers.report import write_numbers
+    from workbench.pages.columns import read_estimates
+
+    for packed in sorted(folder.rglob("*.npz")):
+        path = packed.with_suffix(".csv")
+        if not path.exists():
+            write_numbers(read_estimates(packed), path, 7)
+            output.stage(f"wrote {path}")
 
 
 def _pairs(

@@ -6,7 +6,7 @@ import argparse
 import hashlib
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -35,8 +35,9 @@ def add(commands: arguments.Commands, text: str) -> argparse.ArgumentParser:
     parser = commands.add_parser(
         "simulate",
         help=text,
-        description="Run all estimators on recordings; write a page to read (index.html), and "
-        "beside it scores (summary.json), data (CSV) and figures (PNG, SVG).",
+        description="Run all estimators on recordings. Write a page to read (index.html), and "
+        "beside it scores (summary.json) and data (NAME.npz). 'workbench results FOLDER --csv' "
+        "turns data into CSV.",
         epilog="examples:\n"
         "  workbench simulate\n"
         f"  workbench simulate {own} --out /tmp/one\n"
@@ -73,6 +74,10 @@ def add(commands: arguments.Commands, text: str) -> argparse.ArgumentParser:
         "--live",
         action="store_true",
         help="show each run in a window as it goes, one after the other",
+    )
+    parser.add_argument("--csv", action="store_true", help="write data as NAME.csv, too")
+    parser.add_argument(
+        "--figures", action="store_true", help="write figures of the page as NAME.png and NAME.svg"
     )
     arguments.add_pdf(parser)
     arguments.add_isolated(parser)
@@ -144,10 +149,12 @@ def _run(
         for name, meaning in simulation.meanings().items()
         if name in settings
     }
+    suffixes = ("npz", *["csv"] * options.csv, *["png", "svg"] * options.figures)
+    write = partial(_write, options.out, suffixes)
     if window is None:
-        runs = simulate(simulation, cases, options.workers, partial(_write, options.out))
+        runs = simulate(simulation, cases, options.workers, write)
     else:
-        runs = _run_live(simulation, cases, window, options.out)
+        runs = _run_live(simulation, cases, window, write)
     results: list[CaseResult] = []
     begin = time.perf_counter()
     interrupted = False
@@ -169,8 +176,9 @@ def _run(
         summary = summarise_runs(system, results, provenance)
         write_json(options.out / "summary.json", summary)
         page = options.out / "index.html"
-        write_page(system, summary, [case_figure(result) for result in results], len(cases), page)
-        line = f"{len(results)} of {len(cases)} cases; to read: {page}, data and figures beside it"
+        figures = [case_figure(result) for result in results]
+        write_page(system, summary, figures, len(cases), page, suffixes)
+        line = f"{len(results)} of {len(cases)} cases; to read: {page}, data beside it"
         output.result(line)
     if window is not None and not interrupted:
         window.wait()
@@ -220,7 +228,10 @@ def _unsure(results: Sequence[CaseResult]) -> list[str]:
 
 
 def _run_live(
-    simulation: Simulation, cases: Sequence[Case], window: LiveWindow, out: Path
+    simulation: Simulation,
+    cases: Sequence[Case],
+    window: LiveWindow,
+    write: Callable[[CaseResult], None],
 ) -> Iterator[CaseResult]:
     """Show each case in the window, then run it."""
     from workbench.observers.simulation import simulate
@@ -228,7 +239,7 @@ def _run_live(
     for case in cases:
         with simulation.estimators() as running:
             window.show(case, list(running.values()), simulation.warnings(case))
-        yield from simulate(simulation, [case], 1, partial(_write, out))
+        yield from simulate(simulation, [case], 1, write)
 
 
 def _models(simulation: Simulation) -> dict[str, Any]:
@@ -257,12 +268,17 @@ def _settings(simulation: Simulation, case: Case) -> dict[str, Any]:
     return {name: setting for name, setting in settings.items() if setting}
 
 
-def _write(out: Path, result: CaseResult) -> None:
-    """Write CSV and figures of a case."""
+def _write(out: Path, suffixes: Sequence[str], result: CaseResult) -> None:
+    """Write data and figures of a case; those of an earlier run that are not asked for now go."""
     from workbench.observers.report import write_estimates
     from workbench.observers.simulation import case_figure
     from workbench.pages.figures import draw_case
 
-    write_estimates(result, out / f"{result.case.name}.csv")
-    paths = [out / f"{result.case.name}.{suffix}" for suffix in ("png", "svg")]
-    draw_case(case_figure(result), paths)
+    paths = {s: out / f"{result.case.name}.{s}" for s in ("npz", "csv", "png", "svg")}
+    for suffix, path in paths.items():
+        if suffix in suffixes and suffix in ("npz", "csv"):
+            write_estimates(result, path)
+        elif suffix not in suffixes and path.is_file():
+            path.unlink()
+    if "svg" in suffixes:
+        draw_case(case_figure(result), [paths["png"], paths["svg"]])

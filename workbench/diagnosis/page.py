@@ -75,8 +75,10 @@ def write_diagnosis_page(
     related : what a file says that belongs to this diagnosis, by its path from the folder.
     """
     more = [] if best is None else [estimate_figure(best)]
-    first, *others = zoomable([figures[0], *more, *figures[1:]], summary, folder, own_files=True)
-    estimate = replace(others.pop(0), own_files=False, headed=False) if more else None
+    first, *others = zoomable(
+        [figures[0], *more, *figures[1:]], summary, folder, files=("csv", "png", "svg")
+    )
+    estimate = replace(others.pop(0), files=(), headed=False) if more else None
     found = bool(summary["causes"])
     title = "recording that shows it best" if found else "recording with the largest errors"
     parts = [

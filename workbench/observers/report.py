@@ -15,6 +15,7 @@ from workbench.observers import label
 from workbench.observers.simulation import CaseResult
 from workbench.observers.trust import Contradiction, contradiction_lines
 from workbench.pages.answer import Answer, Measure, percentage, recordings, with_answer
+from workbench.pages.columns import pack_estimates
 from workbench.pages.figures import CaseFigure
 from workbench.pages.parts import (
     Block,
@@ -37,8 +38,11 @@ from workbench.system.system import System
 
 
 def write_estimates(result: CaseResult, path: Path) -> None:
-    """Write one CSV of a case; see `CaseResult.to_frame`."""
-    write_numbers(result.to_frame(), path, 7)
+    """Write the data of a case, CSV or NPZ by suffix; see `CaseResult.to_frame`."""
+    if path.suffix == ".npz":
+        pack_estimates(result.to_frame(), path)
+    else:
+        write_numbers(result.to_frame(), path, 7)
 
 
 def write_numbers(frame: pd.DataFrame, path: Path, digits: int) -> None:
@@ -216,14 +220,16 @@ def write_page(
     figures: Sequence[CaseFigure],
     planned: int,
     path: Path,
+    files: Sequence[str] = ("npz",),
 ) -> None:
-    """Write the page; files of each case are expected beside it.
+    """Write the page.
 
     Parameters
     ----------
     summary : as written to summary.json.
     figures : one per case of the summary.
     planned : number of cases that were asked for; more than there are after an interruption.
+    files : suffixes of the files of each case beside the page.
     """
     reference = system.objective.signal
     ranking = standings(summary, reference)
@@ -235,7 +241,7 @@ def write_page(
 
     ordered = sorted(figures, key=lambda figure: badness(figure.name), reverse=True)
     order = [figure.name for figure in ordered]
-    first, *others = zoomable(ordered, summary, path.parent, own_files=True)
+    first, *others = zoomable(ordered, summary, path.parent, files=files)
     quantity = called(system, reference)
     shown = (
         f"From top to bottom: what was measured and fed to the estimators, the {quantity} measured "

@@ -283,13 +283,13 @@ class Recording:
     ----------
     drawing : its geometry.
     elsewhere : page of its own; empty where it is on this one.
-    own_files : whether its data and pictures lie beside the page.
+    files : suffixes of its data and pictures beside the page.
     headed : whether its name and what it says stand above it.
     """
 
     drawing: Mapping[str, Any]
     elsewhere: str = ""
-    own_files: bool = False
+    files: Sequence[str] = ()
     headed: bool = True
 
 
@@ -379,7 +379,7 @@ def zoomable(
     summary: Mapping[str, Any],
     folder: Path,
     *,
-    own_files: bool = False,
+    files: Sequence[str] = (),
 ) -> list[Recording]:
     """Figures for the page of a summary, in their order.
 
@@ -398,5 +398,5 @@ def zoomable(
                 headline=figure.finding,
                 related={"index.html": "All recordings"},
             ).write(summary, folder / elsewhere)
-        blocks.append(Recording(drawn, elsewhere, own_files))
+        blocks.append(Recording(drawn, elsewhere, files))
     return blocks
