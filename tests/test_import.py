@@ -141,7 +141,10 @@ def test_what_a_library_warns_of_is_noted(tmp_path, stop, system):
     assert any("Duplicate variable name" in note for note in read_recorded_file(path).notes)
 
 
-@pytest.mark.parametrize("package", ["openpyxl", "xlrd", "pyarrow", "h5py", "asammdf", "nptdms"])
+@pytest.mark.parametrize(
+    "package",
+    ["openpyxl", "xlrd", "pyarrow", "h5py", "asammdf", "nptdms", "python_calamine"],
+)
 def test_a_missing_reader_names_the_extra(tmp_path, monkeypatch, package):
     begins = {
         "openpyxl": b"PK\x03\x04",
@@ -150,6 +153,7 @@ def test_a_missing_reader_names_the_extra(tmp_path, monkeypatch, package):
         "h5py": b"MATLAB 7.3 MAT-file",
         "asammdf": b"MDF     ",
         "nptdms": b"TDSm",
+        "python_calamine": b"PK\x03\x04mimetypeapplication/vnd.oasis.opendocument.spreadsheet",
     }
     (tmp_path / "a").write_bytes(begins[package])
     monkeypatch.setitem(sys.modules, package, None)

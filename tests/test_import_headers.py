@@ -1,8 +1,10 @@
 """Names and units as recorders write them above samples, and cells that are no numbers."""
 
 import datetime
+import struct
 import tomllib
 import zipfile
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -233,6 +235,77 @@ def test_a_workbook_of_excel_97_has_sheets_dates_and_gaps(tmp_path):
     assert iso(clock.start) == "2024-03-01T06:00:00.000000"
     assert_allclose(clock.values, np.arange(60.0), atol=1e-6)
     assert_allclose(flow.values, 4.0 + np.arange(60))
+    assert np.flatnonzero(np.isnan(level.values)).tolist() == [30]
+
+
+def open_document(rows: Sequence[Sequence[float | str]]) -> dict[str, bytes]:
+    """Parts of a workbook of OpenDocument, with one sheet."""
+    cells = [
+        [
+            f'<table:table-cell office:value-type="float" office:value="{cell}"/>'
+            if isinstance(cell, float)
+            else f'<table:table-cell office:value-type="string"><text:p>{cell}</text:p>'
+            "</table:table-cell>"
+            for cell in row
+        ]
+        for row in rows
+    ]
+    urn = "urn:oasis:names:tc:opendocument:xmlns"
+    lines = "".join(f"<table:table-row>{''.join(row)}</table:table-row>" for row in cells)
+    content = (
+        f'<office:document-content xmlns:office="{urn}:office:1.0" xmlns:text="{urn}:text:1.0" '
+        f'xmlns:table="{urn}:table:1.0"><office:body><office:spreadsheet>'
+        f'<table:table table:name="Rig">{lines}</table:table>'
+        "</office:spreadsheet></office:body></office:document-content>"
+    )
+    kind = "application/vnd.oasis.opendocument.spreadsheet"
+    manifest = f'<manifest:manifest xmlns:manifest="{urn}:manifest:1.0"/>'
+    parts = {"mimetype": kind, "META-INF/manifest.xml": manifest, "content.xml": content}
+    return {name: part.encode() for name, part in parts.items()}
+
+
+def binary_excel(rows: Sequence[Sequence[float | str]]) -> dict[str, bytes]:
+    """Parts of a binary workbook of Excel, with one sheet ([MS-XLSB], section 2.1)."""
+
+    def record(number: int, content: bytes = b"") -> bytes:
+        parts = [number] if number < 128 else [number & 127 | 128, number >> 7]
+        return bytes([*parts, len(content)]) + content
+
+    def text(value: str) -> bytes:
+        return struct.pack("<I", len(value)) + value.encode("utf-16-le")
+
+    sheet = record(129) + record(148, struct.pack("<4I", 0, len(rows) - 1, 0, 2)) + record(145)
+    for i, row in enumerate(rows):
+        sheet += record(0, struct.pack("<I", i) + bytes(21))
+        for j, cell in enumerate(row):
+            place = struct.pack("<2I", j, 0)
+            value = struct.pack("<d", cell) if isinstance(cell, float) else text(cell)
+            sheet += record(5 if isinstance(cell, float) else 6, place + value)
+    bundle = record(156, struct.pack("<2I", 0, 1) + text("r1") + text("Rig"))
+    relation = "http://schemas.openxmlformats.org/officeDocument/2006/relationships/worksheet"
+    listed = f'<Relationship Id="r1" Type="{relation}" Target="worksheets/sheet1.bin"/>'
+    return {
+        "[Content_Types].xml": b"<Types/>",
+        "xl/_rels/workbook.bin.rels": f"<Relationships>{listed}</Relationships>".encode(),
+        "xl/workbook.bin": record(131) + record(143) + bundle + record(144) + record(132),
+        "xl/worksheets/sheet1.bin": sheet + record(146) + record(130),
+    }
+
+
+@pytest.mark.parametrize("made", [open_document, binary_excel])
+def test_workbooks_of_other_programs_have_sheets_names_and_gaps(tmp_path, made):
+    pytest.importorskip("python_calamine", reason="an extra of [files]")
+    levels = [900.5 + k if k != 30 else "OL" for k in range(60)]
+    samples = [[0.5 * k, 4.0 + k, level] for k, level in enumerate(levels)]
+    with zipfile.ZipFile(tmp_path / "a", "w") as archive:
+        parts = made([["made on the rig"], ["Time [s]", "inflow [l/s]", "h [mm]"], *samples])
+        for name, content in parts.items():
+            archive.writestr(name, content)
+    (group,) = read_recorded_file(tmp_path / "a").groups
+    clock, flow, level = group.channels
+    assert (group.name, flow.unit, level.unit) == ("Rig", "l/s", "mm")
+    assert clock.values.tolist() == [sample[0] for sample in samples]
+    assert flow.values.tolist() == [sample[1] for sample in samples]
     assert np.flatnonzero(np.isnan(level.values)).tolist() == [30]
 
 

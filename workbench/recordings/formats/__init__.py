@@ -31,10 +31,11 @@ __all__ = ["FileChannel", "Group", "RecordedFile", "is_foreign", "read_foreign"]
 _Reader = Callable[[Path, bytes], Contents]
 _OF_THE_FILE = (UserWarning, RuntimeWarning)
 _MOST = 4 << 30  # [byte] unpacked: an hour of a hundred channels at 1 kHz
-# Packages that read a format, by the module here, and what people call its files.
+# Packages that read a format, by the module here and its function, and what people call its files.
 _PACKAGES = {
-    "excel": ("openpyxl", "an Excel workbook"),
-    "excel97": ("xlrd", "a workbook of Excel 97 to 2003 (.xls)"),
+    "workbooks.read_excel": ("openpyxl", "an Excel workbook"),
+    "workbooks.read_excel_97": ("xlrd", "a workbook of Excel 97 to 2003 (.xls)"),
+    "workbooks.read_others": ("python_calamine", "a workbook (.ods, .xlsb)"),
     "parquet": ("pyarrow", "a Parquet file"),
     "matlab5": ("scipy", "a MAT file"),
     "hdf5": ("h5py", "a MAT 7.3 or HDF5 file"),
@@ -42,7 +43,7 @@ _PACKAGES = {
     "tdms": ("nptdms", "a TDMS file"),
 }
 # Their libraries hand what a file says to compiled code, which may end the process or never return.
-_NATIVE = frozenset({"hdf5", "matlab5", "mdf", "parquet"})
+_NATIVE = frozenset({"hdf5", "matlab5", "mdf", "parquet", "workbooks.read_others"})
 _MAT_4 = struct.Struct("<5i")  # type, rows, columns, imaginary, length of the name
 _START, _RATE = 60.0, 1e6  # [s] and [byte/s], a twentieth of what they read on a busy machine
 _UNREAD = {  # how files begin that are told, and not read
@@ -64,8 +65,8 @@ _BEGINS = {  # how files begin, whatever their ending
     b"MATLAB 5.0 MAT-file": "matlab5",
     b"MATLAB 7.3 MAT-file": "hdf5",
     _HDF5: "hdf5",
-    b"PK\x03\x04": "excel",
-    b"\xd0\xcf\x11\xe0": "excel97",
+    b"PK\x03\x04": "workbooks.read_excel",
+    b"\xd0\xcf\x11\xe0": "workbooks.read_excel_97",
 }
 
 
@@ -133,7 +134,11 @@ def _reader(path: Path, raw: bytes) -> _Reader:
     module = next((name for start, name in _BEGINS.items() if raw.startswith(start)), "")
     module = "hdf5" if raw[512:520] == _HDF5 else module  # behind a header of MATLAB
     module = module or "matlab5" * _is_mat_4(raw)
-    _refuse_unread(path, raw, is_workbook=module == "excel")
+    if module == "workbooks.read_excel" and (
+        b"xl/workbook.bin" in raw or b"opendocument.spread" in raw[:200]
+    ):
+        module = "workbooks.read_others"
+    _refuse_unread(path, raw, is_workbook=module == "workbooks.read_excel")
     if not module:
         is_document = is_json(raw)
         return partial(_read_whole, read_as_json, "JSON") if is_document else read_as_text
@@ -158,13 +163,14 @@ def _refuse_unread(path: Path, raw: bytes, *, is_workbook: bool) -> None:
         (format_name for start, format_name in _UNREAD.items() if begin.startswith(start)), ""
     )
     if is_workbook and b"[Content_Types].xml" not in raw and zipfile.is_zipfile(io.BytesIO(raw)):
-        format_name = "an archive (.zip) or a workbook of another program (.ods)"
+        format_name = "an archive (.zip)"
         format_name = "arrays of NumPy (.npz)" if b".npy" in begin else format_name
     if format_name:
         raise InputError(
             where=str(path),
             found=format_name,
-            expected="a recording as CSV, JSON, .xlsx, .xls, .mat, .h5, .parquet, .tdms or .mf4",
+            expected="a recording as CSV, JSON, .xlsx, .xls, .xlsb, .ods, .mat, .h5, .parquet, "
+            ".tdms or .mf4",
             remedy="unpack it, or save or export the recording in one of these formats",
         )
 
@@ -181,13 +187,14 @@ def _is_mat_4(raw: bytes) -> bool:
 
 
 def _here(module: str, path: Path, raw: bytes) -> Contents:
-    reader = import_module(f"workbench.recordings.formats.{module}")
+    module, _, reader = module.partition(".")
+    read = getattr(import_module(f"workbench.recordings.formats.{module}"), reader or "read")
     # Some print what puzzles them, where results are expected.
     with (
         redirect_stdout(io.StringIO()),
         warnings.catch_warnings(record=True, action="always") as warned,
     ):
-        contents: Contents = reader.read(path, raw)
+        contents: Contents = read(path, raw)
     # What libraries warn of is about the file, or is about themselves.
     notes = [
         str(warning.message)[:200]

@@ -1,12 +1,13 @@
-"""Workbooks of Excel: each sheet that holds a table is a group."""
+"""Workbooks of Excel and other programs: each sheet that holds a table is a group.
+
+Formulas are as their program last computed them. Each reader imports the package that it needs.
+"""
 
 import io
 from collections.abc import Collection, Mapping, Sequence
 from datetime import date, datetime, time, timedelta
 from pathlib import Path
 from typing import Any
-
-import openpyxl
 
 from workbench.errors import InputError
 from workbench.recordings.formats.cells import by_tag, find_table, read_group
@@ -17,21 +18,58 @@ _MOST = 1_048_576  # rows of a sheet of Excel
 _WHOLE = 2.0**53  # below which doubles hold whole numbers
 
 
-def read(path: Path, raw: bytes) -> Contents:
-    """Kind, groups and notes of a workbook, with formulas as Excel last computed them.
+def read_excel(path: Path, raw: bytes) -> Contents:
+    """Kind, groups and notes of a workbook of Excel (.xlsx); see `_read_sheets`."""
+    import openpyxl
 
-    Raises
-    ------
-    InputError
-        If it holds no table.
-    """
     book = openpyxl.load_workbook(io.BytesIO(raw), read_only=True, data_only=True)
     sheets = {sheet.title: list(sheet.iter_rows(values_only=True)) for sheet in book.worksheets}
     hidden = {sheet.title for sheet in book.worksheets if sheet.sheet_state != "visible"}
-    return read_sheets(path, "Excel", sheets, hidden)
+    return _read_sheets(path, "Excel", sheets, hidden)
 
 
-def read_sheets(
+def read_excel_97(path: Path, raw: bytes) -> Contents:
+    """The same of Excel 97 to 2003 (.xls)."""
+    import xlrd
+
+    def value(cell: Any) -> Any:
+        """A cell as Python has it; None where it is empty, or a formula that failed."""
+        if cell.ctype == xlrd.XL_CELL_DATE and cell.value >= 1.0:
+            return xlrd.xldate_as_datetime(cell.value, book.datemode)
+        if cell.ctype == xlrd.XL_CELL_DATE:  # the part of a day, to a millisecond as Excel shows it
+            seconds, rest = divmod(round(cell.value * 86_400_000) % 86_400_000, 1000)
+            return time(seconds // 3600, seconds // 60 % 60, seconds % 60, rest * 1000)
+        if cell.ctype in (xlrd.XL_CELL_TEXT, xlrd.XL_CELL_NUMBER):
+            return cell.value
+        return bool(cell.value) if cell.ctype == xlrd.XL_CELL_BOOLEAN else None
+
+    log = io.StringIO()  # of what may be damaged
+    book = xlrd.open_workbook(file_contents=raw, logfile=log)
+    sheets = {
+        sheet.name: [list(map(value, row)) for row in sheet.get_rows()] for sheet in book.sheets()
+    }
+    hidden = {sheet.name for sheet in book.sheets() if sheet.visibility}
+    contents = _read_sheets(path, "Excel 97", sheets, hidden)
+    doubts = dict.fromkeys(f"xlrd: {line[:200]}" for line in log.getvalue().splitlines())
+    return contents._replace(doubts=tuple(doubts))
+
+
+def read_others(path: Path, raw: bytes) -> Contents:
+    """The same of OpenDocument (.ods), and of binary workbooks of Excel (.xlsb)."""
+    from python_calamine import CalamineWorkbook, SheetTypeEnum, SheetVisibleEnum
+
+    book = CalamineWorkbook.from_filelike(io.BytesIO(raw))
+    entries = [entry for entry in book.sheets_metadata if entry.typ == SheetTypeEnum.WorkSheet]
+    sheets = {
+        entry.name: book.get_sheet_by_name(entry.name).to_python(skip_empty_area=False)
+        for entry in entries
+    }
+    hidden = {entry.name for entry in entries if entry.visible != SheetVisibleEnum.Visible}
+    called = "OpenDocument" if b"opendocument.spreadsheet" in raw[:200] else "binary Excel"
+    return _read_sheets(path, called, sheets, hidden)
+
+
+def _read_sheets(
     path: Path, called: str, sheets: Mapping[str, Sequence[Sequence[Any]]], hidden: Collection[str]
 ) -> Contents:
     """Kind, groups and notes of rows of cells, by sheet.
@@ -65,11 +103,8 @@ def read_sheets(
             notes.append(f"sheet '{title}': {left} rows that are no samples were left out")
     if refusal is not None and not groups:
         raise refusal
-    return Contents(f"{called}, {_count_text(len(groups), 'sheet')} with samples", groups, notes)
-
-
-def _count_text(count: int, noun: str) -> str:
-    return f"{count} {noun}{'s' * (count != 1)}"
+    count = f"{len(groups)} sheet{'s' * (len(groups) != 1)}"
+    return Contents(f"{called}, {count} with samples", groups, notes)
 
 
 def _text(cell: Any) -> str:
