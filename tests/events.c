@@ -8,9 +8,11 @@
 #include "fmi2FunctionTypes.h"
 enum { THERMOSTAT, TIMETABLE, RELAYS, FUSE };
 enum { T, DT, TA, G, DG, C, P, SIZE };
-typedef struct { double r[SIZE], time; int mode, flag, relay; } Room;
+typedef struct { double r[SIZE], time; int mode, flag, relay; const fmi2CallbackFunctions *callbacks; } Room;
 static void reset(Room *m) {
+    const fmi2CallbackFunctions *callbacks = m->callbacks;
     memset(m, 0, sizeof *m);
+    m->callbacks = callbacks;
     m->r[T] = 291.0, m->r[TA] = 280.0, m->r[G] = 50.0, m->r[C] = 1e5;
 }
 static void calculate(Room *m) {
@@ -20,7 +22,8 @@ static void calculate(Room *m) {
 const char *fmi2GetTypesPlatform(void) { return fmi2TypesPlatform; }
 const char *fmi2GetVersion(void) { return "2.0"; }
 fmi2Component fmi2Instantiate(fmi2String a, fmi2Type b, fmi2String c, fmi2String d, const fmi2CallbackFunctions *e, fmi2Boolean f, fmi2Boolean g) {
-    Room *m = malloc(sizeof *m);
+    Room *m = calloc(1, sizeof *m);
+    m->callbacks = e;
     reset(m);
     return m;
 }
@@ -61,7 +64,18 @@ fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component c, fmi2Real x[], size
 fmi2Status fmi2SetTime(fmi2Component c, fmi2Real t) { ((Room *)c)->time = t; return fmi2OK; }
 fmi2Status fmi2SetContinuousStates(fmi2Component c, const fmi2Real x[], size_t n) { ((Room *)c)->r[T] = x[0]; return fmi2OK; }
 fmi2Status fmi2GetContinuousStates(fmi2Component c, fmi2Real x[], size_t n) { x[0] = ((Room *)c)->r[T]; return fmi2OK; }
-fmi2Status fmi2GetDerivatives(fmi2Component c, fmi2Real x[], size_t n) { calculate(c); x[0] = ((Room *)c)->r[DT]; return fmi2OK; }
+fmi2Status fmi2GetDerivatives(fmi2Component c, fmi2Real x[], size_t n) {
+    const Room *m = c;
+    calculate(c);
+    x[0] = m->r[DT];
+#ifdef WARNS /* above its table: 1 by a message and a status, 2 by a status alone, 3 by a message alone */
+    if (m->r[T] > 292.0) {
+        if (WARNS != 2) m->callbacks->logger(m->callbacks->componentEnvironment, "room", fmi2Warning, "logStatusWarning", "T is above its table");
+        return WARNS == 3 ? fmi2OK : fmi2Warning;
+    }
+#endif
+    return fmi2OK;
+}
 fmi2Status fmi2GetEventIndicators(fmi2Component c, fmi2Real z[], size_t n) {
     const double *r = ((Room *)c)->r;
     z[0] = r[P] > 0.0 ? 295.0 - r[T] : r[T] - 293.0;

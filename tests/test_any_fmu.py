@@ -6,6 +6,7 @@ import zipfile
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import fmpy
 import numpy as np
@@ -22,6 +23,7 @@ from workbench.observers.contract import Estimator
 from workbench.observers.fmpy_comparison import RIGHT, compare_with_fmpy
 from workbench.observers.gains_file import usual_gains
 from workbench.observers.replay import replay
+from workbench.observers.simulation import prepare
 from workbench.pages.columns import read_estimates
 from workbench.recordings.case import read_case
 from workbench.system.registry import load_system, open_model
@@ -82,10 +84,10 @@ def run(fmu: FMU, name: str, end: float) -> np.ndarray:
     return np.asarray(estimator(fmu, name).run(time, u, y).values)[:, 0]
 
 
-def exact(power: float, t: float, begin: float = 291.0) -> float:
+def exact(power: float, t: Any, begin: float = 291.0) -> Any:
     """Solution of C der(T) = P - G (T - Ta)."""
     end = 280.0 + power / 50.0
-    return float(end + (begin - end) * np.exp(-t * 50.0 / 1e5))
+    return end + (begin - end) * np.exp(-t * 50.0 / 1e5)
 
 
 def test_discrete_states_are_iterated_until_they_are_stable(build):
@@ -185,6 +187,60 @@ def test_a_parameter_is_fitted_through_events(build: Build) -> None:
     assert high is not None
     assert low < 60.0 < high
     assert high - low < 2.0
+
+
+@pytest.mark.parametrize(
+    ("warns", "said"),
+    [(1, "T is above its table"), (2, "no message, but the status"), (3, "T is above its table")],
+)
+def test_what_the_fmu_warns_of_stands_at_the_top_of_each_answer(
+    warns: int, said: str, build: Build
+) -> None:
+    """In compiled loops (ekf), in a loop in Python (open loop, with events), and in a fit."""
+    system = load_system(build("THERMOSTAT", flags=[f"-DWARNS={warns}"]).parent)
+    for estimator, step in (("ekf", 10.0), ("open_loop", 10.0), ("open_loop", 2.0)):
+        time = step * np.arange(25.0)
+        noise = 0.05 * np.random.default_rng(1).standard_normal((2, time.size))
+        columns = {"time [s]": time, "Ta [K]": 280.0 + noise[0]}
+        columns["T [K]"] = along("THERMOSTAT", time) + noise[1]
+        if estimator == "ekf":
+            columns["T [K]"] = 292.5 + noise[1]
+        case = wb.case_from_frame(system, pd.DataFrame(columns))
+        simulation = prepare(system, {estimator: estimators_of(system)[estimator]})
+        result = simulation.run(case)
+        first = result.warnings()[:1]
+        if step == 2.0:  # not warm yet
+            assert not any("warned" in text for text in first)
+        else:
+            assert re.fullmatch(rf"the FMU Room.fmu warned \d+ times, first: {said}.*", first[0])
+    settings = wb.FitSettings(starts=1, profiles=False)
+    case = wb.case_from_frame(system, pd.DataFrame(columns | {"T [K]": 293.0 + noise[1]}))
+    outcome = wb.fit(system, [case], ["T"], settings=settings, workers=1, report=lambda line: None)
+    assert re.search(rf"warned \d+ times, first: {said}", outcome.doubts[0])
+
+
+@pytest.mark.parametrize(
+    ("recorded", "said"),
+    [
+        (lambda T: 1000.0 * T, "T is about 1000 times what the model says, which runs from 291 to"),
+        (lambda T: T - 273.15, "T is about 273.15 K below what the model says"),
+        (lambda T: T + 5.0, ""),
+    ],
+)
+def test_another_unit_is_asked_about_where_the_model_says_no_start(recorded, said, build):
+    """Of a room that is heated, whose scale is as wrong as its recording."""
+    unsaid = VARIABLES.replace(' initial="exact"><Real start="291"/>', "><Real/>")
+    file = build("RELAYS", variables=unsaid).parent / "system.toml"
+    line = 'outputs.T = { unit = "K", noise = "0.05 K", scale = "'
+    file.write_text(file.read_text().replace(f"{line}10 K", f"{line}100000 K"))
+    system, time = load_system(file), 10.0 * np.arange(60.0)
+    noise = 0.05 * np.random.default_rng(1).standard_normal((2, time.size))
+    columns = {"time [s]": time, "Ta [K]": 280.0 + noise[0]}
+    columns["T [K]"] = recorded(exact(1500.0, time)) + noise[1]
+    case = wb.case_from_frame(system, pd.DataFrame(columns))
+    simulation = prepare(system, {"open_loop": estimators_of(system)["open_loop"]})
+    warnings = [text for text in simulation.warnings(case) if "what the model says" in text]
+    assert [text[: len(said)] for text in warnings] == [said] * bool(said)
 
 
 def test_derivatives_stop_at_limits_and_say_where_steps_disagree(build):

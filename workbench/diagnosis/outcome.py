@@ -82,6 +82,7 @@ class Outcome:
         does, or there are not several.
     unsure : of a model that is simulated freely, shares by which derivatives may be wrong, by
         variable; None of any other.
+    warned : what the FMU warned of; empty: nothing.
     """
 
     system: System
@@ -100,6 +101,7 @@ class Outcome:
     certainty: Certainty | None
     one_law: str = ""
     unsure: Mapping[str, float] | None = None
+    warned: str = ""
 
     @property
     def channels(self) -> tuple[Channel, ...]:
@@ -203,6 +205,7 @@ class Outcome:
                 "with --propose before you trust several causes.",
             )
         named = {name for cause in found.causes for name in variables(cause.effect, "")}
+        limits = [f"{self.warned}."] * bool(self.warned) + limits
         shifted = [
             *(level.text for level in found.shifted),
             *(

@@ -133,6 +133,7 @@ def _diagnosed(
                 else None,
                 certainty=assessed,
                 unsure=dict(simulations.unsure) if simulations.free else None,
+                warned=simulations.take_warning(),
             )
 
 

@@ -9,11 +9,12 @@ motions of microseconds beside those of seconds.
 import ctypes
 import math
 import os
+from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path, PurePosixPath
-from typing import NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from fmpy import fmi2, fmi3
@@ -77,6 +78,7 @@ _ACCESSORS = {
     },
 }
 
+_WARNING, _LOGGED = 1, 3  # status of FMI; messages that an error shows
 _MOST_ITERATIONS = 100  # of discrete states at one event; models need some
 
 _CLASSES = {
@@ -139,6 +141,7 @@ class FMUInstance:
     Attributes
     ----------
     version : of FMI.
+    warned : (1,) calls that it answered with a warning.
 
     Raises
     ------
@@ -153,7 +156,9 @@ class FMUInstance:
         self.version = description.version
         self._description = description
         self._interface = interface
-        self._log: list[str] = []
+        self.warned = np.zeros(1, np.int64)
+        self._log: deque[str] = deque(maxlen=_LOGGED)
+        self._warning_messages, self._first_warning = 0, ""
         own_umask()  # before a model can change it
         self._scratch = TemporaryFolder()
         try:
@@ -177,6 +182,7 @@ class FMUInstance:
                 modelIdentifier=identifier,
                 instanceName=identifier,
                 libraryPath=self._library,
+                fmiCallLogger=self._note_call,
             )
         except Exception as error:  # FMPy raises bare Exception where a library cannot be loaded
             os.chdir(here)  # it looks for the library in its own folder, and stays there
@@ -207,17 +213,12 @@ class FMUInstance:
             )
 
     def _instantiate(self) -> None:
-        log = self._log
-
-        def note(*arguments: bytes | None) -> None:
-            log.append((arguments[-1] or b"").decode(errors="replace"))
-
         try:
             if self.version == "3.0":
-                self._instance.instantiate(logMessage=note)
+                self._instance.instantiate(logMessage=self._note)
             else:
                 callbacks = fmi2.fmi2CallbackFunctions()
-                callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(note)
+                callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(self._note)
                 callbacks.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(fmi2.calloc)
                 callbacks.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(fmi2.free)
                 self._instance.instantiate(callbacks=callbacks)
@@ -225,6 +226,28 @@ class FMUInstance:
             raise FMUError(f"{self._description.path.name}: {error}: {self._logged()}") from None
         self._component = ctypes.c_void_p(self._instance.component)
         self._used = False
+
+    def _note(self, *arguments: Any) -> None:
+        """Keep what the FMU logs: its environment and name, then status, category, message."""
+        message = (arguments[-1] or b"").decode(errors="replace")
+        self._log.append(message)
+        if arguments[-3] == _WARNING:
+            self._warning_messages += 1
+            self._first_warning = self._first_warning or message
+
+    def _note_call(self, text: str) -> None:
+        """Count warnings of calls that FMPy makes, which it passes over."""
+        self.warned[0] += text.endswith("-> WARNING")
+
+    def take_warning(self) -> str:
+        """How often the FMU warned since this was asked last, and its first message; or nothing."""
+        count = max(int(self.warned[0]), self._warning_messages)
+        first = self._first_warning.strip() or "no message, but the status of a call"
+        self.warned[0], self._warning_messages, self._first_warning = 0, 0, ""
+        if not count:
+            return ""
+        times = f"{count} times, first" if count > 1 else "once"
+        return f"the FMU {self._description.path.name} warned {times}: {first}"
 
     def close(self) -> None:
         """Free the instance and the unpacked files."""
@@ -401,7 +424,8 @@ class FMUInstance:
         if use not in self._call:
             raise co_simulation_alone(self._description, _FUNCTIONS[use][self.version])
         status = self._call[use](self._component, *arguments)
-        if status > 1:
+        self.warned[0] += status == _WARNING
+        if status > _WARNING:
             raise self.refusal(_FUNCTIONS[use][self.version], status)
 
     @property
@@ -422,7 +446,7 @@ class FMUInstance:
         )
 
     def _logged(self) -> str:
-        text = "; ".join(self._log[-3:]) or "the FMU logged nothing"
+        text = "; ".join(self._log) or "the FMU logged nothing"
         self._log.clear()
         return text
 
@@ -512,6 +536,7 @@ class FMU:
     event_signs : (z,) whether event indicators were above 0 at the last start.
     time : (1,) that the FMU was set to last [s].
     next_event : (1,) time of the next time event [s], of the last start; infinite for none.
+    warned : (1,) calls that it answered with a warning.
 
     Raises
     ------
@@ -577,6 +602,7 @@ class FMU:
         self.time = np.full(1, self.start_time)
         self.next_event = np.full(1, np.inf)
         self._loaded = FMUInstance(self.description, self.interface)
+        self.warned = self._loaded.warned
         # Wrong ones would be wrong steps of a model, and nothing would show it.
         self.has_directional_derivatives = offered.directional_derivatives and derivatives_hold(
             self.description
@@ -726,6 +752,10 @@ class FMU:
         """Value references of the derivatives of the states, (n,)."""
         return self._rates
 
+    def take_warning(self) -> str:
+        """How often it warned since this was asked last, and its first message; or nothing."""
+        return self._loaded.take_warning()
+
     @property
     def instance_address(self) -> int:
         """Address of the instance, for compiled loops that call the FMU's functions."""
@@ -768,17 +798,14 @@ class FMU:
 
         self.time[0] = self.start_time
         self.next_event[0] = self._loaded.start(prepare, self.start_time)
-        if self.interface == MODEL_EXCHANGE:
-            self._correct_start(states)
-        if self.event_signs.size and self.interface == MODEL_EXCHANGE:
-            self.event_signs[:] = self.event_indicators() > 0.0
-
-    def _correct_start(self, states: Mapping[str, float]) -> None:
-        """Set states that the start did not leave where they are to be, such as calculated ones."""
+        if self.interface != MODEL_EXCHANGE:
+            return
         x = self.get_states()
         wanted = np.array([states.get(name, x[i]) for i, name in enumerate(self.states)])
-        if not np.array_equal(x, wanted):
+        if not np.array_equal(x, wanted):  # such as of calculated ones
             self.set_states(wanted)
+        if self.event_signs.size:
+            self.event_signs[:] = self.event_indicators() > 0.0
 
     @property
     def has_events(self) -> bool:

@@ -25,10 +25,11 @@ compiled = jit()
 inlined = jit(inline=True)
 
 OK, REFUSED, SINGULAR, EVENT = 0, 1, 2, 3
+WARNING = 1  # of FMI: the call did what it is for
 
 
 @intrinsic
-def _call(typing, address, words):  # type: ignore[no-untyped-def]
+def _returned(typing, address, words):  # type: ignore[no-untyped-def]
     """Call a C function of whole numbers and doubles, which returns an int; arrays by address."""
 
     def generate(context, builder, signature, values):  # type: ignore[no-untyped-def]
@@ -49,6 +50,15 @@ def _call(typing, address, words):  # type: ignore[no-untyped-def]
     return types.int32(types.intp, words), generate
 
 
+@inlined
+def _call(model, function, words):  # type: ignore[no-untyped-def]
+    """Call a function of an FMU, by its address; returns a status. Warnings are counted."""
+    status = _returned(function, words)
+    if status == WARNING:
+        model.warned[0] += 1
+    return REFUSED if status > WARNING else OK
+
+
 class Instance(NamedTuple):
     """One FMU instance, its functions and the buffers they read and write.
 
@@ -64,6 +74,7 @@ class Instance(NamedTuple):
     time : (1,) that the FMU was set to last [s].
     indicators, event_signs : (z,) event indicators, and whether they were above 0 at the start.
     next_event : (1,) time of the next time event [s], infinite for none.
+    warned : (1,) calls that the FMU answered with a warning.
     ended : (2,) whether the step ends at an event, and whether the FMU asks to end.
     x, dx : (n,) states and their derivatives.
     u, y : (m,) inputs, (l,) outputs.
@@ -88,6 +99,7 @@ class Instance(NamedTuple):
     indicators: Vector
     event_signs: NDArray[np.bool_]
     next_event: Vector
+    warned: NDArray[np.int64]
     ended: NDArray[np.int32]
     x: Vector
     dx: Vector
@@ -146,6 +158,7 @@ def instance(
         indicators=np.zeros(fmu.event_signs.size),
         event_signs=fmu.event_signs,
         next_event=fmu.next_event,
+        warned=fmu.warned,
         ended=np.zeros(2, np.int32),
         x=np.zeros(n),
         dx=np.zeros(n),
@@ -178,11 +191,11 @@ class CoSimulationInstance(NamedTuple):
 
     Attributes
     ----------
-    address, set_real, get_real, inputs, outputs, u, y : see `Instance`.
+    address, set_real, get_real, inputs, outputs, u, y, warned : see `Instance`.
     do_step : address of the FMU's function.
     fmi : version, 2 or 3.
     time : (1,) where the next step begins [s].
-    told, reached : (3,) and (1,) what FMI 3.0 says of a step.
+    flags, reached : (3,) and (1,) what FMI 3.0 says of a step.
     """
 
     address: int
@@ -195,7 +208,8 @@ class CoSimulationInstance(NamedTuple):
     u: Vector
     y: Vector
     time: Vector
-    told: NDArray[np.bool_]
+    warned: NDArray[np.int64]
+    flags: NDArray[np.bool_]
     reached: Vector
 
 
@@ -214,7 +228,8 @@ def co_simulation_instance(
         u=np.zeros(len(inputs)),
         y=np.zeros(len(outputs)),
         time=np.full(1, fmu.start_time),
-        told=np.zeros(3, np.bool_),
+        warned=fmu.warned,
+        flags=np.zeros(3, np.bool_),
         reached=np.zeros(1),
     )
 
@@ -223,8 +238,7 @@ def co_simulation_instance(
 def set_inputs(model, first, count):  # type: ignore[no-untyped-def]
     """Set `count` inputs from number `first` on to model.u; returns a status."""
     references, values = model.inputs[first:], model.u[first:]
-    status = _call(model.set_real, (model.address, references, count, values, count))
-    return REFUSED if status > 1 else OK
+    return _call(model, model.set_real, (model.address, references, count, values, count))
 
 
 @inlined
@@ -259,7 +273,7 @@ def set_time(model, t):  # type: ignore[no-untyped-def]
     if t > model.next_event[0]:
         return EVENT
     model.time[0] = t
-    return REFUSED if _call(model.set_time, (model.address, t)) > 1 else OK
+    return _call(model, model.set_time, (model.address, t))
 
 
 @inlined
@@ -271,14 +285,14 @@ def check_state_events(model):  # type: ignore[no-untyped-def]
     if model.complete_step != 0:
         # The zero: states may be set back to before this point. FMI 3.0 writes one byte of each.
         words = model.address, 0, model.ended, model.ended[1:]
-        if _call(model.complete_step, words) > 1:
+        if _call(model, model.complete_step, words):
             return REFUSED
         if model.ended[0] != 0 or model.ended[1] != 0:
             return EVENT
     n = model.indicators.size
     if n == 0:
         return OK
-    if _call(model.get_indicators, (model.address, model.indicators, n)) > 1:
+    if _call(model, model.get_indicators, (model.address, model.indicators, n)):
         return REFUSED
     for i in range(n):
         if (model.indicators[i] > 0.0) != model.event_signs[i]:
@@ -290,8 +304,7 @@ def check_state_events(model):  # type: ignore[no-untyped-def]
 def set_states(model):  # type: ignore[no-untyped-def]
     """Set the states to model.x; returns a status."""
     n = model.x.size
-    status = _call(model.set_states, (model.address, model.x, n)) if n else 0
-    return REFUSED if status > 1 else OK
+    return _call(model, model.set_states, (model.address, model.x, n)) if n else OK
 
 
 @inlined
@@ -303,29 +316,25 @@ def place(model):  # type: ignore[no-untyped-def]
 @inlined
 def evaluate(model):  # type: ignore[no-untyped-def]
     """Derivatives of the states into model.dx; returns a status."""
-    status = _call(model.derivatives, (model.address, model.dx, model.dx.size))
-    return REFUSED if status > 1 else OK
+    return _call(model, model.derivatives, (model.address, model.dx, model.dx.size))
 
 
 @inlined
 def read(model):  # type: ignore[no-untyped-def]
     """Outputs into model.y; returns a status."""
     n = model.y.size
-    status = _call(model.get_real, (model.address, model.outputs, n, model.y, n))
-    return REFUSED if status > 1 else OK
+    return _call(model, model.get_real, (model.address, model.outputs, n, model.y, n))
 
 
 @inlined
 def do_step(model, h):  # type: ignore[no-untyped-def]
     """Advance a Co-Simulation FMU by h [s] with inputs held; returns a status."""
     t = model.time[0]
-    if model.fmi == 2:
-        status = _call(model.do_step, (model.address, t, h, 0))
-    else:
-        flags, words = model.told, (model.address, t, h, 0)
-        status = _call(model.do_step, (*words, flags, flags[1:], flags[2:], model.reached))
     model.time[0] = t + h
-    return REFUSED if status > 1 else OK
+    words, flags = (model.address, t, h, 0), model.flags
+    if model.fmi == 2:
+        return _call(model, model.do_step, words)
+    return _call(model, model.do_step, (*words, flags, flags[1:], flags[2:], model.reached))
 
 
 @inlined
@@ -345,11 +354,9 @@ def direction(model, unknowns, count, knowns, number, seeds, out):  # type: igno
     """Derivatives of the first `count` unknowns along `number` knowns into `out`; a status."""
     if model.fmi == 2:
         words = model.address, unknowns, count, knowns, number, seeds, out
-        status = _call(model.directional, words)
-    else:
-        more = model.address, unknowns, count, knowns, number, seeds, number, out, count
-        status = _call(model.directional, more)
-    return REFUSED if status > 1 else OK
+        return _call(model, model.directional, words)
+    more = model.address, unknowns, count, knowns, number, seeds, number, out, count
+    return _call(model, model.directional, more)
 
 
 @inlined

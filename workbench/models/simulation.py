@@ -88,7 +88,7 @@ class Simulation:
     def __init__(
         self, fmu: FMU, inputs: Sequence[str], outputs: Sequence[str], holds: ArrayLike
     ) -> None:
-        self._fmu = fmu
+        self.fmu = fmu
         self._inputs, self._outputs = fmu.typed(inputs), fmu.typed(outputs)
         self._holds = np.array(holds, float)
         self._variables = {v.name: v for v in fmu.description.variables}
@@ -117,13 +117,13 @@ class Simulation:
             self._resets = np.array_equal(self._run(drive, values), outputs, equal_nan=True)
             if not self._resets and not np.array_equal(self._run(drive, values), outputs):
                 raise FMUError(
-                    f"{self._fmu.path.name}: the same run gives other results when it is repeated, "
+                    f"{self.fmu.path.name}: the same run gives other results when it is repeated, "
                     "even with a new instance"
                 )
         return outputs
 
     def _run(self, drive: Drive, values: Mapping[str, float]) -> Matrix:
-        fmu = self._fmu
+        fmu = self.fmu
         self._start(drive, values)
         make = CoSimulationRun if isinstance(fmu, CoSimulation) else HybridSimulation
         along = make(fmu, self._inputs, self._holds)  # type: ignore[arg-type]
@@ -136,7 +136,7 @@ class Simulation:
         return outputs
 
     def _start(self, drive: Drive, values: Mapping[str, float]) -> None:
-        fmu = self._fmu
+        fmu = self.fmu
         own = fmu.states if fmu.interface == MODEL_EXCHANGE else ()  # set after the start
         for name in values:
             variable = self._variables.get(name)
@@ -237,7 +237,7 @@ class Simulation:
     ) -> dict[str, float]:
         """Values of variables at the start of a run."""
         self._start(drive, values)
-        read = self._fmu.get_typed(self._fmu.typed(names))
+        read = self.fmu.get_typed(self.fmu.typed(names))
         return dict(zip(names, map(float, read), strict=True))
 
     def size(self, name: str, value: float) -> float:
@@ -285,10 +285,10 @@ def _difference(
         half = moved(0.5 * h)
         if isinstance(half, FMUError):
             raise half
-        slope, apart = (4.0 * half - up) / h, 2.0 * half - up
+        slope, gap = (4.0 * half - up) / h, 2.0 * half - up
     else:
-        slope, apart = (up - down) / (2.0 * h), 0.5 * (up + down)
+        slope, gap = (up - down) / (2.0 * h), 0.5 * (up + down)
     whole = float(np.linalg.norm(h * slope / scale))
     # What does not move at all says nothing: a larger step may.
-    share = float(np.linalg.norm(apart / scale)) / whole if whole else 1.0
+    share = float(np.linalg.norm(gap / scale)) / whole if whole else 1.0
     return _Difference(slope, share, float(np.abs(up / scale).max(initial=0.0)))

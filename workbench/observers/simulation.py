@@ -45,6 +45,7 @@ from workbench.observers.trust import (
     start_doubt,
     step_doubt,
     time_doubt,
+    unit_doubt,
 )
 from workbench.pages.figures import ESTIMATORS, CaseFigure, Curve, Panel
 from workbench.pages.views import (
@@ -294,6 +295,8 @@ class Simulation:
                 name: int(max((step.coarse[0] for step in estimator.steps), default=0.0))
                 for name, estimator in estimators.items()
             }
+            models = [model for estimator in estimators.values() for model in estimator.models]
+            warned = [warning for model in models if (warning := model.take_warning())]
         scores = {name: score(case, run, self.system) for name, run in runs.items()}
         result = CaseResult(self.system, case, runs, scores, self._reference(case, runs))
         narrow = any(test.narrow for tests in result.contradictions.values() for test in tests)
@@ -302,6 +305,7 @@ class Simulation:
         result = replace(
             result,
             doubts=(
+                *warned,
                 *result.doubts,
                 *(
                     f"{name} takes {count} of its steps less accurately than noise allows: the "
@@ -347,6 +351,7 @@ class Simulation:
                 path = trajectory(fmu, self.system, case)
                 clock = "" if path is None else time_doubt(fmu, self.system, case, path)
                 start = start_doubt(fmu, self.system, case)
+                unit = unit_doubt(fmu, self.system, case)
                 sampling = sampling_doubt(fmu, self.system, case) if narrow else ""
                 share, step = 0.0, ""
                 if open_loop is not None:
@@ -356,7 +361,7 @@ class Simulation:
         return {
             "inseparable": {} if known is None else known.inseparable,
             "untold": () if known is None else known.untold,
-            "doubts": tuple(doubt for doubt in (clock, start, sampling, step) if doubt),
+            "doubts": tuple(doubt for doubt in (clock, unit, start, sampling, step) if doubt),
             "resolved": not (sampling or clock),
             "step_share": share,
         }

@@ -14,6 +14,7 @@ import numpy as np
 from scipy.stats import chi2, norm
 
 from workbench.arrays import Matrix, Vector
+from workbench.errors import FMUError
 from workbench.models.fmu import FMU
 from workbench.observers import estimators_of
 from workbench.observers.estimators.kalman import ExtendedKalmanFilter
@@ -48,6 +49,9 @@ _PASSED = np.log(20.0)  # time constants after which a twentieth is left of a mo
 
 
 _APART = 20  # points of a trajectory from one where a model is linearised to the next
+
+
+_CELSIUS = 273.15  # K
 
 
 _FINE = 4  # steps in place of one, which then errs by a quarter of it, or less
@@ -399,6 +403,57 @@ def time_doubt(fmu: FMU, system: System, case: Case, path: Trajectory) -> str:
             f"a recording of {span:.3g} s shows no motion of the model, whose fastest time "
             f"constant is {1.0 / fastest:.2g} s. Check the unit of the time"
         )
+    return ""
+
+
+def unit_doubt(fmu: FMU, system: System, case: Case) -> str:
+    """Say which output is off the model by 1000 times, or the zeros of K and degC; or nothing.
+
+    The model runs alone, from its own start, to y_m, (n,). In another unit, a y that is off it by
+    much, is g(y), which leaves less than a quarter of the square of y_m; of temperatures, less than
+    a quarter of what is between the zeros. Outputs with a start value are compared with that, see
+    `recordings.plausibility`.
+    """
+    starts = {v.name: v.start for v in fmu.description.variables}
+    known = {output.name: np.isfinite(case[output.name]) for output in system.outputs}
+    compared = [
+        output
+        for output in system.outputs
+        if starts.get(output.reading, "") is None and known[output.name].any()
+    ]
+    alone = OpenLoop(fmu, system, OpenLoop.default_gains(fmu, system))
+    alone.set_conditions(case.conditions)
+    fmu.begin_at(case.model_time)
+    unmeasured = np.full_like(case.y, np.nan)
+    try:
+        alone.start(case.u[0], unmeasured[0])
+        begins = fmu.get_typed(fmu.typed([output.reading for output in compared]))
+        for output, begin in zip(tuple(compared), begins, strict=True):
+            usual = float(np.median(case[output.name][known[output.name]]))
+            near = abs(usual - begin) < 0.5 * _CELSIUS or output.unit != "K"
+            if near and 0.03 * abs(begin) < abs(usual) < 30.0 * abs(begin):
+                compared.remove(output)  # it begins in its unit: the model need not run
+        values = alone.run(case.time, case.u, unmeasured).values if compared else unmeasured
+    except FMUError:
+        return ""
+    for output in compared:
+        column = np.asarray(values)[:, list(system.columns).index(output.name)]
+        y, y_m = case[output.name][known[output.name]], column[known[output.name]]
+        if not np.isfinite(y_m).all():
+            continue
+        off, most = _rms(y - y_m), 0.5 * _rms(y_m)
+        others = [(1e3 * y, most, "0.001 times"), (1e-3 * y, most, "1000 times")]
+        for zero, how in ((_CELSIUS, "below"), (-_CELSIUS, "above")):
+            if output.unit == "K":
+                others.append((y + zero, 0.25 * _CELSIUS, f"273.15 K {how}"))
+        for other, limit, how in others:
+            if _rms(other - y_m) < limit < 0.5 * off and off > 5.0 * output.noise_at_scale:
+                return (
+                    f"{output.name} is about {how} what the model says, which runs from "
+                    f"{y_m.min():.4g} to {y_m.max():.4g} {output.unit} with these inputs, where "
+                    f"{y.min():.4g} to {y.max():.4g} {output.unit} are recorded. Check the unit of "
+                    "the column, and its scale in the system file"
+                )
     return ""
 
 

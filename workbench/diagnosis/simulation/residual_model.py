@@ -112,6 +112,10 @@ class ResidualModel:
     def __exit__(self, *error: object) -> None:
         self._open.close()
 
+    def take_warning(self) -> str:
+        """What the FMU of this process warned of, see `FMU.take_warning`."""
+        return self._model.fmu.take_warning()
+
     def _tell(self, fmu: FMU) -> None:
         """What the model says of its variables."""
         self.nominal = dict(fmu.defaults)

@@ -322,6 +322,13 @@ def _simulate(simulation: Simulation, drive: Drive, values: Mapping[str, float])
     return outputs
 
 
+def _warning(simulation: Simulation, drive: Drive, values: Mapping[str, float]) -> str:
+    """What the FMU warns of along a recording; empty: nothing."""
+    simulation.fmu.take_warning()
+    _simulate(simulation, drive, values)
+    return simulation.fmu.take_warning()
+
+
 def _slopes(
     simulation: Simulation,
     drive: Drive,
@@ -382,6 +389,15 @@ class _Problem:
             for number, run in enumerate(self.runs)
         ]
         return [task.result() for task in tasks]
+
+    def warnings(self, x: Vector) -> list[str]:
+        """What the FMU warns of, by recording."""
+        tasks = [
+            self.pool.submit(_warning, run.drive, self.values(x, number))
+            for number, run in enumerate(self.runs)
+        ]
+        texts = [(run.case.name, task.result()) for run, task in zip(self.runs, tasks, strict=True)]
+        return [f"{name}: {text}" for name, text in texts if text]
 
     def residuals(self, x: Vector) -> Vector:
         """(N,) residuals over noise, those of priors last."""
@@ -571,7 +587,9 @@ class _Judgement:
         problem, search = self._problem, self._search
         outputs = problem.outputs(problem.start), problem.outputs(problem.best)
         recordings = list(map(recording_fit, problem.runs, *outputs))
-        doubts = [] if search.converged or interrupted else ["the fit has not converged"]
+        doubts = problem.warnings(problem.best)
+        if not (search.converged or interrupted):
+            doubts.append("the fit has not converged")
         if interrupted:
             doubts.append("interrupted: these are the best values so far, without intervals")
         elif not search.agree():
