@@ -223,7 +223,7 @@ def test_a_place_that_is_no_folder_is_refused(tmp_path):
 
 def test_a_part_that_takes_long_says_how_much_is_left_of_it():
     lines: list[str] = []
-    done = ProgressReporter(lines.append, "simulations", every=0.0).part(4)
+    done = ProgressReporter(lines.append, "simulations", interval=0.0).part(4)
     for step in range(4):
         done(step)
     assert [line.partition(",")[0] for line in lines] == [f"{n} simulations" for n in (1, 2, 3, 4)]
@@ -233,7 +233,7 @@ def test_a_part_that_takes_long_says_how_much_is_left_of_it():
 
 def test_parts_add_up_from_any_thread():
     lines: list[str] = []
-    pace = ProgressReporter(lines.append, "simulations", every=0.0)
+    pace = ProgressReporter(lines.append, "simulations", interval=0.0)
 
     def part(size: int) -> None:
         done = pace.part(size)
@@ -248,7 +248,7 @@ def test_parts_add_up_from_any_thread():
 
 def test_what_is_soon_done_says_nothing():
     lines: list[str] = []
-    done = ProgressReporter(lines.append, "simulations", every=3600.0).part(100)
+    done = ProgressReporter(lines.append, "simulations", interval=3600.0).part(100)
     for step in range(100):
         done(step)
     assert lines == []

@@ -227,7 +227,7 @@ def test_schema_and_reference_have_every_key():
         "| `start.open` | true or false | true | at first |",
     ):
         assert row in page
-    assert "range" not in reference(Pump, apart=[Valve])
+    assert "range" not in reference(Pump, separate=[Valve])
 
 
 def test_a_formula_is_ordinary_arithmetic_over_names_with_dots():

@@ -4,7 +4,8 @@ import hashlib
 import itertools
 import math
 import re
-from collections.abc import Iterable, Mapping
+from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
@@ -317,7 +318,8 @@ def _description(
     def scalars(name: str) -> tuple[str, ...]:
         return tuple(v.name for v in elements[name]) if name in elements else (name,)
 
-    _refuse_twice(v.name for v in variables)
+    if twice := [n for n, count in Counter(v.name for v in variables).items() if count > 1]:
+        raise _WrongError(f"two variables '{twice[0]}'")
     if any(unknown.variable.derivative is None for unknown in description.derivatives):
         raise _WrongError("a derivative in the model structure that is the derivative of nothing")
     return Description(
@@ -389,14 +391,6 @@ def _refuse_impossible(
             raise _WrongError(f"the step size {step:g} s")
         if stop is not None and stop < start:
             raise _WrongError(f"the stop time {stop:g} s before the start time {start:g} s")
-
-
-def _refuse_twice(names: Iterable[str]) -> None:
-    seen: set[str] = set()
-    for name in names:
-        if name in seen:
-            raise _WrongError(f"two variables '{name}'")
-        seen.add(name)
 
 
 def _interface(element: ElementTree.Element, version: str) -> Interface:

@@ -128,7 +128,9 @@ def run_trial(description: Description, interface: str, folder: Path, limits: Li
         process.kill()
         process.wait()
         report.seek(0)
-        records, foreign = _records(report.read(_MOST_REPORTED), secret.encode())
+        line, written = re.compile(secret.encode() + rb"(.*)\n"), report.read(_MOST_REPORTED)
+        records: list[dict[str, Any]] = [json.loads(text) for text in line.findall(written)]
+        foreign = line.sub(b"", written)
     end: dict[str, Any] = {"status": process.returncode, "used": 0.0, "late": late}
     if records and "status" in records[-1]:
         end = records.pop()
@@ -166,12 +168,6 @@ def run_trial(description: Description, interface: str, folder: Path, limits: Li
     if not last["partly"]:
         fmu_cache.remember(_marks(description, interface)[1])
     return f"{where}: {last['refused']}. {tried}" if last["refused"] else ""
-
-
-def _records(report: bytes, secret: bytes) -> tuple[list[dict[str, Any]], bytes]:
-    """What `trial_calls` told, and what else stands in its report."""
-    line = re.compile(re.escape(secret) + rb"(.*)\n")
-    return [json.loads(text) for text in line.findall(report)], line.sub(b"", report)
 
 
 def describe_end(status: int, call: str, seconds: str, at: str = "") -> str:

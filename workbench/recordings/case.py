@@ -330,9 +330,7 @@ def read_case(folder: Path, system: System) -> Case:
     """
     toml = folder / "case.toml"
     document = read_table(
-        toml,
-        "give a folder that holds case.toml and the recording",
-        'title = "..."',
+        toml, "give a folder that holds case.toml and the recording", 'title = "..."'
     )
     document.refuse_unknown(KEYS)
     title = document.take("title", str)

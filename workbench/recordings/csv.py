@@ -120,67 +120,33 @@ def read_columns(
     del text
     _refuse_long(path, lines)
     separator = _separator(path, lines[0])
-    if separator == "," and len(lines) > _TOGETHER:
-        # A part at a time: the cells of all as text take twenty times what they hold.
-        try:
-            return _by_parts(path, lines, required, optional, with_gaps)
-        except InputError:
-            pass  # found again below, with the line of the file
-    return _columns(path, lines, required, optional, with_gaps)
-
-
-def _by_parts(
-    path: Path,
-    lines: list[str],
-    required: Sequence[str],
-    optional: Sequence[str],
-    with_gaps: Collection[str],
-) -> dict[str, Column]:
-    parts = [
-        _columns(path, [lines[0], *lines[first : first + _TOGETHER]], required, optional, with_gaps)
-        for first in range(1, len(lines), _TOGETHER)
-    ]
-    return {
-        name: Column(column.unit, np.concatenate([part[name].values for part in parts]))
-        for name, column in parts[0].items()
-    }
-
-
-def _columns(
-    path: Path,
-    lines: list[str],
-    required: Sequence[str],
-    optional: Sequence[str],
-    with_gaps: Collection[str],
-) -> dict[str, Column]:
-    separator = _separator(path, lines[0])
-    first, *rows = _split(path, lines, separator)
-    columns = _find(path, first, required, optional)
-    if not rows:
+    (cells,) = _split(path, lines[:1], separator)
+    places = _find(path, cells, required, optional)
+    if len(lines) < 2:
         raise InputError(
             where=f"{path}, line 2",
             found="the end of the file after the header",
             expected="rows of numbers",
             remedy="export the recording again, with its samples",
         )
-    table = list(zip(*rows, strict=True))
-    cells = {name: table[index] for name, (index, _) in columns.items()}
-    gaps = {
-        name: np.array([not cell.strip() for cell in column])
-        for name, column in cells.items()
-        if name in with_gaps
-    }
-    filled = {
-        name: np.where(gaps[name], _STAND_IN, column).tolist() if name in gaps else column
-        for name, column in cells.items()
-    }
-    values = _numbers(list(filled.values()), separator)
-    if values is None:
-        raise _first_problem(path, filled, separator)
-    return {
-        name: Column(unit, np.where(gaps[name], np.nan, column) if name in gaps else column)
-        for (name, (_, unit)), column in zip(columns.items(), values, strict=True)
-    }
+    parts: dict[str, list[Vector]] = {name: [] for name in places}
+    # A part at a time: the cells of all as text take twenty times what they hold. Between
+    # semicolons and tabs, all numbers together tell the decimal mark.
+    size = _TOGETHER if separator == "," else len(lines)
+    for first in range(1, len(lines), size):
+        table = list(zip(*_split(path, lines, separator, first, first + size), strict=True))
+        texts = {name: table[index] for name, (index, _) in places.items()}
+        gaps = {
+            name: [not cell.strip() for cell in texts[name]] for name in places if name in with_gaps
+        }
+        for name, empty in gaps.items():
+            texts[name] = tuple(np.where(empty, _STAND_IN, texts[name]).tolist())
+        values = _numbers(list(texts.values()), separator)
+        if values is None:
+            raise _first_problem(path, texts, separator, first + 1)
+        for name, column in zip(texts, values, strict=True):
+            parts[name].append(np.where(gaps[name], np.nan, column) if name in gaps else column)
+    return {name: Column(unit, np.concatenate(parts[name])) for name, (_, unit) in places.items()}
 
 
 def _refuse_long(path: Path, lines: list[str]) -> None:
@@ -216,38 +182,37 @@ def _separator(path: Path, header: str) -> str:
     )
 
 
-def _split(path: Path, lines: list[str], separator: str) -> list[list[str]]:
+def _split(
+    path: Path, lines: list[str], separator: str, first: int = 0, end: int | None = None
+) -> list[list[str]]:
+    """Fields of the lines from `first` to `end`, as many in each as in the header."""
+    part = lines[first:end]
     try:
-        rows = list(csv.reader(lines, delimiter=separator, strict=True))
+        rows = list(csv.reader(part, delimiter=separator, strict=True))
     except csv.Error:
         rows = []
-    if len(rows) != len(lines):
-        complete = [_ends_quotation(line, separator) for line in lines]
-        raise InputError(
-            where=f"{path}, line {complete.index(False) + 1}",
-            found="a quotation that does not end before the next separator or the end of the line",
-            expected="fields without quotation marks, or quoted within one line",
-            remedy="correct or remove the quotation marks",
-        )
-    width = len(rows[0])
-    for line, row in enumerate(rows, start=1):
-        if len(row) != width:
+    for number, line in enumerate(part if len(rows) != len(part) else (), first + 1):
+        try:
+            list(csv.reader([line], delimiter=separator, strict=True))
+        except csv.Error:
             raise InputError(
-                where=f"{path}, line {line}",
-                found=f"{len(row)} fields in '{lines[line - 1][:60]}'",
-                expected=f"{width} as in the header",
+                where=f"{path}, line {number}",
+                found="a quotation that does not end before the next separator or the end of the "
+                "line",
+                expected="fields without quotation marks, or quoted within one line",
+                remedy="correct or remove the quotation marks",
+            ) from None
+    (header,) = csv.reader(lines[:1], delimiter=separator)
+    for number, row in enumerate(rows, first + 1):
+        if len(row) != len(header):
+            raise InputError(
+                where=f"{path}, line {number}",
+                found=f"{len(row)} fields in '{lines[number - 1][:60]}'",
+                expected=f"{len(header)} as in the header",
                 remedy="complete or remove the line; a file with decimal commas needs "
                 "semicolons between its fields, and no number has thousands separators",
             )
     return rows
-
-
-def _ends_quotation(line: str, separator: str) -> bool:
-    try:
-        list(csv.reader([line], delimiter=separator, strict=True))
-    except csv.Error:
-        return False
-    return True
 
 
 def _find(
@@ -294,7 +259,9 @@ def _numbers(columns: Sequence[Sequence[str]], separator: str) -> list[Vector] |
     mark = "," if "," in characters else "."
     if not characters <= _NUMBER_CHARACTERS or {",", "."} <= characters or mark == separator:
         return None
-    if separator != "," and _only_thousands(columns, mark):
+    # Every number with a mark, such as 1.234, may have it between thousands.
+    marked = (cell for column in columns for cell in column if mark in cell)
+    if separator != "," and mark in characters and all(map(_THOUSANDS.fullmatch, marked)):
         return None
     try:
         values = [
@@ -308,23 +275,14 @@ def _numbers(columns: Sequence[Sequence[str]], separator: str) -> list[Vector] |
     return values
 
 
-def _only_thousands(columns: Sequence[Sequence[str]], mark: str) -> bool:
-    """Say whether every number with a mark, such as 1.234, may have it between thousands."""
-    marked = (cell for column in columns for cell in column if mark in cell)
-    first = next(marked, None)
-    return (
-        first is not None
-        and _THOUSANDS.fullmatch(first) is not None
-        and all(_THOUSANDS.fullmatch(cell) for cell in marked)
-    )
-
-
-def _first_problem(path: Path, cells: Mapping[str, Sequence[str]], separator: str) -> InputError:
+def _first_problem(
+    path: Path, cells: Mapping[str, Sequence[str]], separator: str, first_line: int
+) -> InputError:
     """Name the first cell that `_numbers` stumbles over."""
     ambiguous = "one decimal mark throughout the file, and no thousands separators"
     rewrite = "export the recording again, without thousands separators"
     mark, number, place = "", "", str(path)  # the first decimal mark, its number and where
-    for line, row in enumerate(zip(*cells.values(), strict=True), start=2):
+    for line, row in enumerate(zip(*cells.values(), strict=True), first_line):
         for name, cell in zip(cells, row, strict=True):
             where = f"{path}, line {line}, column '{name}'"
             text = cell.strip(" ")

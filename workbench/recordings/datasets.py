@@ -81,7 +81,7 @@ class FolderLayout:
     pattern: str = ""
     one: Callable[[Path], PublishedRecording] | None = None
 
-    def found(self, source: Path) -> dict[str, str]:
+    def hashes_in(self, source: Path) -> dict[str, str]:
         """SHA-256 of the files of the layout that are in a folder, by their path there."""
         paths = source.glob(self.pattern) if self.pattern else map(source.joinpath, self.files)
         return {
@@ -182,7 +182,7 @@ def write_cases(which: str, source: Path, out: Path) -> list[PublishedRecording]
                 "licence": known.licence,
                 "workbench": commit(),
                 "layout": layout.name,
-                "read": layout.found(source),
+                "read": layout.hashes_in(source),
                 "held_out": [recording.name for recording in recordings if recording.held_out],
                 "written": {path: _sha256(text.encode()) for path, text in written.items()},
                 "cases": {recording.name: _description(recording) for recording in recordings},
@@ -246,7 +246,7 @@ def _refuse_other_files(out: Path) -> None:
 def _layout(known: PublishedSet, source: Path) -> FolderLayout:
     """The layout in which the set lies in a folder, of files with the right checksums."""
     for layout in known.layouts:
-        if layout.found(source):
+        if layout.hashes_in(source):
             for path, sha256 in layout.files.items():
                 _check(source / path, sha256)
             return layout
@@ -308,7 +308,4 @@ def _texts(recording: PublishedRecording) -> dict[str, str]:
     dated = {"date": recording.date} if recording.date else {}
     case = {"title": recording.title, **dated, "measurement": measurement}
     conditions = {"conditions": dict(recording.conditions)} if recording.conditions else {}
-    return {
-        _CASE: tomli_w.dumps(case | conditions),
-        "measured.csv": table_text(recording.columns),
-    }
+    return {_CASE: tomli_w.dumps(case | conditions), "measured.csv": table_text(recording.columns)}

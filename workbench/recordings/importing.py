@@ -67,8 +67,13 @@ def cut(time: Vector, signals: Mapping[str, Vector], system: System) -> list[Cut
     parts = _parts(time, signals, system.cutting, pieces, system) if system.cutting else []
     if sum(not part.reason for part in parts) < 2:
         parts = [Cut(first, end) for first, end in pieces]
-    cuts = [_long_enough(part, time, system) for part in parts]
-    return list(_with_rest(cuts, time.size))
+    short = "it is shorter than a recording must be"
+    for k, part in enumerate(parts):
+        lasts = time[part.end - 1] - time[part.first]
+        enough = part.end - part.first >= system.fewest and lasts >= system.shortest
+        if not (part.reason or enough):
+            parts[k] = Cut(part.first, part.end, short)
+    return list(_with_rest(parts, time.size))
 
 
 def _parts(
@@ -93,12 +98,7 @@ def _parts(
 
 
 def _runs(
-    time: Vector,
-    applied: np.ndarray,
-    moving: np.ndarray,
-    released: float,
-    low: int,
-    high: int,
+    time: Vector, applied: np.ndarray, moving: np.ndarray, released: float, low: int, high: int
 ) -> Iterator[tuple[int, int, str]]:
     """First sample, the one after the last, and why a run is no recording."""
     k = low
@@ -119,13 +119,6 @@ def _runs(
         else:
             yield k, end, ""
         k = end
-
-
-def _long_enough(cut: Cut, time: Vector, system: System) -> Cut:
-    lasts = time[cut.end - 1] - time[cut.first]
-    if cut.reason or (cut.end - cut.first >= system.fewest and lasts >= system.shortest):
-        return cut
-    return Cut(cut.first, cut.end, "it is shorter than a recording must be")
 
 
 def _with_rest(parts: list[Cut], size: int) -> Iterator[Cut]:

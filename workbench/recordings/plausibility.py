@@ -14,7 +14,7 @@ import numpy as np
 from workbench.arrays import Vector
 from workbench.errors import InputError
 from workbench.models.description import read_description
-from workbench.system.parts import FIRST, Condition, Redundancy, Signal, Tolerance
+from workbench.system.parts import FIRST, Condition, Redundancy, Signal
 from workbench.system.system import OBSERVER, System
 from workbench.system.units import si_factor
 
@@ -443,8 +443,9 @@ def _conditions(
         values = system.evaluate(condition.agrees.formula, signals)
         sample = 0 if at_start else int(np.argsort(values)[-min(_FEW, values.size)])
         said = float(conditions[condition.name])
-        share = _relative_difference(shown, said, condition.agrees.tolerance)
-        if not share > condition.agrees.tolerance.likely:
+        tolerance, difference = condition.agrees.tolerance, abs(shown - said)
+        share = difference / max(abs(shown), abs(said)) if difference > tolerance.slack else 0.0
+        if not share > tolerance.likely:
             continue
         names = [name for name in signals if name in condition.agrees.formula.names]
         where = origin.at(sample, names[0]) if names else origin.name
@@ -474,12 +475,6 @@ def shown_by(condition: Condition, signals: Mapping[str, Vector], system: System
     return float(
         np.median(values[:few]) if condition.agrees.place == FIRST else np.sort(values)[-few]
     )
-
-
-def _relative_difference(first: float, other: float, tolerance: Tolerance) -> float:
-    """Difference as a share of the larger one, 0 where it means nothing."""
-    difference = abs(first - other)
-    return difference / max(abs(first), abs(other)) if difference > tolerance.slack else 0.0
 
 
 def _condition_text(condition: Condition, value: float) -> str:

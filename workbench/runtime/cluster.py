@@ -182,8 +182,8 @@ class DaskPool(Generic[State]):
         if done is not task.done:
             return  # another worker does it by now
         try:
-            error = self._told(done.exception)
-            result = self._told(done.result) if error is None else None
+            error = self._await_answer(done.exception)
+            result = self._await_answer(done.result) if error is None else None
         except CancelledError:
             return  # the scheduler was gone: the watch sends the task again, or tells that
         match error:
@@ -194,7 +194,7 @@ class DaskPool(Generic[State]):
             case _:
                 self._settle(task, error)
 
-    def _told(self, ask: Callable[..., Any]) -> Any:
+    def _await_answer(self, ask: Callable[..., Any]) -> Any:
         """What the cluster answers, as long as there may be an answer.
 
         Of a scheduler that went away a client may wait for ever, in the one thread that hands over

@@ -44,12 +44,12 @@ def locked_folder(folder: Path) -> Iterator[None]:
     InputError
         If files cannot be made there, there is no room, or another run writes there.
     """
-    with _told(folder):
+    with _refusing_in_words(folder):
         if folder.exists() and not folder.is_dir():
             raise NotADirectoryError(0, "a file, and no folder")
         folder.mkdir(parents=True, exist_ok=True)
     with _locked(folder):
-        with _told(folder):
+        with _refusing_in_words(folder):
             _remove_parts(folder)
             _prove_room(folder)
         try:
@@ -71,7 +71,7 @@ def _locked(folder: Path) -> Iterator[None]:
     if fcntl is None:
         yield
         return
-    with _told(folder):
+    with _refusing_in_words(folder):
         lock = [os.open(folder, os.O_RDONLY)]
 
     def release() -> None:
@@ -114,7 +114,7 @@ def require_writable(path: Path) -> None:
     InputError
         If it is a folder, files cannot be made beside it, or there is no room.
     """
-    with _told(path):
+    with _refusing_in_words(path):
         if path.is_dir():
             raise IsADirectoryError(0, "a folder, and no file")
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -135,7 +135,7 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
     # Named after the process: two that write the same file do not write into each other's. Names
     # may have 255 bytes, and a character up to four.
     part = path.with_name(f"{path.name[:60]}.{os.getpid()}.part")
-    with _told(path):
+    with _refusing_in_words(path):
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             with part.open("wb") as stream:
@@ -156,21 +156,22 @@ def append_line(path: Path, line: str) -> None:
     InputError
         If it cannot be written.
     """
-    with _told(path), path.open("ab") as stream:
+    with _refusing_in_words(path), path.open("ab") as stream:
         stream.write(f"{line}\n".encode())
         stream.flush()
         os.fsync(stream.fileno())
 
 
 @contextmanager
-def _told(path: Path) -> Iterator[None]:
+def _refusing_in_words(path: Path) -> Iterator[None]:
     """Say in words why a place takes no files; modes are as the user has them."""
     before = os.umask(own_umask())
     try:
         yield
     except OSError as error:
+        name = str(path)
         raise InputError(
-            where=_cut(path),
+            where=name if len(name) <= 300 else f"{name[:300]}...",
             found=f"that it cannot be written ({error.strerror or error})",
             expected="a folder where files can be made, and room on the disk",
             remedy="choose another place, or make room; what was there before is kept",
@@ -185,12 +186,6 @@ def own_umask() -> int:
     mask = os.umask(0o077)
     os.umask(mask)
     return mask
-
-
-def _cut(path: Path) -> str:
-    """A path as far as people read it."""
-    text = str(path)
-    return text if len(text) <= 300 else f"{text[:300]}..."
 
 
 @contextmanager

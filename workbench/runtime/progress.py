@@ -14,13 +14,13 @@ class ProgressReporter:
     ----------
     report : takes a line.
     noun : what is counted, in the plural.
-    every : least time between two lines [s].
+    interval : least time between two lines [s].
     """
 
-    def __init__(self, report: Callable[[str], None], noun: str, every: float = _EVERY) -> None:
-        self._report, self._noun, self._every = report, noun, every
+    def __init__(self, report: Callable[[str], None], noun: str, interval: float = _EVERY) -> None:
+        self._report, self._noun, self._interval = report, noun, interval
         self._lock = threading.Lock()
-        self._count, self._told = 0, time.perf_counter()
+        self._count, self._last = 0, time.perf_counter()
 
     def part(self, total: int) -> Callable[[object], None]:
         """Begin a part of so many; what is returned is called, with anything, after each.
@@ -35,11 +35,11 @@ class ProgressReporter:
             with self._lock:
                 done += 1
                 self._count += 1
-                if now - self._told < self._every:
+                if now - self._last < self._interval:
                     return
-                self._told = now
+                self._last = now
                 line = f"{self._count} {self._noun}"
-                if total > done and now - begin >= self._every:
+                if total > done and now - begin >= self._interval:
                     left = (now - begin) / done * (total - done)
                     line += f", about {left:.0f} s left of these {total}"
             self._report(line)

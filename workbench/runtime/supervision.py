@@ -264,7 +264,7 @@ def supervised(
         f'stuck: a call did not return for {limit:g} s (WORKBENCH_TRIAL="call={10 * limit:g}" '
         "allows more), and the command was ended"
         if stuck
-        else blamed or _told(os.waitstatus_to_exitcode(ending))
+        else blamed or _describe_end(os.waitstatus_to_exitcode(ending))
     )
     tell(f"error: {how}")
     return 1
@@ -451,7 +451,7 @@ def _end_the_rest(group: int) -> None:
                 os.waitpid(orphan, 0)
 
 
-def _told(status: int) -> str:
+def _describe_end(status: int) -> str:
     """Say how a process ended that did not come to its end."""
     how = f"killed by {signal.Signals(-status).name}" if status < 0 else f"ended, status {status},"
     return (

@@ -194,9 +194,7 @@ class Experiments:
     )
     cost: Cost = key("of a recording")
     sensors: tuple[Signal, ...] = key(
-        "validation sensors that could be added",
-        absent=(),
-        check=refuse_no_sensor,
+        "validation sensors that could be added", absent=(), check=refuse_no_sensor
     )
 
     @property

@@ -188,9 +188,7 @@ class Signal:
     )
     scale_error: float = key("error of its scale that tuned gains must tolerate", absent=0.0)
     reading: str = key(
-        "output of the model that simulates the sensor reading",
-        absent="{name}",
-        of=VARIABLE,
+        "output of the model that simulates the sensor reading", absent="{name}", of=VARIABLE
     )
     mode: Mode | None = key("vibration mode between machine and sensor", absent=None)
     smoothed: tuple[float, float] | tuple[()] = key(
@@ -206,12 +204,7 @@ class Signal:
         absent=False,
         choices=("before",),
     )
-    resolution: float = key(
-        "quantisation step of the reading",
-        "{unit}",
-        0.0,
-        otherwise="unknown",
-    )
+    resolution: float = key("quantisation step of the reading", "{unit}", 0.0, otherwise="unknown")
     limits: tuple[float, float] = key(
         '`["0 V", "10 V"]`: limits of the sensor; samples at them are excluded',
         "{unit}",
@@ -238,8 +231,7 @@ class Signal:
         expected=_LIMITS,
     )
     called: tuple[str, ...] = key(
-        '`["Bremsdruck", "pC"]`: other names in log files; see [import](import.md)',
-        absent=(),
+        '`["Bremsdruck", "pC"]`: other names in log files; see [import](import.md)', absent=()
     )
     recorded_as: RecordedAs | None = key(
         "what log files hold instead: a formula of this signal and parameters", absent=None
@@ -362,10 +354,7 @@ class EstimatedQuantity(Ranged):
     prior: tuple[float, float] = key("uniform prior", "{unit}", "{range}")
     start: float = key("start value of filters", "{unit}", float("nan"), otherwise="nominal")
     spread: float = key(
-        "standard deviation at the start",
-        "{unit}",
-        _reach,
-        otherwise="that of the range, uniform",
+        "standard deviation at the start", "{unit}", _reach, otherwise="that of the range, uniform"
     )
     relative_error: float = key(
         "systematic error of the estimate due to the model, as a fraction; part of its band",
@@ -492,9 +481,7 @@ class Tolerance:
         expected="the largest likely share before the largest possible one",
     )
     slack: float = key(
-        "difference that is ignored, and least size of both for a comparison",
-        unit_above,
-        0.0,
+        "difference that is ignored, and least size of both for a comparison", unit_above, 0.0
     )
 
     @property
@@ -515,9 +502,7 @@ class RecordingSplit:
     begins: Threshold = key("a part begins where the size of a signal rises above a level")
     ends: BelowThreshold = key("and ends where that of another falls below one, which it was above")
     released: float = key(
-        "longest time below the level within a part; a part with a longer one is left out",
-        "s",
-        0.0,
+        "longest time below the level within a part; a part with a longer one is left out", "s", 0.0
     )
     before: float = key("time that is kept before a part", "s", 0.0)
     after: float = key("time that is kept after a part", "s", 0.0)
@@ -528,9 +513,7 @@ class Store:
     """What a flow in and a flow out differ by is stored."""
 
     formula: Expression = key(
-        'of a balance: the storage [`unit` times s], such as `"J*w"`',
-        name="stores",
-        of=FORMULA,
+        'of a balance: the storage [`unit` times s], such as `"J*w"`', name="stores", of=FORMULA
     )
     over: float = key("of a balance: time over which both are averaged", "s", above=0.0)
 

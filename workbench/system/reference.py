@@ -136,27 +136,29 @@ def _tables_in(hint: Any) -> list[type]:
     return [kind for part in kinds for kind in kinds_of(part) if is_table(kind)]
 
 
-def reference(cls: type, apart: Collection[type] = ()) -> str:
+def reference(cls: type, separate: Collection[type] = ()) -> str:
     """Keys of a table as a table of Markdown.
 
     Parameters
     ----------
-    apart : tables that have a place of their own; keys of others stand beside theirs.
+    separate : tables that have a place of their own; keys of others stand beside theirs.
     """
     lines = ["| key | value | default | meaning |", "| --- | --- | --- | --- |"]
-    lines += [f"| {' | '.join(row)} |" for row in _rows(cls, apart, "")]
+    lines += [f"| {' | '.join(row)} |" for row in _rows(cls, separate, "")]
     return "\n".join(lines)
 
 
-def _rows(cls: type, apart: Collection[type], before: str) -> Iterator[tuple[str, str, str, str]]:
+def _rows(
+    cls: type, separate: Collection[type], before: str
+) -> Iterator[tuple[str, str, str, str]]:
     for entry in _inner_keys(cls):
         name = f"{before}{entry.name}"
         also = "".join(f", `{before}{alias}`" for alias in entry.key.aliases)
         yield f"`{name}`{also}", _value_of(entry), _default(entry), entry.key.meaning
         for inner in _tables_in(entry.hint):
-            if inner not in apart:
+            if inner not in separate:
                 by_name = ".NAME" if table_name_of(inner) or "by name" in _value_of(entry) else ""
-                yield from _rows(inner, apart, f"{name}{by_name}.")
+                yield from _rows(inner, separate, f"{name}{by_name}.")
 
 
 def _value_of(entry: Entry) -> str:

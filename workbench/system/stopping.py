@@ -149,8 +149,7 @@ class Stopping:
     rest: float = key("speed below which a constant rate leads to rest", "m/s")
     longest: float = key("longest time of a stop", "s")
     timed_by: str = key(
-        "input with `delay` or `lag` that shows when the command was given",
-        of=RISING,
+        "input with `delay` or `lag` that shows when the command was given", of=RISING
     )
     asked: tuple[AskedQuantity, ...] = key(
         f"demands of a stop; `{SPEED}` is required", schema={"required": [SPEED]}

@@ -212,16 +212,12 @@ def read_table(path: Path, remedy: str, example: str) -> Table:
     except (ValueError, RecursionError) as error:
         # TOMLDecodeError, a number too long to convert, or brackets within brackets without end.
         place = re.search(r"line (\d+)", str(error))
-        line = int(place[1]) if place else _longest_line(text)
+        # Where a number, or a list within lists, is too long to be read, is most likely so.
+        lines = text.split("\n")
+        line = int(place[1]) if place else lines.index(max(lines, key=len)) + 1
         raise InputError(
             where=f"{path}, line {line}",
             found=f"text that is no TOML ({error})",
             expected=f"lines such as {example}",
             remedy="correct the line",
         ) from None
-
-
-def _longest_line(text: str) -> int:
-    """Where a number, or a list within lists, is too long to be read: most likely there."""
-    lines = text.split("\n")
-    return max(range(len(lines)), key=lambda n: len(lines[n])) + 1

@@ -81,7 +81,7 @@ def build(
             expected=", ".join(PLATFORMS),
             remedy="choose from the list",
         )
-    return assemble(make_explicit(flatten(package, model)), model, fmu, fmi, platforms)
+    return assemble(make_explicit(flatten(package, model)), fmu, fmi, platforms)
 
 
 def build_all(models: Mapping[Path, Sequence[str]], folder: Path) -> list[BuiltFMU]:
@@ -97,10 +97,7 @@ def build_all(models: Mapping[Path, Sequence[str]], folder: Path) -> list[BuiltF
     with tempfile.TemporaryDirectory() as scratch:
         built = [
             _kept_build(
-                package,
-                model,
-                Path(scratch) / f"fmi{fmi}" / f"{model.rpartition('.')[2]}.fmu",
-                fmi,
+                package, model, Path(scratch) / f"fmi{fmi}" / f"{model.rpartition('.')[2]}.fmu", fmi
             )
             for fmi in FMI_VERSIONS
             for package, names in models.items()

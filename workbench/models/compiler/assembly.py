@@ -57,7 +57,6 @@ class SteppingLaw:
 
 def assemble(
     space: StateSpace,
-    model: str,
     fmu: Path,
     fmi: int,
     platforms: Sequence[str],
@@ -68,7 +67,7 @@ def assemble(
 
     Parameters
     ----------
-    model : dotted name.
+    space : whose name is the dotted one of the model.
     fmu : file to write; written whole or not at all.
     fmi : 2 or 3.
     platforms : names from `archive.PLATFORMS`.
@@ -88,7 +87,7 @@ def assemble(
     parts += [file.read_bytes() for file in law.sources.values()] if law else []
     token = _token(digest([*parts, str(fmi)]))
     code = generate(space, token)
-    name, files = identifier(model), library_sources(fmi)
+    name, files = identifier(space.name), library_sources(fmi)
     tool = f"Wheelset observer workbench {version('wheelset-workbench')}"
     description = describe(space, code, token, fmi, tool, files)
     generated = {"model.c": code.source, "model_data.h": code.header}
@@ -113,7 +112,7 @@ def assemble(
         if fmi == 3:
             (sources / "buildDescription.xml").write_text(_build_description(name, files))
         pack(folder, fmu)
-    return BuiltFMU(fmu, model, fmi, token, digest_file(fmu), space.notes)
+    return BuiltFMU(fmu, space.name, fmi, token, digest_file(fmu), space.notes)
 
 
 def _token(digits: str) -> str:

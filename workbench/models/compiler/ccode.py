@@ -22,28 +22,14 @@ _COMPARE = {
     ca.OP_AND: "&&",
     ca.OP_OR: "||",
 }
+# Functions of math.h, which CasADi calls by the same names in capitals.
 _FUNCTIONS = {
-    ca.OP_EXP: "exp",
-    ca.OP_LOG: "log",
-    ca.OP_POW: "pow",
-    ca.OP_CONSTPOW: "pow",
-    ca.OP_SQRT: "sqrt",
-    ca.OP_SIN: "sin",
-    ca.OP_COS: "cos",
-    ca.OP_TAN: "tan",
-    ca.OP_ASIN: "asin",
-    ca.OP_ACOS: "acos",
-    ca.OP_ATAN: "atan",
-    ca.OP_ATAN2: "atan2",
-    ca.OP_SINH: "sinh",
-    ca.OP_COSH: "cosh",
-    ca.OP_TANH: "tanh",
-    ca.OP_FABS: "fabs",
-    ca.OP_FMIN: "fmin",
-    ca.OP_FMAX: "fmax",
-    ca.OP_FLOOR: "floor",
-    ca.OP_CEIL: "ceil",
-}
+    getattr(ca, f"OP_{name.upper()}"): name
+    for name in (
+        *("exp", "log", "pow", "sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "atan2"),
+        *("sinh", "cosh", "tanh", "fabs", "fmin", "fmax", "floor", "ceil"),
+    )
+} | {ca.OP_CONSTPOW: "pow"}
 _FORMS = {
     ca.OP_ASSIGN: "{0}",
     ca.OP_NEG: "-{0}",

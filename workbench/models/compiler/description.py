@@ -62,7 +62,7 @@ def describe(
     """
     entries = _entries(model)
     units = {e.unit: e.variable.place for e in reversed(entries) if e.unit}
-    root = _root2(model, token, tool, sources) if fmi == 2 else _root3(model, token, tool)
+    root = _root(model, token, fmi, tool, sources)
     if units:  # an empty list is not valid
         definitions = ET.SubElement(root, "UnitDefinitions")
         for unit, place in sorted(units.items()):
@@ -84,16 +84,18 @@ def describe(
     ET.SubElement(root, "DefaultExperiment", experiment)
     variables = ET.SubElement(root, "ModelVariables")
     structure = ET.SubElement(root, "ModelStructure")
-    if fmi == 2:
-        for entry in entries:
-            _variable2(variables, entry)
-        _structure2(structure, entries, code)
-    else:
-        for entry in entries:
-            _variable3(variables, entry)
+    for entry in entries:
+        own, real = _attributes(entry), _real_attributes(entry)
+        if fmi == 2:
+            element = ET.SubElement(ET.SubElement(variables, "ScalarVariable", own), "Real", real)
+        else:
+            element = ET.SubElement(variables, "Float64", {**own, **real})
+        if entry.derivative_of is not None:
+            element.set("derivative", str(entry.derivative_of + (fmi == 2)))
+    if fmi == 3:
         time = {"name": "time", "valueReference": str(len(entries)), "causality": "independent"}
         ET.SubElement(variables, "Float64", {**time, "variability": "continuous"})
-        _structure3(structure, entries, code)
+    _structure(structure, entries, code, fmi)
     ET.indent(root, "  ")
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(root, encoding="unicode") + "\n"
 
@@ -155,55 +157,33 @@ def _entries(model: StateSpace) -> list[_Entry]:
     return entries
 
 
-def _root2(model: StateSpace, token: str, tool: str, sources: Sequence[str]) -> ET.Element:
-    root = ET.Element(
-        "fmiModelDescription",
-        fmiVersion="2.0",
-        modelName=model.name,
-        guid=token,
-        description=model.description,
-        generationTool=tool,
-        variableNamingConvention="structured",
-        numberOfEventIndicators="0",
-    )
+def _root(model: StateSpace, token: str, fmi: int, tool: str, sources: Sequence[str]) -> ET.Element:
+    """The description with both interfaces, which FMI 2 and 3 spell otherwise."""
+    state, plural = ("state", "") if fmi == 2 else ("State", "s")
+    attributes = {
+        "fmiVersion": f"{fmi}.0",
+        "modelName": model.name,
+        "guid" if fmi == 2 else "instantiationToken": token,
+        "description": model.description,
+        "generationTool": tool,
+        "variableNamingConvention": "structured",
+        **({"numberOfEventIndicators": "0"} if fmi == 2 else {}),
+    }
     common = {
         "modelIdentifier": identifier(model.name),
-        "canGetAndSetFMUstate": "true",
-        "canSerializeFMUstate": "true",
-        "providesDirectionalDerivative": "true",
+        f"canGetAndSetFMU{state}": "true",
+        f"canSerializeFMU{state}": "true",
+        f"providesDirectionalDerivative{plural}": "true",
+        **({"providesAdjointDerivatives": "true"} if fmi == 3 else {}),
     }
-    exchange = ET.SubElement(root, "ModelExchange", common)
-    simulation = ET.SubElement(
-        root, "CoSimulation", {**common, "canHandleVariableCommunicationStepSize": "true"}
-    )
-    for interface in (exchange, simulation):
-        files = ET.SubElement(interface, "SourceFiles")
-        for name in sources:
-            ET.SubElement(files, "File", name=name)
-    return root
-
-
-def _root3(model: StateSpace, token: str, tool: str) -> ET.Element:
-    root = ET.Element(
-        "fmiModelDescription",
-        fmiVersion="3.0",
-        modelName=model.name,
-        instantiationToken=token,
-        description=model.description,
-        generationTool=tool,
-        variableNamingConvention="structured",
-    )
-    common = {
-        "modelIdentifier": identifier(model.name),
-        "canGetAndSetFMUState": "true",
-        "canSerializeFMUState": "true",
-        "providesDirectionalDerivatives": "true",
-        "providesAdjointDerivatives": "true",
-    }
-    ET.SubElement(root, "ModelExchange", common)
-    ET.SubElement(
-        root, "CoSimulation", {**common, "canHandleVariableCommunicationStepSize": "true"}
-    )
+    root = ET.Element("fmiModelDescription", attributes)
+    stepping = {"canHandleVariableCommunicationStepSize": "true"}
+    for name, own in (("ModelExchange", {}), ("CoSimulation", stepping)):
+        interface = ET.SubElement(root, name, {**common, **own})
+        if fmi == 2:
+            files = ET.SubElement(interface, "SourceFiles")
+            for source in sources:
+                ET.SubElement(files, "File", name=source)
     return root
 
 
@@ -300,19 +280,6 @@ def _real_attributes(entry: _Entry) -> dict[str, str]:
     return attributes
 
 
-def _variable2(parent: ET.Element, entry: _Entry) -> None:
-    element = ET.SubElement(parent, "ScalarVariable", _attributes(entry))
-    real = ET.SubElement(element, "Real", _real_attributes(entry))
-    if entry.derivative_of is not None:
-        real.set("derivative", str(entry.derivative_of + 1))
-
-
-def _variable3(parent: ET.Element, entry: _Entry) -> None:
-    element = ET.SubElement(parent, "Float64", {**_attributes(entry), **_real_attributes(entry)})
-    if entry.derivative_of is not None:
-        element.set("derivative", str(entry.derivative_of))
-
-
 def _dependencies(entry: _Entry, entries: Iterable[_Entry], code: GeneratedCode) -> list[_Entry]:
     """The knowns that a row of the Jacobian depends on."""
     if entry.row is None:
@@ -337,38 +304,25 @@ def _unknowns(entries: Sequence[_Entry]) -> dict[str, list[_Entry]]:
     return {"outputs": outputs, "derivatives": derivatives, "initial": initial}
 
 
-def _structure2(parent: ET.Element, entries: Sequence[_Entry], code: GeneratedCode) -> None:
-    names = {"outputs": "Outputs", "derivatives": "Derivatives", "initial": "InitialUnknowns"}
-    for kind, unknowns in _unknowns(entries).items():
-        if not unknowns:
-            continue
-        group = ET.SubElement(parent, names[kind])
-        for entry in sorted(unknowns, key=lambda e: e.reference):
-            knowns = _dependencies(entry, entries, code)
-            if kind != "initial":
-                knowns = [k for k in knowns if k.causality != "parameter"]
-            ET.SubElement(
-                group,
-                "Unknown",
-                index=str(entry.reference + 1),
-                dependencies=" ".join(str(k.reference + 1) for k in knowns),
-            )
-
-
-def _structure3(parent: ET.Element, entries: Sequence[_Entry], code: GeneratedCode) -> None:
-    names = {
-        "outputs": "Output",
-        "derivatives": "ContinuousStateDerivative",
-        "initial": "InitialUnknown",
+def _structure(
+    parent: ET.Element, entries: Sequence[_Entry], code: GeneratedCode, fmi: int
+) -> None:
+    """Unknowns with the knowns that they depend on: FMI 2 has groups, and counts from 1."""
+    tags = {
+        "outputs": ("Outputs", "Output"),
+        "derivatives": ("Derivatives", "ContinuousStateDerivative"),
+        "initial": ("InitialUnknowns", "InitialUnknown"),
     }
-    for kind, unknowns in _unknowns(entries).items():
+    first, key = (1, "index") if fmi == 2 else (0, "valueReference")
+    for role, unknowns in _unknowns(entries).items():
+        group, tag = parent, tags[role][1]
+        if fmi == 2 and unknowns:
+            group, tag = ET.SubElement(parent, tags[role][0]), "Unknown"
+            unknowns = sorted(unknowns, key=lambda entry: entry.reference)
         for entry in unknowns:
             knowns = _dependencies(entry, entries, code)
-            if kind != "initial":
-                knowns = [k for k in knowns if k.causality != "parameter"]
-            ET.SubElement(
-                parent,
-                names[kind],
-                valueReference=str(entry.reference),
-                dependencies=" ".join(str(k.reference) for k in knowns),
-            )
+            if role != "initial":
+                knowns = [known for known in knowns if known.causality != "parameter"]
+            numbers = " ".join(str(known.reference + first) for known in knowns)
+            own = {key: str(entry.reference + first), "dependencies": numbers}
+            ET.SubElement(group, tag, own)

@@ -379,12 +379,7 @@ class _Solver:
             raise self._structurally_singular(incidence, left)
         _, row_order, column_order, row_blocks, column_blocks, _, _ = _pattern(incidence).btf()
         self._solve_blocks(
-            row_order,
-            column_order,
-            row_blocks,
-            column_blocks,
-            left,
-            slice(0, incidence.shape[0]),
+            row_order, column_order, row_blocks, column_blocks, left, slice(0, incidence.shape[0])
         )
 
     def _unsolved(self, unknowns: ca.SX) -> ca.SX:

@@ -3,6 +3,7 @@
 Values are numpy arrays of scalar SX, so that Modelica's rules of rank hold: a vector is no matrix.
 """
 
+import operator
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -76,22 +77,25 @@ def _scalar_power(a: ca.SX, b: ca.SX) -> ca.SX:
     return a**b
 
 
-BINARY: Mapping[str, Callable[[ca.SX, ca.SX], ca.SX]] = {
-    "add": lambda x, y: x + y,
-    "subtract": lambda x, y: x - y,
-    "divide": lambda x, y: x / y,
+_ARITHMETIC: Mapping[str, Callable[[ca.SX, ca.SX], ca.SX]] = {
+    "add": operator.add,
+    "subtract": operator.sub,
+    "multiply": operator.mul,
+    "divide": operator.truediv,
     "power": _scalar_power,
-    "elementwise_add": lambda x, y: x + y,
-    "elementwise_subtract": lambda x, y: x - y,
-    "elementwise_multiply": lambda x, y: x * y,
-    "elementwise_divide": lambda x, y: x / y,
-    "elementwise_power": _scalar_power,
-    "less": lambda x, y: x < y,
-    "less_equal": lambda x, y: x <= y,
-    "greater": lambda x, y: x > y,
-    "greater_equal": lambda x, y: x >= y,
-    "equal": lambda x, y: x == y,
-    "not_equal": lambda x, y: x != y,
+}
+BINARY: Mapping[str, Callable[[ca.SX, ca.SX], ca.SX]] = {
+    **{
+        f"{prefix}{name}": operation
+        for prefix in ("", "elementwise_")
+        for name, operation in _ARITHMETIC.items()
+    },
+    "less": operator.lt,
+    "less_equal": operator.le,
+    "greater": operator.gt,
+    "greater_equal": operator.ge,
+    "equal": operator.eq,
+    "not_equal": operator.ne,
     "and": ca.logic_and,
     "or": ca.logic_or,
 }
@@ -102,29 +106,19 @@ def _truncate(x: ca.SX) -> ca.SX:
 
 
 _UNARY: Mapping[str, Callable[[ca.SX], ca.SX]] = {
-    "negate": lambda x: -x,
-    "plus": lambda x: x,
+    "negate": operator.neg,
+    "plus": operator.pos,
     "not": ca.logic_not,
 }
 _ELEMENTWISE: Mapping[str, Callable[..., ca.SX]] = {
-    "sin": ca.sin,
-    "cos": ca.cos,
-    "tan": ca.tan,
-    "asin": ca.asin,
-    "acos": ca.acos,
-    "atan": ca.atan,
-    "atan2": ca.atan2,
-    "sinh": ca.sinh,
-    "cosh": ca.cosh,
-    "tanh": ca.tanh,
-    "exp": ca.exp,
-    "log": ca.log,
-    "log10": ca.log10,
-    "sqrt": ca.sqrt,
+    **{
+        name: getattr(ca, name)
+        for name in (
+            *("sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh"),
+            *("exp", "log", "log10", "sqrt", "sign", "floor", "ceil"),
+        )
+    },
     "abs": ca.fabs,
-    "sign": ca.sign,
-    "floor": ca.floor,
-    "ceil": ca.ceil,
     "integer": ca.floor,
     "no_event": lambda x: x,
     "smooth": lambda order, x: x,

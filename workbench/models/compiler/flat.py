@@ -11,7 +11,7 @@ import os
 import re
 import sys
 import tempfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,17 +21,9 @@ import numpy as np
 import rumoca
 
 from workbench.errors import InputError
-from workbench.models.compiler.dropped import refuse_dropped
-from workbench.models.compiler.expressions import (
-    BINARY,
-    NO_EVENT,
-    REWRITE,
-    Arena,
-    Value,
-    each,
-)
+from workbench.models.compiler.expressions import BINARY, NO_EVENT, REWRITE, Arena, Value, each
 from workbench.models.modelica import Library, check, files, packages, read_library
-from workbench.models.modelica.classes import Class
+from workbench.models.modelica.classes import Class, Component, Modifier
 from workbench.runtime.supervision import blaming, limited_memory
 
 SCHEMA = 43
@@ -149,7 +141,7 @@ def flatten(package: Path, model: str) -> FlatModel:
         )
     library = read_library(package)
     reached = check(library, model)
-    refuse_dropped(library, reached)
+    _refuse_dropped(library, reached)
     source = library.find(model)
     if source.partial or source.kind in ("package", "function", "type", "connector", "record"):
         raise InputError(
@@ -501,10 +493,7 @@ class _Reader:
         return number_of
 
     def _scalars(
-        self,
-        number: int,
-        substitute: Callable[[ca.SX], ca.SX],
-        numeric: Callable[[ca.SX], float],
+        self, number: int, substitute: Callable[[ca.SX], ca.SX], numeric: Callable[[ca.SX], float]
     ) -> list[FlatVariable]:
         entry = self.variables[number]
         attributes = entry["attributes"]
@@ -665,3 +654,69 @@ def _substitution(bound: list[tuple[Value, Value]]) -> Callable[[ca.SX], ca.SX]:
             break
         values = resolved
     return lambda expression: ca.substitute(expression, symbols, values)
+
+
+def _refuse_dropped(library: Library, reached: Iterable[str]) -> None:
+    """Refuse what is right in Modelica and the front end drops: a redeclaration, or a value.
+
+    The redeclaration by a class that extends of what its base has from its own base; the value
+    that is given together with attributes to what is inherited, or to a part of a part, as in
+    `extends Part(k(max=2.0)=1.0)`.
+    """
+    for name in reached:
+        _refuse_redeclarations(library, name)
+        for extends in library.classes[name].extends:
+            _refuse_values(extends.modifier)
+        for component in library.classes[name].components:
+            for modification in component.modifier.inner.values():
+                _refuse_values(_inside(modification))
+            if "outer" in component.prefixes:
+                _refuse_outer(component)
+
+
+def _refuse_outer(component: Component) -> None:
+    """Refuse an outer variable: the front end misses the equation that ties it to the inner one."""
+    if component.type in ("Real", "Integer", "Boolean") and not component.prefixes & {
+        "parameter",
+        "constant",
+    }:
+        raise InputError(
+            where=component.where,
+            found=f"'outer {component.type} {component.name}'",
+            expected="an outer component of a model, as the Modelica front end needs",
+            remedy=f"put '{component.name}' into a model, and declare that inner and outer",
+        )
+
+
+def _refuse_redeclarations(library: Library, name: str) -> None:
+    for extends, base in zip(library.classes[name].extends, library.bases(name), strict=True):
+        if base not in library.classes:
+            continue
+        inherited = set(library.components(base))
+        inherited -= {component.name for component in library.classes[base].components}
+        for slot, modifier in extends.modifier.inner.items():
+            if modifier.redeclared is not None and slot in inherited:
+                raise InputError(
+                    where=modifier.where,
+                    found=f"a redeclaration of '{slot}', which {base} inherits",
+                    expected="one of a component that the extended class itself declares, as "
+                    "the Modelica front end needs",
+                    remedy=f"declare '{slot}' in {base}, or extend the class that declares it",
+                )
+
+
+def _refuse_values(modifier: Modifier) -> None:
+    """Refuse values beside attributes at any depth below that of a declaration itself."""
+    for name, given in modifier.inner.items():
+        if given.value and given.inner:
+            raise InputError(
+                where=given.where,
+                found=f"a value of '{name}' together with {', '.join(given.inner)}",
+                expected="one of the two, as the Modelica front end loses the value",
+                remedy=f"give '{name}' its value alone, or its attributes in a class of its own",
+            )
+        _refuse_values(_inside(given))
+
+
+def _inside(modifier: Modifier) -> Modifier:
+    return modifier if modifier.redeclared is None else modifier.redeclared.modifier

@@ -13,7 +13,7 @@ from collections.abc import Iterator, Mapping
 from typing import NoReturn
 
 from workbench.errors import InputError, closest
-from workbench.models.modelica.classes import Class, Component, Connection, Modifier
+from workbench.models.modelica.classes import Component, Connection, Modifier
 from workbench.models.modelica.library import Library
 
 _SCALAR = frozenset({"quantity", "min", "max", "start", "fixed"})
@@ -318,7 +318,8 @@ class _Checker:
         for name in names:
             parts = self._parts(type_name, modifier)
             if name not in parts:
-                if "expandable" in self._prefixes(type_name):
+                cls = self.library.classes.get(type_name)
+                if cls is not None and "expandable" in cls.prefixes:
                     return None
                 _refuse(
                     connection.where,
@@ -337,7 +338,8 @@ class _Checker:
                 )
             type_name, modifier = self._type_of(part), part.modifier
         cls = self.library.classes.get(type_name)
-        if cls is None or not self._connector(cls):
+        lineage = () if cls is None else (cls.name, *self.library.ancestors(cls.name))
+        if cls is None or not any(self.library.classes[n].kind == "connector" for n in lineage):
             _refuse(
                 connection.where,
                 f"connect with '{whole}', which is a {type_name}",
@@ -345,14 +347,6 @@ class _Checker:
                 "connect connectors; write an equation for anything else",
             )
         return type_name
-
-    def _connector(self, cls: Class) -> bool:
-        lineage = (cls.name, *self.library.ancestors(cls.name))
-        return any(self.library.classes[ancestor].kind == "connector" for ancestor in lineage)
-
-    def _prefixes(self, type_name: str) -> frozenset[str]:
-        cls = self.library.classes.get(type_name)
-        return cls.prefixes if cls is not None else frozenset()
 
     def _signature(self, type_name: str) -> object:
         """What two connectors must share: a predefined type, or names, kinds and what flows."""

@@ -98,7 +98,7 @@ def build_observer(
         If the law has what is not translated, with file and line; its memory has no fixed size, or
         does not follow the first sample linearly; its FMU is not of the system's library.
     """
-    plant, model = plant_of(estimator), model_name(estimator)
+    plant = plant_of(estimator)
     gains = gains_in_settings(estimator)
     stepped = SteppingLaw(
         sources=_SOURCES,
@@ -106,8 +106,8 @@ def build_observer(
         described=lambda text: _description(text, estimator.system.sample_time),
         resources={"gains.toml": gains_file},
     )
-    shell = replace(_shell(estimator, list(gains)), name=model, experiment=plant.experiment)
-    return assemble(shell, model, fmu, fmi, platforms, stepped, report)
+    shell = replace(_shell(estimator, list(gains)), experiment=plant.experiment)
+    return assemble(shell, fmu, fmi, platforms, stepped, report)
 
 
 def _description(plain: str, sample_time: float) -> str:
@@ -258,7 +258,7 @@ def _shell(estimator: Estimator, gains: Sequence[str]) -> StateSpace:
     )
     nothing = ca.SX(0, 1)
     return StateSpace(
-        name="",
+        name=model_name(estimator),
         description=f"{estimator.label[0].upper()}{estimator.label[1:]}: {system.title}",
         experiment={},
         t=ca.SX.sym("time"),

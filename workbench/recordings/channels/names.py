@@ -78,16 +78,12 @@ def read_named(table: Table, system: System) -> dict[str, NamedChannel]:
         own.refuse_unknown("channel unit reversed missing")
         unit = spell_unit(own.text("unit", ""))
         other = "reversed" in own and own.take("reversed", bool)
-        missing = _missing_values(own) if "missing" in own else None
+        markers = own.take("missing", list) if "missing" in own else None
+        if not all(type(value) in (int, float) for value in markers or ()):
+            raise own.wrong("missing", "a list of numbers, as the file has them, such as [-9999]")
+        missing = None if markers is None else tuple(map(float, markers))
         channels[signal] = NamedChannel(own.take("channel", str), unit, other, missing)
     return channels
-
-
-def _missing_values(table: Table) -> tuple[float, ...]:
-    values = table.take("missing", list)
-    if not all(isinstance(value, int | float) and not isinstance(value, bool) for value in values):
-        raise table.wrong("missing", "a list of numbers, as the file has them, such as [-9999]")
-    return tuple(map(float, values))
 
 
 def parse_named(text: str, where: str, signals: Collection[str]) -> tuple[str, NamedChannel]:

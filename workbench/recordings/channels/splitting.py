@@ -14,7 +14,7 @@ from workbench.arrays import Vector
 from workbench.errors import InputError
 from workbench.recordings.channels.names import TIME, NamedChannel, RecordingOptions, listed, usable
 from workbench.recordings.channels.proposal import ProposedMapping, propose
-from workbench.recordings.formats import FileChannel, Group, RecordedFile
+from workbench.recordings.formats import Group, RecordedFile
 from workbench.recordings.formats.stamps import iso
 from workbench.system.system import System
 
@@ -349,7 +349,11 @@ def at_one_time(parts: Sequence[ProposedRecording], system: System) -> str:
         span, other = spans[i], spans[j]
         if span and other and span.meets(other):
             return f"{names} hold the same channels at one time, {span} and {other}{_CHOICE}"
-        if same := _same_output(parts[i], parts[j], system) or _same_rows(rows[i], rows[j]):
+        short, long = sorted((rows[i], rows[j]), key=np.size)
+        same = _same_output(parts[i], parts[j], system)
+        if not same and short.size > _FEW and np.isin(short, long).mean() >= _COPIED:
+            same = "all signals"
+        if same:
             return f"{names} hold the same samples of {same}{_CHOICE}"
     return ""
 
@@ -358,7 +362,8 @@ def _span(recording: ProposedRecording) -> _Span | None:
     """When a part was recorded; None: its times count from a zero of their own."""
     for key, clock in recording.proposal.clocks.items():
         group = recording.files[key[0]].groups[key[1]]
-        shown = [c for c in (group.time, *group.channels) if c is not None and _is_dated(c)]
+        channels = [channel for channel in (group.time, *group.channels) if channel is not None]
+        shown = [c for c in channels if np.isfinite([c.start, c.shown]).any()]
         times, zero, scale = clock.times, 0.0, _CLOCK
         if shown:
             dated = np.isfinite(shown[0].start)
@@ -371,10 +376,6 @@ def _span(recording: ProposedRecording) -> _Span | None:
             if scale == _DATE or not own_zero:
                 return _Span(scale, begin, end)
     return None
-
-
-def _is_dated(channel: FileChannel) -> bool:
-    return bool(np.isfinite(channel.start) or np.isfinite(channel.shown))
 
 
 def _same_output(recording: ProposedRecording, other: ProposedRecording, system: System) -> str:
@@ -412,10 +413,3 @@ def _rows(part: ProposedRecording, system: System) -> Vector:
     with np.errstate(over="ignore", invalid="ignore"):
         sums = (np.column_stack([channel.values for channel in held]) * weights).sum(axis=1)
     return np.unique(sums[np.isfinite(sums)])
-
-
-def _same_rows(first: Vector, other: Vector) -> str:
-    """What to call rows that are nearly all in both; or nothing."""
-    short, long = sorted((first, other), key=np.size)
-    copied = short.size > _FEW and np.isin(short, long).mean() >= _COPIED
-    return "all signals" if copied else ""

@@ -148,7 +148,7 @@ def find_table(rows: Sequence[Sequence[str]], lines: Sequence[int], where: str) 
         return find_table(turned, range(1, len(turned) + 1), where)
     samples = _samples(rows, lines, _is_data)
     if len(samples) < _FEWEST:  # numbers may have units behind them
-        samples = _samples(rows, lines, _has_quantities)
+        samples = _samples(rows, lines, lambda row: _is_data(_without_units(row)))
     width = Counter(len(rows[i]) for i in samples).most_common(1)[0][0] if samples else 0
     # A line of a preamble may hold numbers, too, but not several one after the other.
     first = next((i for i, j in zip(samples, samples[2:], strict=False) if j == i + 2), None)
@@ -211,9 +211,9 @@ def is_quantity(cell: str) -> bool:
     return _WITH_UNIT.fullmatch(cell) is not None
 
 
-def _has_quantities(row: Sequence[str]) -> bool:
-    """Whether a row holds two numbers with units behind them."""
-    return _is_data([match["number"] if (match := _WITH_UNIT.fullmatch(c)) else c for c in row])
+def _without_units(cells: Sequence[str]) -> list[str]:
+    """Cells, of numbers with units behind them the numbers alone."""
+    return [match["number"] if (match := _WITH_UNIT.fullmatch(c)) else c for c in cells]
 
 
 def _rows_of_channels(rows: Sequence[Sequence[str]]) -> list[list[str]]:
@@ -491,10 +491,7 @@ def _numbers_within(cells: Sequence[str], unit: str) -> tuple[list[str], str] | 
         return None
     if unit and spell_unit(unit) != spell_unit(own):
         return None
-    bare = [
-        match["number"] if match else cell for match, cell in zip(matches, plainer, strict=True)
-    ]
-    return bare, spell_unit(own)
+    return _without_units(plainer), spell_unit(own)
 
 
 def _join_date_parts(
@@ -531,7 +528,12 @@ def _join_date_parts(
     else:
         used = ["year", "yday"]
         rows = zip(*(columns[at[part]] for part in used), strict=True)
-        days = [_of_year(y, d) for y, d in rows]
+        days = [
+            f"{datetime(int(float(y)), 1, 1) + timedelta(int(float(d)) - 1):%Y%m%d}"
+            if y and d
+            else ""
+            for y, d in rows
+        ]
     if "clock" in at:
         used.append("clock")
         width = 4 if max(map(len, columns[at["clock"]])) <= 4 else 6
@@ -553,14 +555,6 @@ def _two_figures(cell: str) -> str:
     """Hours, minutes or seconds with two figures before their decimals."""
     whole, mark, decimals = cell.replace(",", ".").partition(".")
     return f"{whole:0>2}{mark}{decimals}" if decimals.strip("0") else f"{whole:0>2}"
-
-
-def _of_year(year: str, day: str) -> str:
-    """A date of the day of a year, in figures."""
-    if not year or not day:
-        return ""
-    moment = datetime(int(float(year)), 1, 1) + timedelta(days=int(float(day)) - 1)
-    return f"{moment:%Y%m%d}"
 
 
 def _join_day_and_clock(

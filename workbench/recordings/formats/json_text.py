@@ -125,16 +125,12 @@ def _records(value: Mapping[str, Any]) -> list[dict[str, Any]]:
     by_row = len(members) > len(inner)  # else by column, as pandas writes
     rows = dict(value) if by_row else {k: {name: m[k] for name, m in value.items()} for k in inner}
     columns = zip(*(row.values() for row in rows.values()), strict=True)
-    if len(rows) < _FEWEST or not all(map(_is_of_one_kind, columns)):
+    texts = [[isinstance(cell, str) for cell in cells if cell is not None] for cells in columns]
+    # Texts beside numbers in one column describe something.
+    if len(rows) < _FEWEST or not all(all(cells) or not any(cells) for cells in texts):
         return []
     stated = _tells(list(rows))
     return [{**({"index": key} if stated else {}), **row} for key, row in rows.items()]
-
-
-def _is_of_one_kind(column: Sequence[Any]) -> bool:
-    """Whether values are all texts, or none is: else they describe something."""
-    texts = [isinstance(cell, str) for cell in column if cell is not None]
-    return all(texts) or not any(texts)
 
 
 def _tells(index: Sequence[Any]) -> bool:

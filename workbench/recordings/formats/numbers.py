@@ -30,10 +30,7 @@ _THOUSANDS_COMMA = "decimal points, commas between thousands"
 # Ways to read a number, and what takes it to a text of Python.
 _READINGS: dict[str, tuple[re.Pattern[str], Callable[[str], str]]] = {
     _POINT: (re.compile(rf"[+-]?(\d+\.?\d*|\.\d+){_EXPONENT}"), str),
-    _COMMA: (
-        re.compile(rf"[+-]?(\d+,?\d*|,\d+){_EXPONENT}"),
-        lambda text: text.replace(",", "."),
-    ),
+    _COMMA: (re.compile(rf"[+-]?(\d+,?\d*|,\d+){_EXPONENT}"), lambda text: text.replace(",", ".")),
     _THOUSANDS_POINT: (
         re.compile(rf"[+-]?(\d+|[1-9]\d{{0,2}}(\.\d{{3}})+)(,\d*)?{_EXPONENT}"),
         lambda text: text.replace(".", "").replace(",", "."),

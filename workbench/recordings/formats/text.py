@@ -2,7 +2,7 @@
 
 import csv
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -94,8 +94,8 @@ def _separator(path: Path, lines: Sequence[str]) -> str:
     middle_lines = middle[begin : begin + _SAMPLED]
     scores: dict[str, float] = {}
     for mark in _SEPARATORS:
-        split = _splitter(mark)
-        rows = [split(line) for line in middle_lines]
+        bare = middle_lines if mark == " " else [line.replace('"', "") for line in middle_lines]
+        rows = [line.split(None if mark == " " else mark) for line in bare]
         widths = [len(row) for row in rows]
         if not widths or max(widths) < 2:
             continue
@@ -117,12 +117,6 @@ def _separator(path: Path, lines: Sequence[str]) -> str:
         )
     # Of equals the first: a semicolon separates for certain, a comma may be a decimal mark.
     return max(scores, key=lambda mark: scores[mark])
-
-
-def _splitter(mark: str) -> Callable[[str], list[str]]:
-    if mark == " ":
-        return lambda line: line.split()
-    return lambda line: line.replace('"', "").split(mark)
 
 
 def _rows(lines: Sequence[str], separator: str) -> tuple[list[list[str]], list[int], int]:
