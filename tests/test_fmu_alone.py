@@ -31,7 +31,7 @@ from .built import build_text, machine_file, write_case
 SYSTEM = machine_file("tank_alone/system.toml")
 
 
-def record(folder: Path, seed: int, area=0.5, outlet=1e-3, gain=0.0, zero=0.0) -> Path:
+def record(folder: Path, seed: int, area=0.5, outlet=1e-3, gain=0.0, zero=0.0, late=0.0) -> Path:
     """Four recordings of 200 s, of which each starts at another level."""
     rng = np.random.default_rng(seed)
     time = np.arange(0.0, 200.25, 0.5)
@@ -48,7 +48,9 @@ def record(folder: Path, seed: int, area=0.5, outlet=1e-3, gain=0.0, zero=0.0) -
         columns = {
             "time [s]": time,
             "inflow [m3/s]": (1.0 + gain) * flows + 5e-5 * rng.standard_normal(time.size),
-            "level [m]": np.array(level) + zero + 2e-3 * rng.standard_normal(time.size),
+            "level [m]": np.interp(time - late, time, level)
+            + zero
+            + 2e-3 * rng.standard_normal(time.size),
         }
         write_case(folder / f"{number}", columns, "Steps of the pump")
     return folder
@@ -85,6 +87,17 @@ def test_what_is_wrong_is_named_with_its_size(tank, tmp_path, truth, effect, siz
     assert cause.effect.name == effect
     assert cause.parameters[size].low < value < cause.parameters[size].high
     assert (outcome.extension is None) == (effect != "A")  # a sensor is no matter of the model
+
+
+def test_a_late_sensor_and_an_input_that_acts_late_are_one_cause(tank, tmp_path):
+    """Of one input and one output nothing says which is late."""
+    outcome = diagnosed(tank, tmp_path, seed=2, late=3.0)
+    (cause,) = outcome.diagnosis.causes
+    names = {cause.effect.name, *cause.confusable_with}
+    assert names == {"InputDelay[inflow]", "SensorDelay[level]"}
+    delay = cause.parameters["delay"]
+    assert delay.low < 3.0 < delay.high
+    assert outcome.extension is None
 
 
 def test_parameters_that_act_alike_are_named_together(tank, tmp_path):
@@ -137,8 +150,18 @@ def test_candidates_are_parameters_and_sensors_of_a_stated_size(tank):
     assert names[3:7] == [
         f"Sensor{size}[{signal}]" for signal in ("inflow", "level") for size in ("Gain", "Offset")
     ]
-    assert names[7:] == [
+    assert names[7:11] == [
         f"{form}Term[x]" for form in ("Coulomb", "Viscous", "Quadratic", "Constant")
+    ]
+    assert names[11:] == [
+        "Start[x]",
+        "InputLag[inflow]",
+        *(
+            f"Sensor{form}[level]"
+            for form in ("Lag", "Saturation", "Rectification", "DeadZone", "Quantisation")
+        ),
+        "InputDelay[inflow]",
+        "SensorDelay[level]",
     ]
 
 
@@ -250,6 +273,56 @@ def test_a_missing_friction_is_named_with_its_size(swing, tmp_path, form, size):
     expected = np.interp(run["time"], time, swung(LAWS[form], 0.5, time))
     assert_allclose(run["s"], expected, atol=4e-3)
     assert validate_fmu(str(outcome.extension.fmu)) == []
+
+
+def behind(signal: np.ndarray, h: float, tau: float) -> np.ndarray:
+    """A signal on a fine grid behind a lag of first order, by Euler's method."""
+    y = signal.copy()
+    for k in range(1, y.size):
+        y[k] = y[k - 1] + h / tau * (signal[k - 1] - y[k - 1])
+    return y
+
+
+SENSORS = {
+    "SensorLag[s]": ("lag", 0.03, lambda x: behind(x, 1e-3, 0.03)),
+    "SensorDeadZone[s]": ("width", 0.03, lambda x: np.sign(x) * np.maximum(np.abs(x) - 0.03, 0.0)),
+    "SensorRectification[s]": ("rectified", 2.0, np.abs),
+    "SensorSaturation[s]": ("limit", 0.3, lambda x: x),  # cut with its noise, below
+}
+
+
+@pytest.mark.parametrize("name", SENSORS)
+def test_a_sensor_that_bends_its_signal_is_named_with_its_size(swing, tmp_path, name):
+    parameter, size, sensor = SENSORS[name]
+    rng, fine = np.random.default_rng(2), np.arange(0.0, 4.0055, 1e-3)
+    for number, start in enumerate((0.5, 0.35, -0.4)):
+        seen = sensor(swung(lambda v: 0.0, start, fine))[::10]
+        read = seen + 1e-3 * rng.standard_normal(seen.size)
+        if name.startswith("SensorSaturation"):
+            read = np.clip(read, -size, size)
+        columns = {"time [s]": fine[::10], "s [m]": read}
+        write_case(tmp_path / f"recordings/{number}", columns, "Released")
+    cases = read_cases(tmp_path / "recordings", swing)
+    outcome = diagnose(swing, cases, out=tmp_path, workers=1, report=lambda line: None)
+    (cause,) = outcome.diagnosis.causes
+    assert (cause.effect.name, cause.confusable_with) == (name, ())
+    assert cause.parameters[parameter].low < size < cause.parameters[parameter].high
+    assert outcome.extension is None  # a sensor is no matter of the model
+
+
+def test_errors_far_above_noise_are_never_nothing(swing, tmp_path):
+    """A position that rests where it begins: no mean over half a swing lasts."""
+    rng, time = np.random.default_rng(2), np.arange(0.0, 4.005, 0.01)
+    for number, start in enumerate((0.5, 0.35, -0.4)):
+        position = np.clip(swung(lambda v: 0.0, start, time), -0.2, 0.3)
+        position += 1e-3 * rng.standard_normal(time.size)
+        columns = {"time [s]": time, "s [m]": position}
+        write_case(tmp_path / f"recordings/{number}", columns, "Released")
+    cases = read_cases(tmp_path / "recordings", swing)
+    outcome = diagnose(
+        swing, cases, effects=["m"], out=tmp_path, workers=1, report=lambda line: None
+    )
+    assert outcome.diagnosis.verdict == "unexplained"
 
 
 def test_an_fmu_around_another_has_its_rates_and_derivatives_with_terms(swing, tmp_path):

@@ -7,8 +7,8 @@ its parameters and the errors of its sensors.
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from workbench.diagnosis.data.clocks import clocks
-from workbench.diagnosis.effects.candidates import candidates
+from workbench.diagnosis.data.clocks import clocks, delays
+from workbench.diagnosis.effects.candidates import candidates, considered
 from workbench.diagnosis.effects.catalogue import Effect, read_effects
 from workbench.errors import InputError
 from workbench.models.modelica import Library, read_library
@@ -35,7 +35,8 @@ def catalogue(system: System, library: Library | None) -> tuple[Effect, ...]:
     if library is not None:
         return (*read_effects(library, system.models[OBSERVER].name), *clocks(system))
     with open_model(system) as model:
-        return (*candidates(model, system), *clocks(system))
+        alone = (*candidates(model, system), *delays(system))
+    return (*considered(system, alone), *clocks(system))
 
 
 @dataclass(frozen=True, eq=False)

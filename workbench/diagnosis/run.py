@@ -10,7 +10,11 @@ import numpy as np
 from workbench.diagnosis.data.clocks import case_in_time, late_signals
 from workbench.diagnosis.data.counting import refuse_too_few
 from workbench.diagnosis.data.motion import ModelSource
-from workbench.diagnosis.data.sensors import case_by_sensors, sensor_errors
+from workbench.diagnosis.data.sensors import (
+    case_by_sensors,
+    fitting_recordings,
+    sensor_errors,
+)
 from workbench.diagnosis.effects.candidates import COEFFICIENT, rate_terms, with_starts
 from workbench.diagnosis.effects.catalogue import Effect
 from workbench.diagnosis.effects.extension import ExtendedModel, build, parameter_of
@@ -83,7 +87,6 @@ def _diagnosed(
             if simulations.free and problem.library is None:
                 # Terms of several forms explain a run that nothing corrects as one parameter does.
                 effects = [effect for effect in effects if effect.size != COEFFICIENT]
-                problem = replace(problem, effects=effects)
                 if not effects:
                     raise InputError(
                         where=f"{system.source}, [candidates]",
@@ -91,6 +94,11 @@ def _diagnosed(
                         expected="parameters or sensors",
                         remedy="choose some of 'workbench diagnose --list'",
                     )
+            if problem.library is None:
+                begun = simulations.begin[0]  # by what was measured, in each recording
+                effects = [effect for effect in effects if effect.parameter not in begun]
+                effects = list(fitting_recordings(effects, system, problem.cases))
+                problem = replace(problem, effects=effects)
             fit = Fit(simulations, effects)
             diagnosis = conclude(fit, effects, report)
             base, best = diagnosis.base, diagnosis.best
@@ -270,7 +278,9 @@ class _Found:
         folder.mkdir(parents=True, exist_ok=True)
         extended = folder / f"{EXTENDED}.fmu"
         write_extended(path, extended, [terms[name] for name in added], added, changed)
-        return Extension(None, extended, self._difference(extended, frozenset(sizes)))
+        # A start differs between recordings beside.
+        written = frozenset(sizes) - frozenset(self.fit.unknowns.local)
+        return Extension(None, extended, self._difference(extended, written))
 
     def _difference(self, path: Path, own: Collection[str]) -> float:
         """How far an extended FMU's predictions are from those of the fit, at most.

@@ -30,20 +30,24 @@ def saturated(values: Vector, signal: Signal) -> Mask:
     return mask
 
 
-def outliers(values: Vector, signal: Signal, sound: Soundness) -> Mask:
+def outliers(values: Vector, signal: Signal, sound: Soundness, *, flat: bool = False) -> Mask:
     """Isolated wrong samples (Hampel's identifier), repeated ones and a saturated extreme.
 
     A command is what it is, and what is read in steps repeats itself. Samples at the limit of a
     sensor say nothing of the noise of others.
+
+    Parameters
+    ----------
+    flat : whether an extreme that repeats itself may be right, since saturation is a candidate.
     """
     within = ~saturated(values, signal)
     wrong = np.zeros(values.size, np.bool_)
     if not signal.exact and within.any():
-        wrong[within] = _outliers(values[within], signal, sound)
+        wrong[within] = _outliers(values[within], signal, sound, flat=flat)
     return wrong
 
 
-def _outliers(values: Vector, signal: Signal, sound: Soundness) -> Mask:
+def _outliers(values: Vector, signal: Signal, sound: Soundness, *, flat: bool) -> Mask:
     # Odd at the ends: there too, the median of what rises or falls is the middle sample.
     beside = _ABREAST // 2
     extended = np.pad(values, beside, mode="reflect", reflect_type="odd")
@@ -54,10 +58,11 @@ def _outliers(values: Vector, signal: Signal, sound: Soundness) -> Mask:
     wrong = _out_and_back(values, away > sound.spike * scale, sound.spike * scale)
     same = np.diff(values) == 0.0
     if same.mean() < 0.2 and not signal.resolution:
+        extremes = (values.min(), values.max())
         for first, end in runs(same):
-            if end - first >= sound.stuck - 1:
+            if end - first >= sound.stuck - 1 and not (flat and values[first] in extremes):
                 wrong[first : end + 1] = True
-        for extreme in (values.min(), values.max()):
+        for extreme in () if flat else extremes:
             at = values == extreme
             if at.sum() > 2 * sound.stuck and same[at[1:]].mean() > 0.5:
                 wrong |= at

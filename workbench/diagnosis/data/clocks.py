@@ -14,14 +14,14 @@ from scipy.ndimage import uniform_filter1d
 
 from workbench.arrays import Matrix, Vector
 from workbench.diagnosis.data.samples import Samples
+from workbench.diagnosis.effects.candidates import LEAST_SKEWS
 from workbench.diagnosis.effects.catalogue import Effect
 from workbench.diagnosis.effects.extension import variables
 from workbench.recordings.case import Case
 from workbench.system.system import System
 
 KIND, OWN, SKEW = "LoggerTimeSkew", "TimeSkew", "skew"
-# Of the least time that matters: a logger that scans five channels has neighbours as far apart.
-_MATTERS = 2.0
+DELAY = "delay"
 
 
 def clocks(system: System) -> tuple[Effect, ...]:
@@ -43,13 +43,34 @@ def own_clocks(system: System) -> tuple[Effect, ...]:
     )
 
 
+def delays(system: System) -> tuple[Effect, ...]:
+    """A delay of each signal by itself, but for one that has a logger of its own.
+
+    An input that acts late is recorded early, against which all others are late.
+    """
+    known, effects = {frozenset(names) for names in system.clocks.values()}, []
+    for name, signal in system.signals.items():
+        others = tuple(other for other in system.signals if other != name)
+        acts = signal in system.inputs
+        if not others or known & {frozenset([name]), frozenset(others)}:
+            continue
+        clock = _clock(system, "InputDelay", name, others)
+        text = f"{signal.label} that acts later than it is recorded"
+        if not acts:
+            clock = _clock(system, "SensorDelay", name, (name,))
+            text = f"a sensor of {signal.label} that reads late"
+        separation = f"a second sensor of {signal.label}, with a clock that is known"
+        effects.append(replace(clock, size=DELAY, text=text, separation=separation))
+    return tuple(effects)
+
+
 def _clock(system: System, kind: str, name: str, signals: tuple[str, ...]) -> Effect:
     return Effect(
         name=f"{kind}[{name}]",
         model=kind,
         slots=(),
         size=SKEW,
-        matters=_MATTERS * system.comparison.least_skew,
+        matters=LEAST_SKEWS * system.comparison.least_skew,
         text=f"a logger of {' and '.join(signals)} with a time offset",
         separation="one signal that both loggers record",
         late=signals,
@@ -63,12 +84,12 @@ def late_signals(system: System) -> dict[str, dict[str, float]]:
     were moved: where the clock of the reference is late, all others are early.
     """
     first, directions = reference(system), {}
-    for clock in (*clocks(system), *own_clocks(system)):
+    for clock in (*clocks(system), *own_clocks(system), *delays(system)):
         others = [name for name in system.signals if name not in clock.late]
         moving = (
             dict.fromkeys(others, -1.0) if first in clock.late else dict.fromkeys(clock.late, 1.0)
         )
-        directions[variables(clock, SKEW)[0]] = moving
+        directions[variables(clock, clock.size)[0]] = moving
     return directions
 
 

@@ -89,7 +89,8 @@ def count(
     system = system.under(case.conditions)
     compare, time, h = system.comparison, case.time, float(np.median(np.diff(case.time)))
     beyond = {name: saturated(case[name], system.signals[name]) for name in names}
-    faulty = {name: outliers(case[name], system.signals[name], sound) for name in names}
+    flat = not system.library.is_file()
+    faulty = {name: outliers(case[name], system.signals[name], sound, flat=flat) for name in names}
     wrong = {name: beyond[name] | faulty[name] for name in names}
     clean = {name: bridge(time, case[name], wrong[name]) for name in names}
     applied = applied_at(clean, system, time)

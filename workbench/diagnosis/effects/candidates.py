@@ -1,14 +1,16 @@
 """What a diagnosis may find without a library of effects: in an FMU and its sensors alone.
 
-Each parameter of the FMU may have another value, each sensor another gain or zero, each rate may
-lack a term. No source is needed: a parameter is set, a reading is corrected beside the FMU, and a
-term is added to the rates around it.
+Each parameter of the FMU may have another value, each state another start, each rate may lack a
+term, and each sensor may read wrong: by its gain or zero, late, behind, or bent. No source is
+needed: a parameter or a start is set, a reading is calculated beside the FMU, and a term is added
+to the rates around it.
 """
 
 import re
 import sys
 from collections.abc import Collection, Iterable, Iterator
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,11 +21,49 @@ from workbench.models.added import CONSTANT, COULOMB, QUADRATIC, VISCOUS, RateTe
 from workbench.models.description import Variable
 from workbench.models.fmu import FMU, CoSimulation
 from workbench.observers.operating import start_spreads
-from workbench.system.parts import Signal, StateNoise
+from workbench.system.parts import StateNoise
 from workbench.system.system import System
 from workbench.system.units import with_unit
 
-CHANGE, GAIN, OFFSET, COEFFICIENT = "change", "gain", "offset", "coefficient"
+CHANGE, COEFFICIENT = "change", "coefficient"
+# Parameters of wrong sensors, see `SensorReading`.
+GAIN, OFFSET, LAG, LOSS, LIMIT = "gain", "offset", "lag", "loss", "limit"
+WIDTH, RECTIFIED, STEP = "width", "rectified", "step"
+SHARES = (GAIN, LOSS, RECTIFIED)  # of a signal
+
+
+class _SensorForm(NamedTuple):
+    """How a sensor of `{label}` may be wrong: class, size, and what it is, for people."""
+
+    kind: str
+    size: str
+    text: str
+    shape: str = ""
+
+
+_ZERO = (
+    _SensorForm("SensorGain", GAIN, "a sensor of {label} with another gain"),
+    _SensorForm("SensorOffset", OFFSET, "a sensor of {label} with another zero"),
+)
+_INPUT = (_SensorForm("InputLag", LAG, "{label} that acts behind a lag of first order"),)
+_OUTPUT = (
+    _SensorForm("SensorLag", LAG, "a sensor of {label} behind a lag of first order"),
+    _SensorForm(
+        "SensorSaturation",
+        LOSS,
+        "a sensor of {label} that saturates: it loses so much of what is beyond a limit",
+        LIMIT,
+    ),
+    _SensorForm(
+        "SensorRectification",
+        RECTIFIED,
+        "a sensor of {label} that rectifies: 100% reads zero below zero, 200% the magnitude",
+    ),
+    _SensorForm(
+        "SensorDeadZone", WIDTH, "a sensor of {label} that reads zero within a dead zone of zero"
+    ),
+    _SensorForm("SensorQuantisation", STEP, "a sensor of {label} that reads in steps"),
+)
 _FORMS = {
     COULOMB: "a term of constant size against {state} in its rate, as of Coulomb friction",
     VISCOUS: "a term in proportion to {state} in its rate, as of viscous friction or a leak",
@@ -32,6 +72,8 @@ _FORMS = {
 }
 _SMOOTH = 1e-3  # of a state's size, within which a Coulomb term is smooth
 _CHANGEABLE = ("fixed", "tunable")
+# Of the least time that matters: a logger that scans five channels has neighbours as far apart.
+LEAST_SKEWS = 2.0
 _FACTOR = 10.0  # by which a parameter is larger or smaller at most, if the FMU has no bounds
 
 
@@ -44,15 +86,21 @@ def candidates(model: FMU, system: System) -> tuple[Effect, ...]:
 
     Returns
     -------
-    effects : parameters in the order of the FMU, gain and offset of each input and output, then
-        terms beside the rates, by state.
+    effects : parameters in the order of the FMU, gain and offset of each input and output, terms
+        beside the rates, by state, starts of states, then other errors of sensors.
     """
-    chosen = system.candidates
-    own = (*_parameters(model, system), *_sensors(system), *_terms(model, system))
-    effects = {effect.name: effect for effect in own}
-    considered = _matching(chosen.only, effects, system) if chosen.only else set(effects)
-    considered -= _matching(chosen.without, effects, system)
-    return tuple(effect for name, effect in effects.items() if name in considered)
+    zeros = [effect for effect in wrong_sensors(system) if effect.size in (GAIN, OFFSET)]
+    others = [effect for effect in wrong_sensors(system) if effect.size not in (GAIN, OFFSET)]
+    parameters, terms = _parameters(model, system), _terms(model, system)
+    return (*parameters, *zeros, *terms, *_starts(model, system), *others)
+
+
+def considered(system: System, candidates: Iterable[Effect]) -> tuple[Effect, ...]:
+    """Those candidates that `[candidates]` of the system file does not exclude."""
+    chosen, effects = system.candidates, {effect.name: effect for effect in candidates}
+    names = _matching(chosen.only, effects, system) if chosen.only else set(effects)
+    names -= _matching(chosen.without, effects, system)
+    return tuple(effect for name, effect in effects.items() if name in names)
 
 
 def _matching(patterns: Iterable[str], names: Collection[str], system: System) -> set[str]:
@@ -144,7 +192,7 @@ def with_starts(system: System, model: FMU) -> System:
     known = {state.name: state for state in system.state_noise}
     spreads = dict(zip(model.states, start_spreads(model, system), strict=True))
     if isinstance(model, CoSimulation):  # which sets nothing that it calculates
-        able = {v.name for v in model.description.variables if v.initial in ("exact", "approx")}
+        able = _settable(model)
         spreads = {name: spread for name, spread in spreads.items() if name in able}
     for name, spread in spreads.items():
         state = known.get(name, StateNoise(name, name, None, None))
@@ -217,24 +265,47 @@ def _size(variable: Variable, value: float) -> float:
     return abs(variable.nominal or 0.0)
 
 
-def _sensors(system: System) -> Iterator[Effect]:
+def _starts(model: FMU, system: System) -> Iterator[Effect]:
+    """Starts of states that no output is; they must differ from the FMU's in all recordings."""
+    for name, spread in zip(model.states, start_spreads(model, system), strict=True):
+        if name in system.signals or name not in model.defaults:
+            continue
+        if isinstance(model, CoSimulation) and name not in _settable(model):
+            continue
+        unit = model.units.get(name, "")
+        value = model.defaults[name]
+        nominal = with_unit(value, unit) if unit else f"{value:.3g}"
+        yield Effect(
+            name=f"Start[{name}]",
+            model=name,
+            slots=(),
+            size=CHANGE,
+            matters=system.candidates.matters * float(spread),
+            text=f"another start of {name} in all recordings than {nominal}",
+            separation=f"a measurement of {name} where a recording begins",
+            parameter=name,
+        )
+
+
+def _settable(model: FMU) -> set[str]:
+    """Variables of a Co-Simulation FMU whose starts may be set."""
+    return {v.name for v in model.description.variables if v.initial in ("exact", "approx")}
+
+
+def wrong_sensors(system: System) -> Iterator[Effect]:
+    """Errors of the sensors of all signals, inputs first."""
+    inputs, compare = {signal.name for signal in system.inputs}, system.comparison
     for signal in system.signals.values():
-        for size, least in ((GAIN, 1.0), (OFFSET, signal.scale)):
+        for form in (*_ZERO, *(_INPUT if signal.name in inputs else _OUTPUT)):
+            least = system.candidates.matters * (1.0 if form.size in SHARES else signal.scale)
             yield Effect(
-                name=sensor_error(signal, size),
-                model=sensor_error(signal, size),
+                name=f"{form.kind}[{signal.name}]",
+                model=form.kind,
                 slots=(),
-                size=size,
-                matters=system.candidates.matters * least,
-                text=f"a sensor of {signal.label} with another {_PLAIN[size]}",
+                size=form.size,
+                matters=LEAST_SKEWS * compare.least_skew if form.size == LAG else least,
+                text=form.text.format(label=signal.label),
                 separation=f"a second sensor of {signal.label}",
+                shapes=((form.shape, (signal.scale,)),) if form.shape else (),
                 sensor=signal.name,
             )
-
-
-_PLAIN = {GAIN: "gain", OFFSET: "zero"}
-
-
-def sensor_error(signal: Signal, size: str) -> str:
-    """Name of the wrong gain or zero of a sensor, such as 'SensorGain[u]'."""
-    return f"Sensor{size.capitalize()}[{signal.name}]"

@@ -76,10 +76,11 @@ class LinearizedPoint:
         return float(sum(recording.residual @ recording.residual for recording in self.residuals))
 
     @property
-    def _squares(self) -> tuple[Vector, Vector]:
-        """Number of blocks that are told, and mean square of their errors, by channel (m,)."""
+    def squares(self) -> Vector:
+        """Mean square of the errors of blocks that are told, by channel (m,)."""
         errors = np.concatenate([recording.errors for recording in self.residuals])
-        return _told(self.residuals), _share(self.residuals) * np.square(errors).mean(axis=0)
+        squares: Vector = _share(self.residuals) * np.square(errors).mean(axis=0)
+        return squares
 
     @property
     def deviance(self) -> float:
@@ -89,7 +90,7 @@ class LinearizedPoint:
         its logarithm counts. To spoil one channel for another is no gain then.
         Source: Y. Bard, Nonlinear Parameter Estimation, 1974, section 4-8.
         """
-        count, mean = self._squares
+        count, mean = _told(self.residuals), self.squares
         noise = count * np.minimum(mean, 1.0 + self.excess)
         wrong = count / self.lasting * np.log(self.spread)
         rest = sum(float(recording.rest @ recording.rest) for recording in self.residuals)
@@ -98,7 +99,7 @@ class LinearizedPoint:
     @property
     def spread(self) -> Vector:
         """(m,) By what chi-squared of each channel is divided, for a step to lower the deviance."""
-        wrong: Vector = np.maximum(0.0, self._squares[1] - (1.0 + self.excess))
+        wrong: Vector = np.maximum(0.0, self.squares - (1.0 + self.excess))
         return 1.0 + self.lasting * wrong
 
     def weighed(self, variance_factors: Vector) -> float:

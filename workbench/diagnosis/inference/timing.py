@@ -10,6 +10,7 @@ from itertools import combinations
 
 import numpy as np
 
+from workbench.diagnosis.data.clocks import DELAY
 from workbench.diagnosis.effects.catalogue import Effect
 from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.quadratic import Key, covariance, minimum
@@ -56,6 +57,8 @@ def by_themselves(
     base, best : the nominal model and the last one, with all derivatives.
     clean : whether the last one leaves nothing that lasts.
     """
+    if clean and all(effect.size == DELAY for effect in best.active):
+        return None  # of signals by themselves
     clocks = list(fit.own_clocks)
     other, least = fit.beside(clocks), fit.least_skew
     needed = fit.decides.needed if len(best.active) < 2 else 0.0

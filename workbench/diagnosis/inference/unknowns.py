@@ -11,11 +11,13 @@ import numpy as np
 
 from workbench.diagnosis.data.cleaning import ALONG
 from workbench.diagnosis.data.samples import Samples
+from workbench.diagnosis.data.sensors import step_of
 from workbench.diagnosis.effects.candidates import own_bounds
 from workbench.diagnosis.effects.catalogue import Effect, Unless, Where
 from workbench.diagnosis.effects.extension import variables
 from workbench.diagnosis.inference.linearized import Point
 from workbench.diagnosis.inference.quadratic import Key
+from workbench.diagnosis.inference.thresholds import SOUND
 from workbench.diagnosis.simulation.residual_model import ResidualModel
 from workbench.diagnosis.simulation.simulator import delay
 from workbench.errors import InputError
@@ -138,9 +140,24 @@ class Unknowns:
         led = self._compare.leading is not None and not self._simulations.free
         # What rolls along a measured state may have no sensor of its own.
         seen = [] if led else [name for name in begin if name in system.signals]
-        shown = {name: ALONG * system.signals[name].noise_at_scale for name in seen}
+        shown = {name: ALONG * self._deviation(name) for name in seen}
         hidden = {name: spread for name, spread in system.spreads.items() if spread > 0.0}
         return {**shown, **hidden}
+
+    def _deviation(self, signal: str) -> float:
+        """Standard deviation of a first reading: that of rounding if it goes in coarser steps.
+
+        Where a recording begins at the end of what a sensor reads, it begins anywhere beyond.
+        """
+        recordings, own = self._simulations.recordings, self._simulations.system.signals[signal]
+        read = [r.read[:, r.signals.index(signal)] for r in recordings if signal in r.signals]
+        if not read or self._simulations.system.library.is_file():
+            return own.noise_at_scale
+        every = np.concatenate(read)
+        for end in (every.min(), every.max()):
+            if any(values[0] == end for values in read) and (every == end).sum() > 2 * SOUND.stuck:
+                return own.scale
+        return max(own.noise_at_scale, step_of(every) / float(np.sqrt(12.0)))
 
     def level_unit(self, key: Key) -> str:
         """Unit of a level, or of a delay."""
@@ -155,7 +172,10 @@ class Unknowns:
         """Least and greatest value of a parameter, SI."""
         variable = variables(effect, parameter)[0]
         declared = self._simulations.bounds[variable]
-        if effect.parameter:
+        if effect.parameter in self._starts:
+            middle = self._simulations.nominal.get(variable, 0.0)
+            declared = declared[0] - middle, declared[1] - middle
+        elif effect.parameter:
             declared = own_bounds(self._simulations.nominal[variable], declared)
         low, high = self.opened.get((effect.name, parameter), declared)
         # An amplitude has no sign: its phase has.
@@ -220,6 +240,8 @@ class Unknowns:
             for part, value in parts.items():
                 names = variables(effect, part)
                 start = self._present(effect, names[0]) if part in effect.sizes else 0.0
+                if names[0] in self._starts:
+                    start = values[names[0]]
                 values |= dict.fromkeys(names, start + float(value))
         return values
 

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.stats import bootstrap
 
 from workbench.arrays import Matrix, Vector
-from workbench.diagnosis.effects.candidates import GAIN
+from workbench.diagnosis.effects.candidates import SHARES
 from workbench.diagnosis.effects.catalogue import Effect
 from workbench.diagnosis.inference.discrepancy import correlated_deviations, share_by_form
 from workbench.diagnosis.inference.fit import Fit
@@ -301,6 +301,9 @@ def _clean(fit: Fit, chosen: Selection) -> bool:
 def _verdict(fit: Fit, chosen: Selection) -> Verdict:
     best = chosen.best
     explained = _share(chosen.base, best) > 1.0 - fit.decides.left
+    # What swings about zero may have no mean that lasts; noise is not so large.
+    if not best.active and best.linearised.squares.max() > fit.decides.wrong:
+        return "unexplained"
     if not _clean(fit, chosen) and not (best.active and (chosen.interrupted or explained)):
         return "unexplained"
     return "found" if best.active else "nothing"
@@ -595,7 +598,7 @@ def _cause(fit: Fit, chosen: Selection, effect: Effect, *, noise_alone: bool) ->
         limit = binding_bound(fit, best, effect, key[1])
         unit = unknowns.unit(effect, parameter)
         # A parameter or a zero without a unit may be of any size: 2 is not 200 % of anything.
-        own = bool(effect.parameter or effect.sensor) and effect.size != GAIN
+        own = bool(effect.parameter or effect.sensor) and key[1] not in SHARES
         plain = own and unit in ("", "1")
         least, greatest = max(value - reach, low), min(value + reach, high)
         further = (np.nan, False)

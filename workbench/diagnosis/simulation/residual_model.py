@@ -14,11 +14,10 @@ from typing import Any, Self, TypeVar
 import numpy as np
 
 from workbench.arrays import Matrix
-from workbench.diagnosis.data.clocks import greatest_skew, late_signals
+from workbench.diagnosis.data.clocks import DELAY, greatest_skew, late_signals
 from workbench.diagnosis.data.motion import ModelSource, OpenModel, opened
 from workbench.diagnosis.data.samples import Samples, compared, prepare
 from workbench.diagnosis.data.sensors import sensor_errors
-from workbench.diagnosis.effects.candidates import GAIN
 from workbench.diagnosis.inference.thresholds import SOUND, Soundness
 from workbench.diagnosis.simulation.prediction import Variation
 from workbench.diagnosis.simulation.simulator import (
@@ -134,12 +133,10 @@ class ResidualModel:
                 min(high, parameter.range[1]),
             )
         for name in late_signals(self.system):
-            self.units[name] = "s"
-            self.bounds[name] = (-greatest_skew(self.system), greatest_skew(self.system))
-        for name, (signal, size, typical) in sensor_errors(self.system).items():
-            self.units[name] = "1" if size == GAIN else self.system.signals[signal].unit
-            # A gain keeps the sign of its signal; a zero is off by the size of the signal at most.
-            self.bounds[name] = (-0.9, 9.0) if size == GAIN else (-typical, typical)
+            self.units[name], most = "s", greatest_skew(self.system)
+            self.bounds[name] = (0.0 if name.endswith(DELAY) else -most, most)
+        for name, error in sensor_errors(self.system).items():
+            self.units[name], self.bounds[name] = error.unit, error.bounds
 
     def _prepared(self, *, restarting: bool) -> SimulatorSetup:
         """Make all recordings ready."""

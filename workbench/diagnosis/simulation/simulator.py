@@ -14,14 +14,18 @@ from workbench.arrays import Matrix, Vector
 from workbench.diagnosis.data.clocks import in_time, late_signals, lateness, mirrored, moved
 from workbench.diagnosis.data.samples import Samples
 from workbench.diagnosis.data.sensors import (
-    Reading,
+    SensorReading,
     corrected,
     readings,
-    scaled,
+    sensed,
+    sensed_changes,
     sensor_errors,
     shifted,
     starts,
+    step_of,
+    straightened,
 )
+from workbench.diagnosis.effects.candidates import LAG, STEP
 from workbench.diagnosis.inference.thresholds import Thresholds
 from workbench.diagnosis.simulation.free import FreeDerivatives, FreePredictor
 from workbench.diagnosis.simulation.prediction import Predictor, Variation
@@ -33,6 +37,7 @@ from workbench.system.system import System
 _DELAY_STEP = 1e-3  # of the difference, over the delay's spread; errors are linear in the delay
 _DIFFERENCE = 1e-4  # step over a typical size: far above rounding, far below what bends
 _FINEST = 32  # steps of a sample time
+_STRAIGHTENED = 2  # runs, of which each leads the next
 _DRAWS = 12  # of the noise of inputs: their variance is known to two fifths
 
 
@@ -96,7 +101,7 @@ class Simulator:
         self._rest = fmu.variables([rest.output for rest in given.system.comparison.rests])
         self._clocks = late_signals(given.system)
         self._sensors = sensor_errors(given.system)
-        self._typical = {name: size for name, (_, _, size) in self._sensors.items()}
+        self._typical = {name: error.typical for name, error in self._sensors.items()}
         if not given.system.library.is_file() and not given.free:
             # An FMU of another tool need not take a parameter while it runs: each is set before.
             self._typical |= {
@@ -204,15 +209,18 @@ class Simulator:
         differing = {*self._clocks, *self._typical}
         beside = [j for j, column in enumerate(columns) if column.variables[0] in differing]
         if beside:
-            names = [columns[j].variables[0] for j in beside]
-            jacobian[:blocks, beside] = self._by_differences(number, values, names)
+            varied = [columns[j] for j in beside]
+            jacobian[:blocks, beside] = self._by_differences(number, values, varied)
         for part in _compatible(columns, beside):
             varied = [columns[j] for j in part]
             shares = None if courses is None else courses[:, part]
             absent = self._absent(values, varied, sizes or {})
             given = recording, self._known(values), varied, shares, absent
-            _, along = self._predictor.derivatives(*given)
-            by = self._whitened(number, self._late(number, along.errors, values))
+            errors, along = self._predictor.derivatives(*given)
+            by_sensor = sensed_changes(
+                recording, along.errors, recording.y - errors, self._wrong(values)
+            )
+            by = self._whitened(number, self._late(number, by_sensor, values))
             jacobian[:blocks, part] = by.reshape(-1, len(part))
             if isinstance(along, FreeDerivatives):
                 unsure |= along.unsure
@@ -240,28 +248,34 @@ class Simulator:
         ]
 
     def _by_differences(
-        self, number: int, values: Mapping[str, float], names: Sequence[str]
+        self, number: int, values: Mapping[str, float], varied: Sequence[Variation]
     ) -> Matrix:
         """Derivatives of the errors by clocks, sensors, and parameters of an FMU alone, (b*c, p).
 
-        Of a clock over a sample: within one, a signal that is moved is a straight line.
+        Of a time over a sample: within one, a signal that is moved is a straight line. What is read
+        in steps follows no step; by its size it goes from what is not.
         """
-        sample = float(np.median(np.diff(self._recordings[number].time)))
-        steps = [
-            _DIFFERENCE * self._typical[name] if name in self._typical else sample for name in names
-        ]
+        recording = self._recordings[number]
+        sample = float(np.median(np.diff(recording.time)))
 
         def errors(values: Mapping[str, float]) -> Matrix:
             simulated, _ = self._simulated(number, values)
             return self._whitened(number, self._read(number, simulated, values)).ravel()
 
-        now = errors(values)
-        return np.column_stack(
-            [
-                (errors({**values, name: self._at(name, values) + step}) - now) / step
-                for name, step in zip(names, steps, strict=True)
-            ]
-        )
+        now, columns = errors(values), []
+        for column in varied:
+            name, known = column.variables[0], {**values, **column.setting}
+            at, sensor = self._at(name, values), self._sensors.get(name)
+            if sensor is not None and sensor.parameter == STEP:
+                of = recording.read[:, recording.signals.index(sensor.signal)]
+                size = at or step_of(of) or sensor.typical
+                whole = now if at else errors({**known, name: size})
+                columns.append((whole - errors({**known, name: 0.0})) / size)
+                continue
+            timed = name not in self._typical or (sensor is not None and sensor.parameter == LAG)
+            step = sample if timed else _DIFFERENCE * self._typical[name]
+            columns.append((errors({**known, name: at + step}) - now) / step)
+        return np.column_stack(columns)
 
     def _at(self, name: str, values: Mapping[str, float]) -> float:
         """Value of a parameter, or of the error of a clock or a sensor."""
@@ -349,9 +363,19 @@ class Simulator:
     def _in_time(self, number: int, values: Mapping[str, float]) -> Samples:
         """A recording as by one clock, and by right sensors."""
         by_one_clock = in_time(self._recordings[number], lateness(self._clocks, values))
-        return corrected(by_one_clock, self._wrong(values))
+        wrong = self._wrong(values)
+        read_ = corrected(by_one_clock, wrong)
+        if not read_.corrected or not any(wrong[n].bends for n in read_.signals if n in wrong):
+            return read_
+        # What leads a run are outputs as they were, which what is bent says by the run alone.
+        seen, known = read_.y, self._known(values)
+        straight = read_
+        for _ in range(_STRAIGHTENED):
+            seen = straight.y - self._predictor.errors(straight, known)
+            straight = straightened(read_, seen, wrong)
+        return straight
 
-    def _wrong(self, values: Mapping[str, float]) -> dict[str, Reading]:
+    def _wrong(self, values: Mapping[str, float]) -> dict[str, SensorReading]:
         """What sensors read, of those with an error."""
         return readings(self._sensors, values)
 
@@ -368,14 +392,14 @@ class Simulator:
     def _read(self, number: int, errors: Matrix, values: Mapping[str, float]) -> Matrix:
         """Errors of samples (n, c) with sensors behind structures, as late as `values` say."""
         recording, late = self._recordings[number], lateness(self._clocks, values)
-        seen = self._late(number, recording.y - errors, values)
-        read_ = recording.y - shifted(recording, seen, self._wrong(values))
+        wrong = self._wrong(values)
+        seen = self._late(number, sensed(recording, recording.y - errors, wrong), values)
+        read_ = recording.y - shifted(recording, seen, wrong)
         return mirrored(recording, read_, late) if late else read_
 
     def _late(self, number: int, signals: Matrix, values: Mapping[str, float]) -> Matrix:
-        """What sensors read of signals (n, c, ...), behind structures, late, by their factors."""
+        """What sensors read of signals (n, c, ...), behind structures, late."""
         recording, late = self._recordings[number], lateness(self._clocks, values)
-        signals = scaled(recording, signals, self._wrong(values))
         if self._delays or late:
             signals = signals.copy()
         for j, (name, _) in self._delays.items():
