@@ -57,10 +57,8 @@ def write_case(folder: Path, columns: Mapping[str, Vector], title: str, digits: 
     digits : format of the numbers; all digits unless given.
     """
     folder.mkdir(parents=True)
-    text = f'title = "{title}"\n[measurement]\nfile = "measured.csv"\n'
-    (folder / "case.toml").write_text(text)
-    table = pd.DataFrame(columns)
-    table.to_csv(folder / "measured.csv", index=False, float_format=digits or None)
+    (folder / "case.toml").write_text(f'title = "{title}"\n[measurement]\nfile = "measured.csv"\n')
+    pd.DataFrame(columns).to_csv(folder / "measured.csv", index=False, float_format=digits or None)
     return folder
 
 

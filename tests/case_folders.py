@@ -28,14 +28,7 @@ direction = -1
 [measurement]
 file = "measured.csv"
 """
-UNITS = {
-    "time": "s",
-    "pB": "bar",
-    "tauR": "N.m",
-    "omegaW": "rad/s",
-    "omegaR": "rad/s",
-    "Fx": "N",
-}
+UNITS = {"time": "s", "pB": "bar", "tauR": "N.m", "omegaW": "rad/s", "omegaR": "rad/s", "Fx": "N"}
 SI_OF_UNITS = {"bar": 1e5}  # every other unit above is SI already
 ROWS = 25
 LINES = [
@@ -55,8 +48,7 @@ def write(folder: Path, csv: Text | list[str] = LINES, toml: Text = TOML) -> Pat
     for name, content in (("measured.csv", csv), ("case.toml", toml)):
         if isinstance(content, list):
             content = "\n".join(content) + "\n"
-        data = content if isinstance(content, bytes) else content.encode()
-        (folder / name).write_bytes(data)
+        (folder / name).write_bytes(content if isinstance(content, bytes) else content.encode())
     return folder
 
 

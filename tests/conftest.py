@@ -1,7 +1,10 @@
 """What several test files share: the repository's own FMUs, cases and sources."""
 
+import fcntl
 import json
 import multiprocessing.util
+import os
+import pickle
 import shutil
 import signal
 import subprocess
@@ -10,7 +13,7 @@ from contextlib import ExitStack
 from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import fmpy
 import lxml.html
@@ -37,6 +40,7 @@ from .processes import LONGEST  # noqa: E402
 from .runtime_instances import Fmu, compile_model  # noqa: E402
 
 ROOT = Path(__file__).parent.parent
+Result = TypeVar("Result")
 
 # Its sockets stay where the first of them was, which may be no folder of one test: that has a long
 # name, and goes.
@@ -55,6 +59,30 @@ def workers_begin_with_most() -> Iterator[None]:
         for module in (program, pools):
             patch.setattr(module, "preload", preload)
         yield
+
+
+@pytest.fixture(scope="session")
+def once(tmp_path_factory) -> Callable[[str, Callable[[Path], Result]], Result]:
+    """Gives what is made in a new folder, which the first worker that needs it does for all."""
+    place = tmp_path_factory.getbasetemp()
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        place = place.parent
+    shelf = place / "once"
+    shelf.mkdir(exist_ok=True)
+
+    def get(name: str, make: Callable[[Path], Result]) -> Result:
+        folder, kept = shelf / name, shelf / f"{name}.pickle"
+        with (shelf / f"{name}.lock").open("w") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            if not kept.exists():
+                shutil.rmtree(folder, ignore_errors=True)  # of a worker that failed in it
+                folder.mkdir()
+                part = kept.with_suffix(".part")
+                part.write_bytes(pickle.dumps(make(folder)))
+                part.rename(kept)
+        return pickle.loads(kept.read_bytes())
+
+    return get
 
 
 @pytest.fixture(scope="session")
@@ -83,6 +111,13 @@ def minimal(minimal_path) -> Iterator[FMU]:
         yield fmu
 
 
+@pytest.fixture(scope="module")
+def fmu(minimal_path) -> Iterator[FMU]:
+    """The observer model of the wheelset, as tests of a file leave it to each other."""
+    with FMU(minimal_path) as fmu:
+        yield fmu
+
+
 @pytest.fixture(scope="session")
 def dry_case(system) -> Case:
     return read_case(ROOT / "cases" / "03_dry_120_3.6", system)
@@ -102,14 +137,17 @@ def published(root) -> Callable[[str], Path]:
 
 
 @pytest.fixture(scope="session")
-def published_cases(published, tmp_path_factory) -> Callable[[str, str], Path]:
-    """Makes the case folders of a system from a published set, once."""
+def published_cases(published, once) -> Callable[[str, str], Path]:
+    """Makes the case folders of a system from a published set."""
 
-    @cache
     def made(system: str, name: str) -> Path:
-        out = tmp_path_factory.mktemp(system) / "cases"
-        write_cases(system, published(name), out)
-        return out
+        recordings = published(name)
+
+        def write(folder: Path) -> Path:
+            write_cases(system, recordings, folder / "cases")
+            return folder / "cases"
+
+        return once(f"{system} of {name}", write)
 
     return made
 
@@ -174,26 +212,31 @@ def pool(inline, problem) -> Pool[Evaluator]:
 
 
 @pytest.fixture(scope="session")
-def hostile_path(tmp_path_factory) -> Path:
+def hostile_path(once) -> Path:
     """An FMU that does what HOSTILE in the environment says."""
-    return hostile(tmp_path_factory.mktemp("hostile") / "evil.fmu")
+    return once("hostile", lambda folder: hostile(folder / "evil.fmu"))
 
 
 # --- the C runtime ---
 
 
 @pytest.fixture(scope="session")
-def open_fmu(tmp_path_factory) -> Callable[..., Fmu]:
+def open_fmu(once) -> Callable[..., Fmu]:
     """Opens an instance of a model; compiles each library once."""
-    root = tmp_path_factory.mktemp("runtime")
+
+    @cache
+    def compiled(model: str, version: int) -> Path:
+        platform = fmpy.platform if version == 2 else fmpy.platform_tuple
+        library = Path("binaries", platform, f"{model}{fmpy.sharedLibraryExtension}")
+
+        def build(folder: Path) -> Path:
+            compile_model(model, version, folder / library)
+            return folder
+
+        return once(f"{model}{version}", build)
 
     def open_(model: str, version: int, slave: bool = True, **options: str | bool) -> Fmu:
-        folder = root / f"{model}{version}"
-        platform = fmpy.platform if version == 2 else fmpy.platform_tuple
-        library = folder / "binaries" / platform / f"{model}{fmpy.sharedLibraryExtension}"
-        if not library.exists():
-            compile_model(model, version, library)
-        return Fmu(folder, model, version, slave, **options)
+        return Fmu(compiled(model, version), model, version, slave, **options)
 
     return open_
 
@@ -202,12 +245,30 @@ def open_fmu(tmp_path_factory) -> Callable[..., Fmu]:
 
 
 @pytest.fixture(scope="session")
-def everything(system, tmp_path_factory) -> Path:
+def everything(system, once) -> Path:
     """The observer model of the wheelset with every effect at zero."""
-    path = tmp_path_factory.mktemp("everything") / "AllEffects.fmu"
-    library = read_library(system.library)
-    build_everything(system, library, read_effects(library, "MinimalObserver"), path)
-    return path
+
+    def build(folder: Path) -> Path:
+        library = read_library(system.library)
+        effects = read_effects(library, "MinimalObserver")
+        build_everything(system, library, effects, folder / "AllEffects.fmu")
+        return folder / "AllEffects.fmu"
+
+    return once("everything", build)
+
+
+# --- results of a command ---
+
+
+@pytest.fixture(scope="module")
+def summary(results) -> dict[str, Any]:
+    """Of the `results` that a file has."""
+    return json.loads((results / "summary.json").read_text())
+
+
+@pytest.fixture(scope="module")
+def page(results) -> Any:
+    return lxml.html.fromstring((results / "index.html").read_bytes())
 
 
 # --- pages ---

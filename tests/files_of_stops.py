@@ -103,8 +103,8 @@ def mat_5_array(path: Path, stops: Stops) -> None:
         units = {f"{_identifier(name)}_unit": unit for name, (unit, _) in columns.items()}
         held.append({**vectors, **units})
     array = np.empty((1, len(held)), dtype=[(name, "O") for name in held[0]])
-    for number, one in enumerate(held):
-        for name, value in one.items():
+    for number, recording in enumerate(held):
+        for name, value in recording.items():
             array[0, number][name] = value
     savemat(path, {"stops": array})
 
@@ -137,9 +137,9 @@ def mat_73_array(path: Path, stops: Stops) -> None:
                 entries = {"": ("double", values.reshape(1, -1)), "_unit": ("char", codes)}
                 for ending, (kind, data) in entries.items():
                     field = f"{_identifier(name)}{ending}"
-                    one = hidden.create_dataset(f"{field}{number}", data=data)
-                    one.attrs["MATLAB_class"] = np.bytes_(kind)
-                    fields.setdefault(field, []).append(one.ref)
+                    dataset = hidden.create_dataset(f"{field}{number}", data=data)
+                    dataset.attrs["MATLAB_class"] = np.bytes_(kind)
+                    fields.setdefault(field, []).append(dataset.ref)
         for field, references in fields.items():
             held.create_dataset(field, data=np.array([references], dtype=h5py.ref_dtype))
     content = bytearray(path.read_bytes())

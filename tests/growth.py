@@ -91,16 +91,16 @@ def build(vehicles: int, folder: Path, *, pitching: bool = True) -> System:
     given = {variable.name: variable for variable in system.inputs}
     pressures = [replace(given["pB1"], name=f"pB{j}") for j in range(1, 2 * vehicles + 1)]
     vehicle = [
-        replace(given[f"{one}1"], name=f"{one}{k}") for one in ("mass", "slope") for k in every
+        replace(given[f"{name}1"], name=f"{name}{k}") for name in ("mass", "slope") for k in every
     ]
     speed, accelerometer = system.outputs[0], system.outputs[-1]
     speeds = [replace(speed, name=f"omega{i}", reading=f"omega{i}") for i in axles]
     known = {quantity.name: quantity for quantity in system.estimated}
 
     def estimated(name: str) -> list[EstimatedQuantity]:
-        one = known[f"{name}[1]"]
+        first_axle = known[f"{name}[1]"]
         return [
-            replace(one, name=f"{name}[{i}]", correction=f"d{name}{i}", acts_on=f"omega{i}")
+            replace(first_axle, name=f"{name}[{i}]", correction=f"d{name}{i}", acts_on=f"omega{i}")
             for i in axles
         ]
 

@@ -124,10 +124,10 @@ def _model(code: str, folder: Path, root: Path, where: str) -> None:
 
 
 def _compare(claimed: str, printed: str, where: str, *, whole: bool = False) -> None:
-    found = " ".join(printed.split())
+    output = " ".join(printed.split())
     for line in [claimed] if whole else claimed.splitlines():
         parts = [re.escape(" ".join(part.split())) for part in line.split("...")]
-        assert re.search(".*".join(parts), found), f"{where}: '{line}' is not in\n{printed}"
+        assert re.search(".*".join(parts), output), f"{where}: '{line}' is not in\n{printed}"
 
 
 def calls(code: str) -> Iterator[list[str]]:

@@ -64,12 +64,12 @@ def comes_true(condition: Callable[[], bool]) -> bool:
 
 def living(session: int) -> list[int]:
     """Processes of a session that are not zombies."""
-    found = []
+    alive = []
     for entry in Path("/proc").glob("[0-9]*"):
         try:
             state = (entry / "stat").read_text().rpartition(")")[2].split()
         except OSError:
             continue  # it ended meanwhile
         if int(state[3]) == session and state[0] != "Z":
-            found.append(int(entry.name))
-    return found
+            alive.append(int(entry.name))
+    return alive

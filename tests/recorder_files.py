@@ -101,15 +101,13 @@ def csv_of_indices(path: Path, columns: Columns) -> None:
     step = float(np.median(np.diff(columns["Zeit"][1])))
     names = ";".join(["Index", *(f"{n} [{unit}]" for n, (unit, _) in others.items())])
     held = [f"{k};{row}" for k, row in enumerate(rows(others, ";", german))]
-    lines = [f"Abtastrate: {1 / step:g} Hz", names, *held]
-    path.write_text("\n".join(lines))
+    path.write_text("\n".join([f"Abtastrate: {1 / step:g} Hz", names, *held]))
 
 
 def workbook(path: Path, columns: Columns) -> None:
     """Dates as Excel has them, units in a second row, and a sheet with notes."""
     book = openpyxl.Workbook()
-    notes = book.active
-    notes.append(["Prüfer", "Müller"])
+    book.active.append(["Prüfer", "Müller"])
     sheet = book.create_sheet("Daten")
     sheet.append(["Messung 8"])
     sheet.append([])

@@ -21,7 +21,6 @@ MODELS = Path(__file__).parent / "runtime"
 RUNTIME = Path(__file__).parents[1] / "workbench" / "models" / "compiler" / "runtime"
 HEADERS = Path(fmpy.__file__).parent / "c-code"
 DISCARD, ERROR = 2, 3
-VERSIONS = pytest.mark.parametrize("version", [2, 3])
 
 # Value references of the oscillator: x1' = x2, x2' = -k*x1 - d*x2 + u, output force, local energy.
 X1, X2, DX1, DX2, U, K, D, FORCE, ENERGY, TIME = range(10)

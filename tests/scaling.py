@@ -38,10 +38,7 @@ def write_fleet(folder: Path, trains: int, days: int) -> None:
 def watch(fleet: Path, workers: int) -> tuple[int, float]:
     """Stops that count, and wall time by so many workers, from connecting to the last file [s]."""
     options = {"n_workers": workers, "threads_per_worker": 1, "dashboard_address": ":0"}
-    with (
-        tempfile.TemporaryDirectory() as out,
-        LocalCluster(processes=True, **options) as cluster,
-    ):
+    with tempfile.TemporaryDirectory() as out, LocalCluster(processes=True, **options) as cluster:
         words = f"monitor {fleet} --system train --fleet --quiet --out {out} --cluster".split()
         with redirect_stdout(io.StringIO()):
             status = workbench([*words, cluster.scheduler_address])

@@ -1,6 +1,5 @@
 """Noise levels that follow innovations: what filters learn, leave out, and follow."""
 
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,7 +18,7 @@ from workbench.observers.replay import replay
 from workbench.observers.run import Run
 from workbench.observers.score import judged_window
 from workbench.recordings.case import read_cases
-from workbench.system.registry import load_system, open_model
+from workbench.system.registry import load_system
 from workbench.system.system import System
 
 ROOT = Path(__file__).parent.parent
@@ -27,12 +26,6 @@ WHEELSET = load_system("wheelset")
 FILTERS = ("ekf", "ukf", "imm", "mhe")
 KINDS = (ExtendedKalmanFilter, UnscentedKalmanFilter, MovingHorizonEstimator)
 STEP, BRAKING = 0.005, 2.7e5  # [s], [Pa]
-
-
-@pytest.fixture(scope="module")
-def fmu() -> Iterator[FMU]:
-    with open_model(WHEELSET) as opened:
-        yield opened
 
 
 def stop(fmu: FMU, muDC: Vector, noise: float = 1.0, seed: int = 5) -> tuple[np.ndarray, ...]:
@@ -79,7 +72,7 @@ def test_noise_of_sensors_is_learnt(fmu, kind, noise):
 def test_a_friction_that_stays_is_known_the_better_the_longer(fmu, kind):
     held = replace(WHEELSET, learns=np.inf)
     samples = stop(fmu, np.full(6000, 0.30))
-    learnt, assumed = (estimate(fmu, kind, one, *samples) for one in (WHEELSET, held))
+    learnt, assumed = (estimate(fmu, kind, system, *samples) for system in (WHEELSET, held))
     assert learnt.sigma[-1, MUDC] < 0.4 * assumed.sigma[-1, MUDC]
     late = np.abs(learnt.values[3000:, MUDC] - 0.30)
     assert np.mean(late < 2.0 * learnt.sigma[3000:, MUDC]) > 0.9
@@ -100,9 +93,11 @@ def test_a_single_wrong_sample_is_left_out(fmu, kind):
     time, u, y = stop(fmu, np.full(3000, 0.30))
     spoilt = y.copy()
     spoilt[2000] *= 1.5
-    clean, found = (estimate(fmu, kind, WHEELSET, time, u, one) for one in (y, spoilt))
+    clean, estimates = (
+        estimate(fmu, kind, WHEELSET, time, u, readings) for readings in (y, spoilt)
+    )
     # One sample less is known: a small part of a deviation.
-    moved = np.abs(found.values - clean.values)[1999:]
+    moved = np.abs(estimates.values - clean.values)[1999:]
     assert (moved < 0.5 * np.maximum(clean.sigma, 1e-9)[1999:]).all()
 
 
@@ -122,16 +117,14 @@ def test_a_jump_of_a_friction_is_followed_at_once(fmu, kind, within, limit):
 
 
 @pytest.fixture(scope="module")
-def runs(fmu) -> dict[str, list[tuple[slice, Run]]]:
-    made = {name: estimators_of(WHEELSET)[name] for name in FILTERS}
-    ready = {
-        name: cls(fmu, WHEELSET, cls.default_gains(fmu, WHEELSET)) for name, cls in made.items()
-    }
-    cases = read_cases([ROOT / "cases"], WHEELSET)
-    return {
-        name: [(judged_window(case, WHEELSET), replay(case, one)) for case in cases]
-        for name, one in ready.items()
-    }
+def runs(fmu, once) -> dict[str, list[tuple[slice, Run]]]:
+    cases, known = read_cases([ROOT / "cases"], WHEELSET), estimators_of(WHEELSET)
+
+    def run(name: str) -> list[tuple[slice, Run]]:
+        ready = known[name](fmu, WHEELSET, known[name].default_gains(fmu, WHEELSET))
+        return [(judged_window(case, WHEELSET), replay(case, ready)) for case in cases]
+
+    return once("filters on the rig", lambda _: {name: run(name) for name in FILTERS})
 
 
 @pytest.mark.parametrize("name", FILTERS)

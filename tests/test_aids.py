@@ -127,8 +127,7 @@ def test_an_empty_field_of_an_aid_is_a_sample_that_is_missing(still, tmp_path):
 
 
 def test_a_recording_may_have_no_aid_at_all(still, tmp_path):
-    rows = "\n".join(f"{k},0,1.{k:02d}" for k in range(30))
-    case = read_case(recorded(tmp_path, rows), still)
+    case = read_case(recorded(tmp_path, "\n".join(f"{k},0,1.{k:02d}" for k in range(30))), still)
     assert "fine" not in case
     assert np.isnan(case.y[:, 1]).all()
 
@@ -185,12 +184,12 @@ def test_who_finds_a_condition_is_not_told(stop):
     cls, part = estimators_of(TRAIN)["imm"], slice(0, 20)
     with open_model(TRAIN) as model:
         bank = cls(model, TRAIN, cls.default_gains(model, TRAIN))
-        found = []
+        runs = []
         conditions: list[dict[str, Value]] = [{"rail": "dry"}, {"rail": "wet"}]
         for condition in conditions:
             bank.set_conditions(condition)
-            found.append(bank.run(case.time[part], case.u[part], case.y[part]).values)
-    assert_array_equal(found[0], found[1])
+            runs.append(bank.run(case.time[part], case.u[part], case.y[part]).values)
+    assert_array_equal(runs[0], runs[1])
 
 
 # --- the train ---
@@ -288,10 +287,10 @@ def gradient_error(case: Case, made: SimulatedStop) -> Vector:
     s = np.interp(case.time, made.result.time, made.result.s)
     true = [np.interp(s - place, points(), made.gradient) for place in (10.75, 37.15)]
     filed = [case["slope1"], case["slope2"]]
-    found: Vector = np.average(true, axis=0, weights=made.mass) - np.average(
+    mean: Vector = np.average(true, axis=0, weights=made.mass) - np.average(
         filed, axis=0, weights=made.weighed
     )
-    return found
+    return mean
 
 
 def test_what_is_of_a_recording_is_not_watched_over_many():

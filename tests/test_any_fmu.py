@@ -168,7 +168,7 @@ def test_whole_simulations_say_derivatives_through_events(build):
     assert (by.unsure == 0.0).all()
 
 
-def test_a_parameter_is_fitted_through_events(build: Build) -> None:
+def test_a_parameter_is_fitted_through_events(build):
     """The heat loss of a room whose thermostat switches, from the closed form with noise."""
     folder = build("THERMOSTAT").parent
     text = machine_file("room_fmu/system.toml", correction="dG")
@@ -347,8 +347,7 @@ SWITCHED = VARIABLES.replace(
 
 def test_the_open_loop_sets_discrete_inputs_at_events_and_reads_whole_numbers(build):
     """A Boolean input that adds 1 K/s from 20 s to 40 s; an Integer output that says 10 or 11."""
-    path = build("RELAYS", variables=SWITCHED)
-    file = path.parent / "system.toml"
+    file = build("RELAYS", variables=SWITCHED).parent / "system.toml"
     text = file.read_text().partition("[estimated.G]")[0]
     text += 'inputs.flag = { unit = "1", noise = 0.0, scale = 1.0 }\n'
     file.write_text(text + 'outputs.mode = { unit = "1", noise = 0.5, scale = 1.0 }\n')
@@ -499,8 +498,7 @@ def integrator(tmp_path) -> Path:
     """A system on a Co-Simulation alone: der(x) = u from 1, each step exact."""
     source = Path(__file__).with_name("co_simulation.c")
     library = tmp_path / f"Alone{fmpy.sharedLibraryExtension}"
-    headers = Path(fmpy.__file__).parent / "c-code"
-    flags = ["-shared", "-fPIC", "-w", "-I", headers]
+    flags = ["-shared", "-fPIC", "-w", "-I", Path(fmpy.__file__).parent / "c-code"]
     subprocess.run([str(COMPILER), *flags, source, "-o", library], check=True)
     description = machine_file(
         "room_fmu/modelDescription.xml", count=0, start=0.0, variables=COASTING

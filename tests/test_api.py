@@ -59,12 +59,11 @@ def test_a_script_needs_no_guard_from_file_to_diagnosis(root, folder):
 
 
 def test_a_table_is_the_recording_that_a_file_holds(system, case):
-    frame = pd.read_csv(case.source)
-    again = wb.case_from_frame(system, frame)
+    again = wb.case_from_frame(system, pd.read_csv(case.source))
     assert_array_equal(again.time, case.time)
     assert_allclose(again.u, case.u, rtol=1e-15)
     assert_allclose(again.y, case.y, rtol=1e-15)
-    runs = [wb.observe(system, one, "ekf").signal("c") for one in (case, again)]
+    runs = [wb.observe(system, recording, "ekf").signal("c") for recording in (case, again)]
     assert_allclose(runs[0], runs[1], rtol=1e-12)
 
 

@@ -97,12 +97,14 @@ def recording(system: System, samples: int) -> tuple[Vector, Matrix, Matrix]:
     return t, u, y
 
 
-def assert_alike(found: Estimate, expected: Estimate, rtol: float) -> None:
+def assert_alike(estimate: Estimate, expected: Estimate, rtol: float) -> None:
     """Estimates within a share of their standard deviations, and these."""
-    apart = (found.values - expected.values) / np.where(expected.sigma > 0.0, expected.sigma, 1.0)
+    apart = (estimate.values - expected.values) / np.where(
+        expected.sigma > 0.0, expected.sigma, 1.0
+    )
     assert_allclose(apart, 0.0, atol=rtol)
-    assert_allclose(found.sigma, expected.sigma, rtol=rtol)
-    assert_allclose(found.nis, expected.nis, rtol=rtol)
+    assert_allclose(estimate.sigma, expected.sigma, rtol=rtol)
+    assert_allclose(estimate.nis, expected.nis, rtol=rtol)
 
 
 # --- blocks ---
@@ -144,7 +146,7 @@ def test_a_model_without_blocks_has_the_extended_filter():
         plain, estimator = made(fmu, system)
         t, u, y = growth.stop(system)
         first = slice(0, 20)
-        estimate, expected = (one.run(t[first], u[first], y[first]) for one in (estimator, plain))
+        estimate, expected = (ekf.run(t[first], u[first], y[first]) for ekf in (estimator, plain))
     np.testing.assert_array_equal(estimate.values, expected.values)
     np.testing.assert_array_equal(estimate.sigma, expected.sigma)
 
@@ -309,16 +311,15 @@ def test_estimates_of_a_train_are_those_of_the_extended_filter(rolling, train):
     """
     plain, estimator = made(rolling, train)
     apart, narrower, held = [], [], []
-    columns = list(train.columns)
-    first = columns.index(train.estimated[0].name)
+    first = list(train.columns).index(train.estimated[0].name)
     for samples, truth in stops(rolling, train, 30):
         estimate, expected = estimator.run(*samples), plain.run(*samples)
         apart.append(((estimate.values - expected.values) / expected.sigma)[1:])
         narrower.append((estimate.sigma / expected.sigma)[1:])
         own = slice(first, first + truth.size)
-        for one in (estimate, expected):
-            error = np.abs(one.values[:, own] - truth)
-            held.append(error < 1.96 * one.sigma[:, own])
+        for run in (estimate, expected):
+            error = np.abs(run.values[:, own] - truth)
+            held.append(error < 1.96 * run.sigma[:, own])
     assert np.sqrt(np.mean(np.square(apart), axis=(0, 1))).max() < 0.15
     assert_allclose(narrower, 1.0, atol=0.03)
     ours, theirs = (np.mean(held[side::2]) for side in (0, 1))

@@ -35,8 +35,7 @@ NAMES = ["open_loop", "ekf", "mhe"]
 
 @pytest.fixture(scope="module")
 def vessel(tmp_path_factory) -> System:
-    folder = tmp_path_factory.mktemp("vessel")
-    return declare(folder, *machine("vessel"))
+    return declare(tmp_path_factory.mktemp("vessel"), *machine("vessel"))
 
 
 def result_of(system: System, noise: float, seed: int, leak: float = 0.0) -> CaseResult:
@@ -124,8 +123,8 @@ def test_residuals_of_a_right_filter_pass_both_tests():
 @pytest.mark.parametrize(("walk", "narrow"), [(1.5, True), (0.05, False)])
 def test_a_walk_that_is_wrong_shows_in_what_follows_from_sample_to_sample(walk, narrow):
     rng = np.random.default_rng(2)
-    found = [residual_tests(*innovations(rng, walk, 0.3, count=4000)) for _ in range(20)]
-    assert all(any(t.test == "whiteness" and t.narrow is narrow for t in tests) for tests in found)
+    runs = [residual_tests(*innovations(rng, walk, 0.3, count=4000)) for _ in range(20)]
+    assert all(any(t.test == "whiteness" and t.narrow is narrow for t in tests) for tests in runs)
 
 
 def test_a_mean_shows_though_it_is_far_below_the_noise():

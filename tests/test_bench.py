@@ -176,8 +176,7 @@ def test_the_model_alone_goes_the_same_way_by_fmpy(system, minimal, dry_case):
 def test_plain_c_gives_the_same_bits_as_the_compiled_law(system, minimal, dry_case):
     """Same arithmetic in the same order, and neither compiler may contract or reorder it."""
     gains = DisturbanceObserver.default_gains(minimal, system)
-    observer = DisturbanceObserver(minimal, system, gains)
-    ours = observer.run(dry_case.time, dry_case.u, dry_case.y)
+    ours = DisturbanceObserver(minimal, system, gains).run(dry_case.time, dry_case.u, dry_case.y)
     theirs = CLoop(minimal, system, gains).run(dry_case.time, dry_case.u, dry_case.y)
     assert_array_equal(ours.values, theirs)
 
@@ -255,8 +254,7 @@ def test_memory_of_master_and_workers_is_measured(root, system, monkeypatch):
 def test_a_process_does_not_have_the_peak_of_the_one_that_started_it():
     """It does by `getrusage`."""
     ballast = np.ones(50_000_000)  # 400 MB
-    program = "from workbench.benchmark.memory import peak_memory; print(peak_memory())"
-    run = python("-c", program)
+    run = python("-c", "from workbench.benchmark.memory import peak_memory; print(peak_memory())")
     assert peak_memory() > ballast.nbytes
     assert int(run.stdout) < 100 * MB
 

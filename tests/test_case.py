@@ -86,8 +86,7 @@ def test_arrays_are_read_only_floats(tmp_path, name):
 
 
 def test_a_recording_without_force_has_none(tmp_path):
-    lines = [line.rpartition(",")[0] for line in LINES]
-    assert "Fx" not in read(write(tmp_path, lines))
+    assert "Fx" not in read(write(tmp_path, [line.rpartition(",")[0] for line in LINES]))
 
 
 def test_extra_columns_are_ignored_whatever_they_hold(tmp_path):
@@ -125,8 +124,7 @@ def test_decimal_commas_give_the_same_case(tmp_path, separator):
 
 def test_a_byte_order_mark_does_not_matter(tmp_path):
     mark = b"\xef\xbb\xbf"
-    csv = mark + "\n".join(LINES).encode()
-    marked = read(write(tmp_path / "a", csv, mark + TOML.encode()))
+    marked = read(write(tmp_path / "a", mark + "\n".join(LINES).encode(), mark + TOML.encode()))
     assert_same(marked, read(write(tmp_path / "b")))
 
 
@@ -184,8 +182,7 @@ def recordings(draw):
     steps = draw(st.lists(st.floats(0.1, 10.0), min_size=ROWS, max_size=ROWS))
     values["time"] = np.cumsum(steps)
     separator, mark = draw(st.sampled_from([",.", ";.", ";,", "\t.", "\t,"]))
-    names = draw(st.permutations(list(UNITS)))
-    return units, values, separator, mark, names
+    return units, values, separator, mark, draw(st.permutations(list(UNITS)))
 
 
 # Some 20 ms a case; a deadline would only measure how busy the machine is.

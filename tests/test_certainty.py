@@ -60,8 +60,7 @@ def fits(tmp_path_factory) -> Iterator[dict[str, Fit]]:
 def begun(fit: Fit, name: str, size: float) -> FittedModel:
     """A fit with one effect that begins at a size."""
     effect = fit.unknowns.effects[name]
-    point = replace(fit.unknowns.start(), sizes={(name, effect.label): size})
-    return anew(fit, point, (effect,))
+    return anew(fit, replace(fit.unknowns.start(), sizes={(name, effect.label): size}), (effect,))
 
 
 def least(fit: Fit, best: FittedModel, size: float) -> float:
@@ -69,8 +68,7 @@ def least(fit: Fit, best: FittedModel, size: float) -> float:
     (key,), (level,) = best.point.sizes, best.point.levels
 
     def deviance(scale: float) -> float:
-        point = replace(best.point, sizes={key: size}, levels={level: scale})
-        return fit.at(point).deviance
+        return fit.at(replace(best.point, sizes={key: size}, levels={level: scale})).deviance
 
     # Some hundred times the tolerance of the search is the standard deviation of the scale.
     return float(minimize_scalar(deviance, bounds=(1.0, 3.0), options={"xatol": 1e-5}).fun)
@@ -79,8 +77,7 @@ def least(fit: Fit, best: FittedModel, size: float) -> float:
 def test_at_the_ends_by_noise_alone_the_least_chi_squared_has_risen_by_3_84(fits):
     fit = fits["Bend"]
     best = begun(fit, "Bend", BEND)
-    certainty = assess(fit, best, lambda _: None)
-    ((key, (low, high)),) = certainty.ends.items()
+    ((key, (low, high)),) = assess(fit, best, lambda _: None).ends.items()
     bottom = least(fit, best, best.point.sizes[key])
     rises = [least(fit, best, end) - bottom for end in (low, high)]
     # Ends are found along a parabola through one point of each side: 5 % is its third order.
@@ -135,8 +132,7 @@ def test_autocovariance_is_that_of_a_process_of_first_order():
     for own in errors:
         for k, noise in enumerate(rng.standard_normal(own.size - 1), start=1):
             own[k] = a * own[k - 1] + noise
-    covariance = autocovariance(errors)
-    assert_allclose(covariance[:5], a ** np.arange(5) / (1.0 - a**2), rtol=0.06)
+    assert_allclose(autocovariance(errors)[:5], a ** np.arange(5) / (1.0 - a**2), rtol=0.06)
 
 
 def test_a_size_is_as_unsure_as_what_remains_of_its_effect():

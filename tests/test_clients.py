@@ -187,17 +187,16 @@ def they_are_one_system(theirs: FMU, ours: FMU) -> None:
     A position has aliases, and either may be the state. Values that differ tell the states apart.
     """
     given = {name: 1e-6 + 1e-8 * k for k, name in enumerate(ours.states)} | START
-    found = []
+    jacobians = []
     for fmu in (theirs, ours):
         fmu.start(given)
         assert dict(zip(given, fmu.get(fmu.variables(list(given))), strict=True)) == given
         x, rates = fmu.get_states(), fmu.derivatives()
         order = np.argsort(x)
         assert x[order].tolist() == sorted(given.values())
-        outputs = fmu.variables(ours.outputs)
-        linear = fmu.linearise(fmu.variables(ours.inputs), outputs)
-        found.append((rates[order], linear.C[:, order], linear.D))
-    (rates, C, D), (our_rates, our_C, our_D) = found
+        linear = fmu.linearise(fmu.variables(ours.inputs), fmu.variables(ours.outputs))
+        jacobians.append((rates[order], linear.C[:, order], linear.D))
+    (rates, C, D), (our_rates, our_C, our_D) = jacobians
     # Rounding of sums whose terms are up to a thousand times their value.
     assert_allclose(rates, our_rates, rtol=1e-12, atol=1e-12 * abs(our_rates).max())
     for jacobian, exact in ((C, our_C), (D, our_D)):
@@ -218,12 +217,12 @@ def test_openmodelica_builds_the_same_stop(model, interface, tmp_path):
     (path,) = openmodelica.build_with_omc(package, [f"WheelsetRig.{model}"], tmp_path)
     with FMU(path) as theirs, FMU(fmu_path(2, model)) as ours:
         they_are_one_system(theirs, ours)
-    reference, found = run_fmpy(fmu_path(2, model), "ModelExchange"), run_fmpy(path, interface)
+    reference, result = run_fmpy(fmu_path(2, model), "ModelExchange"), run_fmpy(path, interface)
     compared = abs(TIMES - BRAKE) > STEP / 2
     # As above: CVODE on both sides, each with 1e-9.
     for column, tolerance in ((0, 2e-6), (1, 2e-6), (2, 1e-4)):
         atol = tolerance * abs(reference[:, column]).max()
-        assert_allclose(found[compared, column], reference[compared, column], rtol=0, atol=atol)
+        assert_allclose(result[compared, column], reference[compared, column], rtol=0, atol=atol)
 
 
 CHECKED = (

@@ -126,8 +126,8 @@ def test_code_is_made_again_when_what_makes_it_changes(name, tmp_path, monkeypat
 
 
 def test_what_two_processes_need_at_once_is_compiled_by_one(home):
-    with started(home) as one, started(home) as other:
-        outputs = [process.communicate(timeout=LONGEST) for process in (one, other)]
+    with started(home) as first, started(home) as other:
+        outputs = [process.communicate(timeout=LONGEST) for process in (first, other)]
     assert sorted(outputs) == [("0 kept\n", ""), ("1 kept\n", "")]
     names = {file.name for file in home.rglob("*") if file.is_file()}
     assert {Path(name).suffix for name in names - {"turns", "key"}} == {".code"}
@@ -147,8 +147,8 @@ def test_who_dies_while_it_compiles_leaves_the_turn_to_the_next(home):
 @pytest.mark.parametrize("home", ["/dev/null", "/proc", "", None])
 def test_without_a_place_to_keep_it_code_is_compiled_in_each_process(home):
     """A file, a folder that nothing can be made in, none at all."""
-    cache = {"XDG_CACHE_HOME": "/dev/null/cache"} if not home else {}
-    assert solved(home, **cache) == "0 kept"
+    given = {"XDG_CACHE_HOME": "/dev/null/cache"} if not home else {}
+    assert solved(home, **given) == "0 kept"
 
 
 @pytest.mark.skipif(os.name != "posix" or os.geteuid() != 0, reason="takes another user's part")
@@ -253,11 +253,10 @@ def test_fmus_are_those_of_their_manifest_and_it_is_of_these_sources():
     """Libraries and the compiler, whose code is among the sources; nothing is built."""
     manifest = json.loads((fmus() / "manifest.json").read_text(encoding="utf-8"))
     assert manifest["source_sha256"] == source_hash(*built_models())
-    held = {
+    assert {
         path.relative_to(fmus()).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest()
         for path in fmus().rglob("*.fmu")
-    }
-    assert held == {name: entry["sha256"] for name, entry in manifest["fmus"].items()}
+    } == {name: entry["sha256"] for name, entry in manifest["fmus"].items()}
 
 
 @pytest.mark.long

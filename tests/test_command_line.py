@@ -68,8 +68,7 @@ def test_a_reader_that_has_gone_costs_nothing_but_the_text(root, options):
 
 
 def test_a_mistake_is_a_document_too(capsys):
-    printed = document(["simulate", "cases/nowhere"], capsys)
-    error = printed["error"]
+    error = document(["simulate", "cases/nowhere"], capsys)["error"]
     assert isinstance(error, dict)
     assert error["where"] == "cases/nowhere"
     assert error["found"] == "no such folder"
@@ -135,8 +134,7 @@ try:
 except SystemExit as end:
     print(end.code, sorted(set(sys.modules) & set({HEAVY})), file=sys.stderr)
 """
-    run = python("-c", script)
-    assert run.stderr == "0 []\n"
+    assert python("-c", script).stderr == "0 []\n"
 
 
 # --- completion ---
@@ -173,13 +171,13 @@ def test_every_extra_has_a_purpose(root):
 
 
 def test_a_sound_installation_has_nothing_wrong(capsys):
-    found = {
+    offered = {
         finding["name"]: finding for finding in document(["doctor"], capsys)["result"]["findings"]
     }
-    assert {one["state"] for one in found.values()} <= {"ok", "missing"}
-    assert found["fmus/fmi2/Reference.fmu"]["state"] == "ok"
-    if found["extra [compiler]"]["state"] == "ok":
-        assert found["compiler"]["found"] == "compiled and ran a model with the state x"
+    assert {one["state"] for one in offered.values()} <= {"ok", "missing"}
+    assert offered["fmus/fmi2/Reference.fmu"]["state"] == "ok"
+    if offered["extra [compiler]"]["state"] == "ok":
+        assert offered["compiler"]["found"] == "compiled and ran a model with the state x"
 
 
 def test_a_cached_file_that_is_gone_does_not_end_the_report(tmp_path, monkeypatch, capsys):

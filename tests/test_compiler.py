@@ -174,11 +174,10 @@ def test_a_built_fmu_computes_what_the_equations_say(chain):
 def test_dependencies_are_those_of_the_equations(chain):
     path, _ = chain
     description = fmpy.read_model_description(str(path))
-    found = {
+    assert {
         u.variable.name: sorted(d.name for d in u.dependencies)
         for u in [*description.derivatives, *description.outputs]
-    }
-    assert found == {
+    } == {
         "der(m[1].s)": ["m[1].v"],
         "der(m[1].v)": ["m[1].s", "m[1].v", "m[2].s", "m[2].v"],
         "der(m[2].s)": ["m[2].v"],

@@ -207,11 +207,11 @@ QUICK = Limits(processor=1.0, answer=60.0)
 def test_a_call_that_returns_at_first_and_then_not_is_named_by_its_check(hostile_path, plan):
     plan("spin fmi2Instantiate 30")
     findings = {finding.name: finding for finding in check(hostile_path, 60, QUICK)}
-    found = findings["instantiations"]
-    assert found.passed is False
+    finding = findings["instantiations"]
+    assert finding.passed is False
     assert re.search(
         r"^the FMU did not return from a call within 1 s of processor time after 2\d instances$",
-        found.reason,
+        finding.reason,
     )
     assert findings["rollback"].passed
 

@@ -56,8 +56,7 @@ def test_a_straight_line_is_met_exactly_between_samples(system):
 def test_the_slowest_output_sets_the_times(system):
     fast, slow = np.arange(0.0, 5.0, 0.01), np.arange(0.002, 5.0, 0.02)
     signals = rolling(system, fast, 20.0 + fast)
-    radius = system.values["rR"]
-    signals["omegaR"] = (20.0 + slow) / radius
+    signals["omegaR"] = (20.0 + slow) / system.values["rR"]
     held = file(
         group("roller", slow, omegaR=signals.pop("omegaR")),
         group("others", fast, pB=fast, **signals),
@@ -151,8 +150,7 @@ def test_recordings_of_different_times_are_refused(system):
 )
 def test_times_that_do_not_go_on_are_refused(system, times, rate, match):
     time = np.arange(0.0, 5.0, 0.01)
-    signals = rolling(system, time, np.full(time.size, 20.0))
-    held = file(group("", times, pB=1e5 * time, **signals))
+    held = file(group("", times, pB=1e5 * time, **rolling(system, time, np.full(time.size, 20.0))))
     with pytest.raises(InputError, match=match):
         propose([held], system, {}, rate)
     assert propose([held], system, {}, 0.01).certain  # a given rate wins
@@ -184,8 +182,7 @@ def test_one_channel_of_two_groups_is_not_taken_for_the_other(system):
     time = np.arange(0.0, 5.0, 0.01)
     first = group("run 1", time, pB=time, **rolling(system, time, 20.0 + time))
     held = file(first, group("run 2", time, pB=2 * time))
-    proposal = propose([held], system, {})
-    assert proposal.problems == ("pB: it may be 'run 1/pB' or 'run 2/pB'",)
+    assert propose([held], system, {}).problems == ("pB: it may be 'run 1/pB' or 'run 2/pB'",)
     named = propose([held], system, {"pB": NamedChannel("run 2/pB")})
     assert_allclose(named.assigned["pB"].values, 2 * time)
 
@@ -231,7 +228,7 @@ def test_each_stop_of_a_day_is_a_recording(system):
 
 def test_a_recording_of_one_stop_is_left_whole(system):
     time, signals = drive([(25.0, 1.0)], system)
-    assert [(one.first, one.end, one.reason) for one in cut(time, signals, system)] == [
+    assert [(part.first, part.end, part.reason) for part in cut(time, signals, system)] == [
         (0, time.size, "")
     ]
 
@@ -240,8 +237,7 @@ def test_a_part_without_its_beginning_or_its_end_is_left_out(system):
     time, signals = drive([(25.0, 1.0)] * 4, system)
     piece = slice(round(15 * RATE), round(162 * RATE))  # within the first, within the last
     cuts = cut(time[piece], {name: v[piece] for name, v in signals.items()}, system)
-    reasons = [cut.reason for cut in cuts if "between" not in cut.reason]
-    assert reasons == [
+    assert [cut.reason for cut in cuts if "between" not in cut.reason] == [
         "it had begun before this recording",
         "",
         "",

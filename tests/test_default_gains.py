@@ -37,8 +37,7 @@ def models(system) -> Iterator[dict[str, FMU]]:
 def test_default_gains_reach_the_z_they_claim_and_beat_reasoned_ones(root, system, inline, name):
     path = root / "workbench" / "machines" / "wheelset" / "gains" / f"{name}.toml"
     claimed = tomllib.loads(path.read_text())["provenance"]
-    cases = read_cases([root / "cases"], system)
-    job = pose(system, name, cases, claimed["scale_errors"]).job
+    job = pose(system, name, read_cases([root / "cases"], system), claimed["scale_errors"]).job
     assert dict(system.objective.weights) == claimed["weights"]
     tuned = read_gains(path, {name: job.gains})
     after, before = evaluate_gains(inline(job), job, [tuned.values, job.gains.values])
@@ -57,7 +56,7 @@ def test_models_that_gains_were_not_tuned_on_get_reasoned_ones(system, models):
         name: (usual_gains(cls, minimal, system), usual_gains(cls, full, system))
         for name, cls in known.items()
     }
-    tuned = {n: [one.source.startswith("tuned") for one in both] for n, both in gains.items()}
+    tuned = {n: [chosen.source.startswith("tuned") for chosen in both] for n, both in gains.items()}
     assert tuned.pop("disturbance_observer") == tuned.pop("disturbance_observer_disc")
     assert tuned.pop("parameter_estimator") == [False, True]
     assert not any(any(both) for both in tuned.values())

@@ -149,8 +149,8 @@ def test_a_planted_effect_is_named_with_its_size(planted, tmp_path, diagnosed):
     assert diagnosis.gain.after < diagnosis.gain.before
     if first.effect.name == name:
         # Bounds of 95 %, and a tenth of the size for what the multibody model has besides.
-        one = first.parameters[parameter]
-        assert one.low - 0.1 * abs(size) <= size <= one.high + 0.1 * abs(size)
+        found_size = first.parameters[parameter]
+        assert found_size.low - 0.1 * abs(size) <= size <= found_size.high + 0.1 * abs(size)
 
 
 @pytest.mark.long
@@ -253,7 +253,7 @@ def test_a_cause_outside_the_catalogue_is_not_given_a_name(outside, tmp_path, di
 
 @pytest.mark.long
 @pytest.mark.parametrize(
-    ("one", "other"),
+    ("first", "other"),
     [
         ("fade", "wheel_radius"),
         ("speed_friction", "fx_offset"),
@@ -261,12 +261,12 @@ def test_a_cause_outside_the_catalogue_is_not_given_a_name(outside, tmp_path, di
         ("pressure_offset", "cylinder_lag"),
     ],
 )
-def test_two_effects_are_found_one_after_the_other(one, other, tmp_path, diagnosed):
-    effects = Effects(**{name: 1.5 * PLANTED[name][2] for name in (one, other)})
+def test_two_effects_are_found_one_after_the_other(first, other, tmp_path, diagnosed):
+    effects = Effects(**{name: 1.5 * PLANTED[name][2] for name in (first, other)})
     diagnosis = diagnosed(recorded(tmp_path, effects, 91))
     groups = [{cause.effect.name, *cause.confusable_with} for cause in diagnosis.causes]
     assert len(groups) == 2
-    for planted in (one, other):
+    for planted in (first, other):
         assert any(PLANTED[planted][0] in group for group in groups)
 
 
@@ -284,9 +284,7 @@ def test_two_effects_that_hide_each_other_are_found_in_six_stops(tmp_path, diagn
 
 
 def test_wrong_samples_are_set_aside_and_never_fitted(tmp_path, diagnosed):
-    cases = recorded(tmp_path, Effects(spikes=0.2, dropouts=0.2), 64)
-    diagnosis = diagnosed(cases)
-    assert diagnosis.verdict == "nothing"
+    assert diagnosed(recorded(tmp_path, Effects(spikes=0.2, dropouts=0.2), 64)).verdict == "nothing"
 
 
 # What the independent simulator planted, by the folder of its recordings.
@@ -305,9 +303,9 @@ def test_an_independent_simulator_is_seen_through(folder, diagnosed):
     name, parameter, size = SEEN[folder]
     diagnosis = diagnosed(read_cases([LABELLED / folder], SYSTEM))
     assert [cause.effect.name for cause in diagnosis.causes] == [name]
-    one = diagnosis.causes[0].parameters[parameter]
+    found_size = diagnosis.causes[0].parameters[parameter]
     # Its discs cool and its cylinders lag by formulas of its own: 2 % beside the interval.
-    assert one.low - 0.02 * abs(size) <= size <= one.high + 0.02 * abs(size)
+    assert found_size.low - 0.02 * abs(size) <= size <= found_size.high + 0.02 * abs(size)
     assert diagnosis.gain.after < 0.25 * diagnosis.gain.before
 
 
@@ -441,10 +439,9 @@ def test_an_effect_that_turns_is_found_beside_one_that_dwarfs_it(diagnosed):
         angle = np.cumsum(omegaW * np.diff(case.time, prepend=case.time[0]))
         return case.with_signals({"omegaW": omegaW * (1.0 + 1e-3 * np.cos(angle))})
 
-    diagnosis = diagnosed(
+    law, ring = diagnosed(
         [eccentric(case) for case in read_cases([LABELLED / "speed_friction"], SYSTEM)]
-    )
-    law, ring = diagnosis.causes
+    ).causes
     assert law.effect.name == "SpeedDependentPadFriction"
     assert law.parameters["slope"].low <= 0.22 <= law.parameters["slope"].high
     assert ring.effect.name == "PoleRingEccentricity"

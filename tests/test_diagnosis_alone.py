@@ -43,15 +43,11 @@ def write_fmu(folder: Path, *, alone: bool) -> None:
     given = ["-shared", "-fPIC", "-w", "-I", headers, "-DWHAT=THERMOSTAT", *["-DALONE"] * alone]
     subprocess.run([str(COMPILER), *given, source, "-o", library, "-lm"], check=True)
     description = machine_file(
-        "room_fmu/modelDescription.xml",
-        count=0 if alone else 1,
-        start=0.0,
-        variables=VARIABLES,
+        "room_fmu/modelDescription.xml", count=0 if alone else 1, start=0.0, variables=VARIABLES
     )
     if alone:
         description = description.replace(
-            'ModelExchange modelIdentifier="Room"',
-            ALONE.replace("Alone", "Room"),
+            'ModelExchange modelIdentifier="Room"', ALONE.replace("Alone", "Room")
         )
         first, last = (description.index(f"<{end}Derivatives>") for end in ("", "/"))
         description = description[:first] + description[last + len("</Derivatives>") :]
@@ -130,9 +126,7 @@ SWITCHING, ALWAYS = "thermostat", "co_simulation"
     "thermostat",
     [pytest.param(True, marks=pytest.mark.long, id=SWITCHING), pytest.param(False, id=ALWAYS)],
 )
-def test_a_wrong_heat_loss_is_named_with_an_interval_that_holds_it(
-    tmp_path: Path, thermostat: bool
-) -> None:
+def test_a_wrong_heat_loss_is_named_with_an_interval_that_holds_it(tmp_path, thermostat):
     """It is 60 W/K, and the FMU says 50 W/K."""
     write_fmu(tmp_path, alone=not thermostat)
     summary = diagnosed(tmp_path, 60.0, thermostat=thermostat)
@@ -146,7 +140,7 @@ def test_a_wrong_heat_loss_is_named_with_an_interval_that_holds_it(
 
 
 @pytest.mark.parametrize("thermostat", [True, False], ids=[SWITCHING, ALWAYS])
-def test_nothing_is_missing_of_a_right_fmu(tmp_path: Path, thermostat: bool) -> None:
+def test_nothing_is_missing_of_a_right_fmu(tmp_path, thermostat):
     write_fmu(tmp_path, alone=not thermostat)
     summary = diagnosed(tmp_path, 50.0, thermostat=thermostat)
     assert summary["verdict"] == "nothing"
@@ -154,17 +148,16 @@ def test_nothing_is_missing_of_a_right_fmu(tmp_path: Path, thermostat: bool) -> 
 
 
 @pytest.mark.long
-def test_a_thermometer_that_reads_too_much_is_named(tmp_path: Path) -> None:
+def test_a_thermometer_that_reads_too_much_is_named(tmp_path):
     """By 0.5 K: a thermostat switches at other readings than the FMU."""
     write_fmu(tmp_path, alone=False)
-    summary = diagnosed(tmp_path, 50.0, thermostat=True, offset=0.5)
-    (cause,) = summary["causes"]
+    (cause,) = diagnosed(tmp_path, 50.0, thermostat=True, offset=0.5)["causes"]
     offset = cause["parameters"]["offset"]
     assert cause["effect"] == "SensorOffset[T]"
     assert offset["low"] <= 0.5 <= offset["high"]
 
 
-def test_co_simulation_alone_is_fitted_and_written_with_the_fitted_value(tmp_path: Path) -> None:
+def test_co_simulation_alone_is_fitted_and_written_with_the_fitted_value(tmp_path):
     write_fmu(tmp_path, alone=True)
     record(tmp_path, 60.0, thermostat=False)
     summary = summary_of("fit", tmp_path, "--parameter", "G", "--intervals", "covariance")

@@ -198,10 +198,10 @@ def test_a_clock_that_is_set_right_leaves_readings_the_noise_they_have(share):
     ramp, rng = -3.0 * samples.time, np.random.default_rng(5)
     y = samples.y.copy()
     y[:, j] = ramp + 0.1 * rng.standard_normal(ramp.size)
-    found = in_time(replace(samples, y=y), {"omegaR": late}).y[:, j] - (ramp - 3.0 * late)
+    errors = in_time(replace(samples, y=y), {"omegaR": late}).y[:, j] - (ramp - 3.0 * late)
     inside = slice(20, -20)  # before the first and after the last sample nothing was recorded
-    assert np.std(found[inside]) == pytest.approx(0.1, rel=0.05)
-    assert abs(np.mean(found[inside])) < 5e-3
+    assert np.std(errors[inside]) == pytest.approx(0.1, rel=0.05)
+    assert abs(np.mean(errors[inside])) < 5e-3
 
 
 def test_spikes_are_set_aside_with_their_blocks():
@@ -217,10 +217,9 @@ def test_blocks_span_equal_times_where_steps_do_not(tmp_path):
     """A cycler: 0.5 s while it pulses, one sample in 60 s while it rests; nearly all counts."""
     write_system(tmp_path / "tank")
     tank = load_system(tmp_path / "tank")
-    bursts = [
-        3060.0 * k + np.append(np.arange(0.0, 60.0, 0.5), 60.0 * np.arange(1, 51)) for k in (0, 1)
-    ]
-    time = np.concatenate(bursts)
+    time = np.concatenate(
+        [3060.0 * k + np.append(np.arange(0.0, 60.0, 0.5), 60.0 * np.arange(1, 51)) for k in (0, 1)]
+    )
     noise = np.random.default_rng(1)
     signals = {
         "inflow": 4e-3 + 5e-5 * noise.standard_normal(time.size),
@@ -257,8 +256,7 @@ def test_a_gap_is_in_no_block_and_leaves_others_as_they_are(tmp_path):
     case = make_case("gap", (time, signals), {}, tank)
     blocks = count(case, tank, ("inflow", "h"), SOUND, restarting=False).blocks
     assert set((blocks[:, 1] - blocks[:, 0]).tolist()) == {5}
-    spans = np.array([time[first:end] for first, end in blocks])
-    assert np.diff(spans).max() < 5.0
+    assert np.diff(np.array([time[first:end] for first, end in blocks])).max() < 5.0
 
 
 @pytest.mark.parametrize("name", ["pB", "tauR", "omegaW", "omegaR", "Fx"])
@@ -286,8 +284,7 @@ def test_pressure_loses_its_noise_but_no_time():
     true *= np.exp(-np.clip(time - 14.0, 0.0, None) / 0.5)
     noise = 500.0 * np.random.default_rng(8).standard_normal(time.size)
     speeds = {"omegaW": 39.0 / 0.46 + noise * 1e-5, "omegaR": 39.0 / 0.70 + noise * 1e-6}
-    case = stop(time, {"pB": true + noise, "tauR": np.zeros(time.size), **speeds})
-    pB = ready(case).u[:, 0]
+    pB = ready(stop(time, {"pB": true + noise, "tauR": np.zeros(time.size), **speeds})).u[:, 0]
     held = (time > 9.0) & (time < 12.5)
     # 400 samples in a mean, 30 in a parabola of three times its variance.
     assert np.std(pB[held] - true[held]) < 2.0 * 500.0 / np.sqrt(400.0)
@@ -307,8 +304,7 @@ def test_noise_is_whitened_to_variance_one():
     errors = np.column_stack([case[name] for name in ("omegaW", "omegaR", "Fx")]) - np.column_stack(
         [smooth, force]
     )
-    means = samples.channels(errors)
-    white = np.einsum("bij,bj->bi", samples.whitening, means)
+    white = np.einsum("bij,bj->bi", samples.whitening, samples.channels(errors))
     # 500 blocks: a variance is known to 6 %. The roller's channel allows for the prediction's own
     # variance, which pure measurement noise does not have.
     assert white[:, 0].var() == pytest.approx(1.0, abs=0.25)
@@ -345,8 +341,7 @@ def test_errors_that_last_are_noise_though_samples_are_missing():
 def test_load_cells_behind_the_mode_follow_its_transfer_function():
     samples = ready(noisy(3))
     for frequency in (2.0, 8.0, 15.0):
-        wave = np.sin(2.0 * np.pi * frequency * samples.time)
-        read = samples.behind_structure(2, wave)[2000:]
+        read = samples.behind_structure(2, np.sin(2.0 * np.pi * frequency * samples.time))[2000:]
         s, mode = 1j * frequency, 21.6
         gain = abs(mode**2 / (s**2 + 2 * 0.05 * mode * s + mode**2))
         # Matched poles: 1 % of the amplitude, and 1 % for the samples missing the crest.
@@ -383,12 +378,12 @@ def test_eliminating_local_unknowns_is_least_squares_over_all():
     step = minimum(total)
     # The same by brute force: all local unknowns side by side, priors as rows.
     rows, right = [], []
-    for k, one in enumerate(systems):
+    for k, system in enumerate(systems):
         block = np.zeros((40 + 5, 3 + 5 * 4))
-        block[:40, :3], block[:40, 3 + 5 * k : 8 + 5 * k] = one.J, one.P
+        block[:40, :3], block[:40, 3 + 5 * k : 8 + 5 * k] = system.J, system.P
         block[40:, 3 + 5 * k : 8 + 5 * k] = np.eye(5)
         rows.append(block)
-        right.append(np.concatenate([one.r, one.deviations]))
+        right.append(np.concatenate([system.r, system.deviations]))
     matrix, vector = np.vstack(rows), np.concatenate(right)
     brute = np.linalg.lstsq(matrix, -vector, rcond=None)[0]
     np.testing.assert_allclose(step, brute[:3], rtol=1e-6)
@@ -401,8 +396,7 @@ def test_eliminating_local_unknowns_is_least_squares_over_all():
     shown = np.vstack([np.eye(3, 23), means])
     joint = Joint(keys, keys, (), tuple(systems), nothing)
     np.testing.assert_allclose(joint.covariance(), shown @ full @ shown.T, rtol=1e-5, atol=1e-9)
-    local = systems[2].local(step)
-    np.testing.assert_allclose(local, brute[13:18], rtol=1e-6)
+    np.testing.assert_allclose(systems[2].local(step), brute[13:18], rtol=1e-6)
 
 
 def test_a_tolerance_at_its_bound_stays_there_while_the_rest_does_its_best():
@@ -582,8 +576,8 @@ def test_recordings_that_share_an_open_model_say_what_they_say_alone(everything)
             ModelSource(everything, SYSTEM, values), [case], model=model
         ) as simulations:
             fit = Fit(simulations, [inertia])
-            (found,) = fit.linearise(fit.at(fit.unknowns.start()), [inertia]).residuals
-        return found
+            (whitened,) = fit.linearise(fit.at(fit.unknowns.start()), [inertia]).residuals
+        return whitened
 
     with opened(ModelSource(everything, SYSTEM, values)) as model:
         for case in (noisy(6), noisy(7)):
@@ -727,8 +721,7 @@ def rival(rng: np.random.Generator, furthest: float) -> Rival:
 def test_recordings_so_far_hold_the_unknowns_of_new_ones(furthest, above):
     """Reference: all of them side by side, with what new ones do not have among their own."""
     known = rival(np.random.default_rng(3), furthest)
-    shared = (SIZE, ("friction", "greasy"), ON_DRY)
-    so_far = known.so_far(shared, 3.0)
+    so_far = known.so_far((SIZE, ("friction", "greasy"), ON_DRY), 3.0)
     assert_allclose(so_far.chi_squared, known.chi_squared, rtol=1e-12)
     # Side by side: the friction that new ones lack, then the three own unknowns of each recording.
     P = np.zeros((4 * 7, 1 + 4 * 3))
@@ -742,8 +735,8 @@ def test_recordings_so_far_hold_the_unknowns_of_new_ones(furthest, above):
     J = np.vstack([o.J for o in known.recordings])
     for size, dry, greasy in np.random.default_rng(4).normal(size=(20, 3)):
         least = brute(r + J @ [size, dry, 0.0], P, begun, prior, bounds)
-        found = so_far.moved(np.array([size, greasy, dry])).chi_squared
-        assert least * (1.0 - 1e-6) <= found <= least * (1.0 + above)
+        chi_squared = so_far.moved(np.array([size, greasy, dry])).chi_squared
+        assert least * (1.0 - 1e-6) <= chi_squared <= least * (1.0 + above)
 
 
 def test_information_is_that_of_all_recordings_and_of_what_was_known():

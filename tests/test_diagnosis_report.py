@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 import signal
 from dataclasses import replace
 from pathlib import Path
@@ -19,7 +20,7 @@ from workbench.diagnosis import Residuals
 from workbench.diagnosis.inference.residuals import Balance
 from workbench.diagnosis.outcome import FAST, lasting, lasting_blocks, recording_figure
 from workbench.diagnosis.report import write_diagnosis_page
-from workbench.machines.wheelset.rig import CONSTANT_PADS, SCENARIOS, plant
+from workbench.machines.wheelset.rig import CONSTANT_PADS, plant
 from workbench.pages.figures import CaseFigure
 from workbench.system.registry import load_system
 from workbench.system.system import System
@@ -27,6 +28,7 @@ from workbench.system.system import System
 from .page_rules import check_page, data, script, section, text
 from .processes import running
 from .recordings import record
+from .scenarios import short
 from .schemas import check
 
 STOPS = {"01_dry_80_1.5": 45.0, "03_dry_120_3.6": 70.0, "05_dry_120_2.7_rev": 60.0}  # from [km/h]
@@ -72,31 +74,18 @@ def stops(tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("stops")
     effects = plant(CONSTANT_PADS, [f"fx_offset={PLANTED}"])
     for seed, (name, speed) in enumerate(STOPS.items()):
-        usual = SCENARIOS[name]
-        conditions = replace(usual.conditions, initial_speed=speed / 3.6)
-        short = replace(usual, conditions=conditions)
-        record(short, seed, effects, folder / name)
+        record(short(name, speed), seed, effects, folder / name)
     return folder
 
 
 @pytest.fixture(scope="module")
-def results(root, stops, tmp_path_factory) -> Path:
-    return diagnose(root, stops, tmp_path_factory.mktemp("diagnosis"))
-
-
-@pytest.fixture(scope="module")
-def summary(results) -> dict[str, Any]:
-    return json.loads((results / "summary.json").read_text())
+def results(root, stops, once) -> Path:
+    return once("diagnosis", lambda out: diagnose(root, stops, out))
 
 
 def test_summary_and_page_are_as_all_are(results, summary):
     check("diagnose", summary)
     check_page(results / "index.html", summary)
-
-
-@pytest.fixture(scope="module")
-def page(results) -> Any:
-    return lxml.html.fromstring((results / "index.html").read_bytes())
 
 
 def steps(path: str) -> np.ndarray:
@@ -207,13 +196,13 @@ def test_cause_is_told_with_interval_unit_twin_and_the_experiment(page, summary)
 
 def test_a_size_is_told_with_what_noise_alone_allows_and_what_its_error_goes_with(page, summary):
     (cause,), certainty = summary["causes"], summary["certainty"]
-    ((name, one),) = cause["parameters"].items()
+    ((name, estimated),) = cause["parameters"].items()
     size = f"{cause['effect']} {name}"
     ends = certainty["likelihood"][size]
     row = section(page, "causes").xpath(f".//article//tr[th='{name}']")[0]
     assert [float(cell.get("data-value")) for cell in row[6:8]] == [ends["low"], ends["high"]]
     # The interval also holds forms of laws and companions.
-    assert one["low"] < ends["low"] < one["value"] < ends["high"] < one["high"]
+    assert estimated["low"] < ends["low"] < estimated["value"] < ends["high"] < estimated["high"]
     rows = dict(zip(certainty["unknowns"], certainty["correlations"], strict=True))
     others = {n: c for n, c in zip(rows, rows[size], strict=True) if n != size and abs(c) >= 0.3}
     shown = text(section(page, "causes").xpath(".//article")[0])
@@ -237,8 +226,7 @@ def test_each_candidate_has_one_row_the_best_first(page, summary):
     units = {text(row[0]): text(row[3]) for row in page.xpath("//*[@id='candidate-table']//tr")}
     assert (units["FxOffset"], units["WheelRadius"], units["BrakeFade"]) == ("N", "m", "1/K")
     for name, fall in falls.items():
-        best = max(o["held_out"] for o in summary["candidates"] if o["effect"] == name)
-        assert fall == best
+        assert fall == max(o["held_out"] for o in summary["candidates"] if o["effect"] == name)
     outcomes = {text(row[0]): text(row[-1]) for row in page.xpath("//*[@id='candidate-table']//tr")}
     (cause,) = summary["causes"]
     (twin,) = TWINS - {cause["effect"]}
@@ -250,8 +238,7 @@ def test_each_candidate_has_one_row_the_best_first(page, summary):
 
 def test_matrix_frames_what_was_found_and_reads_out_its_twin(page, summary):
     (matrix,) = page.find_class("matrix")
-    names = summary["confusability"]["effects"]
-    assert len(matrix.xpath("./rect")) == len(names) ** 2
+    assert len(matrix.xpath("./rect")) == len(summary["confusability"]["effects"]) ** 2
     frame = matrix.xpath("./path[@class='mark']/@d")[0]
     framed = matrix.xpath("./text[@class='found' and @y]")[0]
     assert text(framed).endswith(summary["causes"][0]["effect"])
@@ -518,17 +505,19 @@ def test_no_mean_and_no_line_bridges_what_was_set_aside(dry_case, system):
 
 
 @pytest.fixture(scope="module")
-def forceless(root, stops, tmp_path_factory) -> Any:
+def forceless(root, stops, once) -> Any:
     """The page of the same stops without Fx, in which nothing is wrong then."""
-    folder = tmp_path_factory.mktemp("forceless")
-    for name in STOPS:
-        (folder / name).mkdir()
-        (folder / name / "case.toml").write_text((stops / name / "case.toml").read_text())
-        table = pd.read_csv(stops / name / "measured.csv")
-        forces = [column for column in table if column.startswith("Fx")]
-        table.drop(columns=forces).to_csv(folder / name / "measured.csv", index=False)
-    out = diagnose(root, folder, tmp_path_factory.mktemp("forceless_out"))
-    return lxml.html.fromstring((out / "index.html").read_bytes())
+
+    def run(folder: Path) -> Path:
+        for name in STOPS:
+            (folder / "stops" / name).mkdir(parents=True)
+            shutil.copy(stops / name / "case.toml", folder / "stops" / name)
+            table = pd.read_csv(stops / name / "measured.csv")
+            forces = [column for column in table if column.startswith("Fx")]
+            table.drop(columns=forces).to_csv(folder / "stops" / name / "measured.csv", index=False)
+        return diagnose(root, folder / "stops", folder / "out")
+
+    return lxml.html.fromstring((once("forceless", run) / "index.html").read_bytes())
 
 
 @pytest.mark.usefixtures("ctrl_c")

@@ -110,14 +110,17 @@ def test_a_wrong_example_is_found(tmp_path):
 
 
 @pytest.fixture(scope="module")
-def site(tmp_path_factory) -> Path:
+def site(once) -> Path:
     """Built as `make docs` does, where no network can be reached."""
-    out = tmp_path_factory.mktemp("site")
-    nowhere = {f"{kind}_proxy": "http://127.0.0.1:9" for kind in ("http", "https")}
-    command = ("-m", "mkdocs", "build", "--strict", "--site-dir", str(out))
-    run = python(*command, NO_MKDOCS_2_WARNING="1", **nowhere)
-    assert run.returncode == 0, run.stderr
-    return out
+
+    def build(out: Path) -> Path:
+        nowhere = {f"{kind}_proxy": "http://127.0.0.1:9" for kind in ("http", "https")}
+        command = ("-m", "mkdocs", "build", "--strict", "--site-dir", str(out))
+        run = python(*command, NO_MKDOCS_2_WARNING="1", **nowhere)
+        assert run.returncode == 0, run.stderr
+        return out
+
+    return once("site", build)
 
 
 def test_the_site_is_built_strictly_and_needs_no_network(site):
@@ -322,8 +325,7 @@ def test_refusals_are_short_and_in_words_of_the_glossary():
 
 def prose_of_keys(table: type) -> str:
     """Meanings of the keys of a table of the system file, each a paragraph."""
-    rows = re.findall(r"^\| .* \| ([^|]*) \|$", reference(table, ()), re.M)
-    return "\n\n".join(rows)
+    return "\n\n".join(re.findall(r"^\| .* \| ([^|]*) \|$", reference(table, ()), re.M))
 
 
 def test_the_terms_in_place_of_home_made_words_are_in_the_glossary():

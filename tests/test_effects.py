@@ -44,7 +44,7 @@ def tank(folder: Path, *changes: tuple[str, str]) -> Library:
 @pytest.mark.parametrize("effect", EFFECTS, ids=lambda effect: effect.name)
 def test_every_effect_has_a_claim_that_gives_it_a_size(effect):
     """A class with an annotation is an effect, and is found here without being listed."""
-    claims = [
+    assert [
         definition.name
         for definition in WHEELSET.classes.values()
         if definition.name.startswith("WheelsetRig.Tests.")
@@ -54,7 +54,6 @@ def test_every_effect_has_a_claim_that_gives_it_a_size(effect):
         and WHEELSET.resolve(component.type, definition.name) == effect.model
         and not component.modifier.inner.keys().isdisjoint(effect.sizes)
     ]
-    assert claims
 
 
 def test_slots_follow_from_the_class_that_an_effect_extends():
@@ -98,8 +97,8 @@ def test_an_output_that_is_an_input_is_handed_on_by_effects_that_say_nothing_of_
         with FMU(everything) as model:
             model.start({"omegaW": 50.0, "omegaR": 50.0 * 0.46 / 0.70}, {size: film})
             model.set(model.variables(["pB"]), np.array([2.7e5]))
-            (found,) = model.get(model.variables(["FDisc"]))
-        return float(found)
+            (reading,) = model.get(model.variables(["FDisc"]))
+        return float(reading)
 
     dry = force("padFriction.waterFilm.film", 0.0)
     # Half wet it rubs half way from 0.30 to 0.12, as it does where all are.
@@ -163,9 +162,8 @@ def test_a_foreign_library_is_extended_and_flattened(tmp_path):
 def test_effects_in_a_chain_follow_one_another_and_others_add_up(tmp_path):
     """Closed forms: a level of 1 m, Torricelli's law."""
     library = tank(tmp_path)
-    effects = read_effects(library, "Base")
     text = ExtendedModel(
-        library, "Base", "Extended", effects, "", {"Leak": {"area": 2e-4}}
+        library, "Base", "Extended", read_effects(library, "Base"), "", {"Leak": {"area": 2e-4}}
     ).source()
     path = tmp_path / "Extended.fmu"
     build(library, "Extended", text, path, every_platform=False)
@@ -180,8 +178,7 @@ def test_effects_in_a_chain_follow_one_another_and_others_add_up(tmp_path):
         # Of 1e-3 m2 a tenth is closed; the leak of 2e-4 m2 is as wide as ever.
         expected = -(0.9e-3 + 2e-4) * velocity / 2.0
         np.testing.assert_allclose(fmu.derivatives(), [expected], rtol=1e-12)
-        reading = fmu.get(fmu.variables(["reading"]))
-        np.testing.assert_allclose(reading, [1.5 * 1.2], rtol=1e-12)
+        np.testing.assert_allclose(fmu.get(fmu.variables(["reading"])), [1.5 * 1.2], rtol=1e-12)
 
 
 def test_what_is_handed_on_is_so_where_changes_add_up(tmp_path):
@@ -203,8 +200,7 @@ def test_what_is_handed_on_is_so_where_changes_add_up(tmp_path):
             '    output Real reading(unit="m") = gauge',
         ),
     )
-    effects = read_effects(library, "Base")
-    text = ExtendedModel(library, "Base", "Extended", effects, "").source()
+    text = ExtendedModel(library, "Base", "Extended", read_effects(library, "Base"), "").source()
     path = tmp_path / "Extended.fmu"
     build(library, "Extended", text, path, every_platform=False)
     with FMU(path) as fmu:
@@ -288,7 +284,7 @@ def test_a_size_that_is_an_array_makes_an_effect_in_each_place(tmp_path):
 
 def test_all_places_or_one_are_chosen_by_name(tmp_path):
     effects = read_effects(orchard(tmp_path), "Base")
-    assert [one.name for one in choose(["Clogging"], effects)] == [
+    assert [effect.name for effect in choose(["Clogging"], effects)] == [
         effect.name for effect in effects[:3]
     ]
     assert choose(["Clogging[2]", "Drought"], effects) == (effects[1], effects[3])
@@ -301,9 +297,9 @@ def test_the_extended_model_has_a_size_in_its_place_alone(tmp_path):
     library = orchard(tmp_path)
     effects = read_effects(library, "Base")
     values = {"Clogging[1]": {"lost": 0.1}, "Clogging[3]": {"lost": 0.5}, "Drought": {"dry": 0.2}}
-    found = [effects[0], effects[2], effects[3]]
+    chosen = [effects[0], effects[2], effects[3]]
     text = ExtendedModel(
-        library, "Base", "Extended", found, "Two valves, and the well", values
+        library, "Base", "Extended", chosen, "Two valves, and the well", values
     ).source()
     package = library.file.rename(tmp_path / "package.mo")
     (tmp_path / "Extended.mo").write_text(f"within Orchard;\n{text}")
@@ -419,8 +415,7 @@ def test_an_extended_model_has_the_common_laws(beside, tmp_path):
         fmu.start({"v": 0.5}, sizes)
         resists = 3.0 + 4.0 * 0.5 * (2.0 if beside else 1.0)
         np.testing.assert_allclose(fmu.derivatives(), [-resists / 2.0], rtol=1e-12)
-        reading = fmu.get(fmu.variables(["reading"]))
-        np.testing.assert_allclose(reading, [0.5 * 0.6], rtol=1e-12)
+        np.testing.assert_allclose(fmu.get(fmu.variables(["reading"])), [0.5 * 0.6], rtol=1e-12)
 
 
 @pytest.mark.parametrize(

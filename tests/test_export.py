@@ -5,7 +5,6 @@ import shutil
 import zipfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 
 import fmpy
@@ -22,10 +21,12 @@ from workbench.errors import InputError
 from workbench.models.compiler.archive import PLATFORMS
 from workbench.models.compiler.flat import flatten
 from workbench.observers import Estimator, Gains, choose
-from workbench.observers.export import build_observer, model_name, write_package
+from workbench.observers.export import build_observer, write_package
 from workbench.observers.gains_file import format_gains
 from workbench.recordings.case import Case, read_cases
 from workbench.system.registry import load_system, open_model
+
+from .exported import Exported, write_fmu
 
 SYSTEM = load_system("wheelset")
 KINDS = choose(SYSTEM, list(SYSTEM.export.classes))
@@ -45,23 +46,9 @@ OUTPUTS = {
 AGREEMENT = 1e-6
 
 
-@dataclass(frozen=True)
-class Exported:
-    """An FMU for this machine and the Python observer with the same gains."""
-
-    path: Path
-    python: Estimator
-
-
 def default_gains(name: str) -> Gains:
     with open_model(SYSTEM, KINDS[name].role) as fmu:
         return KINDS[name].default_gains(fmu, SYSTEM)
-
-
-def write_fmu(folder: Path, estimator: Estimator, fmi: int = 2) -> Path:
-    path = folder / f"fmi{fmi}" / f"{model_name(estimator).rpartition('.')[2]}.fmu"
-    build_observer(estimator, path, fmi, platforms=["linux-x86_64"])
-    return path
 
 
 def with_all_gains(gains: Gains) -> Gains:
@@ -81,9 +68,8 @@ def with_all_gains(gains: Gains) -> Gains:
 def exported(request, tmp_path_factory) -> Iterator[Exported]:
     cls = KINDS[request.param]
     with open_model(SYSTEM, cls.role) as fmu:
-        gains = with_all_gains(cls.default_gains(fmu, SYSTEM))
-        python = cls(fmu, SYSTEM, gains)
-        yield Exported(write_fmu(tmp_path_factory.mktemp(cls.name), python), python)
+        python = cls(fmu, SYSTEM, with_all_gains(cls.default_gains(fmu, SYSTEM)))
+        yield Exported(write_fmu(tmp_path_factory.mktemp(cls.name) / "law.fmu", python), python)
 
 
 @pytest.fixture(scope="module")
@@ -133,9 +119,9 @@ def run_python(estimator: Estimator, time: np.ndarray, u: np.ndarray, y: np.ndar
     return estimator.run(time, u, y).values[:, columns]
 
 
-def disagreement(found: np.ndarray, expected: np.ndarray) -> float:
+def disagreement(values: np.ndarray, expected: np.ndarray) -> float:
     """Largest deviation of any output, of its largest value in the stop."""
-    return float((abs(found - expected).max(axis=0) / abs(expected).max(axis=0)).max())
+    return float((abs(values - expected).max(axis=0) / abs(expected).max(axis=0)).max())
 
 
 def test_fmu_reproduces_python_on_all_recorded_stops(exported, cases):
@@ -167,21 +153,18 @@ def test_limits_of_friction_are_kept_and_reached(exported, dry_case):
 def test_a_tool_without_python_of_ours_gets_the_same(tmp_path, dry_case, name, fmi):
     """FMPy's own simulation, which sees the estimate at the end of a step, one sample later."""
     with open_model(SYSTEM, KINDS[name].role) as fmu:
-        gains = KINDS[name].default_gains(fmu, SYSTEM)
-        estimator = KINDS[name](fmu, SYSTEM, gains)
-        path = write_fmu(tmp_path, estimator, fmi)
+        estimator = KINDS[name](fmu, SYSTEM, KINDS[name].default_gains(fmu, SYSTEM))
+        path = write_fmu(tmp_path / "law.fmu", estimator, fmi)
         expected = run_python(estimator, dry_case.time, dry_case.u, dry_case.y)
     assert validate_fmu(str(path)) == []
     time = np.arange(dry_case.time.size) * 0.005
     signals = np.column_stack([time, dry_case.u, dry_case.y])
-    recorded = np.array([tuple(row) for row in signals], [(n, float) for n in ("time", *INPUTS)])
-    description = fmpy.read_model_description(str(path))
     result = fmpy.simulate_fmu(
         str(path),
-        input=recorded,
+        input=np.array([tuple(row) for row in signals], [(n, float) for n in ("time", *INPUTS)]),
         stop_time=time[-1],
         output=[*OUTPUTS],
-        output_interval=float(description.defaultExperiment.stepSize),
+        output_interval=float(fmpy.read_model_description(str(path)).defaultExperiment.stepSize),
     )
     estimate = np.column_stack([result[output] for output in OUTPUTS])
     assert disagreement(estimate[1:], expected[:-1]) < AGREEMENT
@@ -213,7 +196,7 @@ def test_gains_are_parameters_that_another_tool_may_set(exported, tmp_path, dry_
     python = exported.python
     gains = default_gains(python.name)
     with open_model(SYSTEM, python.role) as fmu:
-        path = write_fmu(tmp_path, type(python)(fmu, SYSTEM, gains))
+        path = write_fmu(tmp_path / "law.fmu", type(python)(fmu, SYSTEM, gains))
     own = {variable.name: variable for variable in fmpy.read_model_description(path).modelVariables}
     meanings = type(python).meanings(python.fmu, SYSTEM, gains)
     assert all(own[name].unit == unit for name, (_, unit) in meanings.items())
@@ -252,17 +235,20 @@ def test_default_gains_of_the_modelica_classes_are_the_reasoned_ones():
 
 
 @pytest.fixture(scope="module")
-def package(root, tmp_path_factory) -> Path:
+def package(root, once) -> Path:
     """The folder that the command writes, with gains from a file."""
-    folder = tmp_path_factory.mktemp("export")
-    gains = default_gains("disturbance_observer")
-    values = gains.values.copy()
-    values[:16] *= 0.5
-    (folder / "gains.toml").write_text(format_gains(gains.with_values(values), "", {"z": 0.3}))
-    with pytest.MonkeyPatch.context() as patch:
-        patch.chdir(root)
-        assert main(exporting(folder / "gains.toml", folder / "out")) == 0
-    return folder
+
+    def export(folder: Path) -> Path:
+        gains = default_gains("disturbance_observer")
+        values = gains.values.copy()
+        values[:16] *= 0.5
+        (folder / "gains.toml").write_text(format_gains(gains.with_values(values), "", {"z": 0.3}))
+        with pytest.MonkeyPatch.context() as patch:
+            patch.chdir(root)
+            assert main(exporting(folder / "gains.toml", folder / "out")) == 0
+        return folder
+
+    return once("export", export)
 
 
 def exporting(gains: Path, out: Path) -> list[str]:
@@ -292,8 +278,7 @@ def test_the_command_writes_the_gains_of_the_file(package):
 def test_an_observer_is_for_all_platforms_unless_others_are_asked_for(tmp_path):
     gains = default_gains("disturbance_observer")
     with open_model(SYSTEM, KINDS[gains.estimator].role) as fmu:
-        estimator = KINDS[gains.estimator](fmu, SYSTEM, gains)
-        build_observer(estimator, tmp_path / "observer.fmu", 2)
+        build_observer(KINDS[gains.estimator](fmu, SYSTEM, gains), tmp_path / "observer.fmu", 2)
     with zipfile.ZipFile(tmp_path / "observer.fmu") as archive:
         folders = {Path(n).parts[1] for n in archive.namelist() if n.startswith("binaries/")}
     assert folders == {fmi2_name for fmi2_name, *_ in PLATFORMS.values()}
@@ -319,11 +304,10 @@ def test_the_package_follows_the_schemas_and_names_what_its_fmus_have(package, t
     with zipfile.ZipFile(ssp) as archive:
         for component in system.elements:
             file = archive.extract(component.source, tmp_path)
-            found = fmpy.read_model_description(file).modelVariables
-            variables[component.name] = {v.name: v for v in found}
+            described = fmpy.read_model_description(file).modelVariables
+            variables[component.name] = {v.name: v for v in described}
             for connector in component.connectors:
-                variable = variables[component.name][connector.name]
-                assert variable.causality == connector.kind
+                assert variables[component.name][connector.name].causality == connector.kind
     for parameter in start.parameters:
         component, _, name = parameter.name.partition(".")
         assert variables[component][name].start is not None
@@ -372,10 +356,7 @@ def test_in_an_ssp_tool_frictions_are_right_at_any_step(package, step, pressure,
         stop_time=begin + 3.0,
         step_size=step,
         parameter_set=start,
-        input={
-            "pB": lambda t: pressure * np.clip((t - begin) / 0.5, 0.0, 1.0),
-            "tauR": drive,
-        },
+        input={"pB": lambda t: pressure * np.clip((t - begin) / 0.5, 0.0, 1.0), "tauR": drive},
     )
     time, error = result["time"], abs(result["FxEstimate"] - result["Fx"])
     late = time > begin + 2.0

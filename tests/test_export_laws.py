@@ -8,7 +8,6 @@ import subprocess
 import zipfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 
 import fmpy
@@ -19,21 +18,22 @@ from fmpy.fmi2 import FMU2Slave
 from fmpy.fmi3 import FMU3Slave
 from fmpy.ssp.ssd import read_ssd
 from fmpy.validation import validate_fmu
+from numpy.testing import assert_array_equal
 
 from workbench.__main__ import main
 from workbench.errors import InputError
-from workbench.models import fmu_cache
 from workbench.models.compiler import native
 from workbench.models.fmu import FMU
 from workbench.observers import Estimator, choose
 from workbench.observers.estimators.kalman import ExtendedKalmanFilter
-from workbench.observers.export import build_observer, model_name
+from workbench.observers.export import build_observer
 from workbench.observers.gains_file import format_gains
 from workbench.recordings.case import Case, read_case
 from workbench.system.registry import load_system, open_model
 from workbench.system.system import System
 
 from . import heater
+from .exported import Exported, write_fmu
 from .processes import COMPILER
 
 ROOT = Path(__file__).parent.parent
@@ -42,29 +42,6 @@ NAMES = ("ekf", "ukf", "mhe", "imm")
 # Of the largest value of an output. Found here: equal to the bit, as the order of operations is the
 # same; elementary functions of another library may differ in their last bit.
 AGREEMENT = 1e-6
-
-
-@dataclass(frozen=True)
-class Exported:
-    """An FMU for this machine and the Python estimator with the same gains."""
-
-    path: Path
-    python: Estimator
-
-
-def write_fmu(path: Path, estimator: Estimator, fmi: int = 2) -> Path:
-    """Build, once for each state of estimators and compiler."""
-    package = ROOT / "workbench"
-    files = [package / "models" / "native.py", *(package / "observers").rglob("*.[pch]*")]
-    texts = [file.read_text() for file in sorted(files) if file.suffix in (".py", ".c", ".h")]
-    parts = model_name(estimator), estimator.fmu.sha256, str(estimator.gains.summary()), str(fmi)
-    texts.append(estimator.system.source.read_text())
-    fmu_cache.fetch(
-        fmu_cache.key(estimator.system.library, *texts, *parts),
-        path,
-        lambda path: build_observer(estimator, path, fmi, platforms=[native()]),
-    )
-    return path
 
 
 @contextmanager
@@ -162,12 +139,12 @@ def run_python(estimator: Estimator, time: np.ndarray, u: np.ndarray, y: np.ndar
     return np.column_stack([estimate.values, estimate.sigma, estimate.probability, estimate.nis])
 
 
-def assert_same(found: np.ndarray, expected: np.ndarray) -> None:
+def assert_same(values: np.ndarray, expected: np.ndarray) -> None:
     """Equal where there is a number, to a share of the largest value of each output."""
-    assert found.shape == expected.shape
-    np.testing.assert_array_equal(np.isnan(found), np.isnan(expected))
+    assert values.shape == expected.shape
+    assert_array_equal(np.isnan(values), np.isnan(expected))
     largest = np.nan_to_num(abs(expected)).max(axis=0)
-    assert (np.nan_to_num(abs(found - expected)) <= AGREEMENT * largest).all()
+    assert (np.nan_to_num(abs(values - expected)) <= AGREEMENT * largest).all()
 
 
 def test_fmu_reproduces_python_over_first_contact_and_slide(exported, dry_case, slide):
@@ -339,12 +316,10 @@ def test_under_the_sanitizers_samples_are_clean_and_nothing_is_allocated(tmp_pat
         [tmp_path / "sources" / "samples"], input=given, capture_output=True, text=True, check=False
     )
     assert (run.returncode, run.stderr) == (0, "")
-    found = np.array([line.split() for line in run.stdout.splitlines()], float)
+    samples = np.array([line.split() for line in run.stdout.splitlines()], float)
     half, again = count // 2, 10
-    assert_same(np.vstack([found[: half + again], found[half + 2 * again :]]), expected)
-    np.testing.assert_array_equal(
-        found[half : half + again], found[half + again : half + 2 * again]
-    )
+    assert_same(np.vstack([samples[: half + again], samples[half + 2 * again :]]), expected)
+    assert_array_equal(samples[half : half + again], samples[half + again : half + 2 * again])
 
 
 # --- other machines ---

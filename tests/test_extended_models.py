@@ -160,9 +160,9 @@ def test_the_operating_point_is_an_equilibrium_of_every_model(extended):
 
 
 def test_a_cylinder_that_lags_is_full_at_the_operating_point(minimal, extended):
-    expected, found = (gains_of(fmu) for fmu in (minimal, extended["Lagging"]))
-    assert_allclose(found.values, expected.values, rtol=1e-9)
-    assert_allclose(found.design["effect"], expected.design["effect"], rtol=1e-9)
+    expected, lagging = (gains_of(fmu) for fmu in (minimal, extended["Lagging"]))
+    assert_allclose(lagging.values, expected.values, rtol=1e-9)
+    assert_allclose(lagging.design["effect"], expected.design["effect"], rtol=1e-9)
 
 
 def test_discs_are_at_their_start_at_the_operating_point(extended):
@@ -190,15 +190,17 @@ GAIN = 0.04  # of the measured torque, which is most of the balance that the for
 
 
 @pytest.fixture(scope="module")
-def outcome(system, tmp_path_factory) -> Outcome:
+def outcome(system, once) -> Outcome:
     """Of two stops whose torque was measured too large."""
-    folder = tmp_path_factory.mktemp("torque")
-    for scenario in select(STOPS):
-        record(scenario, 3, Effects(torque_gain=GAIN), folder / "stops" / scenario.name)
-    cases = read_cases([folder / "stops"], system)
-    effects = ("DriveTorqueGain", "WheelRadius")
-    out = folder / "out"
-    return diagnose(system, cases, effects=effects, out=out, workers=1, report=lambda _: None)
+
+    def run(folder: Path) -> Outcome:
+        for scenario in select(STOPS):
+            record(scenario, 3, Effects(torque_gain=GAIN), folder / "stops" / scenario.name)
+        cases, out = read_cases([folder / "stops"], system), folder / "out"
+        effects = ("DriveTorqueGain", "WheelRadius")
+        return diagnose(system, cases, effects=effects, out=out, workers=1, report=lambda _: None)
+
+    return once("diagnosis of a wrong torque", run)
 
 
 @pytest.fixture(scope="module")
@@ -226,8 +228,7 @@ def test_load_cells_feed_no_estimate(outcome, estimates):
     """Without them the numbers are the same, but for the share of them that is inside."""
     case = outcome.cases[0]
     signals = {name: values for name, values in case.signals.items() if name != "Fx"}
-    blind = replace(outcome, cases=(replace(case, signals=signals),))
-    best = best_estimate(blind, case.name)
+    best = best_estimate(replace(outcome, cases=(replace(case, signals=signals),)), case.name)
     for model, run in estimates[case.name].runs.items():
         assert_array_equal(run.estimate, best.runs[model].estimate)
         assert_array_equal(run.sigma, best.runs[model].sigma)
@@ -240,5 +241,4 @@ def test_where_errors_have_no_explanation_there_is_no_best_estimate(outcome):
     assert best_estimate(replace(outcome, diagnosis=unexplained), name) is None
     # Of a model that lacks nothing there is one, without an extended model.
     nothing = replace(outcome, diagnosis=replace(outcome.diagnosis, verdict="nothing"))
-    best = best_estimate(replace(nothing, extension=None), name)
-    assert list(best.runs) == ["nominal_model"]
+    assert list(best_estimate(replace(nothing, extension=None), name).runs) == ["nominal_model"]

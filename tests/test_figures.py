@@ -50,9 +50,9 @@ def test_tables_say_what_was_found():
     # Mean and least of the stops; an estimator without bands has no column.
     (stops, *names), (_, *force), *_ = tables.coverage(COVERED)
     assert (stops, len(names), force) == ("2 stops", 1, ["94.0 % (93 %)"])
-    found = tables.causes({"causes": [{"effect": "BrakeFade", "parameters": FADE}]})
+    rows = tables.causes({"causes": [{"effect": "BrakeFade", "parameters": FADE}]})
     estimate = "fade 4.28 (4.07 to 4.5) % per 100 K"
-    assert found[1:] == [["BrakeFade", "fade 4.0 % per 100 K", estimate]]
+    assert rows[1:] == [["BrakeFade", "fade 4.0 % per 100 K", estimate]]
     headline = {"both of a pair": SHARE, "right cause and no other": {**SHARE, "value": None}}
     assert tables.shares({"answer": {"headline": headline}})[1:] == [
         ["both of a pair", "80 %", "95 %", "75.1 to 99.9 %"],
@@ -122,8 +122,7 @@ def test_a_tuning_stands_beside_the_runs_before_and_after_it():
     assert {worst[1], wet[1], dry[1]} == {"2.00 % → 1.00 %"}
     sets = (runs(**usual), runs(**better), runs(**better))
     assert [row[1] for row in tables.tuned_elsewhere(*sets, *sets)[1:]] == 2 * ["2.00 % → 1.00 %"]
-    by = tables.judged_by(runs(**usual), runs(**better), runs(**better))
-    assert by[1:3] == [
+    assert tables.judged_by(runs(**usual), runs(**better), runs(**better))[1:3] == [
         ["untuned", "0.200", "2.00 %"],
         ["tuned by the load cells", "0.100", "1.00 %"],
     ]
@@ -150,9 +149,9 @@ def test_a_machine_is_told_by_what_was_held_out_in_the_unit_of_who_published_it(
         for machine in MACHINES.values()
     ]
     _, *rows = machines(*summaries)
-    found = dict(zip(MACHINES, (row[2:] for row in rows), strict=True))
-    assert found["cascaded_tanks"] == ["0.3 V", "0.04 V", "Leak"]
-    assert found["servo_pendulum"] == ["200 mrad", "20 mrad", "Leak"]
+    written = dict(zip(MACHINES, (row[2:] for row in rows), strict=True))
+    assert written["cascaded_tanks"] == ["0.3 V", "0.04 V", "Leak"]
+    assert written["servo_pendulum"] == ["200 mrad", "20 mrad", "Leak"]
     # Of two recordings the rms is that of all their samples: sqrt((100*0.3^2 + 300*0.5^2)/400).
     machine = MACHINES["O-ring"]
     longer = error("N", samples=300, rms=[0.5, 0.5])
@@ -208,8 +207,8 @@ def test_a_safety_level_stands_beside_plain_stops_as_far_as_these_reach():
 def test_stops_beyond_the_claim_count_apart_with_their_reasons():
     widths = [{"width": width, "outside": ""} for width in (1.0, 1.1, 1.5)]
     slide = {"width": 9.0, "outside": "an axle slides"}
-    one = {"held": {"of": 3, "stops": 2}, "stops": [*widths, slide, slide]}
-    _, row, *_ = train.predicted(*len(train.PREDICTED) * (one,))
+    predictions = {"held": {"of": 3, "stops": 2}, "stops": [*widths, slide, slide]}
+    _, row, *_ = train.predicted(*len(train.PREDICTED) * (predictions,))
     assert row[1:] == ["2 of 3", "1.10 (1.00 to 1.50)", "2: an axle slides"]
 
 
@@ -248,8 +247,7 @@ def test_a_law_is_right_where_the_cause_acts():
     found |= {"after_with_it": 1.0, "function_error": 0.042}
     unknown = found | {"left_out": [], "named": ["B"], "after_with_it": None}
     unknown |= {"function_error": None}
-    twin = none | {"verdict": "found", "named": ["B"], "asked": False}
-    rows = [found, unknown, none, twin]
+    rows = [found, unknown, none, none | {"verdict": "found", "named": ["B"], "asked": False}]
     header, first, second, third, last = tables.laws({"sets": rows, **summarise_left_out(rows)})
     assert len(header) == len(last)
     assert first == ["A", "unexplained", "a law", "yes", "52.9 → 1.32", "1", "4.2 %"]

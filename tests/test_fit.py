@@ -77,9 +77,7 @@ def fitted(
     return wb.fit(system, cases, parameters, settings=settings, workers=1, report=lambda line: None)
 
 
-def test_values_and_deviations_are_those_of_curve_fit_on_the_closed_form(
-    system: System, cases: list[Case]
-) -> None:
+def test_values_and_deviations_are_those_of_curve_fit_on_the_closed_form(system, cases):
     """Both minimise the same sum of squares; the simulation is right to 1e-8 of 60 K."""
     outcome = fitted(system, cases[:1], "C", "G")
 
@@ -99,7 +97,7 @@ def test_values_and_deviations_are_those_of_curve_fit_on_the_closed_form(
     )
 
 
-def test_a_state_that_an_output_shows_under_another_name_starts_there(tmp_path: Path) -> None:
+def test_a_state_that_an_output_shows_under_another_name_starts_there(tmp_path):
     """In mK and without a nominal value: from the model's 0 the start would be 4000 sizes away."""
     block = machine_file("heated_block/Block.mo")
     hidden = block.replace("output Real T(", "Real x(").replace(", nominal=20.0", "")
@@ -117,9 +115,7 @@ def test_a_state_that_an_output_shows_under_another_name_starts_there(tmp_path: 
     assert outcome["C"].value == pytest.approx(C, abs=4.0 * (outcome["C"].deviation or 0.0))
 
 
-def test_intervals_hold_the_truth_and_nothing_speaks_against_a_right_model(
-    system: System, cases: list[Case]
-) -> None:
+def test_intervals_hold_the_truth_and_nothing_speaks_against_a_right_model(system, cases):
     outcome = fitted(system, cases[:1], "C", "G", profiles=True)
     assert outcome.reliable, outcome.doubts
     for name, truth in (("C", C), ("G", G)):
@@ -136,9 +132,7 @@ def test_intervals_hold_the_truth_and_nothing_speaks_against_a_right_model(
         assert 0.4 < recording.error(recording.fitted) < 1.5
 
 
-def test_a_product_that_alone_is_told_is_named_with_its_direction(
-    system: System, cases: list[Case]
-) -> None:
+def test_a_product_that_alone_is_told_is_named_with_its_direction(system, cases):
     given = wb.FittedParameter(name="C", range=(99.0, 101.0), prior=(C, 1.0), by_recording=None)
     outcome = fitted(system, cases[:1], "a", "b", given)
     assert not outcome.reliable
@@ -151,20 +145,20 @@ def test_a_product_that_alone_is_told_is_named_with_its_direction(
     assert outcome["C"].identified
 
 
-def test_a_parameter_that_no_output_shows_is_named(system: System, cases: list[Case]) -> None:
+def test_a_parameter_that_no_output_shows_is_named(system, cases):
     outcome = fitted(system, cases[:1], "C", "G", "idle")
     assert [str(direction) for direction in outcome.directions] == ["idle: no output shows it"]
     assert outcome["C"].identified
 
 
-def test_residuals_that_a_wrong_model_leaves_are_told(system: System, cases: list[Case]) -> None:
+def test_residuals_that_a_wrong_model_leaves_are_told(system, cases):
     """With the heat capacity alone, the loss stays wrong by a quarter."""
     outcome = fitted(system, cases[:1], "C")
     assert not outcome.reliable
     assert any("residuals" in doubt and "times the variance" in doubt for doubt in outcome.doubts)
 
 
-def test_ctrl_c_keeps_the_best_values(system: System, cases: list[Case]) -> None:
+def test_ctrl_c_keeps_the_best_values(system, cases):
     def interrupt(line: str) -> None:
         if "start 1" in line:
             raise KeyboardInterrupt
@@ -177,19 +171,19 @@ def test_ctrl_c_keeps_the_best_values(system: System, cases: list[Case]) -> None
     assert outcome.recordings[0].error(outcome.recordings[0].fitted) < 2.0
 
 
-def test_a_name_that_cannot_be_fitted_is_refused(system: System, cases: list[Case]) -> None:
+def test_a_name_that_cannot_be_fitted_is_refused(system, cases):
     with pytest.raises(InputError, match="expected names or patterns"):
         fitted(system, cases[:1], "K")
 
 
-def test_a_table_of_no_parameter_is_refused(folder: Path) -> None:
+def test_a_table_of_no_parameter_is_refused(folder):
     path = folder / "wrong.toml"
     path.write_text(SYSTEM.replace("fit.G", "fit.g"))
     with pytest.raises(InputError, match=r"'g' \(closest: 'G'\)"):
         wb.load_system(path)
 
 
-def test_the_command_writes_what_other_tools_read(folder: Path, tmp_path: Path) -> None:
+def test_the_command_writes_what_other_tools_read(folder, tmp_path):
     days = [str(folder / "cases" / f"day{k}") for k in (1, 3)]
     command = ["fit", *days, "--system", str(folder), "--held-out", "day3"]
     command += ["--starts", "1", "--intervals", "covariance", "--workers", "1"]
@@ -213,11 +207,10 @@ def test_the_command_writes_what_other_tools_read(folder: Path, tmp_path: Path) 
     assert float(starts["C"] or 0.0) == values["C"]
     assert starts["a"] == "1.0"
     assert any("parameters.ssv" in note for note in summary["notes"])  # compiled-in defaults
-    page = (tmp_path / "index.html").read_text()
-    assert "Fitted values" in page
+    assert "Fitted values" in (tmp_path / "index.html").read_text()
 
 
-def test_a_fitted_fmu_differs_in_start_values_alone(folder: Path, tmp_path: Path) -> None:
+def test_a_fitted_fmu_differs_in_start_values_alone(folder, tmp_path):
     write_fmu(folder / "Block.fmu", {"C": 123.0}, tmp_path / "new.fmu")
     with zipfile.ZipFile(folder / "Block.fmu") as old, zipfile.ZipFile(tmp_path / "new.fmu") as new:
         assert old.namelist() == new.namelist()

@@ -165,9 +165,9 @@ def test_crash_is_named_by_its_signal_and_the_instances_before_and_leaves_no_fil
 def test_wrong_derivative_is_named_with_both_values(minimal_path, tmp_path):
     name, old, new = FAULTS["directional derivative has the wrong sign"]
     reason = by_name(check(faulty(minimal_path, tmp_path / "faulty.fmu", old, new), 1), name).reason
-    found = re.search(r"is (\S+) by the FMU, (\S+) by differences", reason)
+    slopes = re.search(r"is (\S+) by the FMU, (\S+) by differences", reason)
     # Six digits are printed.
-    assert float(found[1]) == pytest.approx(-float(found[2]), rel=1e-4)
+    assert float(slopes[1]) == pytest.approx(-float(slopes[2]), rel=1e-4)
 
 
 @needs_compiler
@@ -302,17 +302,17 @@ def test_co_simulation_rolls_back_to_identical_bits(minimal_path):
 
 
 def test_state_serialised_by_one_instance_continues_in_another(minimal_path):
-    with FMU(minimal_path) as one, FMU(minimal_path) as other:
-        one.start({"omegaW": 60.0, "omegaR": 39.5})
-        one.set(one.variables(["pB"]), np.array([3.6e5]))
-        saved = one.save()
-        data = one.serialise(saved)
-        one.release(saved)
+    with FMU(minimal_path) as first, FMU(minimal_path) as other:
+        first.start({"omegaW": 60.0, "omegaR": 39.5})
+        first.set(first.variables(["pB"]), np.array([3.6e5]))
+        saved = first.save()
+        data = first.serialise(saved)
+        first.release(saved)
         other.start({})
         restored = other.deserialise(data)
         other.restore(restored)
         other.release(restored)
-        assert_array_equal(other.step(0.01), one.step(0.01))
+        assert_array_equal(other.step(0.01), first.step(0.01))
         assert other.get_states()[0] < 60.0
 
 

@@ -187,8 +187,8 @@ def test_compiled_loops_step_as_the_fmu_itself_does(root, version):
     path, read_ = root / "fmus" / version / "MinimalObserver.fmu", ["omegaW", "omegaR", "Fx"]
     with CoSimulation(path) as called, CoSimulation(path) as compiled:
         inputs, outputs = called.variables(["pB", "tauR"]), called.variables(read_)
-        for one in (called, compiled):
-            one.start({"omegaW": 60.0, "omegaR": 39.5})
+        for fmu in (called, compiled):
+            fmu.start({"omegaW": 60.0, "omegaR": 39.5})
         running = co_simulation_instance(compiled, inputs.names, read_)
         for k in range(100):
             values = np.array([1e5 * np.sin(0.1 * k) ** 2, 50.0 * k])

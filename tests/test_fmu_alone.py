@@ -192,14 +192,12 @@ def test_a_stated_range_bounds_the_change(tank, tmp_path):
         system, cases, effects=["A"], out=tmp_path, workers=1, report=lambda line: None
     )
     nearest = [candidate.text for candidate in outcome.diagnosis.nearest]
-    limited = [text for text in [*outcome.warnings, *nearest] if "0.02 m2" in text]
-    assert limited, outcome.summary()
+    assert [text for text in [*outcome.warnings, *nearest] if "0.02 m2" in text], outcome.summary()
 
 
 def test_what_needs_the_equations_says_so(tank, tmp_path):
     cases = read_cases(record(tmp_path / "recordings", seed=6, area=0.55), tank)
-    effects = choose(["SensorOffset[level]"], catalogue(tank, None))
-    problem = Problem(tank, cases, None, effects)
+    problem = Problem(tank, cases, None, choose(["SensorOffset[level]"], catalogue(tank, None)))
     outcome = diagnose(
         tank,
         cases,

@@ -58,8 +58,7 @@ def simulated(seed: int) -> pd.DataFrame:
         rows.append(v)
         given = (AFTER if t >= OPENS else BEFORE, pump(t))
         # An observer takes an input for that of the step to its sample.
-        solution = solve_ivp(volumes, (t, t + STEP), v, args=given, rtol=1e-9, atol=1e-12)
-        v = solution.y[:, -1]
+        v = solve_ivp(volumes, (t, t + STEP), v, args=given, rtol=1e-9, atol=1e-12).y[:, -1]
     level = np.array(rows)[:, 1] / AREA
     rng = np.random.default_rng(seed)
     before = np.append(0.0, time[:-1])
@@ -106,8 +105,9 @@ def made(fmu: FMU, tanks: System, name: str) -> Estimator:
 
 
 @pytest.fixture(scope="module")
-def runs(fmu, tanks, case) -> dict[str, Run]:
-    return {name: replay(case, made(fmu, tanks, name)) for name in estimators_of(tanks)}
+def runs(fmu, tanks, case, once) -> dict[str, Run]:
+    names = estimators_of(tanks)
+    return once("tanks", lambda _: {name: replay(case, made(fmu, tanks, name)) for name in names})
 
 
 def test_a_system_has_the_estimators_of_all_systems_and_no_others(tanks):
@@ -133,7 +133,7 @@ def test_a_leak_that_opens_is_found_from_the_voltage_of_a_level_sensor(case, tan
 
 @pytest.mark.parametrize("name", ESTIMATORS)
 def test_every_observer_is_nearer_to_what_judges_than_the_model_alone(case, tanks, runs, name):
-    alone, own = (score(case, runs[one], tanks) for one in ("open_loop", name))
+    alone, own = (score(case, runs[estimator], tanks) for estimator in ("open_loop", name))
     assert own.nrmse < 0.5 * alone.nrmse
 
 
@@ -178,8 +178,7 @@ def test_filters_are_the_kalman_filter_where_the_model_is_linear(fmu, tanks, cas
         P = keep @ P @ keep.T + R * np.outer(K, K)
         expected.append([z[2], np.sqrt(P[2, 2]), innovation**2 / S])
     correction, sigma, nis = np.array(expected).T
-    estimator = made(fmu, tanks, name)
-    estimate = with_steps(estimator, (case.time, case.u, case.y), accurate)
+    estimate = with_steps(made(fmu, tanks, name), (case.time, case.u, case.y), accurate)
     column = list(tanks.columns).index("dleak")
     # Rounding alone: the covariance of volumes and flow has a condition number of 1e6. An accurate
     # step may leave 1e-7 of a level of 1 m, which is this share of the sensor's deviation.

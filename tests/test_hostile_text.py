@@ -137,11 +137,7 @@ SYSTEM = "modelica/WheelsetRig/system.toml"
 @pytest.mark.parametrize(
     ("old", "new", "match"),
     [
-        (
-            "[points.design]",
-            "design = 3\n[export.other]",
-            "[points] design: found 3; expected",
-        ),
+        ("[points.design]", "design = 3\n[export.other]", "[points] design: found 3; expected"),
         ("relative_noise = 3e-4", f"relative_noise = 0x{'f' * DIGITS}", "relative_noise: found a"),
         ("relative_noise = 3e-4", f"relative_noise = 1{'0' * 4000}", "expected a finite number"),
         ("relative_noise = 3e-4", "relative_noise = nan", "relative_noise: found nan; expected a"),

@@ -76,7 +76,7 @@ def textbook(case: Case, transition: np.ndarray, accurate: bool) -> tuple[np.nda
     first = np.array([case["warm"][0], 0.0])
     z, P = [first, first], [np.diag([NOISE, 0.05]) ** 2] * 2
     weight = np.array([0.5, 0.5])
-    found, last = [(first, np.sqrt(np.diag(P[0])), weight)], case["heater"][0]
+    estimates, last = [(first, np.sqrt(np.diag(P[0])), weight)], case["heater"][0]
     for heater, measured in zip(case["heater"][1:], case["warm"][1:], strict=True):
         before = transition.T @ weight
         mixed, spread, evidence = [], [], []
@@ -104,8 +104,8 @@ def textbook(case: Case, transition: np.ndarray, accurate: bool) -> tuple[np.nda
         cov = sum(
             w * (p + np.outer(a - mean, a - mean)) for w, a, p in zip(weight, z, P, strict=True)
         )
-        found.append((mean, np.sqrt(np.diag(cov)), weight))
-    return tuple(np.array(column) for column in zip(*found, strict=True))
+        estimates.append((mean, np.sqrt(np.diag(cov)), weight))
+    return tuple(np.array(column) for column in zip(*estimates, strict=True))
 
 
 @pytest.mark.parametrize("accurate", [False, True])
@@ -133,8 +133,7 @@ def test_it_is_the_textbook_where_the_model_is_linear(fmu, vessel, case, lasts, 
 
 
 def test_a_cover_that_is_lost_under_way_is_noticed(fmu, vessel, case):
-    run = replay(case, bank(fmu, vessel, 100.0))
-    off = run.probability["cover_off"]
+    off = replay(case, bank(fmu, vessel, 100.0)).probability["cover_off"]
     assert off[140:150].max() < 0.05
     assert np.median(off[-100:]) > 0.95
 
@@ -161,13 +160,16 @@ def test_a_time_that_is_none_is_refused(vessel, tmp_path):
 
 
 @pytest.fixture(scope="module")
-def rails() -> dict[str, Run]:
+def rails(once) -> dict[str, Run]:
     """Wet and dry stops of the rig."""
-    cases = read_cases([ROOT / "cases"], WHEELSET)
-    with open_model(WHEELSET) as opened:
-        gains = InteractingMultipleModel.default_gains(opened, WHEELSET)
-        own = InteractingMultipleModel(opened, WHEELSET, gains)
-        return {one.name: replay(one, own) for one in cases}
+
+    def run(_: Path) -> dict[str, Run]:
+        with open_model(WHEELSET) as opened:
+            gains = InteractingMultipleModel.default_gains(opened, WHEELSET)
+            own = InteractingMultipleModel(opened, WHEELSET, gains)
+            return {case.name: replay(case, own) for case in read_cases([ROOT / "cases"], WHEELSET)}
+
+    return once("rails", run)
 
 
 def test_with_one_hypothesis_it_is_the_extended_filter():
@@ -177,10 +179,10 @@ def test_with_one_hypothesis_it_is_the_extended_filter():
     with open_model(plain) as opened:
         gains = ExtendedKalmanFilter.default_gains(opened, plain)
         kinds = (ExtendedKalmanFilter, InteractingMultipleModel)
-        alone, one = (cls(opened, plain, gains).run(case.time, case.u, case.y) for cls in kinds)
-    assert_allclose(one.values, alone.values, rtol=1e-12, atol=0)
-    assert_allclose(one.sigma, alone.sigma, rtol=1e-12, atol=0)
-    assert_allclose(one.nis, alone.nis, rtol=1e-12, atol=0)
+        alone, mixed = (cls(opened, plain, gains).run(case.time, case.u, case.y) for cls in kinds)
+    assert_allclose(mixed.values, alone.values, rtol=1e-12, atol=0)
+    assert_allclose(mixed.sigma, alone.sigma, rtol=1e-12, atol=0)
+    assert_allclose(mixed.nis, alone.nis, rtol=1e-12, atol=0)
 
 
 def test_the_condition_of_the_rail_is_found_within_a_second(rails):

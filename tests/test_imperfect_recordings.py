@@ -36,11 +36,11 @@ def simulated(seed: int, loss: float, casing: float) -> pd.DataFrame:
     power = np.repeat(rng.uniform(0.0, 60.0, SECONDS // 60), 60)
     A = np.array([[-2.0 - loss, 2.0], [2.0, -2.5]]) / np.array([[100.0], [200.0]])
     whole = expm(np.block([[A, np.array([[0.01], [0.0]])], [np.zeros((1, 3))]]))
-    x, found = np.array([5.0, casing]), []
+    x, temperatures = np.array([5.0, casing]), []
     for watts in power:
-        found.append(x[0])
+        temperatures.append(x[0])
         x = whole[:2, :2] @ x + whole[:2, 2] * watts
-    measured = np.array(found) + NOISE * rng.standard_normal(SECONDS)
+    measured = np.array(temperatures) + NOISE * rng.standard_normal(SECONDS)
     return pd.DataFrame(
         {"time [s]": np.arange(SECONDS, dtype=float), "P [W]": power, "T [K]": measured}
     )
@@ -92,9 +92,9 @@ def test_a_state_that_nobody_measured_starts_where_the_recording_says(heater, tm
     recordings = cases(heater, [simulated(k, 0.0, at) for k, at in enumerate(starts)])
     outcome = diagnosed(heater, recordings, tmp_path)
     assert outcome.diagnosis.verdict == "nothing"
-    found = [30.0 * outcome.deviations[case.name]["Tc"] for case in recordings]
+    fitted = [30.0 * outcome.deviations[case.name]["Tc"] for case in recordings]
     # By noise alone a casing is known to some 0.1 K; its prior draws it to zero by less.
-    assert found == pytest.approx(starts, abs=0.5)
+    assert fitted == pytest.approx(starts, abs=0.5)
 
 
 def test_errors_are_told_on_recordings_that_were_held_out(heater, tmp_path):
@@ -122,12 +122,11 @@ def test_another_tool_starts_the_extended_model_as_a_recording_does(heater, tmp_
     for case in recordings:
         start = outcome.start_values(case.name)
         assert start.keys() == {"T", "Tc"}
-        inputs = np.rec.fromarrays([case.time, case["P"], 0.0 * case.time], names="time, P, dGc")
         result = fmpy.simulate_fmu(
             str(outcome.extension.fmu),
             fmi_type="CoSimulation",
             start_values=start,
-            input=inputs,
+            input=np.rec.fromarrays([case.time, case["P"], 0.0 * case.time], names="time, P, dGc"),
             stop_time=case.time[-1],
             output_interval=1.0,
             output=["T"],

@@ -303,8 +303,7 @@ ENGLISH = ("BCP {} [bar]", "vehicle mass {} [t]", "slope {} [1]", "axle speed {}
 def test_channels_of_a_train_are_known_by_the_names_of_a_laboratory(
     tmp_path, train_stop, names, curve, acceleration
 ):
-    factors = 1e-5, 1e-3, 1.0, 3.6 * 0.46
-    kinds = zip(("pB", "mass", "slope", "omega"), names, factors, strict=True)
+    kinds = zip(("pB", "mass", "slope", "omega"), names, (1e-5, 1e-3, 1.0, 3.6 * 0.46), strict=True)
     columns = {"Zeit [s]": train_stop.time}
     for kind, name, factor in kinds:
         for i in range(1, 9):
@@ -330,8 +329,8 @@ def test_speeds_of_all_axles_in_another_unit_contradict_the_acceleration(train_s
     origin = Origin("stop.csv", 2, {}, "")
     signals = {**train_stop.signals, **wrong}
     right, told = (
-        doubts(train_stop.time, one, train_stop.conditions, train, origin)
-        for one in (train_stop.signals, signals)
+        doubts(train_stop.time, recorded, train_stop.conditions, train, origin)
+        for recorded in (train_stop.signals, signals)
     )
     (doubt,) = set(told) - set(right)
     assert "what a train accelerates by turns its axles faster" in doubt
@@ -394,8 +393,7 @@ def test_an_answer_confirms_and_corrects_at_once(table, tmp_path, system, monkey
     ],
 )
 def test_what_is_not_certain_is_not_taken_by_yes(table, tmp_path, capsys, headers, match):
-    path = table(**headers)
-    assert main(["import", str(path), "--out", str(tmp_path / "out"), "--yes"]) == 2
+    assert main(["import", str(table(**headers)), "--out", str(tmp_path / "out"), "--yes"]) == 2
     error = capsys.readouterr().err
     assert match.replace("\\", "") in error
     assert not list((tmp_path / "out").glob("*/case.toml"))
@@ -434,14 +432,12 @@ def test_a_unit_that_a_further_file_states_is_not_overruled(table, tmp_path, cap
 def test_of_several_files_one_that_is_refused_leaves_the_others(table, tmp_path, system):
     bad = table("bad.csv", Zeit="Messwert")
     good = table("good.csv")
-    command = ["import", str(bad), str(good), "--out", str(tmp_path / "out"), "--yes"]
-    assert main(command) == 2
+    assert main(["import", str(bad), str(good), "--out", str(tmp_path / "out"), "--yes"]) == 2
     assert [read_case.name for read_case in wb.read_cases(tmp_path / "out", system)] == ["good"]
 
 
 def test_a_folder_with_other_files_is_left_as_it_is(table, tmp_path, capsys):
-    path = table()
-    assert main(["import", str(path), "--out", str(tmp_path), "--yes"]) == 2
+    assert main(["import", str(table()), "--out", str(tmp_path), "--yes"]) == 2
     assert "a folder with other files" in capsys.readouterr().err
 
 
@@ -492,13 +488,13 @@ def test_each_recording_of_a_file_is_a_case_without_a_wrong_number(
     assert take(name) == 0
     recorded = record(tmp_path)
     assert [entry["recording"] for entry in recorded] == list(called)
-    for one, truth in zip(recorded, cases, strict=True):
-        (folder,) = one["cases"]
+    for entry, truth in zip(recorded, cases, strict=True):
+        (folder,) = entry["cases"]
         (got,) = wb.read_cases(tmp_path / "out" / folder, system)
         assert_same(got, truth)
-        assert set(one["channels"]) == set(SIGNALS)
-        assert one["channels"]["omegaR"]["converted"]["recorded_as"] == "rR * omegaR"
-        assert one["dropped"] == ["Temperatur [degC]"]
+        assert set(entry["channels"]) == set(SIGNALS)
+        assert entry["channels"]["omegaR"]["converted"]["recorded_as"] == "rR * omegaR"
+        assert entry["dropped"] == ["Temperatur [degC]"]
     assert len(list((tmp_path / "out").glob("*/case.toml"))) == 2
 
 
@@ -574,8 +570,7 @@ def test_what_else_a_workbook_holds_is_written_down(tmp_path, take, stops, capsy
     add_sheet(book, "Stop 1", stops["Stop 1"])
     book.create_sheet("empty")
     book.create_chartsheet("diagram").add_chart(LineChart())
-    climate = {"Zeit": ("s", np.arange(60.0)), "Feuchte": ("%", np.arange(60.0))}
-    add_sheet(book, "climate", climate)
+    add_sheet(book, "climate", {"Zeit": ("s", np.arange(60.0)), "Feuchte": ("%", np.arange(60.0))})
     add_sheet(book, "Stop 2", stops["Stop 2"])
     book["Stop 2"].sheet_state = "hidden"
     book.save(tmp_path / "a.xlsx")
@@ -599,8 +594,7 @@ def test_names_of_sheets_become_names_that_differ(tmp_path, take, stops, system,
         (got,) = wb.read_cases(tmp_path / "out" / name, system)
         assert_same(got, truth)
     assert len(record(tmp_path)) == 2
-    text = (tmp_path / "out" / "a_80_km_h_wet" / "case.toml").read_text()
-    assert "a.tdms, '80 km/h wet'" in text
+    assert "a.tdms, '80 km/h wet'" in (tmp_path / "out" / "a_80_km_h_wet" / "case.toml").read_text()
 
 
 # --- what cannot be told ---
@@ -690,7 +684,7 @@ def test_channels_of_one_sheet_may_be_named(tmp_path, take, stops, system, cases
 
 def test_signals_of_two_sheets_that_may_be_two_recordings_are_told(tmp_path, take, stops, capsys):
     """What the second lacks is in the first alone, and would be taken from it in silence."""
-    second = {name: one for name, one in stops["Stop 2"].items() if name != "v_Rad"}
+    second = {name: column for name, column in stops["Stop 2"].items() if name != "v_Rad"}
     workbook(tmp_path / "a.xlsx", {"Stop 1": stops["Stop 1"], "Stop 2": second})
     channels = {"pB": "Bremsdruck", "tauR": "Antriebsmoment", "omegaR": "v_Rolle"}
     said = [part for key, name in channels.items() for part in ("--column", f"{key}=Stop 2/{name}")]
@@ -770,6 +764,6 @@ def test_vectors_without_a_time_of_their_own_are_no_recordings(tmp_path, stops, 
     proposal = propose_recordings(
         [read_recorded_file(tmp_path / "a.tdms")], system, {}, RecordingOptions()
     )
-    (one,) = proposal.held
-    assert one.name == ""
+    (recording,) = proposal.held
+    assert recording.name == ""
     assert "pB: it may be 'Stop 1/Bremsdruck' or 'Stop 2/Bremsdruck'" in proposal.problems

@@ -35,8 +35,7 @@ def tank(tmp_path_factory) -> System:
     folder = tmp_path_factory.mktemp("systems") / "tank"
     write_system(folder)
     path = folder / "system.toml"
-    text = path.read_text().replace('sample_time = "0.5 s"', 'sample_time = "900 s"')
-    path.write_text(text)
+    path.write_text(path.read_text().replace('sample_time = "0.5 s"', 'sample_time = "900 s"'))
     return load_system(folder)
 
 
@@ -188,8 +187,7 @@ def test_two_figures_are_minutes_and_seconds_if_that_is_nearer_to_usual_steps(tm
 def test_hours_to_12_go_on_from_12_to_1(tmp_path, tank):
     """As times of day they are told; beside dates half days are not known, and asked for."""
     begin = datetime(2024, 3, 5, tzinfo=UTC)
-    path = table(tmp_path / "a.csv", local(begin, 200, "%I:%M:%S"))
-    read_clock = clock(path, tank)
+    read_clock = clock(table(tmp_path / "a.csv", local(begin, 200, "%I:%M:%S")), tank)
     assert_allclose(read_clock.times, QUARTER * np.arange(200))
     assert "hours count to 12" in read_clock.reason
     dated = table(tmp_path / "b.csv", local(begin, 200, "%Y-%m-%d %I:%M:%S"))
@@ -210,8 +208,7 @@ def test_an_hour_that_may_be_missing_is_told(tmp_path, tank):
 
 
 def test_a_zone_of_the_header_is_that_of_its_times(tmp_path, tank):
-    begin = datetime(2024, 10, 26, 22, tzinfo=BERLIN)
-    stamps = local(begin, 100, "%d.%m.%Y %H:%M")
+    stamps = local(datetime(2024, 10, 26, 22, tzinfo=BERLIN), 100, "%d.%m.%Y %H:%M")
     read_clock = clock(table(tmp_path / "a.csv", stamps, "Time [Europe/Berlin]"), tank)
     assert_allclose(read_clock.times, QUARTER * np.arange(100))
     assert iso(read_clock.start) == "2024-10-26T20:00:00.000000"
@@ -221,8 +218,7 @@ def test_days_that_follow_are_not_those_of_several_years(tmp_path, tank):
     """Eight hours a day: no order is even."""
     stamps = local(datetime(2024, 3, 1, tzinfo=UTC), 300, "%y/%m/%d %H:%M")
     worked = [stamp for stamp in stamps if "08:00" <= stamp[-5:] < "16:00"]
-    times = clock(table(tmp_path / "a.csv", worked), tank).times
-    assert times[-1] < 4 * 86400.0
+    assert clock(table(tmp_path / "a.csv", worked), tank).times[-1] < 4 * 86400.0
 
 
 def test_dates_that_go_on_in_two_ways_are_asked_for(tmp_path, tank):

@@ -95,9 +95,12 @@ def test_a_row_for_each_value_is_read_by_tags(tmp_path):
     rows = [f"h;2024-03-05 10:00:{k:02d};95{k % 7}.5;mm" for k in range(60)]
     rows[1::2] = [row.replace("h;", "inflow;").replace(";mm", ";l/s") for row in rows[1::2]]
     path = table(tmp_path / "a.csv", ["Tag;Time;Value;Unit", *rows])
-    found = {c.name: c for held in read_recorded_file(path).groups for c in held.channels[1:]}
-    assert {name: channel.unit for name, channel in found.items()} == {"h": "mm", "inflow": "l/s"}
-    assert found["h"].values.size == 30
+    channels = {c.name: c for held in read_recorded_file(path).groups for c in held.channels[1:]}
+    assert {name: channel.unit for name, channel in channels.items()} == {
+        "h": "mm",
+        "inflow": "l/s",
+    }
+    assert channels["h"].values.size == 30
 
 
 @pytest.mark.parametrize(

@@ -92,8 +92,7 @@ def test_times_beside_data_that_state_no_unit_are_asked_about(tmp_path, tank):
 def test_steps_of_a_waveform_are_in_its_own_unit(tmp_path, tank, unit, step):
     stated = {"unit_string": "mm", "wf_increment": step, "wf_start_offset": 2 * step}
     with TdmsWriter(tmp_path / "a.tdms") as file:
-        written = ChannelObject("G", "h", MINUTE, {**stated, "wf_xunit_string": unit})
-        file.write_segment([written])
+        file.write_segment([ChannelObject("G", "h", MINUTE, {**stated, "wf_xunit_string": unit})])
     assert_allclose(clock(tmp_path / "a.tdms", tank).times, 1.0 + MINUTE, rtol=1e-12)
 
 
@@ -239,10 +238,9 @@ def test_in_place_of_a_unit_that_is_not_known_none_is_proposed(tmp_path, tank):
 
 
 def test_a_unit_that_contradicts_the_one_in_the_file_is_told(tmp_path, tank, capsys):
-    path = table(tmp_path / "a.csv", ["t [ms];inflow [l/s];h [Zoll]", *ROWS])
     command = [
         "import",
-        str(path),
+        str(table(tmp_path / "a.csv", ["t [ms];inflow [l/s];h [Zoll]", *ROWS])),
         "--system",
         str(tank.source.parent),
         "--out",
@@ -295,9 +293,9 @@ def test_a_channel_that_judges_is_named_and_not_dropped_in_silence(tmp_path, sys
     ],
 )
 def test_units_of_workshops_are_known(unit, si, factor):
-    found = conversion(spell_unit(f"[{unit}]"), si)
-    assert found.factor == pytest.approx(factor, rel=1e-15)
-    assert found.zero == 0.0
+    converted = conversion(spell_unit(f"[{unit}]"), si)
+    assert converted.factor == pytest.approx(factor, rel=1e-15)
+    assert converted.zero == 0.0
 
 
 def test_a_torque_without_a_unit_may_be_in_that_of_another_country(tmp_path, system):
@@ -318,8 +316,7 @@ def test_channels_that_are_left_out_have_the_names_by_which_they_are_taken(tmp_p
             sheet.append([t, 5.0, t])
     book.save(tmp_path / "a.xlsx")
     held = read_recorded_file(tmp_path / "a.xlsx")
-    left = propose([held], tank, {}).left
-    assert "two/h [mm]" in left
+    assert "two/h [mm]" in propose([held], tank, {}).left
     named = {name: NamedChannel(f"two/{name}") for name in ("inflow", "h")}
     assert propose([held], tank, named).certain
 
@@ -358,13 +355,11 @@ def proposed(path: Path, system: System, *columns: str) -> ProposedMapping:
 
 @pytest.mark.parametrize("marker", [-9999.0, -7999.0, 9.9e37, 32767.0, 3276.7])
 def test_a_marker_of_a_recorder_is_no_sample(tmp_path, tank, marker):
-    levels = np.where(np.arange(200) % 50 == 20, marker, LEVEL)
-    path = write(tmp_path / "a.csv", levels)
+    path = write(tmp_path / "a.csv", np.where(np.arange(200) % 50 == 20, marker, LEVEL))
     proposal = proposed(path, tank)
     assert proposal.assigned["h"].missing == (marker,)
     assert f"{marker:g}, 4 times, is no sample" in proposal.assigned["h"].reason
-    measured = merge([read_recorded_file(path)], proposal, tank)
-    assert measured.signals["h"].max() < 1.0
+    assert merge([read_recorded_file(path)], proposal, tank).signals["h"].max() < 1.0
 
 
 def test_a_value_that_may_be_a_marker_is_asked_about_and_declared(tmp_path, tank):
@@ -429,8 +424,7 @@ def test_steps_between_a_few_values_are_samples():
 
 def test_a_marker_in_a_recording_of_the_workbench_is_refused(tmp_path, tank):
     (tmp_path / "case.toml").write_text('title = "a"\n[measurement]\nfile = "measured.csv"\n')
-    levels = np.where(np.arange(200) == 20, -9999.0, LEVEL)
-    path = write(tmp_path / "measured.csv", levels)
+    path = write(tmp_path / "measured.csv", np.where(np.arange(200) == 20, -9999.0, LEVEL))
     path.write_text(path.read_text().replace(";", ","))
     with pytest.raises(InputError, match=r"line 22, column 'h': found -9999 in 1 samples"):
         wb.read_cases(tmp_path, tank)
@@ -497,8 +491,7 @@ def test_milliseconds_declared_as_seconds_are_refused(tmp_path, tank):
         f"{1000 * t},{4 + k % 7 / 10},{h:.3f}"
         for k, (t, h) in enumerate(zip(TIME, LEVEL, strict=True))
     ]
-    names = "time [s],inflow [l/s],h [mm]"
-    (tmp_path / "measured.csv").write_text("\n".join([names, *rows]))
+    (tmp_path / "measured.csv").write_text("\n".join(["time [s],inflow [l/s],h [mm]", *rows]))
     match = r"a sample every 500 s, 1000 times as far apart.*the unit of the time"
     with pytest.raises(InputError, match=match):
         wb.read_cases(tmp_path, tank)

@@ -107,20 +107,17 @@ def test_data_of_system_identification_has_its_names_units_and_steps(tmp_path, c
             "inflow": struct(Time=TIME, Data=FLOW.reshape(1, 1, -1), DataInfo=struct(Units="l/s")),
             "h": struct(Time=TIME, Data=LEVEL.reshape(1, 1, -1), DataInfo=struct(Units="mm")),
         },
-        {
-            "inflow": struct(v=FLOW, t=TIME, unit="l/s"),
-            "h": struct(v=LEVEL, t=TIME, unit="mm"),
-        },
+        {"inflow": struct(v=FLOW, t=TIME, unit="l/s"), "h": struct(v=LEVEL, t=TIME, unit="mm")},
     ],
     ids=["Dataset", "array of signals", "time series", "values, times and units"],
 )
 def test_signals_with_times_of_their_own_have_their_names(tmp_path, logged):
     savemat(tmp_path / "a.mat", {"logsout": logged})
     groups = read_recorded_file(tmp_path / "a.mat").groups
-    found = {c.name: c for held in groups for c in held.channels}
-    assert (found["inflow"].unit, found["h"].unit) == ("l/s", "mm")
-    assert_allclose(found["inflow"].values, FLOW)
-    assert_allclose(found["h"].values, LEVEL)
+    channels = {c.name: c for held in groups for c in held.channels}
+    assert (channels["inflow"].unit, channels["h"].unit) == ("l/s", "mm")
+    assert_allclose(channels["inflow"].values, FLOW)
+    assert_allclose(channels["h"].values, LEVEL)
 
 
 def test_signals_over_common_times_are_those_of_a_test_stand(tmp_path):
@@ -287,14 +284,14 @@ def test_results_of_modelica_tools_are_recordings(tmp_path, *, turned):
     }
     savemat(tmp_path / "a.mat", content, format="4")
     recorded = read_recorded_file(tmp_path / "a.mat")
-    (found,) = recorded.groups
-    assert [(channel.name, channel.unit) for channel in found.channels] == [
+    (group,) = recorded.groups
+    assert [(channel.name, channel.unit) for channel in group.channels] == [
         *(("time", "s"), ("tank.h", "m"), ("mirror", "m"), ("valve", ""))
     ]
-    assert_allclose(found.channels[0].values, [0.0, 1.0, 2.0, 3.0])
-    assert_allclose(found.channels[1].values, [0.0, 10.0, 20.0, 30.0])
-    assert_allclose(found.channels[2].values, [0.0, -10.0, -20.0, -30.0])
-    assert_allclose(found.channels[3].values, [0.0, 0.0, 1.0, 1.0])
+    assert_allclose(group.channels[0].values, [0.0, 1.0, 2.0, 3.0])
+    assert_allclose(group.channels[1].values, [0.0, 10.0, 20.0, 30.0])
+    assert_allclose(group.channels[2].values, [0.0, -10.0, -20.0, -30.0])
+    assert_allclose(group.channels[3].values, [0.0, 0.0, 1.0, 1.0])
     assert recorded.notes == (
         "1 samples before events were left out, of the times of those after",
         "1 parameters and constants were left out",

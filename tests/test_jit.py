@@ -19,10 +19,10 @@ def root(x: float) -> float:
 
 @compiled
 def total(x: np.ndarray) -> float:
-    found = 0.0
-    for one in x:
-        found += root(one)
-    return found
+    total = 0.0
+    for number in x:
+        total += root(number)
+    return total
 
 
 def test_a_loop_does_what_its_law_does_and_refuses_what_it_refuses():
@@ -93,7 +93,7 @@ def test_what_a_law_writes_into_arrays_is_seen_by_itself_and_by_its_caller():
 
 
 def test_arrays_of_one_call_are_not_those_of_the_next():
-    assert [weighted(Part(np.full(2, one), 1.0)) for one in (1.0, 2.0, 3.0)] == [2.0, 4.0, 6.0]
+    assert [weighted(Part(np.full(2, value), 1.0)) for value in (1.0, 2.0, 3.0)] == [2.0, 4.0, 6.0]
 
 
 def _named(fields: list[tuple[str, Any]]) -> Callable[..., Any]:
@@ -107,8 +107,8 @@ def difference(pair: Any) -> float:
 
 
 def test_classes_of_one_name_may_have_their_fields_in_another_order():
-    one, other = [("first", float), ("second", float)], [("second", float), ("first", float)]
-    assert difference(_named(one)(5.0, 3.0)) == 2.0
+    fields, other = [("first", float), ("second", float)], [("second", float), ("first", float)]
+    assert difference(_named(fields)(5.0, 3.0)) == 2.0
     assert difference(_named(other)(5.0, 3.0)) == -2.0
 
 

@@ -128,9 +128,8 @@ def recorded(late: Mapping[str, int], seed: int) -> pd.DataFrame:
     }
     noise = {"u": 0.0, "i": 0.02, "w": 0.4}
     units = {"u": "V", "i": "A", "w": "rad/s"}
-    time = {"time [s]": np.arange(3000) * 1e-3}
     return pd.DataFrame(
-        time
+        {"time [s]": np.arange(3000) * 1e-3}
         | {f"{n} [{units[n]}]": v + noise[n] * rng.standard_normal(v.size) for n, v in held.items()}
     )
 

@@ -44,7 +44,7 @@ def block(folder: Path, more: str) -> System:
 def recorded(conductance: float, seed: int, share: float = 1.0) -> pd.DataFrame:
     """Temperatures of a block with so much of it, by SciPy, while powers change."""
     rng = np.random.default_rng(seed)
-    powers, x, found = share * rng.uniform(10.0, 90.0, 12), np.zeros(2), []
+    powers, x, temperatures = share * rng.uniform(10.0, 90.0, 12), np.zeros(2), []
     for power in powers:
 
         def rates(_: float, x: np.ndarray, power: float = power) -> list[float]:
@@ -53,9 +53,9 @@ def recorded(conductance: float, seed: int, share: float = 1.0) -> pd.DataFrame:
             return [(power - into - conductance * T) / 100.0, (into - 0.5 * casing) / 200.0]
 
         run = solve_ivp(rates, (0.0, 60.0), x, t_eval=np.arange(61), rtol=1e-9, atol=1e-9)
-        found.append(run.y[0, :-1])
+        temperatures.append(run.y[0, :-1])
         x = run.y[:, -1]
-    measured = np.concatenate(found) + NOISE * rng.standard_normal(720)
+    measured = np.concatenate(temperatures) + NOISE * rng.standard_normal(720)
     time = np.arange(measured.size, dtype=float)
     return pd.DataFrame({"time [s]": time, "P [W]": np.repeat(powers, 60), "T [K]": measured})
 
@@ -69,8 +69,7 @@ def found(frames: Sequence[pd.DataFrame], folder: Path) -> list[str]:
 
 def test_what_no_block_of_its_kind_has_is_a_cause(tmp_path):
     """Of 3.5 deviations, where 3.3 are asked for. Held-out recordings say nothing of it."""
-    frames = [recorded(G + 3.5 * SPREAD, seed) for seed in range(3)]
-    assert found(frames, tmp_path) == ["Draught"]
+    assert found([recorded(G + 3.5 * SPREAD, seed) for seed in range(3)], tmp_path) == ["Draught"]
 
 
 def test_what_one_block_in_twenty_has_is_none(tmp_path):
@@ -123,8 +122,7 @@ def test_a_state_at_the_start_is_no_further_off_than_chance_makes_it(tmp_path):
             ModelSource(path, system, system.given), cases(system, [warm])
         ) as simulations:
             fit = Fit(simulations, effects)
-            begun = fit.linearise(fit.at(fit.unknowns.start()), [])
-            point = fit.stepped(begun, np.ones(1), {})
+            point = fit.stepped(fit.linearise(fit.at(fit.unknowns.start()), []), np.ones(1), {})
             steps[name] = point.deviations[0, list(fit.unknowns.local).index("Tc")]
     assert steps["free"] * of.spreads["Tc"] > 2.0 * Thresholds.furthest
     assert steps["known"] == pytest.approx(Thresholds.furthest)
@@ -207,7 +205,7 @@ def radiating(seed: int) -> pd.DataFrame:
     """Temperatures while the power is held for a minute each time, with noise."""
     rng = np.random.default_rng(seed)
     powers = rng.uniform(0.0, 90.0, COUNT)
-    x, found = np.array([5.0, 5.0]), []
+    x, temperatures = np.array([5.0, 5.0]), []
     for power in powers:
 
         def rates(_: float, x: np.ndarray, power: float = power) -> list[float]:
@@ -217,9 +215,9 @@ def radiating(seed: int) -> pd.DataFrame:
             return [(power - into - lost) / 100.0, (into - 0.5 * casing) / 200.0]
 
         run = solve_ivp(rates, (0.0, HELD), x, t_eval=np.arange(HELD + 1), rtol=1e-9)
-        found.append(run.y[0, :-1])
+        temperatures.append(run.y[0, :-1])
         x = run.y[:, -1]
-    measured = np.concatenate(found) + NOISE * rng.standard_normal(HELD * COUNT)
+    measured = np.concatenate(temperatures) + NOISE * rng.standard_normal(HELD * COUNT)
     time = np.arange(measured.size, dtype=float)
     return pd.DataFrame({"time [s]": time, "P [W]": np.repeat(powers, HELD), "T [K]": measured})
 

@@ -106,8 +106,7 @@ def residuals(
     for k, node in enumerate(s):
         inflow = np.array([u[k + 1, 0], -lost(model, 1e-4 + node[2])]) / 0.5
         ends[k, :2] += inverse @ (STEP * (A @ node[:2] + inflow))
-    volts = [reading(model, end[1]) for end in ends]
-    seen = np.column_stack([volts, ends[:, 0]])
+    seen = np.column_stack([[reading(model, end[1]) for end in ends], ends[:, 0]])
     terms = [(s[0] - first) / spread, (s[1:] - ends[:-1]) / WALK, (y[1:] - seen) / NOISE]
     return np.concatenate([term.ravel() for term in terms]), ends
 
@@ -204,8 +203,7 @@ def test_a_full_horizon_solves_the_nonlinear_least_squares_problem(bent):
     window = estimator._state.window
     count = window.filled[0]
     # Differences of scipy's derivatives are good to 1e-8 of a term; a standard deviation is 1.
-    solution = window.nodes[:count] / SIZES
-    assert_allclose(solution, best.x.reshape(-1, 3) / SIZES, rtol=0, atol=2e-4)
+    assert_allclose(window.nodes[:count] / SIZES, best.x.reshape(-1, 3) / SIZES, rtol=0, atol=2e-4)
     assert cost(window) == pytest.approx(2.0 * best.cost, rel=1e-7)
     assert_allclose(
         estimator._state.filter.z[:2], residuals(best.x, "Bent", samples)[1][-1, :2], atol=2e-6
@@ -305,8 +303,7 @@ def test_the_smoother_is_the_batch_least_squares_solution(linear):
     columns = [residuals(column, "Linear", samples)[0] - offset for column in np.diag(unit)]
     matrix = np.column_stack(columns)
     best = np.linalg.lstsq(matrix, -offset, rcond=None)[0] * unit
-    factor = np.linalg.qr(matrix, mode="r")
-    deviations = np.linalg.norm(np.linalg.inv(factor), axis=1) * unit
+    deviations = np.linalg.norm(np.linalg.inv(np.linalg.qr(matrix, mode="r")), axis=1) * unit
     estimate = smoother(*linear).run(*samples)
     ends = residuals(best, "Linear", samples)[1]
     h1, dleak = estimate.values[1:, 1], estimate.values[1:, 2]

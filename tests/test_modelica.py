@@ -42,8 +42,7 @@ def test_classes_within_a_class_are_read_in_their_order(tmp_path):
 
 def test_every_file_of_the_library_is_read_in_the_order_of_its_packages(wheelset):
     files = {path.stem for path in (ROOT / "modelica" / "WheelsetRig").rglob("*.mo")} - {"package"}
-    names = [name.rpartition(".")[2] for name in wheelset.classes]
-    assert files <= set(names)
+    assert files <= {name.rpartition(".")[2] for name in wheelset.classes}
     order = (ROOT / "modelica" / "WheelsetRig" / "Effects" / "package.order").read_text().split()
     of_effects = [n.rpartition(".")[2] for n in wheelset.classes if n.startswith("WheelsetRig.Ef")]
     assert of_effects == ["Effects", *order]
@@ -212,14 +211,13 @@ def test_what_cannot_be_read_is_refused_with_its_line(text, line, message, tmp_p
 
 
 def test_a_class_inherited_on_two_ways_has_what_either_says(tmp_path):
-    read = library(
+    parts = library(
         tmp_path,
         "package P partial model A input Real u; input Real w; end A; "
         'partial model B extends A(u(unit="m")); end B; '
         "model L extends A(u(min=1)); parameter Real p(max=3) = 0; end L; "
         "model K extends L; end K; model C extends B; extends K(p(min=2)); end C; end P;",
-    )
-    parts = read.components("P.C")
+    ).components("P.C")
     assert list(parts) == ["u", "w", "p"]
     assert {key: modification.value for key, modification in parts["u"].modifier.inner.items()} == {
         "unit": '"m"',

@@ -134,8 +134,7 @@ FOLLOWING = (
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_starts_in_an_fmu_follow_what_is_set_and_yield_to_a_start_that_is_set(fmi, tmp_path):
     fmu = tmp_path / "M.fmu"
-    package = write(tmp_path, FOLLOWING)
-    compiler.build(package, "Lib.M", fmu, fmi=fmi, platforms=[compiler.native()])
+    compiler.build(write(tmp_path, FOLLOWING), "Lib.M", fmu, fmi=fmi, platforms=[compiler.native()])
     assert validate_fmu(str(fmu)) == []  # without any unit, too
 
     def begin(start: Mapping[str, float], interface: str) -> list[float]:

@@ -51,7 +51,7 @@ def test_mean_run_lengths_are_those_of_the_closed_form(level):
 def test_surprises_of_a_sound_quantity_are_standard_normal_and_independent():
     """From the third estimate on, whatever level, scatter and standard errors are."""
     random = np.random.default_rng(5)
-    found = []
+    distances = []
     for _ in range(300):
         chart = Chart(Scatter(1.0))
         for number in range(12):
@@ -61,8 +61,8 @@ def test_surprises_of_a_sound_quantity_are_standard_normal_and_independent():
             if number:
                 chart.scatter.add(square)
             chart.add(number, value, error**2, surprise)
-            found.append(surprise)
-    surprises = np.reshape(found, (300, 12))
+            distances.append(surprise)
+    surprises = np.reshape(distances, (300, 12))
     assert np.isnan(surprises[:, :2]).all()
     told = surprises[:, 2:]
     # Of right ones, one seed in a thousand fails.
@@ -153,9 +153,11 @@ def test_one_wild_estimate_hardly_raises_an_alarm_and_none_of_others():
         values[25, 8] -= 100.0
 
     usual = [changed(Machine(seed, 40).watched()) for seed in range(20)]
-    found = [changed(Machine(seed, 40).watched(jumps)) for seed in range(20)]
-    assert sum(20 in raised or 25 in raised for one in found for raised in one.values()) <= 1
-    assert sum(map(len, found)) <= sum(map(len, usual)) + 1
+    spoilt = [changed(Machine(seed, 40).watched(jumps)) for seed in range(20)]
+    assert (
+        sum(20 in raised or 25 in raised for changes in spoilt for raised in changes.values()) <= 1
+    )
+    assert sum(map(len, spoilt)) <= sum(map(len, usual)) + 1
 
 
 def test_an_alarm_that_is_taken_back_says_so():
@@ -194,19 +196,21 @@ def train() -> System:
 
 
 @pytest.fixture(scope="module")
-def history(tmp_path_factory) -> Path:
+def history(once) -> Path:
     """Sixteen stops; from the ninth on, the pads of axle 3 have 15 % less friction."""
-    folder = tmp_path_factory.mktemp("history")
-    for k in range(1, 17):
-        pads = {3: 0.255} if k > 8 else {}
-        write_stop(folder / f"{k:02d}", k, pads, f"2026-03-{k:02d}")
-    return folder
+
+    def write(folder: Path) -> Path:
+        for k in range(1, 17):
+            write_stop(folder / f"{k:02d}", k, {3: 0.255} if k > 8 else {}, f"2026-03-{k:02d}")
+        return folder
+
+    return once("history", write)
 
 
 @pytest.fixture(scope="module")
-def usual(history, train, tmp_path_factory) -> MonitoringResult:
+def usual(history, train, once) -> MonitoringResult:
     """All at once."""
-    return wb.monitor(train, history, out=tmp_path_factory.mktemp("usual"), workers=1)
+    return once("monitored", lambda out: wb.monitor(train, history, out=out, workers=1))
 
 
 def same(monitored: MonitoringResult, other: MonitoringResult) -> None:
@@ -234,8 +238,7 @@ def test_work_of_friction_is_what_pads_take_from_the_train(usual, history, train
     """
     stops = [read_case(path, train) for path in sorted(history.iterdir())[:8]]
     ends = 0.46 * np.array([stop[train.outputs[0].name][-1] for stop in stops])
-    sums = usual.work[:8].sum(axis=1)
-    assert_allclose(sums, 0.5 * 96e3 * (20.0**2 - ends**2), rtol=0.08)
+    assert_allclose(usual.work[:8].sum(axis=1), 0.5 * 96e3 * (20.0**2 - ends**2), rtol=0.08)
     worn = usual.to_dict()["work"]
     assert min(worn, key=lambda name: worn[name]["of_the_mean"]) == "pads[3]"
 
@@ -278,8 +281,7 @@ def test_nothing_is_estimated_twice(history, train, tmp_path, monkeypatch):
         shutil.copytree(history / name, tmp_path / "in" / name)
     wb.monitor(train, tmp_path / "in", out=tmp_path / "out", workers=1)
     monkeypatch.setattr("workbench.studies.monitoring.estimate.replay", None)  # would fail
-    result = wb.monitor(train, tmp_path / "in", out=tmp_path / "out", workers=1)
-    assert result.names == ("01", "02")
+    assert wb.monitor(train, tmp_path / "in", out=tmp_path / "out", workers=1).names == ("01", "02")
 
 
 def test_a_state_of_another_model_or_a_damaged_one_is_refused(history, train, tmp_path):
@@ -359,8 +361,7 @@ def test_a_condition_that_the_model_needs_and_nobody_knows_is_told(history, trai
 
 
 def test_the_page_shows_what_has_changed_and_where(usual, tmp_path, probe):
-    provenance = {"run": run_of("monitor", usual.system, {})}
-    page = write_monitoring(usual, provenance, tmp_path)
+    page = write_monitoring(usual, {"run": run_of("monitor", usual.system, {})}, tmp_path)
     content = check_page(page, json.loads((tmp_path / "summary.json").read_text()))
     # Of eight axles, the third is marked, with its loss.
     (mark,) = content.xpath("//ol[@class='strip']/li[contains(@class, 'wrong')]")
@@ -396,8 +397,7 @@ def test_the_command_writes_what_it_says(history, usual, tmp_path, capsys):
     assert "[16/16]" in said.err
     alarms = pd.read_csv(tmp_path / "out" / "alarms.csv")
     assert set(alarms["quantity"]) == {"muDC[3] against the others"}
-    estimates = pd.read_csv(tmp_path / "out" / "estimates.csv")
-    assert len(estimates) == 16 * 19
+    assert len(pd.read_csv(tmp_path / "out" / "estimates.csv")) == 16 * 19
     check("monitor", json.loads((tmp_path / "out" / "summary.json").read_text()))
     for name in ("history.png", "history.svg", "index.html", "work.csv", STATE):
         assert (tmp_path / "out" / name).stat().st_size > 500
@@ -429,7 +429,7 @@ def test_the_machine_is_known_from_before_a_change_and_diagnosed_after_it(usual)
         # Of stops to the eighth, before axle 3 has changed: all pads are alike, within a deviation
         # of 2.4 % by stop, and three of a mean of eight.
         assert abs(system.values[name] / nominal.values[name] - 1.0) < 3.0 * 0.024 / np.sqrt(8)
-        before, after = (one.comparison.levels[name].spread for one in (nominal, system))
+        before, after = (declared.comparison.levels[name].spread for declared in (nominal, system))
         assert after < 0.6 * before
     assert system.given["muDC[3]"] == system.values["muDC[3]"]
 
@@ -452,14 +452,17 @@ def test_the_cause_of_a_slow_loss_is_named_with_its_axle(tmp_path):
 
 
 @pytest.fixture(scope="module")
-def fleet(tmp_path_factory) -> Path:
+def fleet(once) -> Path:
     """Two machines of two stops, and one whose recordings are none."""
-    folder = tmp_path_factory.mktemp("fleet")
-    for machine, pads in (("one", {}), ("two", {3: 0.27})):
-        for number in (1, 2):
-            write_stop(folder / machine / f"0{number}", 10 * len(pads) + number, pads)
-    (folder / "broken" / "01").mkdir(parents=True)
-    return folder
+
+    def write(folder: Path) -> Path:
+        for machine, pads in (("one", {}), ("two", {3: 0.27})):
+            for number in (1, 2):
+                write_stop(folder / machine / f"0{number}", 10 * len(pads) + number, pads)
+        (folder / "broken" / "01").mkdir(parents=True)
+        return folder
+
+    return once("fleet", write)
 
 
 def watched(where: str, out: Path, *more: str) -> dict[str, dict[str, object]]:
@@ -471,10 +474,12 @@ def watched(where: str, out: Path, *more: str) -> dict[str, dict[str, object]]:
 
 
 @pytest.fixture(scope="module")
-def local(fleet, tmp_path_factory) -> Path:
-    out = tmp_path_factory.mktemp("local")
-    watched(str(fleet), out, "--workers", "1")
-    return out
+def local(fleet, once) -> Path:
+    def watch(out: Path) -> Path:
+        watched(str(fleet), out, "--workers", "1")
+        return out
+
+    return once("monitored fleet", watch)
 
 
 def estimates(out: Path) -> pd.DataFrame:
@@ -527,6 +532,5 @@ def test_a_cluster_finds_the_same(fleet, local, tmp_path):
     ],
 )
 def test_what_makes_no_sense_is_refused(where, more, found, tmp_path, capsys):
-    words = ["monitor", where, "--system", "train", "--out", str(tmp_path / "out"), *more]
-    assert main(words) == 2
+    assert main(["monitor", where, "--system", "train", "--out", str(tmp_path / "out"), *more]) == 2
     assert found in capsys.readouterr().err

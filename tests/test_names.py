@@ -92,8 +92,7 @@ def test_a_name_that_the_fmu_does_not_have_is_refused_with_the_closest(minimal_p
 def test_a_variable_whose_name_is_given_to_another_stays_within_reach(minimal_path):
     """FxReading takes the place of Fx; the model's own Fx is fmu.Fx from then on."""
     with FMU(minimal_path) as plain, FMU(minimal_path, {"Fx": "FxReading"}) as mapped:
-        pairs = [("FxReading", "Fx"), ("Fx", "fmu.Fx")]
-        for own, new in pairs:
+        for own, new in [("FxReading", "Fx"), ("Fx", "fmu.Fx")]:
             expected = plain.variables([own]).references
             assert_array_equal(mapped.variables([new]).references, expected)
         assert "fmu.Fx" in mapped.outputs
@@ -137,8 +136,7 @@ def test_another_unit_is_refused_and_both_are_named(minimal, system, ours, unit)
 
 
 def test_a_variable_without_a_unit_is_taken_as_si(minimal, system):
-    bare = with_units(minimal, dict.fromkeys(minimal.units))
-    check_model(system, bare.description)
+    check_model(system, with_units(minimal, dict.fromkeys(minimal.units)).description)
 
 
 def copy(case: Path, folder: Path, text: str, system: System) -> Case:

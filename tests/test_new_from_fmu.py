@@ -80,8 +80,7 @@ def test_two_commands_lead_from_an_fmu_and_logs_to_an_open_loop(tmp_path, fmu, a
     assert content["fit"]["C"]["range"] == ["10 J/K", "1000 J/K"]
     assert content["fit"]["K"]["range"] == ["0.4 W/K", "10 W/K"]
     assert "offset" not in content["fit"]  # zero, and no range: nobody knows its size
-    system = load_system(folder)
-    cases = read_cases([folder / "recordings"], system)
+    cases = read_cases([folder / "recordings"], load_system(folder))
     assert [case.name for case in cases] == ["day1", "day2"]
     assert 294.0 < cases[0]["T"][0] < 296.0
     out = str(tmp_path / "out")
@@ -190,8 +189,7 @@ def ran(command: str, folder: Path, out: Path, *options: str) -> dict[str, objec
 
 
 def test_it_is_simulated_on_its_recordings(folder, tmp_path):
-    summary = ran("simulate", folder, tmp_path, "--workers", "1")
-    cases = summary["cases"]
+    cases = ran("simulate", folder, tmp_path, "--workers", "1")["cases"]
     assert isinstance(cases, dict)
     assert len(cases) == 4
     for case in cases.values():

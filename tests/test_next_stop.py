@@ -69,8 +69,7 @@ def test_what_is_left_is_the_criterion_of_buzzi_ferraris_and_forzatti():
     root = rng.standard_normal((3, 3))
     N = root @ root.T + np.eye(3)
     covariance = np.eye(12) + J @ np.linalg.inv(N) @ J.T
-    new = Quadratic(J.T @ J, J.T @ d, float(d @ d), 12)
-    left, z = refitted(new, N)
+    left, z = refitted(Quadratic(J.T @ J, J.T @ d, float(d @ d), 12), N)
     # Both are double precision on well-conditioned matrices.
     assert_allclose(left, d @ np.linalg.solve(covariance, d), rtol=1e-9)
     assert_allclose(left, np.sum((d + J @ z) ** 2) + z @ N @ z, rtol=1e-9)
@@ -100,8 +99,7 @@ def test_criteria_are_those_of_an_independent_package(x):
     assert_allclose(refitted(nothing, np.zeros((0, 0)))[0], hunter / noise**2, rtol=1e-7)
     J = np.column_stack([line, -curve]) / noise
     N = np.diag(np.diag(J.T @ J))
-    both = Quadratic(J.T @ J, J.T @ d, float(d @ d), 3)
-    assert_allclose(refitted(both, N)[0], buzzi, rtol=1e-7)
+    assert_allclose(refitted(Quadratic(J.T @ J, J.T @ d, float(d @ d), 3), N)[0], buzzi, rtol=1e-7)
     before, _ = precision(np.zeros((1, 1)), N[:1, :1], [0])
     assert_allclose(-2.0 * np.log(before), information, rtol=1e-7)
 
@@ -144,7 +142,7 @@ def test_the_chance_is_the_share_of_simulated_decisions():
     right = np.array([1.0, 0.0])
     wrong = np.array([cosine, np.sqrt(1.0 - cosine**2)])
     y = np.sqrt(apart / (1.0 - cosine**2)) * right + rng.standard_normal((count, 2))
-    left = [np.sum(y**2, axis=1) - (y @ one) ** 2 for one in (wrong, right)]
+    left = [np.sum(y**2, axis=1) - (y @ direction) ** 2 for direction in (wrong, right)]
     share = np.mean(left[0] - left[1] > decides.form)
     # Four standard deviations of a share of 4000, and 0.01 for the noise that the right one leaves.
     expected = discrimination_chance(apart, 0.0, decides)
@@ -179,8 +177,8 @@ def test_a_lag_is_of_first_order():
     time = np.arange(0.0, 6.0, 0.01)
     expected = np.where(time >= 1.0, 1.0 - np.exp(-(time - 1.0) / 0.7), 0.0)
     # The filter is exact at samples, one of which the demand may come earlier.
-    found = Profile(varied, STEP, (1.0,), 4.0).signal(time)
-    assert np.abs(found - expected).max() < 0.01 / 0.7 + 1e-9
+    signal = Profile(varied, STEP, (1.0,), 4.0).signal(time)
+    assert np.abs(signal - expected).max() < 0.01 / 0.7 + 1e-9
 
 
 def a_grid(counts: list[int]) -> Experiments:
@@ -218,17 +216,17 @@ def test_what_is_released_is_so_after_its_time_where_a_machine_allows_it():
 )
 def test_of_a_large_grid_a_fraction_is_tried_with_every_value(counts, parts):
     asked = a_grid(counts)
-    every, some = all_settings(asked), settings_fraction(asked)
-    assert len(some) <= 48
-    assert len(some) == pytest.approx(len(every) / parts, abs=1.0)
+    grid, fraction = all_settings(asked), settings_fraction(asked)
+    assert len(fraction) <= 48
+    assert len(fraction) == pytest.approx(len(grid) / parts, abs=1.0)
     for name, values in asked.settings.items():
-        often = [sum(one.settings[name] == value for one in some) for value in values]
+        often = [sum(trial.settings[name] == value for trial in fraction) for value in values]
         assert min(often) > 0
         assert np.ptp(often) <= 2
     # What is left out differs from something that is tried in one setting.
-    near = [other_setting for each in some for other_setting in other_settings(asked, each)]
-    assert len(other_settings(asked, every[0])) == sum(counts) - len(counts)
-    assert all(one in near for one in every if one not in some)
+    near = [other_setting for each in fraction for other_setting in other_settings(asked, each)]
+    assert len(other_settings(asked, grid[0])) == sum(counts) - len(counts)
+    assert all(experiment in near for experiment in grid if experiment not in fraction)
 
 
 # --- a heated block, whose recordings solve the equations by SciPy ---
@@ -285,13 +283,14 @@ def mild(block) -> list[Case]:
 
 
 @pytest.fixture(scope="module")
-def undecided(block, mild, tmp_path_factory) -> Outcome:
-    return diagnosed(block, mild, tmp_path_factory.mktemp("undecided"))
+def undecided(block, mild, once) -> Outcome:
+    return once("undecided", lambda out: diagnosed(block, mild, out))
 
 
 @pytest.fixture(scope="module")
-def proposed(undecided) -> NextStop:
-    return wb.next_stop(undecided, workers=1, report=lambda _: None)
+def proposed(undecided, once) -> NextStop:
+    quiet = {"workers": 1, "report": lambda _: None}
+    return once("next experiment", lambda _: wb.next_stop(undecided, **quiet))
 
 
 def made(block: System, experiment: RankedExperiment) -> list[Case]:
@@ -316,8 +315,7 @@ def test_a_difference_that_the_models_own_error_drowns_is_told_so(proposed):
     """By 20 times the noise; a separation of 0.0 would say that they are the same."""
     best = proposed.tried[0]
     nothing = np.zeros_like(best.prediction.pairwise)
-    same = replace(best.prediction, pairwise=nothing, chance=nothing)
-    lost = replace(best, prediction=same)
+    lost = replace(best, prediction=replace(best.prediction, pairwise=nothing, chance=nothing))
     rivals = replace(proposed.rivals, variance_factors=np.full(len(proposed.channels), 400.0))
     proposal = replace(proposed, tried=(lost,), rivals=rivals)
     assert "20 times the noise, drowns their difference" in proposal.sentence
@@ -330,8 +328,7 @@ def test_what_is_beside_the_best_of_a_fraction_is_tried_too(block, undecided, mo
     asked = replace(block.experiments, further=(*block.experiments.further, knob))
     assert len(settings_fraction(asked)) == 1
     proposal = next_stop(replace(block, experiments=asked), undecided.rivals, ALONE)
-    turned = {row.prediction.candidate.settings["knob"].value for row in proposal.tried}
-    assert turned == {0.0, 1.0}
+    assert {row.prediction.candidate.settings["knob"].value for row in proposal.tried} == {0.0, 1.0}
 
 
 def test_an_experiment_drawn_at_random_parts_half_as_often_at_most(proposed):
@@ -383,8 +380,8 @@ def test_each_experiment_is_drawn_as_often(block):
     rng = np.random.default_rng(8)
     (first,) = all_settings(block.experiments)
     every = [first, *other_profiles(block.experiments, first)]
-    found = [every.index(draw_experiment(block.experiments, rng)) for _ in range(7000)]
-    counts = np.bincount(found, minlength=len(every))
+    drawn = [every.index(draw_experiment(block.experiments, rng)) for _ in range(7000)]
+    counts = np.bincount(drawn, minlength=len(every))
     assert len(every) == 7
     assert np.sum((counts - 1000.0) ** 2 / 1000.0) < chi2.isf(1e-3, 6)
 
@@ -404,8 +401,7 @@ def test_of_a_single_cause_the_deviation_of_its_size_falls_as_predicted(
     assert deviations == sorted(deviations)
     assert "narrows the interval of" in proposal.sentence
     both = [*mild, *named_anew(made(block, proposal.tried[0]))]
-    rivals = diagnosed(block, both, tmp_path).rivals
-    shown = rivals.models[0].information[0, 0] ** -0.5
+    shown = diagnosed(block, both, tmp_path).rivals.models[0].information[0, 0] ** -0.5
     # Of information that adds up, the draw of noise moves the derivatives by little.
     assert shown == pytest.approx(deviations[0], rel=0.2)
 
@@ -511,8 +507,7 @@ def test_a_system_that_does_not_say_what_may_be_varied_is_refused(block, undecid
 )
 def test_a_mistake_in_what_may_be_varied_is_refused(block, old, new, said, tmp_path):
     for name in ("package.mo", "system.toml"):
-        text = (block.source.parent / name).read_text()
-        (tmp_path / name).write_text(text.replace(old, new))
+        (tmp_path / name).write_text((block.source.parent / name).read_text().replace(old, new))
     with pytest.raises(InputError, match=said):
         load_system(tmp_path)
 

@@ -86,10 +86,9 @@ def test_the_proposed_stop_parts_what_stops_alike_did_not(
     (cause,) = undecided.diagnosis.causes
     assert {cause.effect.name, *cause.confusable_with} == set(EFFECTS)
     cases = [*alike, made(proposed.tried[0], one_speed, tmp_path)]
-    then = wb.diagnose(
+    (cause,) = wb.diagnose(
         one_speed, cases, effects=EFFECTS, out=tmp_path, workers=1, report=lambda _: None
-    )
-    (cause,) = then.diagnosis.causes
+    ).diagnosis.causes
     assert (cause.effect.name, cause.confusable_with) == (EFFECTS[0], ())
 
 
@@ -152,12 +151,12 @@ def other_surface(system: System, rail: str, imitated: float) -> Experiment:
     fixed: dict[str, object] = {"initial_speed": 160.0 / 3.6, "direction": 1}
     fixed |= {"wheel_rail": rail, "wheel_load": 80e3, "imitated": imitated}
     fixed |= {"disc_temperature": 333.15}
-    (one,) = (
+    (chosen,) = (
         experiment
         for experiment in all_settings(system.experiments)
         if all(experiment.settings[name].value == value for name, value in fixed.items())
     )
-    return one
+    return chosen
 
 
 def of_two(
@@ -204,8 +203,7 @@ def test_rivals_that_bend_far_are_fitted_again_in_full(
 @pytest.mark.long
 def test_what_derivatives_alone_promise_is_not_proposed(system, tmp_path):
     """On wet rails, derivatives part stiffness from load by ten deviations; full fits do not."""
-    names = ["CreepStiffness", "WheelLoad"]
-    _, rivals, _ = of_two(system, "creep_stiffness=0.16", names, tmp_path)
+    _, rivals, _ = of_two(system, "creep_stiffness=0.16", ["CreepStiffness", "WheelLoad"], tmp_path)
     proposed = next_stop(system, rivals, ALONE)
     assert not proposed.parts
     assert proposed.tried[0].prediction.separation < 4.0
@@ -218,8 +216,7 @@ def test_what_one_rival_alone_takes_beyond_the_claims_is_proposed_last(system, t
     asked = system.experiments
     light = {**asked.conditions, "wheel_load": (Setting(60e3, "60 kN"),)}
     rig = replace(system, experiments=replace(asked, conditions=light))
-    names = ["CreepStiffness", "WheelLoad"]
-    _, rivals, _ = of_two(rig, "creep_stiffness=-0.16", names, tmp_path)
+    _, rivals, _ = of_two(rig, "creep_stiffness=-0.16", ["CreepStiffness", "WheelLoad"], tmp_path)
     proposed = next_stop(rig, rivals, ALONE)
     assert not proposed.parts
     assert proposed.tried[0].prediction.separation < 4.0
@@ -241,8 +238,7 @@ def test_a_faster_stop_is_proposed_and_parts_the_radii(system, tmp_path):
     light = read_cases([RADIUS / "01_dry_80_1.5"], system)
     _, rivals = rivals_of_set(system, effects, all_effects, light)
     assert {model.effects for model in rivals.models} == {("WheelRadius",), ("RollerRadius",)}
-    asked = next_stop(system, rivals, ALONE)
-    assert "initial speed 160 km/h" in asked.tried[0].text
+    assert "initial speed 160 km/h" in next_stop(system, rivals, ALONE).tried[0].text
     both = [*light, *read_cases([RADIUS / "06_dry_160_3.6_rev"], system)]
     (cause,) = diagnose_set(system, effects, all_effects, both).causes
     assert (cause.effect.name, cause.confusable_with) == ("WheelRadius", ())

@@ -132,11 +132,9 @@ def test_bound_without_noise_of_inputs_is_the_inverse_of_gramian_and_prior():
 def test_gramian_of_a_stable_system_solves_lyapunov_equations():
     A, C = np.array([[-1.0, 2.0], [-3.0, -2.0]]), np.array([[1.0, 0.5]])
     h, n = 0.01, 2000
-    model = constant_model(expm(A * h), C, np.ones(1), n)
-    gramian = gramians(model, FIRST, n)[0]
+    gramian = gramians(constant_model(expm(A * h), C, np.ones(1), n), FIRST, n)[0]
     # 20 s are 30 time constants: the rest is exp(-60).
-    discrete = solve_discrete_lyapunov(expm(A * h).T, C.T @ C)
-    assert_allclose(gramian, discrete, rtol=1e-9)
+    assert_allclose(gramian, solve_discrete_lyapunov(expm(A * h).T, C.T @ C), rtol=1e-9)
     # The sum is a rectangle rule for the integral: off by h/2 of its first value, h/2 * C'C.
     continuous = solve_continuous_lyapunov(A.T, -C.T @ C)
     assert_allclose(h * gramian - 0.5 * h * C.T @ C, continuous, atol=1e-4)
@@ -364,6 +362,5 @@ def test_command_tells_when_frictions_are_known(start_of_a_stop, tmp_path, capsy
 
 def test_command_refuses_a_missing_full_model(capsys, monkeypatch, tmp_path):
     monkeypatch.chdir(ROOT)
-    arguments = ["observability", str(CASE), "--out", str(tmp_path), "--full-fmu", "none.fmu"]
-    assert main(arguments) == 2
+    assert main(["observability", str(CASE), "--out", str(tmp_path), "--full-fmu", "none.fmu"]) == 2
     assert "none.fmu: found no such file" in capsys.readouterr().err

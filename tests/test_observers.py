@@ -35,12 +35,6 @@ SECONDS, STEP = 24.0, 0.005
 
 
 @pytest.fixture(scope="module")
-def fmu(minimal_path) -> Iterator[FMU]:
-    with FMU(minimal_path) as opened:
-        yield opened
-
-
-@pytest.fixture(scope="module")
 def gains(fmu, system) -> Gains:
     return DisturbanceObserver.default_gains(fmu, system)
 
@@ -132,6 +126,17 @@ def made(fmu, root, system) -> Iterator[dict[str, Estimator]]:
         }
 
 
+@pytest.fixture(scope="module")
+def replayed(stop, made, once) -> Callable[..., Run]:
+    """Gives what an estimator makes of a stop, each made once."""
+
+    def run(name: str, muDC: Callable[[float], float], *muWR: float) -> Run:
+        case = stop(muDC, *muWR)
+        return once(f"{name} {muDC.__name__} {muWR}", lambda _: replay(case, made[name]))
+
+    return run
+
+
 @pytest.mark.parametrize("name", ONLINE)
 def test_every_estimator_keeps_the_contract(made, dry_case, name):
     """Shapes, finite force, and the same bits step by step, in the loop and when started again."""
@@ -158,46 +163,41 @@ def test_a_wrong_radius_does_not_lead_the_smoother_astray(made, dry_case, radius
     wrong = dry_case.with_signals({"omegaW": dry_case["omegaW"] * 0.46 / (0.46 + radius)})
     errors = {}
     for name in ("ekf", "smoother"):
-        result = score(wrong, replay(wrong, made[name]), WHEELSET)
-        errors[name] = result.nrmse
+        errors[name] = score(wrong, replay(wrong, made[name]), WHEELSET).nrmse
     assert errors["smoother"] < 1.1 * errors["ekf"]
     assert errors["smoother"] < 0.0025  # no more than twice that of the right radius
 
 
 @pytest.mark.parametrize("name", OBSERVERS)
-def test_every_observer_recovers_friction_and_force(stop, made, name):
+def test_every_observer_recovers_friction_and_force(stop, replayed, name):
     """Recovery: muDC within 0.01 and Fx within 2 % on a stop whose pads dry."""
-    case = stop(drying)
-    run = replay(case, made[name])
+    case, run = stop(drying), replayed(name, drying)
     window = judged_window(case, WHEELSET)
     settled = slice(window.start + 200, window.stop)
     truth = np.array([drying(t) for t in case.time])
     # 0.01 is the accuracy asked of dry friction; noise is averaged over what 5 Hz pass.
     error = low_pass(case.time, run.signal("muDC") - truth, 5.0)[settled]
     assert np.abs(error).max() < 0.01
-    result = score(case, run, WHEELSET)
-    assert result.nrmse < 0.02
+    assert score(case, run, WHEELSET).nrmse < 0.02
 
 
 @pytest.mark.parametrize("name", OBSERVERS)
-def test_nine_tenths_of_a_step_in_force_are_reached_within_half_a_second(stop, made, name):
+def test_nine_tenths_of_a_step_in_force_are_reached_within_half_a_second(stop, replayed, name):
     case = stop(wetted)
-    force = low_pass(case.time, replay(case, made[name]).signal("Fx"), 5.0)
+    force = low_pass(case.time, replayed(name, wetted).signal("Fx"), 5.0)
     before, after = (force[np.searchsorted(case.time, t)] for t in (11.5, 13.5))
-    reached = force[np.searchsorted(case.time, 12.5)]
-    assert (before - reached) / (before - after) > 0.9
+    assert (before - force[np.searchsorted(case.time, 12.5)]) / (before - after) > 0.9
 
 
 @pytest.mark.parametrize("muWR", [0.15, 0.18])
 @pytest.mark.parametrize("name", OBSERVERS)
 def test_claimed_friction_of_the_rail_is_right_where_the_contact_is_the_models(
-    stop, made, name, muWR
+    replayed, name, muWR
 ):
     """Within 10 % at 99 of 100 samples, which is what noise of the speeds makes of slip."""
-    case = stop(drying, muWR)
-    run = replay(case, made[name])
+    run = replayed(name, drying, muWR)
     claimed = run.signal("muWR")[run.claimed["muWR"]]
-    assert claimed.size > 0.5 * case.time.size
+    assert claimed.size > 0.5 * run.time.size
     assert np.mean(np.abs(claimed / muWR - 1.0) < 0.1) > 0.99
 
 
@@ -233,10 +233,9 @@ def test_the_adhesion_that_is_used_is_estimated_with_the_force_and_its_band(made
     assert np.isnan(replay(dry_case, made["open_loop"]).deviation("adhesion")).all()
 
 
-def test_ekf_and_ukf_agree_where_the_model_is_nearly_linear(stop, made):
+def test_ekf_and_ukf_agree_where_the_model_is_nearly_linear(stop, replayed):
     """Reference: both are the Kalman filter of a linear model; a dry stop is close to one."""
-    case = stop(drying)
-    runs = [replay(case, made[name]) for name in ("ekf", "ukf")]
+    case, runs = stop(drying), [replayed(name, drying) for name in ("ekf", "ukf")]
     settled = slice(judged_window(case, WHEELSET).start + 200, judged_window(case, WHEELSET).stop)
     difference = (runs[0].signal("muDC") - runs[1].signal("muDC"))[settled]
     sigma = runs[0].sigma[settled, COLUMNS.index("muDC")]
@@ -251,8 +250,7 @@ def test_observers_run_on_the_full_model_too(fmu, stop, root, name):
     with FMU(root / "fmus" / "fmi2" / "FullObserver.fmu") as full:
         cls = estimators_of(WHEELSET)[name]
         estimator = cls(full, WHEELSET, cls.default_gains(full, WHEELSET))
-        result = score(case, replay(case, estimator), WHEELSET)
-        assert result.nrmse < 0.02
+        assert score(case, replay(case, estimator), WHEELSET).nrmse < 0.02
 
 
 @pytest.mark.parametrize("fmi", ["fmi2", "fmi3"])
@@ -271,8 +269,7 @@ def test_any_fmu_runs_in_the_same_loop(root, fmu, gains, dry_case, fmi, differen
 
 def test_parameter_estimator_has_the_poles_it_was_given(fmu):
     """Reference: eigenvalues of model and PI controller at the design point."""
-    gains = WheelsetParameterEstimator.default_gains(fmu, WHEELSET)
-    L = gains.values.reshape(2, 4)
+    L = WheelsetParameterEstimator.default_gains(fmu, WHEELSET).values.reshape(2, 4)
     A = fmu.state_jacobian()
     B = fmu.input_jacobian(fmu.variables(["dmuWR", "dmuDC"]))
     closed = np.block([[A - B @ L[:, :2], B @ L[:, 2:]], [-np.eye(2), np.zeros((2, 2))]])
@@ -285,17 +282,18 @@ def test_parameter_estimator_has_the_poles_it_was_given(fmu):
 
 
 @pytest.mark.parametrize("name", OBSERVERS)
-def test_forward_and_reverse_are_mirror_images(fmu, stop, made, name):
+def test_forward_and_reverse_are_mirror_images(fmu, stop, made, replayed, name):
     """Property: speeds, torque and force change sign, friction does not."""
     case = stop(drying)
-    turned = {name: -case[name] for name in ("tauR", "omegaW", "omegaR", "Fx")}
-    mirrored = case.with_signals(turned)
+    mirrored = case.with_signals({name: -case[name] for name in ("tauR", "omegaW", "omegaR", "Fx")})
     # On the minimal model: the full one has its pads on one side, which is not symmetric.
-    estimator = made[name]
     if name == "parameter_estimator":
         reasoned = WheelsetParameterEstimator.default_gains(fmu, WHEELSET)
         estimator = ParameterEstimator(fmu, WHEELSET, reasoned)
-    forward, reverse = replay(case, estimator), replay(mirrored, estimator)
+        forward = replay(case, estimator)
+    else:
+        estimator, forward = made[name], replayed(name, drying)
+    reverse = replay(mirrored, estimator)
     turning = ("omegaW", "omegaR", "Fx", "slip", "speed")
     signs = np.array([-1.0 if column in turning else 1.0 for column in forward.columns])
     # Rounding only, amplified by the stiff slip.
@@ -345,14 +343,14 @@ def ends(root) -> dict[str, Case]:
 
 def chattering(estimator: Estimator, cases: Iterable[Case]) -> list[str]:
     """Cases at whose end the noise of two speed sensors appears as creep force."""
-    found = []
+    shaking = []
     for case in cases:
         resting = case.time > case.time[-1] - 0.5
         run = replay(case, estimator)
         # 100 N is the noise of the load cell itself (80 N) with a margin for the drive's torque.
         if np.abs(run.signal("Fx")[resting]).max() > 100.0:
-            found.append(case.name)
-    return found
+            shaking.append(case.name)
+    return shaking
 
 
 SPRINGING_BACK = ("08_wet_120_3.6", "09_wet_160_4.2_wsp")
@@ -567,8 +565,7 @@ def test_what_was_learned_decays_towards_the_law_not_towards_the_constant(
     """At rest the law of speed says 0.30 (1 + slope); a decay of 2/s forgets all else in 10 s."""
     values = gains.values.copy()
     values[gains.names.index("T_muDC")] = -2.0
-    disc = DiscModel(slope=0.25, fade=0.0)
-    observer = DiscObserver(fmu, system, gains.with_values(values), disc)
+    observer = DiscObserver(fmu, system, gains.with_values(values), DiscModel(slope=0.25, fade=0.0))
     observer.run(dry_case.time, dry_case.u, dry_case.y)
     nothing, end = np.zeros(2), dry_case.time[-1]
     observer.step(end, dry_case.u[-1], nothing)

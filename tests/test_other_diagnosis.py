@@ -80,43 +80,40 @@ def simulated(
         torque = K * i - drag * w * abs(w) - load(t, w)
         return [torque / J, (winding * i * i - G * T) / C]
 
-    x, found = np.zeros(2), []
+    x, speeds = np.zeros(2), []
     count = round(HOLD / STEP)
     for first in range(0, time.size, count):
         at = np.append(time[first : first + count], time[first] + HOLD)
         solved = solve_ivp(
             rates, at[[0, -1]], x, t_eval=at, args=(voltage[first],), rtol=1e-8, atol=1e-9
         )
-        found.append(solved.y[0, :-1])
+        speeds.append(solved.y[0, :-1])
         x = solved.y[:, -1]
-    return np.concatenate(found)
+    return np.concatenate(speeds)
 
 
 @pytest.fixture(scope="module")
 def fan(tmp_path_factory) -> System:
-    folder = tmp_path_factory.mktemp("fan")
-    return declare(folder, LIBRARY, SYSTEM)
+    return declare(tmp_path_factory.mktemp("fan"), LIBRARY, SYSTEM)
 
 
 @pytest.fixture(scope="module")
-def diagnosed(fan, tmp_path_factory) -> Callable[[Torque], tuple[Outcome, Path]]:
+def diagnosed(fan, once) -> Callable[[Torque], tuple[Outcome, Path]]:
     """Diagnoses recordings under a load, once, and writes what was found."""
-    known: dict[Torque, tuple[Outcome, Path]] = {}
 
     def run(load: Torque) -> tuple[Outcome, Path]:
-        if load not in known:
-            folder = tmp_path_factory.mktemp("diagnosis")
+        def diagnose_load(folder: Path) -> tuple[Outcome, Path]:
             cases = recorded(folder / "recordings", fan, load)
-            known[load] = diagnosis(fan, cases, folder / "results"), folder / "results"
-        return known[load]
+            return diagnosis(fan, cases, folder / "results"), folder / "results"
+
+        return once(f"fan, {load.__name__}", diagnose_load)
 
     return run
 
 
 def diagnosis(system: System, cases: list[Case], out: Path) -> Outcome:
     library = read_library(system.library)
-    effects = catalogue(system, library)
-    return diagnose(Problem(system, cases, library, effects), Engine(out=out))
+    return diagnose(Problem(system, cases, library, catalogue(system, library)), Engine(out=out))
 
 
 def test_a_bearing_that_rubs_is_named_with_its_friction(diagnosed):
@@ -172,13 +169,16 @@ def test_a_logger_of_the_system_file_that_is_late_is_named(fan, tmp_path):
 
 
 @pytest.fixture(scope="module")
-def bounded(tmp_path_factory) -> tuple[Outcome, Path]:
+def bounded(once) -> tuple[Outcome, Path]:
     """A bearing that rubs by more than its class allows, and brushes that cannot stand for it."""
-    folder = tmp_path_factory.mktemp("bounded")
     library = LIBRARY.replace("min=0.0, max=1.0", f"min=0.0, max={0.6 * FRICTION}")
-    system = declare(folder, library.replace("max=3.0", "max=0.06"), SYSTEM)
-    cases = recorded(folder / "recordings", system, rubbing)
-    return diagnosis(system, cases, folder / "results"), folder / "results"
+
+    def run(folder: Path) -> tuple[Outcome, Path]:
+        system = declare(folder, library.replace("max=3.0", "max=0.06"), SYSTEM)
+        cases = recorded(folder / "recordings", system, rubbing)
+        return diagnosis(system, cases, folder / "results"), folder / "results"
+
+    return once("fan beyond bounds", run)
 
 
 def test_a_cause_beyond_its_bound_is_told_with_it(bounded):

@@ -89,9 +89,7 @@ def test_outputs_of_one_unit_share_a_panel(boiler):
     """Where another signal is judged, which has a panel of its own."""
     room = replace(boiler.outputs[0], name="TRoom", label="temperature of the room")
     other = replace(
-        boiler,
-        reference_signals=(room,),
-        objective=replace(boiler.objective, signal=room.name),
+        boiler, reference_signals=(room,), objective=replace(boiler.objective, signal=room.name)
     )
     titles = [view.title for view in views(other)]
     assert titles[0] == "Temperature of the skin TSkin (solid), temperature of the water T (dashed)"
@@ -149,13 +147,13 @@ def test_outputs_that_are_no_states_tell_of_states_and_loss(boiler, case, tmp_pa
     with open_model(boiler) as fmu:
         linear = linear_test(fmu, boiler)
     assert linear.observable
-    one = case_observability(boiler, {"observer": linear.scale}, case)
+    observed = case_observability(boiler, {"observer": linear.scale}, case)
     # Nothing is lost to a room of the same temperature: before it is heated only the prior holds.
     prior = (40.0 - 1.0) / np.sqrt(12.0)
-    assert_allclose(one.tests[0].bound[:20, 0], prior, rtol=0.01)
-    assert one.tests[0].bound[-1, 0] < 0.5 * prior
-    write_windows(one, tmp_path / "case.csv")
-    draw_observability(one, tmp_path / "case.png")
-    write_observability(boiler, [linear], [one], {}, tmp_path / "observability.json")
+    assert_allclose(observed.tests[0].bound[:20, 0], prior, rtol=0.01)
+    assert observed.tests[0].bound[-1, 0] < 0.5 * prior
+    write_windows(observed, tmp_path / "case.csv")
+    draw_observability(observed, tmp_path / "case.png")
+    write_observability(boiler, [linear], [observed], {}, tmp_path / "observability.json")
     assert "Vessel.bound_dG [W/K]" in pd.read_csv(tmp_path / "case.csv")
-    assert "Vessel: rank 2 of 2, observable" in format_observability(boiler, [linear], [one])
+    assert "Vessel: rank 2 of 2, observable" in format_observability(boiler, [linear], [observed])

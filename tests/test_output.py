@@ -242,8 +242,7 @@ def test_parts_add_up_from_any_thread():
 
     with ThreadPoolExecutor(4) as threads:
         list(threads.map(part, [25, 50, 75, 100]))
-    counts = sorted(int(line.split()[0]) for line in lines)
-    assert counts == list(range(1, 251))
+    assert sorted(int(line.split()[0]) for line in lines) == list(range(1, 251))
 
 
 def test_what_is_soon_done_says_nothing():
@@ -289,8 +288,7 @@ def test_report_has_a_few_pages(results):
 def test_report_tells_number_version_and_data_and_has_lines_to_sign(results):
     summary = json.loads((results / "summary.json").read_text())
     run = summary["provenance"]["run"]
-    page = lxml.html.fromstring((results / "index.html").read_bytes())
-    (footer,) = page.xpath("//footer")
+    (footer,) = lxml.html.fromstring((results / "index.html").read_bytes()).xpath("//footer")
     text = " ".join(footer.text_content().split())
     assert text.startswith(f"Report {number_of(summary)} ")
     assert run["workbench"] in text

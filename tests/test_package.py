@@ -114,15 +114,17 @@ def test_the_fmus_that_come_along_are_those_that_system_files_name(root):
 
 
 @pytest.fixture(scope="module")
-def installed(root, tmp_path_factory) -> Path:
+def installed(root, once) -> Path:
     """What pip installs of the wheel that is built from the source distribution."""
-    folder = tmp_path_factory.mktemp("installed")
-    sources = tmp_path_factory.mktemp("sources")
-    run("-m", "hatchling", "build", "-t", "sdist", "-d", str(sources), cwd=root, check=True)
-    (archive,) = sources.glob("*.tar.gz")
-    alone = ("--no-deps", "--no-index", "--no-build-isolation")
-    run("-m", "pip", "install", *alone, "--target", str(folder), str(archive), check=True)
-    return folder
+
+    def install(folder: Path) -> Path:
+        run("-m", "hatchling", "build", "-t", "sdist", "-d", str(folder), cwd=root, check=True)
+        (archive,) = folder.glob("*.tar.gz")
+        alone, installed = ("--no-deps", "--no-index", "--no-build-isolation"), folder / "installed"
+        run("-m", "pip", "install", *alone, "--target", str(installed), str(archive), check=True)
+        return installed
+
+    return once("package", install)
 
 
 @pytest.fixture
@@ -177,8 +179,8 @@ def test_a_folder_of_the_same_name_does_not_shadow_the_cases_of_the_wheel(
     assert f"simulate {min(own.iterdir())} " in anywhere("simulate", "--help").stdout
 
 
-def test_messages_of_the_wheel_name_only_what_it_has(anywhere):
-    missing = anywhere("simulate", "--fmu", "missing.fmu")
+def test_messages_of_the_wheel_name_only_what_it_has(anywhere, root):
+    missing = anywhere("simulate", str(root / "cases" / "01_dry_80_1.5"), "--fmu", "missing.fmu")
     assert missing.returncode == 2
     assert "To do: give the path of one with --fmu." in missing.stderr
     refused = anywhere("fmu", "build", "--all")

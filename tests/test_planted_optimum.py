@@ -24,15 +24,7 @@ from workbench.observers import Gains, SearchSpace
 from workbench.observers.estimators.disturbance import DisturbanceObserver
 from workbench.observers.score import corner
 from workbench.recordings.case import Case
-from workbench.tuning import (
-    Checkpointing,
-    Job,
-    Plan,
-    Search,
-    evaluate_gains,
-    recording,
-    search,
-)
+from workbench.tuning import Checkpointing, Job, Plan, Search, evaluate_gains, recording, search
 
 from .built import declare, machine
 
@@ -218,8 +210,8 @@ def around(gains: Gains, free: Sequence[str]) -> SearchSpace:
     )
 
 
-def gain(found: Search, name: str) -> float:
-    return float(found.best[NAMES.index(name)])
+def gain(search: Search, name: str) -> float:
+    return float(search.best[NAMES.index(name)])
 
 
 @pytest.fixture(scope="module")

@@ -104,10 +104,7 @@ IMPOSSIBLE: dict[str, tuple[Callable[[Table], Table], str]] = {
         three_stops,
         r"column 'time': found a gap of 30 s after .* s; expected samples of one recording",
     ),
-    "reversed roller": (
-        lambda t: changed(t, omegaR=-t[SPEEDS[1]]),
-        "by 200% apart in half of",
-    ),
+    "reversed roller": (lambda t: changed(t, omegaR=-t[SPEEDS[1]]), "by 200% apart in half of"),
     "bar labelled kPa": (
         lambda t: renamed(t, pB="pB [kPa]"),
         "brake_pressure: found 360000 Pa where the record has pB = 36.*its largest",
@@ -178,8 +175,7 @@ def test_a_condition_that_the_record_belies_is_refused(tmp_path, system, stop, o
 )
 def test_a_recording_that_is_unlikely_is_read_with_a_doubt(tmp_path, system, stop, change, match):
     toml, table = stop
-    case = read_case(write(tmp_path / "a", toml, change(table)), system)
-    (doubt,) = case.doubts
+    (doubt,) = read_case(write(tmp_path / "a", toml, change(table)), system).doubts
     assert re.search(match, doubt), doubt
 
 

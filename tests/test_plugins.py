@@ -46,24 +46,28 @@ class Coasting(OpenLoop):
 
 
 @pytest.fixture(scope="module")
-def installed(root, tmp_path_factory) -> Path:
+def installed(minimal_path, once) -> Path:
     """Where pip has installed the distribution."""
-    sources, folder = tmp_path_factory.mktemp("sources"), tmp_path_factory.mktemp("installed")
-    fmu = root / "fmus" / "fmi2" / "MinimalObserver.fmu"
-    for name, text in {
+    files = {
         "pyproject.toml": machine_file("spinning/pyproject.toml"),
         "spinning/__init__.py": PLUGIN,
-        "spinning/system.toml": machine_file("spinning/system.toml", fmu=fmu),
+        "spinning/system.toml": machine_file("spinning/system.toml", fmu=minimal_path),
         "spinning/spin.py": COMMAND,
         "spinning/estimators/__init__.py": "",
         "spinning/estimators/coasting.py": ESTIMATOR,
-    }.items():
-        (sources / name).parent.mkdir(parents=True, exist_ok=True)
-        (sources / name).write_text(text)
-    alone = ("--no-deps", "--no-index", "--no-build-isolation", "--quiet")
-    pip = [sys.executable, "-m", "pip", "install", *alone, "--target", str(folder), str(sources)]
-    subprocess.run(pip, check=True, capture_output=True)
-    return folder
+    }
+
+    def install(folder: Path) -> Path:
+        sources, target = folder / "sources", folder / "installed"
+        for name, text in files.items():
+            (sources / name).parent.mkdir(parents=True, exist_ok=True)
+            (sources / name).write_text(text)
+        alone = ("--no-deps", "--no-index", "--no-build-isolation", "--quiet")
+        pip = [sys.executable, "-m", "pip", "install", *alone, "--target", target, sources]
+        subprocess.run(pip, check=True, capture_output=True)
+        return target
+
+    return once("plugin", install)
 
 
 def said(*command: str, beside: Path) -> str:

@@ -19,9 +19,7 @@ from workbench.errors import InputError
 from workbench.machines.wheelset.planting import PLANTABLE, SHEET_ERRORS, PlantedStops
 from workbench.machines.wheelset.rig import (
     CONSTANT_PADS,
-    SCENARIOS,
     Effects,
-    Scenario,
     plant,
     simulate,
 )
@@ -58,6 +56,7 @@ from workbench.system.template import write_system
 
 from .page_rules import check_page
 from .processes import ROOT, comes_true, living, running
+from .scenarios import short
 from .schemas import check
 
 REFERENCE = ROOT / "fmus" / "fmi2" / "Reference.fmu"
@@ -71,13 +70,6 @@ PROVENANCE = {
     "stops": [],
     "interrupted": False,
 }
-
-
-def short(name: str, speed: float) -> Scenario:
-    """A standard stop from a lower speed [km/h]."""
-    usual = SCENARIOS[name]
-    conditions = dataclasses.replace(usual.conditions, initial_speed=speed / 3.6)
-    return dataclasses.replace(usual, conditions=conditions)
 
 
 STOPS = [short("01_dry_80_1.5", 30.0), short("03_dry_120_3.6", 40.0)]
@@ -97,10 +89,12 @@ def named(effect: str, *twins: str, **intervals: tuple[float, float, float]) -> 
 
 
 @pytest.fixture(scope="module")
-def all_effects(tmp_path_factory) -> Path:
-    path = tmp_path_factory.mktemp("fmu") / "AllEffects.fmu"
-    build_everything(SYSTEM, REPERTOIRE.effects, path)
-    return path
+def all_effects(once) -> Path:
+    def build(folder: Path) -> Path:
+        build_everything(SYSTEM, REPERTOIRE.effects, folder / "AllEffects.fmu")
+        return folder / "AllEffects.fmu"
+
+    return once("rig with everything", build)
 
 
 # --- plan ---
@@ -110,10 +104,9 @@ def test_every_effect_of_the_catalogue_is_planted_and_every_other_one_is_outside
     assert sorted(plantable.effect for plantable in PLANTABLE if plantable.effect) == sorted(
         effect.name for effect in REPERTOIRE.effects
     )
-    faults_of_the_acquisition = {"spikes", "dropouts", "fx_limit"}
-    rig = {field.name for field in dataclasses.fields(Effects)} - faults_of_the_acquisition
+    rig = {field.name for field in dataclasses.fields(Effects)} - {"spikes", "dropouts", "fx_limit"}
     clocks = {name for name in rig if name.startswith("late_")}  # of loggers that are not declared
-    assert {one.name for one in (*PLANTABLE, *SHEET_ERRORS)} == rig - clocks
+    assert {plantable.name for plantable in (*PLANTABLE, *SHEET_ERRORS)} == rig - clocks
 
 
 def test_sensed_effects_leave_the_stop_alone_and_others_do_not():
@@ -155,8 +148,7 @@ def test_longer_plan_holds_the_shorter_one():
         return {planted.options for group in groups for planted in group}
 
     shorter = plan(REPERTOIRE, 2, [1.0, 4.0], 1, 2, 1)
-    longer = plan(REPERTOIRE, 5, [0.5, 1.0, 4.0], 2, 3, 1)
-    assert options(shorter) < options(longer)
+    assert options(shorter) < options(plan(REPERTOIRE, 5, [0.5, 1.0, 4.0], 2, 3, 1))
     assert options(shorter).isdisjoint(options(plan(REPERTOIRE, 2, [1.0, 4.0], 1, 2, 2)))
 
 
@@ -429,8 +421,8 @@ def test_what_is_clear_is_found_in_19_of_20(unknowns):
     rng = np.random.default_rng(unknowns)
     drawn = rng.standard_normal((4000, unknowns))
     drawn[:, 0] += clear(unknowns, decides)
-    found = (np.square(drawn).sum(axis=1) > decides.fall_of(unknowns)).mean()
-    assert found == pytest.approx(SURE, abs=3.0 * np.sqrt(SURE * (1.0 - SURE) / 4000))
+    power = (np.square(drawn).sum(axis=1) > decides.fall_of(unknowns)).mean()
+    assert power == pytest.approx(SURE, abs=3.0 * np.sqrt(SURE * (1.0 - SURE) / 4000))
 
 
 def test_a_system_without_a_plugin_is_planted_in_its_own_model(tmp_path):
@@ -529,15 +521,21 @@ def test_a_rig_that_makes_no_experiments_is_refused(tmp_path, capsys):
     assert "one with the method 'following'" in capsys.readouterr().err
 
 
+def followed(effect: str, out: Path) -> dict[str, Any]:
+    """The set of an effect that two stops alike leave undecided, and what was proposed for it."""
+    options = ["--follow", "--effects", effect, "--sizes", "8", "--repeats", "1"]
+    alike = ["--case", "24_alike_80_2.7", "--case", "25_alike_80_2.7"]
+    assert main(["power", *options, *alike, "--out", str(out), "--workers", "1"]) == 0
+    summary = json.loads((out / "followed" / "followed.json").read_text())
+    check("followed", summary)
+    (row,) = summary["sets"]
+    return row
+
+
 @pytest.mark.long
 def test_torque_and_force_part_where_the_drive_imitates_nothing(tmp_path):
     """With an inertia imitated, both are collinear in any stop, whatever the pressure."""
-    options = ["--follow", "--effects", "FxGain", "--sizes", "8", "--repeats", "1"]
-    alike = ["--case", "24_alike_80_2.7", "--case", "25_alike_80_2.7"]
-    assert main(["power", *options, *alike, "--out", str(tmp_path), "--workers", "1"]) == 0
-    said = json.loads((tmp_path / "followed" / "followed.json").read_text())
-    check("followed", said)
-    (row,) = said["sets"]
+    row = followed("FxGain", tmp_path)
     assert set(row["group"]) >= {"FxGain", "DriveTorqueGain"}
     assert "imitates 0 kg.m2" in row["proposed"]["experiment"]
     assert (row["proposed"]["foreseen"], row["proposed"]["named"]) == (True, ["FxGain"])
@@ -559,12 +557,7 @@ def test_torque_and_force_part_where_the_drive_imitates_nothing(tmp_path):
     ],
 )
 def test_a_twin_is_parted_by_what_is_proposed_for_it(planted, twin, sensor, answer, tmp_path):
-    options = ["--follow", "--effects", planted, "--sizes", "8", "--repeats", "1"]
-    alike = ["--case", "24_alike_80_2.7", "--case", "25_alike_80_2.7"]
-    assert main(["power", *options, *alike, "--out", str(tmp_path), "--workers", "1"]) == 0
-    said = json.loads((tmp_path / "followed" / "followed.json").read_text())
-    check("followed", said)
-    (row,) = said["sets"]
+    row = followed(planted, tmp_path)
     assert set(row["group"]) == {planted, twin}
     made = row["proposed"]
     assert answer in made["experiment"]

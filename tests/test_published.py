@@ -121,8 +121,7 @@ def test_records_of_tanks_are_whole_and_end_at_the_limit_of_the_sensor(published
 def test_lines_between_sharpened_samples_swing_as_the_signal_does():
     """Closed form: of the lines the first harmonic is the signal, at 9 samples a period."""
     n, cycles, fine = 900, 100, 64
-    signal = np.sin(2.0 * np.pi * cycles * np.arange(n) / n)
-    samples = electronic_oscillator.sharpened(signal)
+    samples = electronic_oscillator.sharpened(np.sin(2.0 * np.pi * cycles * np.arange(n) / n))
     samples = np.append(samples, samples[0])
     at = np.arange(n * fine) / fine
     lines = np.interp(at, np.arange(n + 1), samples)
@@ -200,9 +199,9 @@ def house(published_cases) -> dict[str, Case]:
 
 
 @pytest.fixture(scope="module")
-def outcome(house, tmp_path_factory) -> Outcome:
-    system, out = load_system("heated_house"), tmp_path_factory.mktemp("house")
-    return diagnosed(system, [house["four_days"]], out, held_out=[house["rest"]])
+def outcome(house, once) -> Outcome:
+    system, fitted, rest = load_system("heated_house"), [house["four_days"]], [house["rest"]]
+    return once("diagnosis of a house", lambda out: diagnosed(system, fitted, out, held_out=rest))
 
 
 def test_what_follows_the_fitted_hours_is_held_out(tmp_path):
@@ -291,13 +290,12 @@ def test_both_layouts_of_chambers_give_the_same_recordings(tmp_path):
 
 
 def test_a_chamber_is_cut_where_it_is_closed_and_at_2_bar(tmp_path):
-    time = np.round(0.1 * np.arange(300), 3)
-    folders(tmp_path, time)
+    folders(tmp_path, np.round(0.1 * np.arange(300), 3))
     read = {
         recording.name: recording
         for recording in leaking_chamber.PUBLISHED.layouts[1].read(tmp_path)
     }
-    held_out = [name for name, one in read.items() if one.held_out]
+    held_out = [name for name, recording in read.items() if recording.held_out]
     assert held_out == ["Ultimaker_015_below", "Ultimaker_020_below"]
     assert read["Aluminium_above"].rows == (0, 299)
     above, below = read["Ultimaker_020_above"], read["Ultimaker_020_below"]
@@ -336,8 +334,7 @@ def test_a_leak_is_found_however_far_it_leads_from_the_tight_chamber(tmp_path, t
         (folder / "case.toml").write_text(
             'title = "A chamber that is closed"\nmeasurement.file = "measured.csv"\n'
         )
-    cases = read_cases([tmp_path / "recordings"], system)
-    outcome = diagnosed(system, cases, tmp_path)
+    outcome = diagnosed(system, read_cases([tmp_path / "recordings"], system), tmp_path)
     assert outcome.diagnosis.verdict == "found"
     cause = outcome.diagnosis.causes[0]
     assert cause.effect.name == "LaminarLeak"
@@ -379,7 +376,7 @@ def test_the_record_with_pulses_is_held_out(tmp_path):
     pulses = (np.arange(40) % 7)[:, None]
     savemat(tmp_path / "DATA_EMPS_PULSES.mat", {**content, "pulses_N": pulses})
     fitted, held_out = positioning_stage.PUBLISHED.layouts[0].read(tmp_path)
-    assert [one.held_out for one in (fitted, held_out)] == [False, True]
+    assert [recording.held_out for recording in (fitted, held_out)] == [False, True]
     assert not fitted.columns["pulse [V]"].any()
     assert_array_equal(held_out.columns["pulse [V]"], pulses.ravel())
     assert_array_equal(fitted.columns["command [V]"], 2.0 * goal.ravel())
@@ -390,8 +387,7 @@ def test_friction_and_its_slant_are_named(published_cases, tmp_path):
     """Published: 20.4 N and 203.5 N.s/m, or 166.7 one way and 240.4 the other."""
     cases = published_cases("positioning_stage", "positioning_stage")
     system = load_system("positioning_stage")
-    fitted = read_cases([cases / "motion"], system)
-    outcome = diagnosed(system, fitted, tmp_path)
+    outcome = diagnosed(system, read_cases([cases / "motion"], system), tmp_path)
     causes = {cause.effect.name: cause for cause in outcome.diagnosis.causes}
     assert set(causes) == {"DryFriction", "ViscousFriction", "SlantedDamping"}
     assert outcome.diagnosis.causes[0].effect.name == "DryFriction"
@@ -425,8 +421,7 @@ def test_both_layouts_of_seals_give_the_same_recordings(tmp_path):
             f"{a:.3f}\t3.476\t0.5\t1.07\t{b}\t{c}\t{d}\r\n"
             for a, b, c, d in zip(t, s, p, F, strict=True)
         ]
-        file = f"results_pneumatic-actuator/data/friction/{name}.csv"
-        (theirs / file).write_text("".join(lines))
+        (theirs / f"results_pneumatic-actuator/data/friction/{name}.csv").write_text("".join(lines))
         (ours / "friction" / name).mkdir(parents=True)
         rows = [f"{a / 1e3},{b},{c},{d}\n" for a, b, c, d in zip(t, s, p, F, strict=True)]
         header = "time [s],stroke [mm],pressure [bar],force [N]\n"
@@ -540,8 +535,7 @@ def test_cases_of_an_earlier_run_go_unless_somebody_changed_them(pumps, tmp_path
     (out / "a_3" / "notes.txt").write_text("mine")
     (out / "mine").mkdir()
     write_cases(str(pumps("a_1")), tmp_path / "set", out)
-    left = {str(path.relative_to(out)) for path in out.rglob("*")}
-    assert left == {
+    assert {str(path.relative_to(out)) for path in out.rglob("*")} == {
         *("prepared.json", "mine", "a_1", "a_1/case.toml", "a_1/measured.csv"),
         *("a_2", "a_2/measured.csv", "a_3", "a_3/notes.txt"),
     }

@@ -76,8 +76,7 @@ def simulate_stop(
     by_name |= {v.name: model.w[i] for i, v in enumerate(model.outputs)}
     p = {v.name: model.p[i] for i, v in enumerate(model.parameters)}
     omegaW, omegaR = by_name["omegaW"], by_name["omegaR"]
-    dt = ca.fmax(0.0, t - 0.2)
-    pB = pressure * (1.0 - ca.exp(-dt / 0.9))
+    pB = pressure * (1.0 - ca.exp(-ca.fmax(0.0, t - 0.2) / 0.9))
     loss = (40.0 + ca.fabs(omegaR) + 0.02 * omegaR**2) * ca.tanh(omegaR / 0.05)
     temperature = ca.SX.sym("T")
     force = ca.fmax(100.0, p["actuation.kappa"] * (pB - p["actuation.p0"]))
@@ -151,8 +150,7 @@ def test_no_parameter_within_its_bounds_divides_by_zero(name):
     u = [2e5 if v.name == "pB" else 0.0 for v in model.inputs]
     broken = []
     for parameter in model.parameters:
-        lowest = max(parameter.minimum or 0.0, 0.0)
-        p = values(model, "parameters", {parameter.name: lowest})
+        p = values(model, "parameters", {parameter.name: max(parameter.minimum or 0.0, 0.0)})
         f, w, holds = evaluate(0.0, x, u, p)
         if np.array(holds).all() and not np.isfinite(np.array(ca.vertcat(f, w))).all():
             broken.append(parameter.name)
@@ -344,10 +342,7 @@ def test_creep_force_agrees_with_fastsim_at_constant_friction(
 ):
     speed = 20.0
     constant = {"polach.kA": 1.0, "polach.kS": 1.0, "polach.A": 1.0, "muWR": 0.40}
-    state = {
-        "omegaR": speed / RADIUS_ROLLER,
-        "omegaW": speed * (1.0 - creepage) / RADIUS_WHEEL,
-    }
+    state = {"omegaR": speed / RADIUS_ROLLER, "omegaW": speed * (1.0 - creepage) / RADIUS_WHEEL}
     read = ca.Function("w", [small_model.x, small_model.u, small_model.p], [small_model.w])
     w = read(values(small_model, "states", state), 0, values(small_model, "parameters", constant))
     force = 0.5 * float(w[[v.name for v in small_model.outputs].index("Fx")])
@@ -397,11 +392,7 @@ def test_stiffness_grows_with_load_to_the_power_two_thirds(minimal):
 
 
 @settings(max_examples=60, deadline=None)
-@given(
-    w=st.floats(0.0, 40.0),
-    v=st.floats(-45.0, 45.0),
-    mu0=st.floats(0.05, 0.55),
-)
+@given(w=st.floats(0.0, 40.0), v=st.floats(-45.0, 45.0), mu0=st.floats(0.05, 0.55))
 def test_force_is_odd_in_slip_and_bounded_by_friction(minimal_path, w, v, mu0):
     contact = DRY_55 | {"muWR": mu0}
     with FMU(minimal_path) as fmu:

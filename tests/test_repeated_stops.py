@@ -75,12 +75,12 @@ def test_fade_of_the_model_begins_there_too(tmp_path):
 def coasting() -> Experiment:
     """From 120 km/h with the drive off: braked for five seconds, and released."""
     fixed = {"initial_speed": 120.0 / 3.6, "direction": 1, "wheel_rail": "dry", "imitated": 0.0}
-    one = next(
+    chosen = next(
         experiment
         for experiment in all_settings(SYSTEM.experiments)
         if all(experiment.settings[name].value == value for name, value in fixed.items())
     )
-    profiles = other_profiles(SYSTEM.experiments, one)
+    profiles = other_profiles(SYSTEM.experiments, chosen)
     return next(profile for profile in profiles if profile.profiles[0].shape == RELEASE)
 
 

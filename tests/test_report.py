@@ -1,6 +1,5 @@
 """What `simulate` shows: the page that a colleague opens without the tool, and the live window."""
 
-import json
 import os
 import re
 import shutil
@@ -9,7 +8,6 @@ import sys
 from pathlib import Path
 from typing import Any
 
-import lxml.html
 import numpy as np
 import pandas as pd
 import pytest
@@ -29,32 +27,23 @@ UNJUDGED = '15 vehicle "A&B" <50 %>'  # a name that every quoting has to survive
 
 
 @pytest.fixture(scope="module")
-def results(tmp_path_factory, root) -> Path:
+def results(once, root) -> Path:
     """Three recorded stops and one without Fx, through the command line."""
-    folder = tmp_path_factory.mktemp("report")
-    source = root / "cases" / "02_dry_100_2.7"
-    vehicle = folder / UNJUDGED
-    vehicle.mkdir()
-    (vehicle / "case.toml").write_text((source / "case.toml").read_text())
-    table = pd.read_csv(source / "measured.csv").drop(columns="Fx [N]").iloc[:1600]
-    table.to_csv(vehicle / "measured.csv", index=False)
-    out = folder / "out"
-    with pytest.MonkeyPatch.context() as patch:
-        patch.chdir(root)
-        cases = [f"cases/{name}" for name in CASES]
-        command = ["simulate", *cases, str(vehicle), "--csv", "--figures", "--out", str(out)]
-        assert main(command) == 0
-    return out
 
+    def run(folder: Path) -> Path:
+        source, vehicle, out = root / "cases" / "02_dry_100_2.7", folder / UNJUDGED, folder / "out"
+        vehicle.mkdir()
+        (vehicle / "case.toml").write_text((source / "case.toml").read_text())
+        table = pd.read_csv(source / "measured.csv").drop(columns="Fx [N]").iloc[:1600]
+        table.to_csv(vehicle / "measured.csv", index=False)
+        with pytest.MonkeyPatch.context() as patch:
+            patch.chdir(root)
+            cases = [f"cases/{name}" for name in CASES]
+            command = ["simulate", *cases, str(vehicle), "--csv", "--figures", "--out", str(out)]
+            assert main(command) == 0
+        return out
 
-@pytest.fixture(scope="module")
-def summary(results) -> dict[str, Any]:
-    return json.loads((results / "summary.json").read_text())
-
-
-@pytest.fixture(scope="module")
-def page(results) -> Any:
-    return lxml.html.fromstring((results / "index.html").read_bytes())
+    return once("report", run)
 
 
 def test_page_is_as_all_are(results, summary):
@@ -368,12 +357,10 @@ window.wait()
 @pytest.mark.skipif(shutil.which("xvfb-run") is None, reason="no virtual screen")
 def test_live_window_draws_whole_runs_and_may_be_closed(root):
     pytest.importorskip("tkinter", reason="no toolkit for windows")
-    case = root / "cases" / CASES[0]
-    environment = {k: v for k, v in os.environ.items() if k != "MPLBACKEND"}
     run = subprocess.run(
-        ["xvfb-run", "-a", sys.executable, "-c", LIVE, str(case)],
+        ["xvfb-run", "-a", sys.executable, "-c", LIVE, str(root / "cases" / CASES[0])],
         cwd=root,
-        env=environment,
+        env={k: v for k, v in os.environ.items() if k != "MPLBACKEND"},
         capture_output=True,
         text=True,
         timeout=LONGEST,

@@ -35,10 +35,7 @@ PROVENANCE = {
 SCORE = {"Fx_nrmse": None, "Fx_rms_N": 1.0, "z": 1.0, "seconds": 1.0, "reason": ""}
 
 
-@given(
-    values=st.lists(st.floats(-1e6, 1e6), min_size=2, max_size=200),
-    blocks=st.integers(1, 50),
-)
+@given(values=st.lists(st.floats(-1e6, 1e6), min_size=2, max_size=200), blocks=st.integers(1, 50))
 def test_decimation_keeps_ends_and_extremes(values, blocks):
     signal = np.array(values)
     kept = extremes(signal, blocks)
@@ -50,7 +47,7 @@ def test_decimation_keeps_ends_and_extremes(values, blocks):
     assert signal[kept].max() == signal.max()
 
 
-def contrast(one: str, other: str) -> float:
+def contrast(colour: str, other: str) -> float:
     """Contrast of two colours, WCAG 2.2."""
 
     def luminance(colour: str) -> float:
@@ -58,7 +55,7 @@ def contrast(one: str, other: str) -> float:
         linear = np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
         return float(linear @ [0.2126, 0.7152, 0.0722])
 
-    light, dark = sorted((luminance(one), luminance(other)), reverse=True)
+    light, dark = sorted((luminance(colour), luminance(other)), reverse=True)
     return (light + 0.05) / (dark + 0.05)
 
 
@@ -77,8 +74,7 @@ def test_contrast_is_enough_in_both_themes(root, theme, curves):
 @pytest.fixture(scope="module")
 def uncertain(dry_case, system) -> CaseResult:
     """Two estimators, the second with a standard deviation of Fx in the first half."""
-    chosen = choose(system, ["open_loop", "direct_inversion"])
-    result = prepare(system, chosen).run(dry_case)
+    result = prepare(system, choose(system, ["open_loop", "direct_inversion"])).run(dry_case)
     run = result.runs["direct_inversion"]
     sigma = np.full_like(run.estimate, np.nan)
     sigma[: len(sigma) // 2, list(system.columns).index("Fx")] = 1e3  # [N]
@@ -140,9 +136,9 @@ def test_samples_are_those_of_the_curves(uncertain):
     for curve, ranges in zip(curves, json.loads(header)["curves"], strict=True):
         for values, (least, most) in zip((curve.values, curve.reach), ranges, strict=False):
             row = next(rows)
-            found = np.where(row == 65535, np.nan, least + (most - least) * row / 65534)
+            decoded = np.where(row == 65535, np.nan, least + (most - least) * row / 65534)
             # Half a code of rounding.
-            assert_allclose(found, values, rtol=0, atol=0.51 * (most - least) / 65534 + 1e-12)
+            assert_allclose(decoded, values, rtol=0, atol=0.51 * (most - least) / 65534 + 1e-12)
 
 
 def test_pages_of_fourteen_cases_and_six_noisy_estimators_stay_below_3_MB(uncertain, tmp_path):

@@ -128,8 +128,7 @@ def test_a_run_compared_with_itself_is_unchanged(results):
     ],
 )
 def test_the_way_that_is_better_decides(results, tmp_path, changed, verdict):
-    after = other(results, tmp_path / "after", error=changed)
-    assert verdicts(results, after)[NAME] == verdict
+    assert verdicts(results, other(results, tmp_path / "after", error=changed))[NAME] == verdict
 
 
 @pytest.mark.parametrize(("low", "verdict"), [(3.0, "unclear"), (3.6, "better")])
@@ -157,8 +156,7 @@ def test_what_else_differs_is_said(results, root, tmp_path, capsys):
     measured = case / "measured.csv"
     measured.write_text(measured.read_text() + "\n")
     out = tmp_path / "after"
-    asked = ["simulate", str(case), "--estimator", "ukf", "--out", str(out)]
-    assert main(asked) == 0
+    assert main(["simulate", str(case), "--estimator", "ukf", "--out", str(out)]) == 0
     capsys.readouterr()
     assert main(["results", str(results), str(out)]) == 0
     said = capsys.readouterr().out

@@ -289,10 +289,12 @@ def test_a_folder_without_a_proposal_is_refused(tmp_path):
 
 
 @pytest.fixture(scope="module")
-def recordings(tmp_path_factory) -> Path:
-    out = tmp_path_factory.mktemp("rig")
-    assert main(arguments(out, "--workers", "2")) == 0
-    return out
+def recordings(once) -> Path:
+    def make(out: Path) -> Path:
+        assert main(arguments(out, "--workers", "2")) == 0
+        return out
+
+    return once("rig", make)
 
 
 def arguments(out: Path, *more: str) -> list[str]:
@@ -360,8 +362,7 @@ def test_recordings_are_cases_with_their_conditions(recordings):
 def test_truth_stands_in_files_of_its_own(recordings):
     folder = recordings / "10_wet_100_2.7_rev"
     truth = pd.read_csv(folder / "truth.csv")
-    case = read_case(folder, SYSTEM)
-    assert np.array_equal(truth["time [s]"], case.time)
+    assert np.array_equal(truth["time [s]"], read_case(folder, SYSTEM).time)
     assert truth["film2 [1]"].iloc[0] == 1.0
     assert truth["film2 [1]"].iloc[-1] < 0.1
     made = json.loads((folder / "truth.json").read_text())

@@ -191,9 +191,8 @@ def test_planted_film_leaves_with_the_energy_of_its_disc(effect, discs):
 
 
 def test_a_wet_disc_is_no_wetter_for_a_planted_film():
-    effects = plant(CONSTANT_PADS, ["water_film=0.2"])
     pads = Pads(
-        effects,
+        plant(CONSTANT_PADS, ["water_film=0.2"]),
         dataclasses.replace(SCENARIOS["03_dry_120_3.6"].conditions, discs=("wet", "dry", "wet")),
         1.0,
         0.0,
@@ -254,8 +253,7 @@ def test_out_of_round_wheel_turns_slower_where_its_radius_is_larger():
     stop = make("out_of_round=2e-4")
     t = coasting(stop)
     ratio = stop.truth["omegaW"][t] / stop.truth["omegaR"][t]
-    angle = stop.truth["phiW"][t] + stop.phases.out_of_round
-    cosine, sine = waves(ratio / ratio.mean(), angle)
+    cosine, sine = waves(ratio / ratio.mean(), stop.truth["phiW"][t] + stop.phases.out_of_round)
     # The rim follows the roller to the slip that the ripple of the force needs: 1 % at 11 m/s.
     assert cosine == pytest.approx(-2e-4 / WHEEL_RADIUS, rel=0.01)
     assert abs(sine) < 0.02 * abs(cosine)
@@ -349,11 +347,9 @@ def test_twice_the_roller_loss_is_what_the_drive_does_not_give_back():
 
 
 def test_friction_steps_at_90_degrees_of_the_disc():
-    discs = ("dry", "dry", "dry")
-    effects = plant(CONSTANT_PADS, ["friction_step=-0.1"])
     pads = Pads(
-        effects,
-        dataclasses.replace(SCENARIOS["03_dry_120_3.6"].conditions, discs=discs),
+        plant(CONSTANT_PADS, ["friction_step=-0.1"]),
+        dataclasses.replace(SCENARIOS["03_dry_120_3.6"].conditions, discs=("dry", "dry", "dry")),
         1.0,
         0.0,
         1e-3,
@@ -365,7 +361,6 @@ def test_friction_steps_at_90_degrees_of_the_disc():
 
 def test_friction_ripples_from_first_contact():
     stop = make("friction_ripple=0.05")
-    touched = int(np.flatnonzero(normal_force(stop) > 0.0)[0])
-    since = np.maximum(0.0, stop.time - stop.time[touched])
+    since = np.maximum(0.0, stop.time - stop.time[int(np.flatnonzero(normal_force(stop) > 0.0)[0])])
     expected = 1.0 + 0.05 * np.sin(2.0 * np.pi * 0.3 * since)
     assert friction(stop, 2) == pytest.approx(expected, abs=1e-9)

@@ -96,9 +96,9 @@ def test_sensors_that_are_fitted_besides_read_the_truth_with_their_noise():
         stop, scenario=dataclasses.replace(stop.scenario, sensors=tuple(FURTHER))
     )
     time, wrong = recorded(stop), plant(CONSTANT_PADS, ["roller_radius=0.002", "wheel_load=0.05"])
-    without, found = (sample(one, wrong, time) for one in (stop, fitted))
-    assert set(found) - set(without) == set(FURTHER)
-    assert all(np.array_equal(found[name], without[name]) for name in CHANNELS)
+    without, readings = (sample(rig, wrong, time) for rig in (stop, fitted))
+    assert set(readings) - set(without) == set(FURTHER)
+    assert all(np.array_equal(readings[name], without[name]) for name in CHANNELS)
     # What the sensors feel: the contact's force, the load on it, the rim of the roller, and one of
     # three discs that are all alike.
     way = np.sign(stop.at(time, "omegaW"))
@@ -110,7 +110,7 @@ def test_sensors_that_are_fitted_besides_read_the_truth_with_their_noise():
     }
     assert set(truth) == set(FURTHER)
     for name, (felt, noise) in truth.items():
-        error = (found[name] - felt) / noise
+        error = (readings[name] - felt) / noise
         # Four sigma of the estimates, as above.
         assert error.mean() == pytest.approx(0.0, abs=4.0 / np.sqrt(error.size)), name
         assert error.std() == pytest.approx(1.0, abs=4.0 / np.sqrt(2.0 * error.size)), name
@@ -118,8 +118,7 @@ def test_sensors_that_are_fitted_besides_read_the_truth_with_their_noise():
 
 def test_the_disc_that_brakes_least_is_the_wet_one():
     """Also where it is wet no more, and its friction differs from that of others by noise alone."""
-    usual = SCENARIOS["03_dry_120_3.6"]
-    scenario = dataclasses.replace(usual, sensors=("disc",))
+    scenario = dataclasses.replace(SCENARIOS["03_dry_120_3.6"], sensors=("disc",))
     wet = plant(CONSTANT_PADS, ["single_disc_film=0.5"])
     stop = simulate(scenario, SEED, wet, REFERENCE)
     time = recorded(stop)
@@ -205,8 +204,7 @@ def test_load_cell_drifts_in_time_in_both_directions():
     for direction in (1, -1):
         stop = make(speed=20.0, direction=direction)
         # Both readings are rounded to 10 N.
-        drift = added("force_drift=20", stop)["Fx"]
-        assert drift == pytest.approx(20.0 * recorded(stop), abs=10.0)
+        assert added("force_drift=20", stop)["Fx"] == pytest.approx(20.0 * recorded(stop), abs=10.0)
 
 
 # --- corrupted samples ---
@@ -232,8 +230,7 @@ def test_dropouts_leave_out_rows_and_nothing_else(tmp_path):
     rate = 5.0
     lossy = plant(CONSTANT_PADS, [f"dropouts={rate}", "spikes=1"])
     write_recording(stop, lossy, 200, tmp_path / "lossy")
-    spiky = plant(CONSTANT_PADS, ["spikes=1"])
-    write_recording(stop, spiky, 200, tmp_path / "spiky")
+    write_recording(stop, plant(CONSTANT_PADS, ["spikes=1"]), 200, tmp_path / "spiky")
     full, kept = (
         (tmp_path / f / "measured.csv").read_text().splitlines() for f in ("spiky", "lossy")
     )

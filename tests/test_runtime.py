@@ -30,7 +30,6 @@ from .runtime_instances import (
     FORCE,
     HEADERS,
     TIME,
-    VERSIONS,
     X1,
     X2,
     D,
@@ -43,27 +42,46 @@ from .runtime_instances import (
 
 pytestmark = needs_compiler
 
+
+VERSIONS = pytest.mark.parametrize("version", [2, 3])  # last in the names of tests
+
+
+@pytest.fixture(params=[2, 3])
+def version(request) -> int:
+    return request.param
+
+
+@pytest.fixture
+def fmu(open_fmu, version) -> Fmu:
+    """The oscillator in Co-Simulation, initialised."""
+    return open_fmu("oscillator", version).start()
+
+
+@pytest.fixture
+def model(open_fmu, version) -> Fmu:
+    """The oscillator in Model Exchange, in continuous time."""
+    model = open_fmu("oscillator", version, slave=False).start()
+    model.fmi.enterContinuousTimeMode()
+    return model
+
+
 # --- Model Exchange and the extension -------------------------------------------------------------
 
 
-@VERSIONS
-def test_model_exchange_evaluates_the_equations(open_fmu, version):
-    fmu = open_fmu("oscillator", version, slave=False).start()
-    fmu.fmi.enterContinuousTimeMode()
-    fmu.fmi.setTime(3.0)
-    fmu.fmi.setContinuousStates((ctypes.c_double * 2)(2.0, 5.0), 2)
-    fmu.set([U], [1.0])
+def test_model_exchange_evaluates_the_equations(model, version):
+    model.fmi.setTime(3.0)
+    model.fmi.setContinuousStates((ctypes.c_double * 2)(2.0, 5.0), 2)
+    model.set([U], [1.0])
     derivatives = (ctypes.c_double * 2)()
     read = "getDerivatives" if version == 2 else "getContinuousStateDerivatives"
-    getattr(fmu.fmi, read)(derivatives, 2)
+    getattr(model.fmi, read)(derivatives, 2)
     assert list(derivatives) == [5.0, -8.0 - 2.5 + 1.0]
-    assert fmu.get(X1, X2, DX1, DX2, U, K, D, FORCE, ENERGY, TIME) == (
+    assert model.get(X1, X2, DX1, DX2, U, K, D, FORCE, ENERGY, TIME) == (
         [2.0, 5.0, 5.0, -9.5, 1.0, 4.0, 0.5, -9.5, 20.5, 3.0]
     )
-    assert fmu.fmi.completedIntegratorStep() == (False, False)
+    assert model.fmi.completedIntegratorStep() == (False, False)
 
 
-@VERSIONS
 def test_model_without_events_needs_no_event_iteration(open_fmu, version):
     fmu = open_fmu("oscillator", version, slave=False).start()
     update = fmu.fmi.newDiscreteStates if version == 2 else fmu.fmi.updateDiscreteStates
@@ -73,9 +91,7 @@ def test_model_without_events_needs_no_event_iteration(open_fmu, version):
     fmu.fmi.enterContinuousTimeMode()
 
 
-@VERSIONS
-def test_cached_values_follow_every_change(open_fmu, version):
-    fmu = open_fmu("oscillator", version).start()
+def test_cached_values_follow_every_change(fmu):
     assert fmu.get(DX2, FORCE, FORCE) == [-4.0, -4.0, -4.0]
     for reference, value, force in [(U, 1.0, -3.0), (K, 5.0, -4.0), (X1, 2.0, -9.0)]:
         fmu.set([reference], [value])
@@ -90,28 +106,25 @@ def test_cached_values_follow_every_change(open_fmu, version):
 
 @VERSIONS
 @pytest.mark.parametrize("unknowns", [[DX1, DX2], [FORCE, ENERGY], [DX1, DX2, FORCE, ENERGY]])
-def test_columns_of_the_jacobian_follow_every_change(open_fmu, version, unknowns):
-    fmu = open_fmu("oscillator", version, slave=False).start()
-    fmu.fmi.enterContinuousTimeMode()
+def test_columns_of_the_jacobian_follow_every_change(model, unknowns):
 
     def check(x1: float, k: float) -> None:
         column = {DX1: 0.0, DX2: -k, FORCE: -k, ENERGY: k * x1}
-        found = fmu.fmi.getDirectionalDerivative(unknowns, [X1], [1.0])
-        assert found == [column[unknown] for unknown in unknowns]
+        derivatives = model.fmi.getDirectionalDerivative(unknowns, [X1], [1.0])
+        assert derivatives == [column[unknown] for unknown in unknowns]
 
     check(1.0, 4.0)
-    state = fmu.save()
-    fmu.fmi.setContinuousStates((ctypes.c_double * 2)(3.0, 0.0), 2)
+    state = model.save()
+    model.fmi.setContinuousStates((ctypes.c_double * 2)(3.0, 0.0), 2)
     check(3.0, 4.0)
-    fmu.set([K], [5.0])
+    model.set([K], [5.0])
     check(3.0, 5.0)
-    fmu.set([X1], [2.0])
+    model.set([X1], [2.0])
     check(2.0, 5.0)
-    fmu.restore(state)
+    model.restore(state)
     check(1.0, 4.0)
 
 
-@VERSIONS
 def test_reset_instance_repeats_a_new_one_with_identical_bits(open_fmu, version):
     results = []
     fmu = open_fmu("oscillator", version)
@@ -164,9 +177,7 @@ def oscillator_jacobian(x1: float, x2: float, k: float = 4.0, d: float = 0.5) ->
     )
 
 
-@VERSIONS
-def test_directional_derivative_is_the_jacobian(open_fmu, version):
-    fmu = open_fmu("oscillator", version).start()
+def test_directional_derivative_is_the_jacobian(fmu):
     fmu.set([X1, X2], [2.0, 3.0])
     J = oscillator_jacobian(2.0, 3.0)
     for seed in np.eye(5):
@@ -177,9 +188,8 @@ def test_directional_derivative_is_the_jacobian(open_fmu, version):
 
 @VERSIONS
 @pytest.mark.parametrize("known", [X1, X2, U, K, D])
-def test_a_block_of_unknowns_gives_what_single_unknowns_give(open_fmu, version, known):
+def test_a_block_of_unknowns_gives_what_single_unknowns_give(fmu, known):
     """Unknowns that stand one after the other are treated at once; any others one by one."""
-    fmu = open_fmu("oscillator", version).start()
     fmu.set([X1, X2], [2.0, 3.0])
     unknowns = [X1, X2, DX1, DX2, FORCE, ENERGY]
 
@@ -234,8 +244,7 @@ def test_dependencies_are_the_pattern_of_the_jacobian(open_fmu):
         ([99], [X1], "99 is no"),
     ],
 )
-def test_wrong_unknown_or_known_is_refused(open_fmu, version, unknowns, knowns, match):
-    fmu = open_fmu("oscillator", version).start()
+def test_wrong_unknown_or_known_is_refused(fmu, unknowns, knowns, match):
     with fmu.refuses(ERROR, match):
         fmu.fmi.getDirectionalDerivative(unknowns, knowns, [1.0])
 
@@ -243,9 +252,7 @@ def test_wrong_unknown_or_known_is_refused(open_fmu, version, unknowns, knowns, 
 # --- Saved states ---------------------------------------------------------------------------------
 
 
-@VERSIONS
-def test_restored_state_runs_on_with_identical_bits(open_fmu, version):
-    fmu = open_fmu("oscillator", version).start()
+def test_restored_state_runs_on_with_identical_bits(fmu):
     fmu.run(0.0, 1.0, 0.03)
     state = fmu.save()
     start = fmu.get(TIME)[0]
@@ -264,7 +271,6 @@ def test_restored_state_runs_on_with_identical_bits(open_fmu, version):
     fmu.free(state)
 
 
-@VERSIONS
 def test_state_serialized_in_one_instance_runs_on_in_another(open_fmu, version):
     first, second = (open_fmu("oscillator", version).start(1e-8) for _ in range(2))
     first.set([K, U], [9.0, 2.0])
@@ -279,7 +285,6 @@ def test_state_serialized_in_one_instance_runs_on_in_another(open_fmu, version):
     assert results[0] == results[1]
 
 
-@VERSIONS
 def test_foreign_short_and_damaged_states_are_refused(open_fmu, version):
     fmu = open_fmu("oscillator", version).start()
     other = open_fmu("van_der_pol", version).start()
@@ -296,7 +301,6 @@ def test_foreign_short_and_damaged_states_are_refused(open_fmu, version):
             fmu.deserialize(wrong)
 
 
-@VERSIONS
 def test_state_of_the_other_kind_is_refused(open_fmu, version):
     slave = open_fmu("oscillator", version).start()
     model = open_fmu("oscillator", version, slave=False).start()
@@ -308,7 +312,6 @@ def test_state_of_the_other_kind_is_refused(open_fmu, version):
 # --- Library --------------------------------------------------------------------------------------
 
 
-@VERSIONS
 def test_information_is_logged_only_on_request(open_fmu, version):
     quiet = open_fmu("oscillator", version).start()
     verbose = open_fmu("oscillator", version, verbose=True).start()
@@ -320,7 +323,6 @@ def test_information_is_logged_only_on_request(open_fmu, version):
     assert len(verbose.log) == count
 
 
-@VERSIONS
 def test_two_threads_give_the_same_as_one(open_fmu, version):
     def simulate(fmu: Fmu) -> list[list[float]]:
         fmu.run(0.0, 2.0, 1e-3)
@@ -333,7 +335,6 @@ def test_two_threads_give_the_same_as_one(open_fmu, version):
     assert together == [alone, alone]
 
 
-@VERSIONS
 @pytest.mark.skipif(shutil.which("nm") is None, reason="needs nm")
 def test_library_exports_the_functions_of_the_standard_and_nothing_else(open_fmu, version):
     fmu = open_fmu("oscillator", version)
@@ -368,8 +369,7 @@ def test_wrong_token_and_empty_name_are_refused(open_fmu, version, options, matc
 
 @VERSIONS
 @pytest.mark.parametrize("value", [math.nan, math.inf])
-def test_values_that_are_not_finite_are_refused(open_fmu, version, value):
-    fmu = open_fmu("oscillator", version).start()
+def test_values_that_are_not_finite_are_refused(fmu, value):
     with fmu.refuses(ERROR, "value reference 0, expected a finite"):
         fmu.set([U, X1], [7.0, value])
     assert fmu.get(U) == [0.0]
@@ -377,16 +377,13 @@ def test_values_that_are_not_finite_are_refused(open_fmu, version, value):
         fmu.set([U], [value])
 
 
-@VERSIONS
-def test_states_that_are_not_finite_are_refused_but_large_ones_are_not(open_fmu, version):
-    fmu = open_fmu("oscillator", version, slave=False).start()
-    fmu.fmi.enterContinuousTimeMode()
+def test_states_that_are_not_finite_are_refused_but_large_ones_are_not(model):
     large = sys.float_info.max  # two of them overflow a sum
-    fmu.fmi.setContinuousStates((ctypes.c_double * 2)(large, large), 2)
-    assert fmu.get(X1, X2) == [large, large]
-    with fmu.refuses(ERROR, "value reference 1, expected a finite"):
-        fmu.fmi.setContinuousStates((ctypes.c_double * 2)(1.0, math.nan), 2)
-    assert fmu.get(X1, X2) == [large, large]
+    model.fmi.setContinuousStates((ctypes.c_double * 2)(large, large), 2)
+    assert model.get(X1, X2) == [large, large]
+    with model.refuses(ERROR, "value reference 1, expected a finite"):
+        model.fmi.setContinuousStates((ctypes.c_double * 2)(1.0, math.nan), 2)
+    assert model.get(X1, X2) == [large, large]
 
 
 @VERSIONS
@@ -401,13 +398,11 @@ def test_states_that_are_not_finite_are_refused_but_large_ones_are_not(open_fmu,
         (2**32 - 1, "4294967295 is no variable"),
     ],
 )
-def test_what_cannot_be_set_is_refused(open_fmu, version, reference, match):
-    fmu = open_fmu("oscillator", version).start()
+def test_what_cannot_be_set_is_refused(fmu, reference, match):
     with fmu.refuses(ERROR, match):
         fmu.set([U, reference], [7.0, 1.0])
 
 
-@VERSIONS
 def test_states_and_tunable_parameters_can_be_set_while_running_but_fixed_ones_cannot(
     open_fmu, version
 ):
@@ -423,7 +418,6 @@ def test_states_and_tunable_parameters_can_be_set_while_running_but_fixed_ones_c
     assert fmu.get(X1, U, K, D) == [4.0, 1.0, 6.0, 0.2]
 
 
-@VERSIONS
 def test_calls_in_the_wrong_phase_are_refused(open_fmu, version):
     fmu = open_fmu("oscillator", version)
     with fmu.refuses(ERROR, r"DoStep: called in phase 'instantiated', allowed in: step mode"):
@@ -464,19 +458,15 @@ def test_impossible_tolerance_is_refused(open_fmu, version, tolerance):
         fmu.initialize(tolerance)
 
 
-@VERSIONS
-def test_wrong_array_length_is_refused(open_fmu, version):
-    fmu = open_fmu("oscillator", version, slave=False).start()
-    fmu.fmi.enterContinuousTimeMode()
-    with fmu.refuses(ERROR, "3 values, expected 2"):
-        fmu.fmi.setContinuousStates((ctypes.c_double * 3)(), 3)
-    with fmu.refuses(ERROR, "NULL"):
-        fmu.fmi.setContinuousStates(None, 2)
-    with fmu.refuses(ERROR, "event indicators"):
-        fmu.fmi.getEventIndicators((ctypes.c_double * 1)(), 1)
+def test_wrong_array_length_is_refused(model):
+    with model.refuses(ERROR, "3 values, expected 2"):
+        model.fmi.setContinuousStates((ctypes.c_double * 3)(), 3)
+    with model.refuses(ERROR, "NULL"):
+        model.fmi.setContinuousStates(None, 2)
+    with model.refuses(ERROR, "event indicators"):
+        model.fmi.getEventIndicators((ctypes.c_double * 1)(), 1)
 
 
-@VERSIONS
 def test_no_instance_is_an_error_and_nothing_to_free(open_fmu, version):
     library = open_fmu("oscillator", version).fmi.dll
     assert getattr(library, f"fmi{version}Reset")(None) == ERROR
@@ -500,7 +490,6 @@ def test_variables_of_other_types_are_refused(open_fmu):
 # --- Failures of the model ------------------------------------------------------------------------
 
 
-@VERSIONS
 def test_overflow_discards_the_derivative(open_fmu, version):
     fmu = open_fmu("overflow", version, slave=False).start()
     fmu.fmi.enterContinuousTimeMode()
@@ -516,7 +505,6 @@ def test_overflow_discards_the_derivative(open_fmu, version):
         fmu.get(2)
 
 
-@VERSIONS
 def test_step_into_a_singularity_stops_before_it(open_fmu, version):
     """x = -log(1 - t) ends at t = 1; the instance stands at its last accepted step."""
     fmu = open_fmu("overflow", version).start()
@@ -554,7 +542,6 @@ def test_discarded_step_can_be_repeated_from_a_saved_state(open_fmu):
     assert_allclose(fmu.get(0), -math.log(0.5), rtol=1e-5)  # ten times the tolerance
 
 
-@VERSIONS
 def test_violated_assertion_stops_the_step_with_its_text(open_fmu, version):
     fmu = open_fmu("tank", version).start()
     fmu.fmi.doStep(0.0, 0.9)
@@ -568,7 +555,6 @@ def test_violated_assertion_stops_the_step_with_its_text(open_fmu, version):
     assert_allclose(level, t, rtol=1e-12)  # level' = 1: exact but for rounding
 
 
-@VERSIONS
 def test_violated_assertion_stops_initialization_and_model_exchange(open_fmu, version):
     fmu = open_fmu("tank", version, slave=False)
     fmu.set([0], [2.0])
@@ -644,7 +630,6 @@ def test_one_large_step_kills_a_stiff_transient(fixed_step):
     assert abs(x[0] - 1.0) < 1e-4  # 100/|z|; an A-stable method with |R(oo)| = 1 leaves 1
 
 
-@VERSIONS
 def test_error_falls_with_tolerance(open_fmu, version):
     """Forced oscillation, input jumps included, against the matrix exponential."""
     errors = {}
@@ -723,14 +708,11 @@ def step_memory(fmu: Fmu) -> float:
     return float(np.frombuffer(fmu.serialize(fmu.save()), offset=header, count=4)[3])
 
 
-@VERSIONS
-def test_communication_points_are_hit_exactly(open_fmu, version):
-    fmu = open_fmu("oscillator", version).start()
+def test_communication_points_are_hit_exactly(fmu):
     fmu.run(0.0, 1.0, 0.1)
     assert fmu.get(TIME) == [0.9 + 0.1]
 
 
-@VERSIONS
 def test_steps_that_add_up_with_rounding_are_accepted(open_fmu, version):
     fmu = open_fmu("oscillator", version).start(stop=10.0)
     t = 0.0
@@ -740,7 +722,6 @@ def test_steps_that_add_up_with_rounding_are_accepted(open_fmu, version):
     assert_allclose(fmu.get(X1, X2), oscillate([1.0, 0.0], 0.0, 10.0), atol=1e-6)  # = tolerance
 
 
-@VERSIONS
 def test_model_without_states_steps(open_fmu, version):
     fmu = open_fmu("gain", version).start()
     fmu.set([0], [3.0])

@@ -30,12 +30,12 @@ def test_every_system_file_is_as_the_schema_says(name):
 
 
 WRONG: dict[str, Callable[[dict[str, Any]], object]] = {
-    "an unknown key": lambda one: one.update(inputz={}),
-    "no outputs": lambda one: one.pop("outputs"),
-    "a unit that is a number": lambda one: one["outputs"]["h"].update(unit=1),
-    "noise that is a list": lambda one: one["outputs"]["h"].update(noise=["1 mm"]),
-    "an unknown key of a signal": lambda one: one["outputs"]["h"].update(noize="1 mm"),
-    "a model without a class": lambda one: one["models"]["observer"].pop("class"),
+    "an unknown key": lambda system: system.update(inputz={}),
+    "no outputs": lambda system: system.pop("outputs"),
+    "a unit that is a number": lambda system: system["outputs"]["h"].update(unit=1),
+    "noise that is a list": lambda system: system["outputs"]["h"].update(noise=["1 mm"]),
+    "an unknown key of a signal": lambda system: system["outputs"]["h"].update(noize="1 mm"),
+    "a model without a class": lambda system: system["models"]["observer"].pop("class"),
 }
 
 

@@ -20,23 +20,25 @@ OBSERVERS = ("disturbance_observer", "parameter_estimator", "ekf", "ukf")
 
 
 @pytest.fixture(scope="module")
-def results(tmp_path_factory, root) -> Path:
+def results(once, root) -> Path:
     """All fourteen cases through the command line."""
-    out = tmp_path_factory.mktemp("simulate")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.chdir(root)
-        assert main(["simulate", "--out", str(out)]) == 0
-    return out
+
+    def run(out: Path) -> Path:
+        with pytest.MonkeyPatch.context() as patch:
+            patch.chdir(root)
+            assert main(["simulate", "--out", str(out)]) == 0
+        return out
+
+    return once("simulate", run)
 
 
 @pytest.fixture(scope="module")
-def nrmse(results) -> pd.DataFrame:
+def nrmse(summary) -> pd.DataFrame:
     """Error of Fx by case (rows) and estimator (columns)."""
-    cases = json.loads((results / "summary.json").read_text())["cases"]
     return pd.DataFrame(
         {
             name: {e: values["Fx_nrmse"] for e, values in case["estimators"].items()}
-            for name, case in cases.items()
+            for name, case in summary["cases"].items()
         }
     ).T
 
@@ -93,8 +95,7 @@ def test_chosen_estimators_alone_are_run(root, tmp_path, monkeypatch):
     assert "slope" in summary["provenance"]["disturbance_observer_disc"]["disc"]
 
 
-def test_summary_keeps_its_contract(results):
-    summary = json.loads((results / "summary.json").read_text())
+def test_summary_keeps_its_contract(summary):
     assert summary["weights"] == {"omegaW": 1.0, "omegaR": 1.0, "Fx": 1e-3}
     assert len(summary["provenance"]["fmu"]["sha256"]) == 64
     for case in summary["cases"].values():
@@ -104,15 +105,14 @@ def test_summary_keeps_its_contract(results):
             assert values["z"] > 0.0
 
 
-def test_the_table_of_the_documentation_is_that_of_the_command(results):
-    summary = json.loads((results / "summary.json").read_text())
+def test_the_table_of_the_documentation_is_that_of_the_command(summary):
     (text,) = figures.block("simulate").findall((figures.PAGES / "accuracy.md").read_text())
     rows = [line.strip("| ").split(" | ") for line in text.splitlines() if line.startswith("|")]
     header, *made = figures.tables.errors(summary)
     assert rows[0] == list(header)
-    for row, found in zip(rows[2:], made, strict=True):
-        assert row[0] == found[0]
-        ours, theirs = ([float(one.split()[0]) for one in line[1:]] for line in (row, found))
+    for row, computed in zip(rows[2:], made, strict=True):
+        assert row[0] == computed[0]
+        ours, theirs = ([float(cell.split()[0]) for cell in line[1:]] for line in (row, computed))
         # The last digit: another processor may round otherwise.
         np.testing.assert_allclose(ours, theirs, rtol=0.0, atol=0.0101)
 
@@ -129,10 +129,9 @@ def test_estimates_of_every_case_are_written_in_little_room(results, root, syste
     assert not list(results.glob("*.part"))
 
 
-def test_gains_from_a_file_are_used_and_named(results, root, tmp_path, monkeypatch):
+def test_gains_from_a_file_are_used_and_named(summary, root, tmp_path, monkeypatch):
     """The same gains give the same error; with none, nothing is learned."""
-    default = json.loads((results / "summary.json").read_text())
-    values = default["provenance"]["disturbance_observer"]
+    values = summary["provenance"]["disturbance_observer"]
     name = "02_dry_100_2.7"
     errors = {}
     for share in (1.0, 0.0):
@@ -144,11 +143,10 @@ def test_gains_from_a_file_are_used_and_named(results, root, tmp_path, monkeypat
         gains.write_text("\n".join(text))
         monkeypatch.chdir(root)
         assert main(["simulate", f"cases/{name}", "--gains", str(gains), "--out", str(out)]) == 0
-        summary = json.loads((out / "summary.json").read_text())
-        assert "gains.toml" in summary["provenance"]["disturbance_observer"]["source"]
-        scores = summary["cases"][name]["estimators"]["disturbance_observer"]
-        errors[share] = scores["Fx_nrmse"]
-    expected = default["cases"][name]["estimators"]["disturbance_observer"]["Fx_nrmse"]
+        own = json.loads((out / "summary.json").read_text())
+        assert "gains.toml" in own["provenance"]["disturbance_observer"]["source"]
+        errors[share] = own["cases"][name]["estimators"]["disturbance_observer"]["Fx_nrmse"]
+    expected = summary["cases"][name]["estimators"]["disturbance_observer"]["Fx_nrmse"]
     assert errors[1.0] == expected
     assert errors[0.0] > 5 * expected
 

@@ -78,8 +78,7 @@ def sliding(noise: float) -> Case:
 
 def ready(case: Case, system: System = SYSTEM) -> Samples:
     with FMU(MINIMAL) as fmu:
-        signals = compared(system, [case])
-        return prepare(case, system, signals, OpenModel(fmu, motion(fmu, system)))
+        return prepare(case, system, compared(system, [case]), OpenModel(fmu, motion(fmu, system)))
 
 
 def slip_errors(samples: Samples, values: dict[str, float]) -> Vector:
@@ -146,10 +145,7 @@ def diagnosed(
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("planted", "name", "size"),
-    [
-        ("adhesion_recovery", "AdhesionRecovery", 0.3),
-        ("falling_friction", "FallingFriction", 0.3),
-    ],
+    [("adhesion_recovery", "AdhesionRecovery", 0.3), ("falling_friction", "FallingFriction", 0.3)],
 )
 def test_what_slip_makes_of_friction_is_named_from_three_slides(
     planted, name, size, everything, tmp_path
@@ -173,7 +169,7 @@ def test_nothing_is_found_in_slides_where_nothing_is_missing(everything, tmp_pat
 def test_a_patch_that_no_law_explains_is_left_out(everything, tmp_path):
     """Low adhesion from the sixth to the eighth second, on a rail that is said to be dry."""
     patched = replace(SCENARIOS["04_dry_160_4.2"], patch=Patch(6.0, 8.0, 0.12))
-    others = [SCENARIOS[one] for one in ("03_dry_120_3.6", "05_dry_120_2.7_rev")]
+    others = [SCENARIOS[scenario] for scenario in ("03_dry_120_3.6", "05_dry_120_2.7_rev")]
     diagnosis, aside = diagnosed(everything, tmp_path, [patched, *others], 803, Effects())
     assert diagnosis.verdict == "nothing"
     assert [samples["slide"] > 0 for samples in aside] == [False, True, False]

@@ -116,8 +116,7 @@ def test_estimators_find_the_stiffness_without_a_state(balance, tmp_path):
     for name in ("disturbance_observer", "parameter_estimator", "ekf", "ukf", "smoother"):
         # Friction is 5 % of the spring's force there at most, and changes its sign.
         pulled = estimates["measured.F [N]"] > 8.0
-        estimate = estimates[f"{name}.c [N/m]"][pulled].mean()
-        assert estimate == pytest.approx(STIFFNESS, rel=0.02)
+        assert estimates[f"{name}.c [N/m]"][pulled].mean() == pytest.approx(STIFFNESS, rel=0.02)
 
 
 def test_noise_of_an_input_that_the_output_shows_at_once_counts(balance):
@@ -140,8 +139,7 @@ def test_the_pivot_that_rubs_is_named(balance, tmp_path):
     assert cause.parameters["fc"].low < FRICTION < cause.parameters["fc"].high
     with FMU(outcome.extension.fmu) as extended:
         assert extended.states == ()
-    best = best_estimate(outcome, "00_pull")
-    assert set(bands(best)["extended_model"]) == {"c"}
+    assert set(bands(best_estimate(outcome, "00_pull"))["extended_model"]) == {"c"}
 
 
 def test_states_of_an_extension_are_not_corrected(balance, tmp_path):
@@ -159,8 +157,7 @@ def test_states_of_an_extension_are_not_corrected(balance, tmp_path):
 def test_observability_of_a_quantity_without_a_state(balance, tmp_path):
     options = ["--system", str(balance), "--out", str(tmp_path), "--workers", "1"]
     assert main(["observability", str(balance / "recordings" / "00_pull"), *options]) == 0
-    windows = pd.read_csv(tmp_path / "00_pull.csv")
-    assert windows["Observer.bound_dc [N/m]"].median() < 0.5
+    assert pd.read_csv(tmp_path / "00_pull.csv")["Observer.bound_dc [N/m]"].median() < 0.5
 
 
 def test_a_model_without_anything_to_estimate_is_refused(balance, capsys, tmp_path):
@@ -191,8 +188,7 @@ def test_a_correction_has_the_sign_by_which_the_output_shows_it(balance, tmp_pat
     estimates = read_estimates(tmp_path / "00_press.npz")
     pressed = estimates["measured.F [N]"] < -8.0
     for name in ("disturbance_observer", "parameter_estimator"):
-        estimate = estimates[f"{name}.c [N/m]"][pressed].mean()
-        assert estimate == pytest.approx(STIFFNESS, rel=0.02)
+        assert estimates[f"{name}.c [N/m]"][pressed].mean() == pytest.approx(STIFFNESS, rel=0.02)
 
 
 # --- without inputs, and few samples ---
@@ -203,8 +199,7 @@ def test_estimators_follow_a_leak_without_an_input(bottle, tmp_path):
     assert main(["simulate", str(bottle / "recordings" / "00_leak"), *options]) == 0
     estimates = read_estimates(tmp_path / "00_leak.npz")
     for name in ("disturbance_observer", "ekf", "ukf"):
-        estimate = estimates[f"{name}.k [1/s]"].iloc[100:].mean()
-        assert estimate == pytest.approx(LEAK, rel=0.05)
+        assert estimates[f"{name}.k [1/s]"].iloc[100:].mean() == pytest.approx(LEAK, rel=0.05)
 
 
 def test_the_pore_is_named_and_not_the_wall(bottle, tmp_path):
@@ -238,11 +233,9 @@ def test_what_is_before_only_leads_to_what_counts(bottle, tmp_path):
     toml = (case / "case.toml").read_text()
     (case / "case.toml").write_text(f'{toml}counts_from = "150 s"\n')
     system = loaded(bottle)
-    fitted = read_cases([bottle / "recordings" / "00_leak"], system)
-    held_out = read_cases([case], system)
     outcome = diagnose(
-        *(system, fitted),
-        held_out=held_out,
+        *(system, read_cases([bottle / "recordings" / "00_leak"], system)),
+        held_out=read_cases([case], system),
         effects=["Pore"],
         out=tmp_path / "out",
         workers=1,

@@ -90,8 +90,7 @@ def test_a_swing_does_not_fade_without_feedback(spring, fmu):
 def test_filters_of_an_exact_model_err_by_less_than_a_sensor(spring, fmu, name):
     kind = estimators_of(spring)[name]
     run = replay(recorded(spring, NOISE), kind(fmu, spring, kind.default_gains(fmu, spring)))
-    errors = (run.signal("s") - swing()[2])[200:]
-    assert np.sqrt(np.mean(errors**2)) < 0.5 * NOISE
+    assert np.sqrt(np.mean((run.signal("s") - swing()[2])[200:] ** 2)) < 0.5 * NOISE
     # The mean of 1800 values with one degree of freedom, of which 3 standard deviations are 0.1; a
     # filter whose states may walk, which these do not, expects a little more than there is.
     assert 0.85 < np.mean(run.nis[200:]) < 1.1

@@ -33,12 +33,12 @@ def moved(block: FMU, force: Callable[[float], float], start: float, end: float)
     model, work = instance(block, ["F"], [], []), steps(block, np.array([0, 1]), 1)
     model.x[:], model.u[0] = block.get_states(), force(0.0)
     block.set(block.variables(["F"]), model.u)
-    found = [model.x.copy()]
+    course = [model.x.copy()]
     for k in range(round(end / H)):
         work.to[0] = force((k + 1) * H)
         assert step(model, work, H) == 0
-        found.append(model.x.copy())
-    return np.array(found)
+        course.append(model.x.copy())
+    return np.array(course)
 
 
 def test_a_block_comes_to_rest_where_its_energy_is_spent(block):

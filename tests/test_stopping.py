@@ -66,8 +66,8 @@ def stopping(train) -> Stopping:
 
 @pytest.fixture(scope="module")
 def forecaster(train) -> Iterator[Forecaster]:
-    with open_forecaster(train) as one:
-        yield one
+    with open_forecaster(train) as forecaster:
+        yield forecaster
 
 
 # --- formulas of standards ---
@@ -130,8 +130,7 @@ def test_a_stop_is_that_of_the_models_own_integrator(train, stopping, forecaster
     path, h = train.model(OBSERVER).path, 0.02
     with CoSimulation(path) as model:
         speed = stop.asked["speed"]
-        start = {f"omega{axle}": speed / 0.46 for axle in range(1, 9)}
-        model.start({"vTrain": speed, **start})
+        model.start({"vTrain": speed, **{f"omega{axle}": speed / 0.46 for axle in range(1, 9)}})
         inputs = model.variables([quantity.name for quantity in stopping.driven])
         seen = model.variables(["vTrain"])
         way, t = 0.0, 0.0
@@ -190,8 +189,7 @@ def question(train: System, stop: Stop, left: float) -> Question:
 
 def test_a_distribution_is_that_of_its_parts(train, stopping, forecaster):
     """Variances of a function that is nearly linear add up: parts by differences, one by one."""
-    stop = asked_stop({}, train, stopping)
-    asked = question(train, stop, left=0.01)
+    asked = question(train, asked_stop({}, train, stopping), left=0.01)
     count = dimension(asked, train, stopping)
     steps = np.vstack([np.zeros(count), 0.5 * np.eye(count)])
     logs = np.log(forecaster.distances(replace(asked, left=0.0), steps))
@@ -208,24 +206,22 @@ def test_a_stop_that_is_drawn_is_the_one_before_the_steps_were_longer(train, sto
     stop = asked_stop({}, train, stopping)
     asked = question(train, stop, left=0.0)
     usual = np.zeros((1, dimension(asked, train, stopping)))
-    drawn, found = forecaster.distances(asked, usual), forecaster.stop(stop, {}).distance
-    assert_allclose(drawn, found, rtol=1e-4)
-    assert drawn != found  # they are longer
+    drawn, simulated = forecaster.distances(asked, usual), forecaster.stop(stop, {}).distance
+    assert_allclose(drawn, simulated, rtol=1e-4)
+    assert drawn != simulated  # they are longer
 
 
 def test_a_stop_does_not_depend_on_the_one_before(train, stopping, forecaster):
     """A Jacobian at rest that is kept for the first steps of the next stop moves one of these."""
     asked = question(train, asked_stop({}, train, stopping), left=0.0)
     points = np.random.default_rng(4).standard_normal((510, dimension(asked, train, stopping)))
-    there, back = (forecaster.distances(asked, one) for one in (points, points[::-1]))
+    there, back = (forecaster.distances(asked, order) for order in (points, points[::-1]))
     np.testing.assert_array_equal(there, back[::-1])
 
 
 def test_the_safety_level_agrees_with_plain_samples(train, stopping, forecaster):
-    stop = asked_stop({}, train, stopping)
-    asked = question(train, stop, left=0.005)
-    count = dimension(asked, train, stopping)
-    points = np.random.default_rng(2).standard_normal((1500, count))
+    asked = question(train, asked_stop({}, train, stopping), left=0.005)
+    points = np.random.default_rng(2).standard_normal((1500, dimension(asked, train, stopping)))
     plain = -np.log(forecaster.distances(asked, points))
     runs = tuple(forecaster.descent(asked, 2, 150, seed)[0] for seed in range(4))
     quantile = Tail(runs, asked.addend).quantile(2)
@@ -240,8 +236,8 @@ def test_ranks_of_a_sample_hold_its_quantile_as_often_as_they_say():
     held = [
         low <= 0.01 <= high
         for _ in range(1000)
-        if (found := quantile(np.sort(random.uniform(size=2000)), 0.01)) is not None
-        for _, low, high in [found]
+        if (limit := quantile(np.sort(random.uniform(size=2000)), 0.01)) is not None
+        for _, low, high in [limit]
     ]
     # 95 %, within three deviations of a thousand trials; ranks are whole, so a little more.
     assert 0.93 < np.mean(held) < 0.98
@@ -250,8 +246,7 @@ def test_ranks_of_a_sample_hold_its_quantile_as_often_as_they_say():
 
 @pytest.mark.long
 def test_the_safety_level_agrees_with_many_plain_samples(train, stopping, forecaster):
-    stop = asked_stop({}, train, stopping)
-    asked = question(train, stop, left=0.005)
+    asked = question(train, asked_stop({}, train, stopping), left=0.005)
     points = np.random.default_rng(3).standard_normal((100_000, dimension(asked, train, stopping)))
     plain = np.sort(-np.log(forecaster.distances(asked, points)))
     runs = tuple(forecaster.descent(asked, 9, 1000, seed)[0] for seed in range(8))
@@ -327,21 +322,27 @@ def test_a_system_that_does_not_say_how_it_stops_is_refused(system, dry_case):
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory) -> Path:
+def folder(once) -> Path:
     if not RECORDINGS.exists():
         pytest.skip("the recordings are not at hand")
-    out = tmp_path_factory.mktemp("stops")
-    write_cases("train", RECORDINGS / "healthy", out)
-    return out
+
+    def write(out: Path) -> Path:
+        write_cases("train", RECORDINGS / "healthy", out)
+        return out
+
+    return once("healthy stops of a train", write)
 
 
 @pytest.fixture(scope="module")
-def result(folder, tmp_path_factory) -> Path:
-    out = tmp_path_factory.mktemp("result")
-    options = ["--out", str(out), "--ask", "speed=140 km/h", "--samples", "400", "--safety", "1"]
-    options += ["--plain", "2100"]
-    assert main(["distance", "--system", "train", str(folder), *options, "--workers", "1"]) == 0
-    return out
+def result(folder, once) -> Path:
+    options = ["--ask", "speed=140 km/h", "--samples", "400", "--safety", "1", "--plain", "2100"]
+
+    def run(out: Path) -> Path:
+        command = ["distance", "--system", "train", str(folder), "--out", str(out), *options]
+        assert main([*command, "--workers", "1"]) == 0
+        return out
+
+    return once("distances", run)
 
 
 def test_bands_hold_stops_that_were_not_used(result):
@@ -489,12 +490,12 @@ def test_quantiles_are_those_of_closed_forms_down_to_one_in_1e9(evaluate, dimens
     quantiles = [[tail.quantile(decade) for decade in DECADES] for tail in tails]
     held = [
         row.low <= value <= row.high
-        for one in quantiles
-        for row, value in zip(one, exact, strict=True)
+        for tail_quantiles in quantiles
+        for row, value in zip(tail_quantiles, exact, strict=True)
     ]
     # 90 intervals, those of one tail alike; of ten tails, two and a half deviations are 0.24.
     assert np.mean(held) > 0.66
-    mean = np.mean([[row.value for row in one] for one in quantiles], axis=0)
+    mean = np.mean([[row.value for row in tail_quantiles] for tail_quantiles in quantiles], axis=0)
     # Ten tails leave half a percent at 1e-9; 500 samples of a decade bias it by as much.
     assert_allclose(mean, exact, rtol=0.01)
 
@@ -502,8 +503,8 @@ def test_quantiles_are_those_of_closed_forms_down_to_one_in_1e9(evaluate, dimens
 def test_a_probability_scatters_as_it_says():
     """Coefficient of variation at 1e-6, over 25 tails whose quantiles have known probability."""
     quantiles = [tail(summed, 10, 100 * k).quantile(6) for k in range(25)]
-    scatter = np.std(np.log(norm.cdf([one.value for one in quantiles])), ddof=1)
-    said = np.sqrt(np.mean(np.square([one.variation for one in quantiles])))
+    scatter = np.std(np.log(norm.cdf([quantile.value for quantile in quantiles])), ddof=1)
+    said = np.sqrt(np.mean(np.square([quantile.variation for quantile in quantiles])))
     # 25 give a deviation to 14 %, eight runs theirs to 27 %, 25 times: two and a half of both.
     assert 0.6 < scatter / said < 1.4
 
@@ -523,10 +524,10 @@ def test_what_is_added_with_a_heavy_tail_is_not_missed():
         quantile: Vector = stdtr(freedom, x / left)
         return quantile
 
-    one = tail(lambda points: spread * summed(points), 30, 1, addend)
+    heavy = tail(lambda points: spread * summed(points), 30, 1, addend)
     for decade in (4, 9):
         exact = brentq(lambda x, p=10.0**-decade: np.log(beyond(x) / p), -2.0, 0.0)
-        quantile = one.quantile(decade)
+        quantile = heavy.quantile(decade)
         # Three times the half of its interval, which is 1 % at 1e-6 where the tail turns.
         assert abs(quantile.value - exact) < 1.5 * (quantile.high - quantile.low)
         assert_allclose(quantile.value, exact, rtol=0.03)

@@ -49,7 +49,7 @@ def left(folder: Path) -> list[Path]:
     [
         ("simulate", CASE, "--out", "out", "--fmu"),
         pytest.param(("observability", CASE, "--out", "out", "--fmu"), marks=pytest.mark.long),
-        ("diagnose", ROOT / "cases", "--out", "out", "--model"),
+        ("diagnose", CASE, ROOT / "cases" / "02_dry_100_2.7", "--out", "out", "--model"),
     ],
 )
 def test_a_model_that_ends_its_process_does_not_end_a_command_in_silence(
@@ -88,8 +88,8 @@ def test_a_model_that_ends_its_process_late_is_told_by_the_process_beside(
         # A busy machine may compile a loop for longer than that, which would be told alike.
         "WORKBENCH_TRIAL": "memory=768 answer=60" + " call=3" * ("a call did not" in how),
     }
-    command = ("simulate", CASE, "--workers", "1", "--out", "out", "--fmu", hostile_path)
-    run = workbench(home, *command, **own)
+    command = ("simulate", CASE, "--estimator", "open_loop", "--workers", "1", "--out", "out")
+    run = workbench(home, *command, "--fmu", hostile_path, **own)
     assert run.returncode == 1
     assert re.search(how, run.stderr)
     assert "Traceback" not in run.stderr
@@ -101,8 +101,7 @@ def test_a_model_that_ends_its_process_late_is_told_by_the_process_beside(
 def test_what_a_model_writes_to_all_open_files_is_no_answer_of_a_worker(attack, hostile_path, home):
     cases = (CASE, ROOT / "cases" / "02_dry_100_2.7")
     command = ("simulate", *cases, "--estimator", "open_loop", "--workers", "2", "--out", "out")
-    plan = f"{attack} fmi2SetReal 1000"
-    run = workbench(home, *command, "--fmu", hostile_path, HOSTILE=plan)
+    run = workbench(home, *command, "--fmu", hostile_path, HOSTILE=f"{attack} fmi2SetReal 1000")
     assert run.returncode == 1
     assert "a model's own code wrote into files that are not its own" in run.stderr
     assert "Traceback" not in run.stderr
@@ -124,9 +123,9 @@ def test_what_a_model_prints_or_sets_is_not_in_the_results(attack, hostile_path,
 
 @needs_compiler
 def test_the_document_of_a_command_that_a_model_ends_says_so(hostile_path, home):
-    plan = "exit fmi2SetReal 1000"
-    command = ("simulate", CASE, "--workers", "1", "--json", "--out", "out", "--fmu", hostile_path)
-    run = workbench(home, *command, HOSTILE=plan)
+    command = ("simulate", CASE, "--estimator", "open_loop", "--workers", "1", "--json")
+    command += ("--out", "out", "--fmu", hostile_path)
+    run = workbench(home, *command, HOSTILE="exit fmi2SetReal 1000")
     assert run.returncode == 1
     document = json.loads(run.stdout)
     assert (document["command"], document["status"]) == ("simulate", 1)
@@ -304,12 +303,12 @@ def served(session: int) -> list[int]:
     """The server of workers, if it runs, and the workers it has started."""
 
     def of_server() -> set[int]:
-        found = set()
+        processes = set()
         for process in living(session):
             with suppress(OSError):  # it ended meanwhile
                 if b"multiprocessing.forkserver" in Path(f"/proc/{process}/cmdline").read_bytes():
-                    found.add(process)
-        return found
+                    processes.add(process)
+        return processes
 
     # a program that the server's imports run bears the server's name until it is loaded
     seen = of_server()
@@ -412,8 +411,7 @@ def test_an_isolated_model_changes_no_mode_owner_time_attribute_limit_or_socket(
     place = home / "file"
     place.touch(0o600)
     command = ("fmu", "check", hostile_path, "--instantiations", "5", "--isolated")
-    plan = {"HOSTILE": "meddle fmi2Reset 3", "PLACE": str(place)}
-    run = workbench(home, *command, **plan)
+    run = workbench(home, *command, HOSTILE="meddle fmi2Reset 3", PLACE=str(place))
     assert run.returncode == 0, run.stderr
     deeds = ["chmod", "chown", "utimes", "setxattr", "setflags", "prlimit", "socket"]
     said = [line for line in run.stderr.splitlines() if line.endswith((" refused", " DEED"))]

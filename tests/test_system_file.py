@@ -233,8 +233,7 @@ def test_schema_and_reference_have_every_key():
 def test_a_formula_is_ordinary_arithmetic_over_names_with_dots():
     formula = Expression("-2*abs(pump.flow - 1) + max(a, 3)**2/4 - sqrt(b)*sign(c)", "file")
     assert formula.names == {"pump.flow", "a", "b", "c"}
-    values = {"pump.flow": 3.0, "a": 1.0, "b": 9.0, "c": -2.0}
-    assert formula(values) == -2 * 2 + 9 / 4 + 3
+    assert formula({"pump.flow": 3.0, "a": 1.0, "b": 9.0, "c": -2.0}) == -2 * 2 + 9 / 4 + 3
 
 
 def test_names_may_hold_whole_recordings():

@@ -1,6 +1,5 @@
 """What decides in a diagnosis, and what is said of a rig that differs from its data sheet."""
 
-import dataclasses
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +11,7 @@ from scipy.stats import binom, chi2, norm
 from workbench.__main__ import main
 from workbench.diagnosis.inference.thresholds import thresholds
 from workbench.machines.wheelset.planting import SHEET_ERRORS, PlantedStops
-from workbench.machines.wheelset.rig import SCENARIOS, Scenario
+from workbench.machines.wheelset.rig import SCENARIOS
 from workbench.runtime.engine import Engine
 from workbench.studies.power import (
     NamedCause,
@@ -36,6 +35,8 @@ from workbench.studies.power.statistics import named_wrong, summarise_sheet
 from workbench.system.comparison import RATE
 from workbench.system.registry import load_system
 
+from .scenarios import short
+
 ROOT = Path(__file__).parents[1]
 REFERENCE = ROOT / "fmus" / "fmi2" / "Reference.fmu"
 SYSTEM = load_system("wheelset")
@@ -50,17 +51,17 @@ counts = st.integers(1, 500)
 
 @given(rates, counts)
 def test_thresholds_are_the_quantiles_of_their_statistics(rate, candidates):
-    one = thresholds(candidates, rate)
+    limits = thresholds(candidates, rate)
     # To rounding: inverse functions of double precision.
-    assert 2.0 * candidates * norm.sf(one.significant) == pytest.approx(rate, rel=1e-9)
-    assert candidates * chi2.sf(one.fall, 1) == pytest.approx(rate, rel=1e-9)
-    assert 2.0 * norm.sf(one.immaterial) == pytest.approx(rate, rel=1e-9)
-    assert np.exp(-0.5 * one.tied) == pytest.approx(rate, rel=1e-9)
+    assert 2.0 * candidates * norm.sf(limits.significant) == pytest.approx(rate, rel=1e-9)
+    assert candidates * chi2.sf(limits.fall, 1) == pytest.approx(rate, rel=1e-9)
+    assert 2.0 * norm.sf(limits.immaterial) == pytest.approx(rate, rel=1e-9)
+    assert np.exp(-0.5 * limits.tied) == pytest.approx(rate, rel=1e-9)
 
 
 @given(rates, st.floats(1.01, 4.0), counts)
 def test_fewer_false_alarms_ask_for_more(rate, times, candidates):
-    rare, usual = (threshold_values(thresholds(candidates, one)) for one in (rate, times * rate))
+    rare, usual = (threshold_values(thresholds(candidates, r)) for r in (rate, times * rate))
     for name in DERIVED:
         assert rare[name] > usual[name], name
     assert {n: v for n, v in rare.items() if n not in DERIVED} == {
@@ -99,13 +100,6 @@ def test_one_threshold_is_changed_and_no_other(name, factor):
     assert scaled_values == {other: value for other, value in usual.items() if other != name}
 
 
-def short(name: str, speed: float) -> Scenario:
-    """A standard stop from a lower speed [km/h]."""
-    usual = SCENARIOS[name]
-    conditions = dataclasses.replace(usual.conditions, initial_speed=speed / 3.6)
-    return dataclasses.replace(usual, conditions=conditions)
-
-
 @pytest.mark.long
 def test_what_is_clear_is_said_by_half_and_by_twice_of_a_threshold(tmp_path):
     """Two short stops, a load cell's gain of 1.6 %; simulations that are kept change nothing."""
@@ -113,11 +107,11 @@ def test_what_is_clear_is_said_by_half_and_by_twice_of_a_threshold(tmp_path):
     setup = Setup(SYSTEM, rig, tmp_path / "AllEffects.fmu", EFFECTS)
     build_everything(SYSTEM, EFFECTS, setup.everything)
     planting = Planting("single", 12, 8.0, {"fx_gain": 0.016}, ("FxGain",))
-    found = vary(setup, planting, ["fall"])
+    effect = vary(setup, planting, ["fall"])
     cases = setup.record(planting, rig.simulate(planting.seed, planting.gains))
     plain = diagnose_set(SYSTEM, EFFECTS, setup.everything, cases)
-    assert found.said == (plain.verdict, *(cause.effect.name for cause in plain.causes))
-    assert (found.said[0], found.changed) == ("found", ())
+    assert effect.said == (plain.verdict, *(cause.effect.name for cause in plain.causes))
+    assert (effect.said[0], effect.changed) == ("found", ())
 
 
 def test_sets_are_of_all_kinds_alike():
@@ -178,15 +172,11 @@ def test_a_wrong_inertia_of_the_roller_never_gets_a_wrong_name(gain, tmp_path):
     names = ("01_dry_80_1.5", "03_dry_120_3.6", "05_dry_120_2.7_rev")
     rig = PlantedStops(tuple(SCENARIOS[name] for name in names), REFERENCE)
     planting = Planting("sheet", 41, 1.0, {"roller_inertia": gain}, ("RollerInertia",))
-    (found,), _ = diagnose_sets(
-        [(planting,)],
-        PowerStudy(SYSTEM, rig, EFFECTS),
-        Engine(out=tmp_path),
-        seed=1,
-        resume=False,
+    (verdict,), _ = diagnose_sets(
+        [(planting,)], PowerStudy(SYSTEM, rig, EFFECTS), Engine(out=tmp_path), seed=1, resume=False
     )
-    assert found.verdict in ("found", "nothing", "unexplained")
-    assert not named_wrong(found)
+    assert verdict.verdict in ("found", "nothing", "unexplained")
+    assert not named_wrong(verdict)
 
 
 def test_command_makes_one_check_at_a_time(capsys):

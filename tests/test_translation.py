@@ -47,8 +47,8 @@ def _total(values):
 @compiled
 def pieces(a, m, x):
     n = int(abs(x))
-    found = _total(a[n:]) + 2.0 * _total(a[:n]) + 3.0 * _total(a[-n:]) + 5.0 * _total(a[1:-1])
-    return found + 7.0 * _total(m[:, 1]) + 11.0 * _total(m[2, 1:]) + 13.0 * _total(m[:n, 0])
+    total = _total(a[n:]) + 2.0 * _total(a[:n]) + 3.0 * _total(a[-n:]) + 5.0 * _total(a[1:-1])
+    return total + 7.0 * _total(m[:, 1]) + 11.0 * _total(m[2, 1:]) + 13.0 * _total(m[:n, 0])
 
 
 @compiled
@@ -101,11 +101,11 @@ def first_that_decides(a, m, x):
 @compiled
 def order_of_calls(a, m, x):
     a[4] = 1.0
-    found = a[4] + _note(a, 2.0) * a[4] - _note(a, 3.0) / a[4]
+    total = a[4] + _note(a, 2.0) * a[4] - _note(a, 3.0) / a[4]
     a[0] += _note(a, 4.0)
     a[4] += _note(a, 5.0)
     m[int(_note(a, 1.0)), 0] = a[4] + _note(a, 6.0)
-    return found + m[1, 0]
+    return total + m[1, 0]
 
 
 @compiled
@@ -121,23 +121,23 @@ def kinds(a, m, x):
 
 @compiled
 def loops(a, m, x):
-    end, found = 4, 0.0
+    end, total = 4, 0.0
     for i in range(end):
         end = 1
         if i == 2:
             continue
-        found += a[i]
+        total += a[i]
     for i in range(LENGTH - 1, -1, -2):
         for j in range(i):
-            found = 0.5 * found + a[i] * a[j]
+            total = 0.5 * total + a[i] * a[j]
     k = 0
     while True:
         k += 1
         if k > 3 or (x > 0.0 and not k < 2):
             break
-    while k < 10 and found < 1e3:
+    while k < 10 and total < 1e3:
         k += 1
-    return found + 1.0 * k
+    return total + 1.0 * k
 
 
 @compiled
@@ -157,9 +157,9 @@ def choices(a, m, x):
 
 @compiled
 def functions(a, m, x):
-    found = np.sqrt(abs(x)) + np.exp(-x * x) + np.log(1.0 + abs(x)) + math.sin(x) * np.tanh(x)
+    total = np.sqrt(abs(x)) + np.exp(-x * x) + np.log(1.0 + abs(x)) + math.sin(x) * np.tanh(x)
     gone = np.isnan(x) or not np.isfinite(a[0])
-    return np.inf if gone else found + np.arctan2(x, 2.0) + np.floor(x) + np.hypot(x, 1.0)
+    return np.inf if gone else total + np.arctan2(x, 2.0) + np.floor(x) + np.hypot(x, 1.0)
 
 
 LAWS = (
@@ -205,8 +205,7 @@ def test_c_gives_the_bits_that_compiled_python_gives(library, law, x):
     of = ctypes.c_void_p(b.ctypes.data), ctypes.c_void_p(n.ctypes.data), ctypes.c_double(x)
     expected = law(a, m, x)
     # Elementary functions of two libraries differ in the last bit.
-    close = {"rtol": 1e-14 if law is functions else 0.0}
-    np.testing.assert_allclose(run(*of), expected, **close)
+    np.testing.assert_allclose(run(*of), expected, rtol=1e-14 if law is functions else 0.0)
     np.testing.assert_array_equal(b, a)
     np.testing.assert_array_equal(n, m)
 

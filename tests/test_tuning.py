@@ -67,8 +67,7 @@ def test_planted_gains_are_found(system, prepare, stop_beginnings, inline, tmp_p
     tuned = search(
         pool, job, problem.space, everything, plan, Checkpointing(tmp_path / "checkpoint.json")
     )
-    z_reasoned = evaluate_gains(pool, job, [reasoned.values]).max()
-    assert tuned.z < 0.02 * z_reasoned
+    assert tuned.z < 0.02 * evaluate_gains(pool, job, [reasoned.values]).max()
     # Columns that decide about the force; a tenth is what is left of z over its slope.
     assert_allclose(tuned.best[[3, 5, 7]], planted[[3, 5, 7]], rtol=0.1)
 
@@ -198,19 +197,19 @@ def test_gains_are_as_good_as_the_last_candidates_that_lose_one_percent_at_most(
 ):
     job, space = problem.job, problem.space
     plan = Plan(generations=0, population=1, seed=3)
-    found = search(
+    ended = search(
         pool, job, space, range(len(job.recordings)), plan, Checkpointing(tmp_path / "c.json")
     )
-    assert not found.converged
-    members = np.tile(found.coordinates, (3, 1))
+    assert not ended.converged
+    members = np.tile(ended.coordinates, (3, 1))
     members[:, 0] = 0.55, 0.65, 0.95
-    last = Population(members, found.z * np.array([1.0, 1.009, 1.011]), found.last.z_k[:3])
-    tuned = TuningResult(problem, plan, replace(found, last=last), found.z_k, interrupted=False)
+    last = Population(members, ended.z * np.array([1.0, 1.009, 1.011]), ended.last.z_k[:3])
+    tuned = TuningResult(problem, plan, replace(ended, last=last), ended.z_k, interrupted=False)
     told = summarise_tuning(tuned)
     assert (told["work"]["as_good"], told["work"]["last"]) == (2, 3)
     assert_allclose(told["gains"]["L11"]["as_good"], space.gains(members)[:2, 0])
     low, high = told["gains"]["L21"]["as_good"]
-    assert low == high == found.best[job.gains.names.index("L21")]
+    assert low == high == ended.best[job.gains.names.index("L21")]
 
 
 # --- what gains are judged by ---
@@ -325,8 +324,7 @@ def test_a_run_that_is_killed_resumes_to_the_result_of_one_that_is_not(
         master.kill()
     assert comes_true(lambda: not living(master.pid))
     # As if it had been killed inside a checkpoint, which is written beside and then renamed.
-    half = checkpoint.read_bytes()[:1000]
-    checkpoint.with_name("checkpoint.json.part").write_bytes(half)
+    checkpoint.with_name("checkpoint.json.part").write_bytes(checkpoint.read_bytes()[:1000])
     assert len(json.loads(checkpoint.read_text())["history"]) < 16
     monkeypatch.chdir(root)
     assert main(command(folder, killed, "--resume")) == 0
@@ -336,8 +334,7 @@ def test_a_run_that_is_killed_resumes_to_the_result_of_one_that_is_not(
 
 def test_results_keep_their_contract(root, system, folder, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(root)
-    arguments = command(folder, tmp_path, "--folds", "2", "--budget", "2", "--live")
-    assert main(arguments) == 0
+    assert main(command(folder, tmp_path, "--folds", "2", "--budget", "2", "--live")) == 0
     printed, told = capsys.readouterr()
     assert "evaluations/s" in told
     assert "of work saved" in told
@@ -355,8 +352,7 @@ def test_results_keep_their_contract(root, system, folder, tmp_path, monkeypatch
         assert (tmp_path / name).stat().st_size > 10_000
     assert not list(tmp_path.glob("*.part"))
     cls = tunable(system, "parameter_estimator")
-    simulation = prepare(system, {cls.name: cls}, path)
-    assert_array_equal(simulation.gains[cls.name].values, gains.values)
+    assert_array_equal(prepare(system, {cls.name: cls}, path).gains[cls.name].values, gains.values)
 
 
 @pytest.mark.parametrize(

@@ -1,9 +1,11 @@
 """The page of `tune`: every number of the summary, the bad news first."""
 
 import copy
+import io
 import json
 import re
 import signal
+from contextlib import redirect_stdout
 from pathlib import Path
 from typing import Any
 
@@ -12,13 +14,14 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from workbench.__main__ import main
 from workbench.observers import Gains, estimators_of
 from workbench.system.registry import load_system, open_model
 from workbench.system.system import System
 from workbench.tuning.report import write_tuning_page
 
 from .page_rules import check_page, data, script, text
-from .processes import LONGEST, comes_true, python, running
+from .processes import LONGEST, comes_true, running
 from .recordings import write_beginnings
 from .schemas import check
 
@@ -39,29 +42,21 @@ def command(folder: Path, out: Path, *options: str) -> list[str]:
 
 
 @pytest.fixture(scope="module")
-def results(root, folder, tmp_path_factory) -> Path:
+def results(folder, once) -> Path:
     """Through the command line, its last line beside the results."""
-    out = tmp_path_factory.mktemp("tuned")
-    arguments = command(folder, out, "--budget", "2", "--folds", "2")
-    run = python("-m", "workbench", *arguments)
-    assert run.returncode == 0, run.stderr
-    (out / "printed").write_text(run.stdout)
-    return out
 
+    def tune(out: Path) -> Path:
+        with redirect_stdout(io.StringIO()) as printed:
+            assert main(command(folder, out, "--budget", "2", "--folds", "2")) == 0
+        (out / "printed").write_text(printed.getvalue())
+        return out
 
-@pytest.fixture(scope="module")
-def summary(results) -> dict[str, Any]:
-    return json.loads((results / "summary.json").read_text())
+    return once("tuned", tune)
 
 
 def test_summary_and_page_are_as_all_are(results, summary):
     check("tune", summary)
     check_page(results / "index.html", summary)
-
-
-@pytest.fixture(scope="module")
-def page(results) -> Any:
-    return lxml.html.fromstring((results / "index.html").read_bytes())
 
 
 def news(page: Any) -> str:
@@ -86,8 +81,7 @@ def changed(summary) -> dict[str, Any]:
 
 
 def test_command_ends_with_the_name_of_the_page(results):
-    last = (results / "printed").read_text().splitlines()[-1]
-    assert str(results / "index.html") in last
+    assert str(results / "index.html") in (results / "printed").read_text().splitlines()[-1]
 
 
 def test_page_follows_from_the_summary_alone(results, summary, tmp_path):
@@ -395,11 +389,7 @@ def test_other_estimators_are_compared_and_better_ones_are_bad_news(page, change
     z, name = changed["z"], "disturbance observer"
     changed["beside"] = {
         "direct_inversion": {"label": "direct inversion", "z": 9.0 * z, "worst": HOSTILE},
-        "ekf": {
-            "label": "extended Kalman filter",
-            "z": 0.5 * z,
-            "worst": "03_dry_120_3.6",
-        },
+        "ekf": {"label": "extended Kalman filter", "z": 0.5 * z, "worst": "03_dry_120_3.6"},
     }
     beside = written(changed, tmp_path)
     table = data(beside, "beside-table")

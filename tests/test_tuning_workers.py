@@ -8,10 +8,9 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, closing, contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -40,7 +39,7 @@ from workbench.tuning import (
 from workbench.tuning.checkpoint import Checkpoint, Generation, Population, load, save
 from workbench.tuning.search import identity
 
-from .processes import python
+from .processes import comes_true, python
 
 SMALL = Plan(generations=4, population=1, seed=3)
 
@@ -49,6 +48,17 @@ def run(pool: Workers, problem: Problem, path: Path, plan: Plan, **options) -> S
     job, space = problem.job, problem.space
     kept = Checkpointing(path, **options)
     return search(pool, job, space, range(len(job.recordings)), plan, kept)
+
+
+@pytest.fixture(scope="session")
+def alone(once, problem) -> Search:
+    """What a search finds in this process, undisturbed."""
+
+    def find(folder: Path) -> Search:
+        with Pool(1, Evaluator, problem.job) as pool:
+            return run(pool, problem, folder / "checkpoint.json", SMALL)
+
+    return once("undisturbed search", find)
 
 
 def test_economy_changes_nothing_but_the_work(problem, pool, tmp_path):
@@ -70,13 +80,11 @@ def test_economy_changes_nothing_but_the_work(problem, pool, tmp_path):
 
 
 def test_gains_do_not_depend_on_the_number_of_workers_nor_on_the_death_of_one(
-    problem, pool, tmp_path
+    problem, alone, tmp_path
 ):
     """One process of two is killed while it works."""
-    job = problem.job
-    alone = run(pool, problem, tmp_path / "alone.json", SMALL)
     killed: list[int] = []
-    with evaluators(job, 2) as two:
+    with evaluators(problem.job, 2) as two:
 
         def kill_once(history: Sequence[object]) -> None:
             if not killed:
@@ -94,26 +102,24 @@ def pid(evaluator: Evaluator) -> int:
     return os.getpid()
 
 
-def test_a_cluster_finds_the_same_gains(problem, pool, tmp_path):
-    import distributed
-
+@contextmanager
+def on_cluster(address: str, problem: Problem, **options) -> Iterator[Workers]:
     from workbench.runtime.cluster import DaskPool
 
-    job = problem.job
-    alone = run(pool, problem, tmp_path / "alone.json", SMALL)
+    with closing(DaskPool(address, Evaluator, problem.job, 60.0, **options)) as pool:
+        yield pool
+
+
+def test_a_cluster_finds_the_same_gains(problem, alone, tmp_path):
+    import distributed
+
     # Dask pauses workers whose process is large, as this one is after hundreds of tests: no limit.
-    options = {
-        "n_workers": 1,
-        "threads_per_worker": 2,
-        "dashboard_address": ":0",
-        "memory_limit": 0,
-    }
-    with distributed.LocalCluster(processes=False, **options) as cluster:
-        remote = DaskPool(cluster.scheduler_address, Evaluator, job, 60.0)
-        try:
-            tuned = run(remote, problem, tmp_path / "remote.json", SMALL)
-        finally:
-            remote.close()
+    options = {"n_workers": 1, "threads_per_worker": 2, "memory_limit": 0}
+    with (
+        distributed.LocalCluster(processes=False, dashboard_address=":0", **options) as cluster,
+        on_cluster(cluster.scheduler_address, problem) as remote,
+    ):
+        tuned = run(remote, problem, tmp_path / "remote.json", SMALL)
     assert_array_equal(tuned.best, alone.best)
 
 
@@ -180,24 +186,21 @@ def scheduler(tmp_path) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
     """Address and process of a scheduler."""
     file = tmp_path / "scheduler.json"
     with dask("scheduler", "--scheduler-file", str(file), "--port", "0") as process:
-        deadline = time.monotonic() + 60.0
-        while not (file.exists() and file.read_text()) and time.monotonic() < deadline:
-            time.sleep(0.05)
+        assert comes_true(lambda: file.exists() and file.read_text() != "")
         yield json.loads(file.read_text())["address"], process
 
 
 def test_a_cluster_without_workers_is_refused_in_words(scheduler, problem):
-    from workbench.runtime.cluster import DaskPool
+    refused = pytest.raises(
+        InputError, match=r"found no workers; .* start workers with 'dask worker"
+    )
+    with refused, on_cluster(scheduler[0], problem, patience=1.0):
+        pass
 
-    with pytest.raises(InputError, match=r"found no workers; .* start workers with 'dask worker"):
-        DaskPool(scheduler[0], Evaluator, problem.job, 60.0, patience=1.0)
 
-
-def test_only_workers_with_the_same_code_get_work(scheduler, problem, pool, tmp_path):
+def test_only_workers_with_the_same_code_get_work(scheduler, problem, alone, tmp_path):
     """One lacks the project, one has a constant of its objective otherwise."""
     import distributed
-
-    from workbench.runtime.cluster import DaskPool
 
     address, _ = scheduler
     lacking, other = tmp_path / "lacking", tmp_path / "other"
@@ -210,27 +213,23 @@ def test_only_workers_with_the_same_code_get_work(scheduler, problem, pool, tmp_
     with worker(address, lacking), worker(address, other):
         with distributed.Client(address) as client:
             client.wait_for_workers(2, timeout=120)
-        with pytest.raises(InputError, match="code of workbench none, here"):
-            DaskPool(address, Evaluator, problem.job, 60.0, warn=warnings.append)
+        refused = pytest.raises(InputError, match="code of workbench none, here")
+        with refused, on_cluster(address, problem, warn=warnings.append):
+            pass
         assert len(warnings) == 2
         warnings.clear()
         with worker(address), distributed.Client(address) as client:
             client.wait_for_workers(3, timeout=120)
-            remote = DaskPool(address, Evaluator, problem.job, 60.0, warn=warnings.append)
-            try:
+            with on_cluster(address, problem, warn=warnings.append) as remote:
                 tuned = run(remote, problem, tmp_path / "remote.json", SMALL)
-            finally:
-                remote.close()
     assert len(warnings) == 2
     assert all("it gets no work" in warning for warning in warnings)
-    assert_array_equal(tuned.best, run(pool, problem, tmp_path / "alone.json", SMALL).best)
+    assert_array_equal(tuned.best, alone.best)
 
 
 def test_a_scheduler_that_dies_keeps_the_best_and_resuming_changes_nothing(
-    scheduler, problem, pool, tmp_path
+    scheduler, problem, pool, alone, tmp_path
 ):
-    from workbench.runtime.cluster import DaskPool
-
     address, process = scheduler
     warnings: list[str] = []
 
@@ -239,38 +238,27 @@ def test_a_scheduler_that_dies_keeps_the_best_and_resuming_changes_nothing(
             process.kill()
 
     path = tmp_path / "checkpoint.json"
-    with worker(address):
-        remote = DaskPool(address, Evaluator, problem.job, 60.0, patience=120.0)  # busy machine
-        try:
-            part = run(remote, problem, path, SMALL, report=die_in_time, warn=warnings.append)
-            with pytest.raises(NoWorkersError, match="does not answer"):
-                remote.submit(pid).result()
-        finally:
-            remote.close()
+    # A busy machine may take long to start one.
+    with worker(address), on_cluster(address, problem, patience=120.0) as remote:
+        part = run(remote, problem, path, SMALL, report=die_in_time, warn=warnings.append)
+        with pytest.raises(NoWorkersError, match="does not answer"):
+            remote.submit(pid).result()
     assert part.interrupted
     assert len(part.history) >= 2
     assert "--resume goes on from there" in warnings[0]
-    whole = run(pool, problem, tmp_path / "whole.json", SMALL)
-    rest = run(pool, problem, path, SMALL, resume=True)
-    assert_array_equal(rest.best, whole.best)
+    assert_array_equal(run(pool, problem, path, SMALL, resume=True).best, alone.best)
 
 
 def test_a_cluster_whose_workers_are_gone_says_so(scheduler, problem, tmp_path):
-    from workbench.runtime.cluster import DaskPool
-
     address, _ = scheduler
-    with worker(address) as process:
-        remote = DaskPool(address, Evaluator, problem.job, 60.0, patience=120.0)
+    with worker(address) as process, on_cluster(address, problem, patience=120.0) as remote:
         remote._patience = 2.0
         process.kill()
-        try:
-            with pytest.raises(NoWorkersError, match=r"all workers of the cluster .* are gone"):
-                remote.submit(pid).result(timeout=120)
-            # Another joins too late for this pool.
-            with pytest.raises(NoWorkersError):
-                remote.submit(pid).result(timeout=120)
-        finally:
-            remote.close()
+        with pytest.raises(NoWorkersError, match=r"all workers of the cluster .* are gone"):
+            remote.submit(pid).result(timeout=120)
+        # Another joins too late for this pool.
+        with pytest.raises(NoWorkersError):
+            remote.submit(pid).result(timeout=120)
 
 
 def test_an_answer_that_a_dead_scheduler_owes_holds_up_no_other_pool(
@@ -280,27 +268,18 @@ def test_an_answer_that_a_dead_scheduler_owes_holds_up_no_other_pool(
     interpreter waits for; a client may wait for ever there for a result that it knows is made."""
     import distributed
 
-    from workbench.runtime.cluster import DaskPool
-
     async def never(client: object, futures: object) -> None:
         await asyncio.Event().wait()
 
     address, process = scheduler
-    with worker(address):
-        remote = DaskPool(address, Evaluator, problem.job, 60.0, patience=120.0)
-        try:
-            monkeypatch.setattr(distributed.Client, "_gather", never)
-            owed = remote.submit(pid)
-            deadline = time.monotonic() + 60.0
-            while remote._tasks[owed].done.status != "finished" and time.monotonic() < deadline:
-                time.sleep(0.05)
-            process.kill()
-            with pytest.raises(NoWorkersError, match="does not answer"):
-                owed.result(timeout=120)
-        finally:
-            remote.close()
-    handing_over = distributed.Future._cb_executor
-    assert handing_over.submit(pid, None).result(timeout=30) == os.getpid()
+    with worker(address), on_cluster(address, problem, patience=120.0) as remote:
+        monkeypatch.setattr(distributed.Client, "_gather", never)
+        owed = remote.submit(pid)
+        assert comes_true(lambda: remote._tasks[owed].done.status == "finished")
+        process.kill()
+        with pytest.raises(NoWorkersError, match="does not answer"):
+            owed.result(timeout=120)
+    assert distributed.Future._cb_executor.submit(pid, None).result(timeout=30) == os.getpid()
 
 
 def test_a_candidate_that_hangs_ends_its_worker_and_is_infinitely_bad(problem):
@@ -348,9 +327,8 @@ def test_only_the_candidate_that_kills_workers_is_lost(problem, pool):
 
 
 def test_a_full_disk_costs_a_warning_and_keeps_the_checkpoint_before(
-    problem, pool, tmp_path, monkeypatch
+    problem, pool, alone, tmp_path, monkeypatch
 ):
-    undisturbed = run(pool, problem, tmp_path / "undisturbed.json", SMALL)
     path = tmp_path / "checkpoint.json"
     warnings: list[str] = []
     kept: list[bytes] = []
@@ -369,12 +347,12 @@ def test_a_full_disk_costs_a_warning_and_keeps_the_checkpoint_before(
     assert not list(tmp_path.glob("*.part"))
     assert len(warnings) == SMALL.generations - 1
     assert "No space left on device" in warnings[0]
-    assert_array_equal(tuned.best, undisturbed.best)
+    assert_array_equal(tuned.best, alone.best)
 
 
-def test_interruption_keeps_the_best_so_far_and_resuming_changes_nothing(problem, pool, tmp_path):
-    whole = run(pool, problem, tmp_path / "whole.json", SMALL)
-
+def test_interruption_keeps_the_best_so_far_and_resuming_changes_nothing(
+    problem, pool, alone, tmp_path
+):
     def interrupt(history: Sequence[object]) -> None:
         if len(history) == 3:
             raise KeyboardInterrupt
@@ -384,8 +362,8 @@ def test_interruption_keeps_the_best_so_far_and_resuming_changes_nothing(problem
     assert part.interrupted
     assert len(part.history) == 3
     rest = run(pool, problem, path, SMALL, resume=True)
-    assert_array_equal(rest.best, whole.best)
-    assert [g.z for g in rest.history] == [g.z for g in whole.history]
+    assert_array_equal(rest.best, alone.best)
+    assert [g.z for g in rest.history] == [g.z for g in alone.history]
 
 
 def test_another_search_does_not_go_on_from_a_checkpoint(problem, pool, tmp_path):
@@ -433,13 +411,13 @@ def test_no_damage_of_a_checkpoint_goes_unseen(saved):
         last = min(last, first + 8)
         path.write_bytes(written[:first] + middle[rng.integers(3)] + written[last:])
         try:
-            found = load(path, "mark")
+            loaded = load(path, "mark")
         except InputError:
             refused += 1
         else:
-            assert found.history == checkpoint.history
+            assert loaded.history == checkpoint.history
             for name in ("members", "z", "z_k"):
                 assert_array_equal(
-                    getattr(found.population, name), getattr(checkpoint.population, name)
+                    getattr(loaded.population, name), getattr(checkpoint.population, name)
                 )
     assert refused > 1900

@@ -1,10 +1,10 @@
 """Friction wheel-rail is claimed where the creep force shows it, and nowhere else."""
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 from workbench.machines.wheelset.validity import PeakForce
 from workbench.models.fmu import FMU
@@ -19,12 +19,6 @@ from workbench.system.system import System
 COLUMNS = list(load_system("wheelset").columns)
 RR, NOMINAL = 0.70, 0.15
 Slide = tuple[Case, Run]
-
-
-@pytest.fixture(scope="module")
-def fmu(minimal_path) -> Iterator[FMU]:
-    with FMU(minimal_path) as opened:
-        yield opened
 
 
 @pytest.fixture(scope="module")
@@ -56,7 +50,7 @@ def test_utilisation_is_that_of_polachs_law(peak_force, muWR, used):
     force = [4e3, 8e3, 12.5e3][: len(used)]
     utilised = peak_force.utilisation(estimates([muWR] * len(used), force))
     # Half of the last digit of the reference, as much again for interpolation.
-    np.testing.assert_allclose(utilised, used, atol=0.01)
+    assert_allclose(utilised, used, atol=0.01)
 
 
 def test_peak_agrees_with_a_fine_scan_of_the_written_law(peak_force):
@@ -86,9 +80,7 @@ def test_direction_does_not_matter(peak_force):
     forward = estimates([0.2, 0.3], [10e3, 10e3], slip=0.1)
     signs = np.ones(len(COLUMNS))
     signs[[COLUMNS.index(name) for name in ("omegaR", "Fx", "slip")]] = -1.0
-    np.testing.assert_array_equal(
-        peak_force.utilisation(forward), peak_force.utilisation(signs * forward)
-    )
+    assert_array_equal(peak_force.utilisation(forward), peak_force.utilisation(signs * forward))
 
 
 def test_claims_begin_above_six_tenths(peak_force):
@@ -96,7 +88,7 @@ def test_claims_begin_above_six_tenths(peak_force):
     force = np.linspace(2e3, 14e3, 121)
     rows = estimates([0.25] * force.size, list(force))
     used, claimed = peak_force.utilisation(rows), peak_force.valid(rows)
-    np.testing.assert_array_equal(claimed, used > 0.6)
+    assert_array_equal(claimed, used > 0.6)
     assert 0 < claimed.sum() < claimed.size
 
 

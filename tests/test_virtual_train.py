@@ -42,13 +42,13 @@ def test_a_train_that_is_true_to_its_sheet_stops_as_its_model(tmp_path):
         start = {output.name: case[output.name][0] for output in SYSTEM.outputs}
         model.start({**start, "vTrain": 0.46 * start["omega1"]}, {})
         inputs = model.variables([quantity.name for quantity in SYSTEM.inputs])
-        found = []
+        speeds = []
         for k, u in enumerate(case.u[:-1]):
             model.set(inputs, u)
-            found.append(model.step(case.time[k + 1] - case.time[k])[model.states.index("omega1")])
+            speeds.append(model.step(case.time[k + 1] - case.time[k])[model.states.index("omega1")])
     # Loads that shift by forces, and three discs for one, move a speed of 72 rad/s by a tenth.
     moving = case["omega1"][1:] > 5.0
-    assert_allclose(np.array(found)[moving], case["omega1"][1:][moving], atol=0.35)
+    assert_allclose(np.array(speeds)[moving], case["omega1"][1:][moving], atol=0.35)
 
 
 @pytest.mark.parametrize(
@@ -66,8 +66,8 @@ def test_a_fault_acts_in_its_place(name, tmp_path):
         return
     # Each axle against the mean of all: what moves the whole train cancels.
     ratio = [
-        np.array([one[s][:n] for s in signals[4:]]) / np.mean([one[s][:n] for s in signals[4:]], 0)
-        for one in (sound, faulty)
+        np.array([run[s][:n] for s in signals[4:]]) / np.mean([run[s][:n] for s in signals[4:]], 0)
+        for run in (sound, faulty)
     ]
     moved = np.abs(ratio[1] - ratio[0]).max(axis=1)
     axles = {2} if not name.startswith("lag") else {4, 5}
@@ -158,8 +158,10 @@ def test_sets_of_the_independent_simulator_are_understood():
     folder = SHARED / "train" / "labelled"
     if not folder.exists():
         pytest.skip("the recordings are not at hand")
-    found = {next(iter(group[0].effects)) for group in read_recorded_sets(SYSTEM, [folder]).groups}
-    assert {"WeakPads[3]", "IsolatedUnit[6]", "DraggingBrake[5]", "Glazing"} <= found
+    effects = {
+        next(iter(group[0].effects)) for group in read_recorded_sets(SYSTEM, [folder]).groups
+    }
+    assert {"WeakPads[3]", "IsolatedUnit[6]", "DraggingBrake[5]", "Glazing"} <= effects
 
 
 # --- trains of any length ---
@@ -170,16 +172,15 @@ def test_a_generated_train_of_two_vehicles_is_the_one_that_is_known(tmp_path):
     samples = growth.stop(generated)
     same = {quantity.name for quantity in generated.estimated}
     estimated = tuple(quantity for quantity in SYSTEM.estimated if quantity.name in same)
-    for one in (replace(SYSTEM, estimated=estimated, intermittent=()), generated):
+    for system in (replace(SYSTEM, estimated=estimated, intermittent=()), generated):
         # Inputs of a system file stand in an order of its own.
-        order = [[x.name for x in generated.inputs].index(x.name) for x in one.inputs]
-        names = [x.name for x in one.estimated]
-        with open_model(one) as model:
+        order = [[x.name for x in generated.inputs].index(x.name) for x in system.inputs]
+        names = [x.name for x in system.estimated]
+        with open_model(system) as model:
             cls = ExtendedKalmanFilter
-            estimator = cls(model, one, cls.default_gains(model, one))
+            estimator = cls(model, system, cls.default_gains(model, system))
             values = estimator.run(samples[0], samples[1][:, order], samples[2]).values
-        at = [list(one.columns).index(name) for name in sorted(names)]
-        estimates.append(values[:, at])
+        estimates.append(values[:, [list(system.columns).index(name) for name in sorted(names)]])
     # Their equations are sorted and rounded in other orders.
     assert_allclose(estimates[1], estimates[0], rtol=1e-7, atol=1e-9)
 
@@ -209,12 +210,12 @@ def test_force_and_adhesion_of_each_axle_are_estimated(stops, within, tmp_path):
             row = np.searchsorted(result.time, case.time[at])
             force, load = result.force[row], result.load[row]
             for name, unit, true in (("axleForce", "N", force), ("utilised", "1", force / load)):
-                found, sigma = (
+                estimated, sigma = (
                     np.array([run[f"{prefix}{name}[{i}] [{unit}]"] for i in range(1, 9)]).T[at]
                     for prefix in ("", "sigma_")
                 )
-                ratios[name].append(found / true)
-                held.append(np.abs(found - true) < 1.96 * sigma)
+                ratios[name].append(estimated / true)
+                held.append(np.abs(estimated - true) < 1.96 * sigma)
     # Pads, profiles and loads of axles differ by 2, 2 and 1 %; of that a force is told by slip.
     assert {name: rms(some) < 0.035 for name, some in ratios.items()} == dict.fromkeys(ratios, True)
     # Of a wet rail the law differs along the way more than a friction that walks.
@@ -226,10 +227,12 @@ def rms(ratios: list[Matrix]) -> float:
 
 
 @pytest.fixture(scope="module")
-def everything(tmp_path_factory) -> Path:
-    path = tmp_path_factory.mktemp("everything") / "everything.fmu"
-    build_everything(SYSTEM, library_effects(SYSTEM), path)
-    return path
+def everything(once) -> Path:
+    def build(folder: Path) -> Path:
+        build_everything(SYSTEM, library_effects(SYSTEM), folder / "everything.fmu")
+        return folder / "everything.fmu"
+
+    return once("train with everything", build)
 
 
 def named(planted: dict[str, float], seed: int, everything: Path, folder: Path) -> Cause:
@@ -246,7 +249,7 @@ def named(planted: dict[str, float], seed: int, everything: Path, folder: Path) 
     [
         (5008, "pads[8]", 0.15, "WeakPads[8]"),
         (5009, "reading[1]", 0.1, "PressureSensorGain[1]"),
-        (5019, "pads[6]", 0.15, "WeakPads[6]"),
+        pytest.param(5019, "pads[6]", 0.15, "WeakPads[6]", marks=pytest.mark.long),
     ],
 )
 def test_faults_are_named_of_which_held_out_stops_say_nothing(
@@ -262,7 +265,7 @@ def test_faults_are_named_of_which_held_out_stops_say_nothing(
     # A film is gone in a twentieth of the stop, which shows it; a gradient has the look of bias and
     # resistances, by half of what is planted.
     [
-        ("water", 0.5, "WaterFilm", "film", 0.1),
+        pytest.param("water", 0.5, "WaterFilm", "film", 0.1, marks=pytest.mark.long),
         ("gradient", -4e-3, "WrongGradient", "offset", 0.5),
     ],
 )
@@ -280,11 +283,11 @@ def test_water_and_a_wrong_track_file_are_named(
         (5102, "late[3]", 0.002, "LateSpeed[3]"),
         (5103, "drag[5]", 400.0, "DraggingBrake[5]"),
         (5108, "zero[2]", 2000.0, "PressureSensorOffset[2]"),  # it shows while the train coasts
-        (5109, "accelerometer_bias", 0.12, "AccelerometerBias"),
-        (5110, "accelerometer_gain", 0.03, "AccelerometerGain"),
-        (5111, "glazing", 0.03, "Glazing"),
+        pytest.param(5109, "accelerometer_bias", 0.12, "AccelerometerBias", marks=pytest.mark.long),
+        pytest.param(5110, "accelerometer_gain", 0.03, "AccelerometerGain", marks=pytest.mark.long),
+        pytest.param(5111, "glazing", 0.03, "Glazing", marks=pytest.mark.long),
         # Gone when brakes have hardly begun, as if all cylinders lagged.
-        (5106, "drying", 3000.0, "WaterFilm"),
+        pytest.param(5106, "drying", 3000.0, "WaterFilm", marks=pytest.mark.long),
     ],
 )
 def test_faults_of_some_deviations_of_the_sheet_are_named_alone(

@@ -41,8 +41,7 @@ def write_stop(
     outputs = [output.name for output in system.outputs]
     rows = []
     with open_model(system) as model:
-        speeds = dict.fromkeys(outputs[:-1], _SPEED / 0.46)
-        model.start({**speeds, "vTrain": _SPEED}, friction)
+        model.start({**dict.fromkeys(outputs[:-1], _SPEED / 0.46), "vTrain": _SPEED}, friction)
         inputs = model.variables([variable.name for variable in system.inputs])
         states = [model.states.index(name) for name in outputs]
         u = np.array([0.0, 0.0, 0.0, 0.0, _MASS, _MASS, 0.0, 0.0, 0.0])

@@ -42,5 +42,5 @@ def _tables(out: Path) -> dict[str, bytes]:
 def _verdicts(out: Path) -> list[dict[str, Any]]:
     """Verdicts in the order of the plan, without how long they took."""
     _, *lines = (out / "sets.jsonl").read_text().splitlines()
-    found = [{**json.loads(line), "seconds": None, "checksum": None} for line in lines]
-    return sorted(found, key=lambda one: json.dumps(one["planting"]))
+    verdicts = [{**json.loads(line), "seconds": None, "checksum": None} for line in lines]
+    return sorted(verdicts, key=lambda verdict: json.dumps(verdict["planting"]))

@@ -143,7 +143,7 @@ def _workbook(files: Files, random: Random) -> tuple[Files, str]:
     """A mutant of a workbook, which is an archive of texts."""
     ((name, content),) = files.items()
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
-        entries = {one: archive.read(one) for one in archive.namelist()}
+        entries = {name: archive.read(name) for name in archive.namelist()}
     texts = [entry for entry in entries if entry.startswith("xl/")]
     changed, mutation = _archive(entries, random.choice(texts), random)
     return {name: changed}, mutation
@@ -257,11 +257,7 @@ def _summary() -> Target:
     sizes, levels = {("Fade", "size"): 0.5}, {("muWR", "dry"): 0.25}
     rival = Rival(("Fade",), sizes, levels, (recording,), prior, 100.0)
     rivals = Rivals((rival,), ("Fade", "Lag"), {"mu": 0.5}, ("omegaW",), np.array([1.5]))
-    content = {
-        "verdict": "found",
-        "provenance": {"system": "wheelset"},
-        "rivals": rivals.to_dict(),
-    }
+    content = {"verdict": "found", "provenance": {"system": "wheelset"}, "rivals": rivals.to_dict()}
 
     def impossible(found: tuple[str, Rivals]) -> str:
         whole = [
@@ -292,8 +288,7 @@ def _system(name: str, content: bytes) -> Target:
 
 def _with_fmus(system: System) -> bytes:
     """The file of a system for any folder: its FMUs where they are."""
-    text = system.source.read_text()
-    return text.replace("../../fmus", resources.fmus().as_posix()).encode()
+    return system.source.read_text().replace("../../fmus", resources.fmus().as_posix()).encode()
 
 
 def _read_modelica(folder: Path) -> None:
