@@ -259,14 +259,14 @@ def _work(
     except Exception as error:  # whatever a foreign library brings about is a finding
         known = isinstance(error, FMUError) and not isinstance(error, NoAnswerError)
         send(error if isinstance(error, NoAnswerError) else str(error) if known else repr(error))
-    if os.name == "posix":  # Python's handler goes before this process does
+    if hasattr(signal, "setitimer"):  # Python's handler goes before this process does
         signal.setitimer(signal.ITIMER_PROF, 0.0)
 
 
 def _limit(limits: Limits) -> None:
     """Limit what this process may use; processor time in each call that does not return."""
     limit_sizes(limits.file, limits.memory)
-    if os.name != "posix":
+    if not hasattr(signal, "setitimer"):  # Windows
         return
 
     def alive(number: int = 0, frame: FrameType | None = None) -> None:
