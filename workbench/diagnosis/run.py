@@ -66,83 +66,85 @@ def diagnose(
         compiled, or the model is none of this library.
     """
     refuse_too_few(problem.cases, problem.system, len(problem.held_out))
-    try:
-        return _diagnosed(problem, engine, every_platform, certainty, free=False)
-    except EventError:
-        if problem.library is not None:
-            raise
-        engine.report("events of the model at other values: whole simulations instead")
-        return _diagnosed(problem, engine, every_platform, certainty, free=True)
+    with tempfile.TemporaryDirectory() as scratch:
+        problem, everything = _with_model(problem, Path(scratch), engine.report)
+        try:
+            return _diagnosed(problem, everything, engine, every_platform, certainty, free=False)
+        except EventError:
+            if problem.library is not None:
+                raise
+            engine.report("events of the model at other values: whole simulations instead")
+            return _diagnosed(problem, everything, engine, every_platform, certainty, free=True)
 
 
 def _diagnosed(
-    problem: Problem, engine: Engine, every_platform: bool, certainty: bool, *, free: bool
+    problem: Problem,
+    everything: Path,
+    engine: Engine,
+    every_platform: bool,
+    certainty: bool,
+    *,
+    free: bool,
 ) -> Outcome:
-    """A diagnosis; `free` if nothing is to correct the simulations."""
-    with tempfile.TemporaryDirectory() as scratch:
-        problem, everything = _with_model(problem, Path(scratch), engine.report)
-        system, effects, report = problem.system, problem.effects, engine.report
-        source = ModelSource(everything, system, given_values(everything, system))
-        with ResidualModel(source, problem.cases, engine, free=free) as simulations:
-            if simulations.free and problem.library is None:
-                # Terms of several forms explain a run that nothing corrects as one parameter does.
-                effects = [effect for effect in effects if effect.size != COEFFICIENT]
-                if not effects:
-                    raise InputError(
-                        where=f"{system.source}, [candidates]",
-                        found="only terms beside rates, of an FMU that runs freely",
-                        expected="parameters or sensors",
-                        remedy="choose some of 'workbench diagnose --list'",
-                    )
-            if problem.library is None:
-                begun = simulations.begin[0]  # by what was measured, in each recording
-                effects = [effect for effect in effects if effect.parameter not in begun]
-                effects = list(fitting_recordings(effects, system, problem.cases))
-                problem = replace(problem, effects=effects)
-            fit = Fit(simulations, effects)
-            diagnosis = conclude(fit, effects, report)
-            base, best = diagnosis.base, diagnosis.best
-            asked = certainty and bool(diagnosis.causes) and not diagnosis.interrupted
-            assessed = assess(fit, best, report) if asked else None
-            answer = _Found(problem, engine, simulations, fit, diagnosis)
-            extension = answer.extend(every_platform=every_platform)
-            errors = errors_of(simulations, fit, base.linearised, best.linearised, held_out=False)
-            starts = fit.unknowns.starts(best.point)
-            if problem.held_out:
-                report("errors on recordings that were held out")
-                more, their_starts = held_out_errors(
-                    simulations, effects, (base, best), problem.held_out, engine.workers
+    """A diagnosis with an FMU that has all effects; `free` if nothing corrects simulations."""
+    system, effects, report = problem.system, problem.effects, engine.report
+    source = ModelSource(everything, system, given_values(everything, system))
+    with ResidualModel(source, problem.cases, engine, free=free) as simulations:
+        if simulations.free and problem.library is None:
+            # Terms of several forms explain a run that nothing corrects as one parameter does.
+            effects = [effect for effect in effects if effect.size != COEFFICIENT]
+            if not effects:
+                raise InputError(
+                    where=f"{system.source}, [candidates]",
+                    found="only terms beside rates, of an FMU that runs freely",
+                    expected="parameters or sensors",
+                    remedy="choose some of 'workbench diagnose --list'",
                 )
-                errors, starts = errors + more, starts | their_starts
-            shown = residuals(simulations, fit, base.linearised, best.linearised)
-            return Outcome(
-                system=system,
-                cases=tuple(simulations.cases),
-                diagnosis=diagnosis,
-                residuals=shown,
-                dependences=dependences(simulations, shown),
-                levels={
-                    key: (float(value), fit.unknowns.level_unit(key))
-                    for key, value in best.point.levels.items()
-                },
-                deviations={
-                    name: dict(zip(fit.unknowns.local, map(float, row), strict=True))
-                    for name, row in zip(fit.unknowns.names, best.point.deviations, strict=True)
-                },
-                set_aside={
-                    recording.name: recording.set_aside for recording in simulations.recordings
-                },
-                observers=answer.observers(extension),
-                extension=extension,
-                errors=tuple(errors),
-                starts=_differing(system, extension, starts),
-                rivals=gathered(simulations, fit, base, diagnosis.rivals)
-                if diagnosis.rivals
-                else None,
-                certainty=assessed,
-                unsure=dict(simulations.unsure) if simulations.free else None,
-                warned=simulations.take_warning(),
+        if problem.library is None:
+            begun = simulations.begin[0]  # by what was measured, in each recording
+            effects = [effect for effect in effects if effect.parameter not in begun]
+            effects = list(fitting_recordings(effects, system, problem.cases))
+            problem = replace(problem, effects=effects)
+        fit = Fit(simulations, effects)
+        diagnosis = conclude(fit, effects, report)
+        base, best = diagnosis.base, diagnosis.best
+        asked = certainty and bool(diagnosis.causes) and not diagnosis.interrupted
+        assessed = assess(fit, best, report) if asked else None
+        answer = _Conclusion(problem, engine, simulations, fit, diagnosis)
+        extension = answer.extend(every_platform=every_platform)
+        errors = errors_of(simulations, fit, base.linearised, best.linearised, held_out=False)
+        starts = fit.unknowns.starts(best.point)
+        if problem.held_out:
+            report("errors on recordings that were held out")
+            more, their_starts = held_out_errors(
+                simulations, effects, (base, best), problem.held_out, engine.workers
             )
+            errors, starts = errors + more, starts | their_starts
+        shown = residuals(simulations, fit, base.linearised, best.linearised)
+        return Outcome(
+            system=system,
+            cases=tuple(simulations.cases),
+            diagnosis=diagnosis,
+            residuals=shown,
+            dependences=dependences(simulations, shown),
+            levels={
+                key: (float(value), fit.unknowns.level_unit(key))
+                for key, value in best.point.levels.items()
+            },
+            deviations={
+                name: dict(zip(fit.unknowns.local, map(float, row), strict=True))
+                for name, row in zip(fit.unknowns.names, best.point.deviations, strict=True)
+            },
+            set_aside={recording.name: recording.set_aside for recording in simulations.recordings},
+            observers=answer.observers(extension),
+            extension=extension,
+            errors=tuple(errors),
+            starts=_differing(system, extension, starts),
+            rivals=gathered(simulations, fit, base, diagnosis.rivals) if diagnosis.rivals else None,
+            certainty=assessed,
+            unsure=dict(simulations.unsure) if simulations.free else None,
+            warned=simulations.take_warning(),
+        )
 
 
 def _with_model(
@@ -216,7 +218,7 @@ def given_values(everything: Path, system: System) -> dict[str, float]:
 
 
 @dataclass(frozen=True, eq=False)
-class _Found:
+class _Conclusion:
     """What was found, and with what."""
 
     problem: Problem

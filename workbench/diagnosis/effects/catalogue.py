@@ -324,6 +324,9 @@ def _read(library: Library, slots: Sequence[Slot], cls: Class, said: AnnotationR
     else:
         size = said.text("size")
     shapes = said.part("shapes") if "shapes" in said.content else AnnotationReader(said.where, {})
+    where = _texts(said, "where", "condition", "is", "share")
+    unless = _texts(said, "unless", "condition", "is", "because")
+    falling = _texts(said, "falling", "signal", "because")
     effect = Effect(
         name=cls.name.rpartition(".")[2],
         model=cls.name,
@@ -334,10 +337,10 @@ def _read(library: Library, slots: Sequence[Slot], cls: Class, said: AnnotationR
         separation=said.text("separation"),
         shapes=tuple((name, shapes.numbers(name)) for name in shapes.content),
         hidden=said.text("hidden", ""),
-        where=_where(said),
-        unless=_unless(said),
-        falling=_falling(said),
-        restarted=_restarted(said),
+        where=Where(*where) if where else None,
+        unless=Unless(*unless) if unless else None,
+        falling=Falling(*falling) if falling else None,
+        restarted="".join(_texts(said, "restarted", "because")),
     )
     _check_parameters(library, cls, effect)
     _check_extends(library, cls)
@@ -375,36 +378,13 @@ def _slots(
     return tuple(name for name in fitting if name in chosen)
 
 
-def _where(said: AnnotationReader) -> Where | None:
-    if "where" not in said.content:
-        return None
-    part = said.part("where")
-    part.only("condition", "is", "share")
-    return Where(part.text("condition"), part.text("is"), part.text("share", ""))
-
-
-def _unless(said: AnnotationReader) -> Unless | None:
-    if "unless" not in said.content:
-        return None
-    part = said.part("unless")
-    part.only("condition", "is", "because")
-    return Unless(part.text("condition"), part.text("is"), part.text("because"))
-
-
-def _falling(said: AnnotationReader) -> Falling | None:
-    if "falling" not in said.content:
-        return None
-    part = said.part("falling")
-    part.only("signal", "because")
-    return Falling(part.text("signal"), part.text("because"))
-
-
-def _restarted(said: AnnotationReader) -> str:
-    if "restarted" not in said.content:
-        return ""
-    part = said.part("restarted")
-    part.only("because")
-    return part.text("because")
+def _texts(said: AnnotationReader, part: str, *keys: str) -> tuple[str, ...]:
+    """Texts of a part of the annotation, in this order; none if it is not there."""
+    if part not in said.content:
+        return ()
+    inner = said.part(part)
+    inner.only(*keys)
+    return tuple(inner.text(key, "" if key == "share" else None) for key in keys)
 
 
 def _check_extends(library: Library, cls: Class) -> None:
