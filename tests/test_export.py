@@ -18,7 +18,7 @@ from fmpy.validation import validate_fmu
 from workbench.__main__ import main
 from workbench.cli.parser import command_line
 from workbench.errors import InputError
-from workbench.models.compiler.archive import PLATFORMS
+from workbench.models.compiler.assembly import PLATFORMS
 from workbench.models.compiler.flat import flatten
 from workbench.observers import Estimator, Gains, choose
 from workbench.observers.export import build_observer, write_package

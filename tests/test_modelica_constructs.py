@@ -30,8 +30,6 @@ TIMES = np.linspace(0.0, 1.0, 11)  # s
 # Far above the error of the integration (1e-9 a step), far below any other reading of the source;
 # where an expression switches without an event, the step of 0.01 s across it errs by up to 1e-3.
 TOLERANCE = 2e-3
-
-
 FOLDER = Path(__file__).parent
 PAGE = FOLDER.parent / "docs" / "modelica.md"
 

@@ -56,8 +56,6 @@ from .recordings import record
 
 THRESHOLD, RATE = 1.2, 3e-3  # [m], [m2/s] of a leak that begins at a level
 PERIOD = 1.885  # [m] of way
-
-
 Q = np.linspace(-4.0, 4.0, 81)
 
 

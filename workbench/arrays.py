@@ -4,6 +4,4 @@ import numpy as np
 from numpy.typing import NDArray
 
 Vector = NDArray[np.float64]
-
-
 Matrix = NDArray[np.float64]

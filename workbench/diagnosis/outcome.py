@@ -568,14 +568,8 @@ def _step(step: Step) -> dict[str, Any]:
 
 
 NOMINAL, EXTENDED, NOISE = "0", "2", "raw"  # styles of curves
-
-
 FAST = 1  # block: what turns with a shaft does not last
-
-
 _BAND = 2.0  # standard deviations
-
-
 _ROOM = 1.1  # of a panel over its largest value
 
 

@@ -72,7 +72,7 @@ def write_extended(
         If the FMU is none of FMI 2.0 with Model Exchange for this machine.
     """
     # An extra: what extended FMUs are compiled with; running them needs none.
-    from workbench.models.compiler.archive import (
+    from workbench.models.compiler.assembly import (
         PLATFORMS,
         compile_files,
         digest,

@@ -30,33 +30,15 @@ from workbench.system.system import System
 # A 95 % band of deviations that are too small by the root of this covers 93 %; of such that are
 # too large by the root of the other, 97 %.
 NARROW, WIDE = (1.960 / 1.812) ** 2, (1.960 / 2.170) ** 2
-
-
 _OFF = 0.335  # deviations; a 95 % band of an estimate that is off by so many covers 93 %
-
-
 # A 95 % band of deviations that are too small by the root of this misses more often than it holds.
 _USELESS = (1.960 / 0.674) ** 2
-
-
 _CHANCE = 1e-3  # of a recording in which a test contradicts what is right
-
-
 _LAGS = 10  # that a test of whiteness looks at; Hyndman and Athanasopoulos (2021), section 5.4
-
-
 _PASSED = np.log(20.0)  # time constants after which a twentieth is left of a motion
-
-
 _APART = 20  # points of a trajectory from one where a model is linearised to the next
-
-
 _CELSIUS = 273.15  # K
-
-
 _FINE = 4  # steps in place of one, which then errs by a quarter of it, or less
-
-
 # Shares of the open loop's error that are its steps'. From the first on they are said; from the
 # second on steps make more of the error than the model does.
 _NOTED, MOSTLY = 0.1, 0.5

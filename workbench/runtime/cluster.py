@@ -28,34 +28,16 @@ from workbench.runtime.pool import NoWorkersError
 cloudpickle.register_pickle_by_value(installation)  # for workers that may lack it
 
 Given = TypeVar("Given")
-
-
 State = TypeVar("State")
-
-
 Result = TypeVar("Result")
-
-
 Arguments = TypeVarTuple("Arguments")
 
 _ANSWER = 5.0  # [s] for the scheduler to answer
-
-
 _SILENCE = 30.0  # [s] after which one that does not is dead: a machine may be busy
-
-
 _PATIENCE = 30.0  # [s] in which a cluster starts a worker
-
-
 _PERIOD = 0.5  # [s] between two looks at who is there
-
-
 _TRIALS = 3  # workers that a task may end, as of Dask's own
-
-
 _PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "fmpy")  # that compute
-
-
 _PREPARATION = 600.0  # [s] to load the model and compile its loop, on a busy machine
 
 _LOG = logging.getLogger("distributed.client")

@@ -24,11 +24,7 @@ except ImportError:  # Windows locks no folders: there a second run is not refus
     fcntl = None  # type: ignore[assignment]
 
 _ROOM = 5_000_000  # [byte] of a page with its curves, the largest of the usual results
-
-
 _SEAL = "checksum"  # SHA-256, name of its entry
-
-
 _PART = re.compile(r".*\.[0-9]+\.part")
 
 
@@ -245,16 +241,10 @@ except ImportError:  # Windows: folders go with their users, but not after a kil
     fcntl = None  # type: ignore[assignment]
 
 _PREFIX = "workbench-"
-
-
 _MARK = ".scratch"  # in every folder that is ours: a name alone is no proof
-
-
 # Longer paths leave no room for sockets of processes that start others, PLACE/workbench-12345678/
 # pymp-12345678/listener-12345678, which the system limits to 104 bytes.
 _LONGEST = 104 - 52
-
-
 _SHORT = "/tmp"
 
 

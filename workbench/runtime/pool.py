@@ -37,28 +37,14 @@ from workbench.runtime.files import temporary_folder
 from workbench.runtime.supervision import Watch, beat, usual_limits
 
 Given = TypeVar("Given")
-
-
 State = TypeVar("State")
-
-
 Item = TypeVar("Item")
-
-
 Result = TypeVar("Result")
-
-
 Arguments = TypeVarTuple("Arguments")
 
 _PREPARATION = 600.0  # [s] to load models and compile loops, on a busy machine
-
-
 _END = 5.0  # [s] from the end of a pipe to that of its process, on a busy machine
-
-
 _GIVEN = "given.pickle"  # in the folder of a pool
-
-
 _SECRET_SIZE = 16  # [byte]
 
 

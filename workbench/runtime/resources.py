@@ -7,11 +7,7 @@ import subprocess
 from pathlib import Path
 
 _PACKAGE = Path(__file__).resolve().parents[1]
-
-
 _DATA = _PACKAGE / "data"
-
-
 _ROOT = _DATA if _DATA.is_dir() else _PACKAGE.parent
 
 # Top level of the sources that this package is run from; None if it was installed from a wheel.

@@ -32,15 +32,11 @@ except ImportError:  # Windows: there memory is not limited
     resource = None  # type: ignore[assignment]
 
 _DIE_WITH_PARENT, _ADOPT = 1, 36  # PR_SET_PDEATHSIG, PR_SET_CHILD_SUBREAPER of <sys/prctl.h>
-
-
 _REQUESTS = tuple(
     getattr(signal, name)
     for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGTSTP")
     if hasattr(signal, name)  # Windows has not all
 )
-
-
 _PATIENCE = 10  # [s] from a request to end until the end; results are written in less
 
 
@@ -467,27 +463,13 @@ def _control(what: int, value: int) -> None:
 
 
 _CREATE_RULESET, _ADD_RULE, _RESTRICT_SELF = 444, 445, 446  # the same on every processor
-
-
 _VERSION, _BENEATH = 1, 1
-
-
 # Write a file; remove folders and files; make device, folder, file, socket, FIFO, block, link.
 _WRITING = 1 << 1 | sum(1 << right for right in range(4, 13))
-
-
 _LINK_ELSEWHERE, _TRUNCATE = 1 << 13, 1 << 14  # since versions 2 and 3
-
-
 _TCP = 3  # bind and connect, since version 4
-
-
 _DEVICES = 1 << 15  # ioctl of devices, since version 5
-
-
 _OUTSIDE = 3  # abstract sockets and signals, since version 6
-
-
 _NO_NEW_PRIVILEGES, _SECCOMP, _FILTER = 38, 22, 2  # of prctl
 
 # Numbers of system calls: sockets, modes, owners, times and attributes of files, memory of others.
@@ -500,17 +482,9 @@ _CALLS = {
     "x86_64": (0xC000003E, _X86_64 | {311} | _SINCE_2019, 302, 16),
     "aarch64": (0xC00000B7, _ARM64 | _SINCE_2019, 261, 29),
 }
-
-
 _SET_ATTRIBUTES = (0x40086602, 0x401C5820)  # FS_IOC_SETFLAGS, FS_IOC_FSSETXATTR
-
-
 _LOAD, _EQUAL, _AT_LEAST, _RETURN = 0x20, 0x15, 0x35, 0x06
-
-
 _ALLOW, _REFUSE = 0x7FFF0000, 0x00050000
-
-
 _X32 = 0x40000000  # bit of the numbers of a second interface on x86_64
 
 

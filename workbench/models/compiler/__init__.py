@@ -11,8 +11,16 @@ from pathlib import Path
 
 from workbench.errors import InputError
 from workbench.models import fmu_cache
-from workbench.models.compiler.archive import PLATFORMS, RUNTIME, digest, digest_file, native
-from workbench.models.compiler.assembly import BuiltFMU, SteppingLaw, assemble
+from workbench.models.compiler.assembly import (
+    PLATFORMS,
+    RUNTIME,
+    BuiltFMU,
+    SteppingLaw,
+    assemble,
+    digest,
+    digest_file,
+    native,
+)
 from workbench.models.compiler.explicit import make_explicit
 from workbench.models.compiler.flat import flatten
 from workbench.models.description import read_description
@@ -63,7 +71,7 @@ def build(
     model : dotted name of the model.
     fmu : file to write; written whole or not at all.
     fmi : 2 or 3.
-    platforms : names from `archive.PLATFORMS`.
+    platforms : names from `assembly.PLATFORMS`.
 
     Raises
     ------

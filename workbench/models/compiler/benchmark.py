@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.errors import InputError
-from workbench.models.compiler.archive import FLAGS, PLATFORMS
+from workbench.models.compiler.assembly import FLAGS, PLATFORMS
 from workbench.models.description import Description
 
 _PROGRAM = Path(__file__).parent / "bench.c"

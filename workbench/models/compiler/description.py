@@ -297,31 +297,26 @@ def _row_columns(pattern: ca.Sparsity, row: int) -> list[int]:
     return [j for j in range(pattern.size2()) if row in rows[starts[j] : starts[j + 1]]]
 
 
-def _unknowns(entries: Sequence[_Entry]) -> dict[str, list[_Entry]]:
-    outputs = [e for e in entries if e.causality == "output"]
-    derivatives = [e for e in entries if e.derivative_of is not None]
-    initial = [e for e in [*derivatives, *outputs] if e.initial == "calculated"]
-    return {"outputs": outputs, "derivatives": derivatives, "initial": initial}
-
-
 def _structure(
     parent: ET.Element, entries: Sequence[_Entry], code: GeneratedCode, fmi: int
 ) -> None:
     """Unknowns with the knowns that they depend on: FMI 2 has groups, and counts from 1."""
-    tags = {
-        "outputs": ("Outputs", "Output"),
-        "derivatives": ("Derivatives", "ContinuousStateDerivative"),
-        "initial": ("InitialUnknowns", "InitialUnknown"),
-    }
+    outputs = [e for e in entries if e.causality == "output"]
+    derivatives = [e for e in entries if e.derivative_of is not None]
+    initial = [e for e in [*derivatives, *outputs] if e.initial == "calculated"]
     first, key = (1, "index") if fmi == 2 else (0, "valueReference")
-    for role, unknowns in _unknowns(entries).items():
-        group, tag = parent, tags[role][1]
+    for unknowns, whole, tag in (
+        (outputs, "Outputs", "Output"),
+        (derivatives, "Derivatives", "ContinuousStateDerivative"),
+        (initial, "InitialUnknowns", "InitialUnknown"),
+    ):
+        group = parent
         if fmi == 2 and unknowns:
-            group, tag = ET.SubElement(parent, tags[role][0]), "Unknown"
+            group, tag = ET.SubElement(parent, whole), "Unknown"
             unknowns = sorted(unknowns, key=lambda entry: entry.reference)
         for entry in unknowns:
             knowns = _dependencies(entry, entries, code)
-            if role != "initial":
+            if whole != "InitialUnknowns":
                 knowns = [known for known in knowns if known.causality != "parameter"]
             numbers = " ".join(str(known.reference + first) for known in knowns)
             own = {key: str(entry.reference + first), "dependencies": numbers}

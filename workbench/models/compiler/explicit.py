@@ -22,8 +22,6 @@ from workbench.models.compiler.flat import FlatModel, FlatVariable
 
 # Share of the largest coefficient of its column below which an expression is no pivot.
 _PIVOT = 1e-3
-
-
 Incidence = NDArray[np.bool_]
 
 

@@ -312,7 +312,8 @@ class _Reader:
             shape = tuple(self.arena.types[entry["value_type"]]["dimensions"])
             symbol: Value = np.empty(shape, object)
             for index in np.ndindex(shape):
-                symbol[index] = ca.SX.sym(_scalar_name(entry["name"], index))
+                place = f"[{','.join(str(i + 1) for i in index)}]" if index else ""
+                symbol[index] = ca.SX.sym(f"{entry['name']}{place}")
             self.arena.symbols.append(symbol)
             if entry["role"] == "state":
                 self.arena.rates[number] = each(lambda s: ca.SX.sym(f"der({s.name()})"), symbol)
@@ -407,7 +408,8 @@ class _Reader:
         asserted = {r for a in storage["event_actions"] for r in self._relations(a["guard"])}
         expected = "continuous equations without events"
         export = "export the model as an FMU from a tool that treats events, and use that FMU"
-        whens = [a for a in storage["event_actions"] if not _assertion(a["kind"])]
+        checked = ("assert", "warning")
+        whens = [a for a in storage["event_actions"] if not any(k in a["kind"] for k in checked)]
         for clock in storage["clocks"]:
             raise refuse("sampling", clock, expected, export)
         for when in [*whens, *storage["discrete_real_equations"]]:
@@ -618,10 +620,6 @@ class _Reader:
         return numbers
 
 
-def _assertion(kind: Mapping[str, Any]) -> bool:
-    return "assert" in kind or "warning" in kind
-
-
 def _refuse_outside(parameters: Sequence[FlatVariable]) -> None:
     """Refuse a value of a parameter that its own limits exclude."""
     for parameter in parameters:
@@ -636,10 +634,6 @@ def _refuse_outside(parameters: Sequence[FlatVariable]) -> None:
                 expected=" and ".join(f"{k} = {v:g}" for k, v in limits.items() if v is not None),
                 remedy="correct the value, or its limits",
             )
-
-
-def _scalar_name(name: str, index: tuple[int, ...]) -> str:
-    return f"{name}[{','.join(str(i + 1) for i in index)}]" if index else str(name)
 
 
 def _substitution(bound: list[tuple[Value, Value]]) -> Callable[[ca.SX], ca.SX]:

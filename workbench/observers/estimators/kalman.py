@@ -44,11 +44,7 @@ from workbench.observers.operating import start_spreads, walks
 from workbench.system.system import System
 
 _OUTLYING = 9.0  # three standard deviations, squared: what is larger counts as this
-
-
 _LEVEL_RANGE = 1e4  # of levels, in variance
-
-
 _RATE = 0.3  # change of a level within the filter's memory by its own evidence [1]
 
 
@@ -369,8 +365,6 @@ def process_noise(settings, state, fade, h, i):  # type: ignore[no-untyped-def]
 
 
 _FAINTEST = 1e-3  # share of feedback that the noise of measurements is raised for
-
-
 _REACH = 100.0  # a level this far from the sensors' noise means: trust it wholly, or not at all
 
 

@@ -90,7 +90,7 @@ def build_observer(
     fmi : 2 or 3.
     gains_file : text of gains.toml, kept in the FMU.
     report : called with the name of each platform when it is about to be compiled.
-    platforms : names from `archive.PLATFORMS`.
+    platforms : names from `assembly.PLATFORMS`.
 
     Raises
     ------

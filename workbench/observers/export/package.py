@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from workbench.errors import InputError
-from workbench.models.compiler.archive import pack
+from workbench.models.compiler.assembly import pack
 from workbench.models.compiler.description import base_units
 from workbench.models.description import CO_SIMULATION, read_description
 from workbench.system.system import System

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from workbench.arrays import Matrix, Vector
 from workbench.errors import InputError
-from workbench.models.compiler.archive import FLAGS, PLATFORMS
+from workbench.models.compiler.assembly import FLAGS, PLATFORMS
 from workbench.models.fmu import FMU
 from workbench.observers import Gains
 from workbench.system.system import System

@@ -34,8 +34,6 @@ MEASURED = {
     "omegaR": Sensor(0.003, 0.0, 1e-3),
     "Fx": Sensor(80.0, 0.0, 10.0),
 }
-
-
 FURTHER = {
     "arms": Sensor(200.0, 0.0, 10.0),
     "load": Sensor(400.0, 0.0, 10.0),
