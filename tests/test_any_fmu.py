@@ -220,17 +220,18 @@ def test_what_the_fmu_warns_of_stands_at_the_top_of_each_answer(
 
 
 @pytest.mark.parametrize(
-    ("recorded", "said"),
+    ("what", "recorded", "said"),
     [
-        (lambda T: 1000.0 * T, "T is about 1000 times what the model says, which runs from 291 to"),
-        (lambda T: T - 273.15, "T is about 273.15 K below what the model says"),
-        (lambda T: T + 5.0, ""),
+        ("RELAYS", lambda T: 1000.0 * T, "T is about 1000 times what the model says, which runs"),
+        ("THERMOSTAT", lambda T: 1000.0 * T, "T is about 1000 times what the model says"),
+        ("RELAYS", lambda T: T - 273.15, "T is about 273.15 K below what the model says"),
+        ("RELAYS", lambda T: T + 5.0, ""),
     ],
 )
-def test_another_unit_is_asked_about_where_the_model_says_no_start(recorded, said, build):
-    """Of a room that is heated, whose scale is as wrong as its recording."""
+def test_another_unit_is_asked_about_where_the_model_says_no_start(what, recorded, said, build):
+    """Of a heated room, through events or without. The scale is as wrong as the recording."""
     unsaid = VARIABLES.replace(' initial="exact"><Real start="291"/>', "><Real/>")
-    file = build("RELAYS", variables=unsaid).parent / "system.toml"
+    file = build(what, variables=unsaid).parent / "system.toml"
     line = 'outputs.T = { unit = "K", noise = "0.05 K", scale = "'
     file.write_text(file.read_text().replace(f"{line}10 K", f"{line}100000 K"))
     system, time = load_system(file), 10.0 * np.arange(60.0)

@@ -337,7 +337,7 @@ class Simulation:
     ) -> dict[str, Any]:
         """What a recording tells, by the model alone, as fields of the result.
 
-        Nothing where the model does not run along the recording.
+        Little where the model cannot be linearised along the recording.
 
         Parameters
         ----------
@@ -345,19 +345,20 @@ class Simulation:
         open_loop : its run, where its error is shown.
         coarse : estimators whose steps may not do, see `step_doubt`.
         """
+        unit = ""
         try:
             with open_model(self.system) as fmu:
+                unit = unit_doubt(fmu, self.system, case)
                 known = information(fmu, self.system, case)
                 path = trajectory(fmu, self.system, case)
                 clock = "" if path is None else time_doubt(fmu, self.system, case, path)
                 start = start_doubt(fmu, self.system, case)
-                unit = unit_doubt(fmu, self.system, case)
                 sampling = sampling_doubt(fmu, self.system, case) if narrow else ""
                 share, step = 0.0, ""
                 if open_loop is not None:
                     share, step = step_doubt(fmu, self.system, case, open_loop, coarse)
         except (InputError, FMUError, np.linalg.LinAlgError):
-            return {}
+            return {"doubts": (unit,) if unit else ()}
         return {
             "inseparable": {} if known is None else known.inseparable,
             "untold": () if known is None else known.untold,
