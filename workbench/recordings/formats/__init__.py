@@ -26,7 +26,7 @@ from workbench.runtime.files import read_bytes
 from workbench.runtime.pool import Pool
 from workbench.runtime.resources import installing
 
-__all__ = ["FileChannel", "Group", "RecordedFile", "is_foreign", "read_foreign"]
+__all__ = ["FileChannel", "Group", "RecordedFile", "is_other_format", "read_recorded_file"]
 
 _Reader = Callable[[Path, bytes], Contents]
 _OF_THE_FILE = (UserWarning, RuntimeWarning)
