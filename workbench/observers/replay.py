@@ -57,6 +57,8 @@ def replay(case: Case, estimator: Estimator) -> Run:
             ending = Ending.NOT_FINITE
             message = f"at t = {case.time[lost[0]]:.3f} s"
         validity = _claims(case, estimator, values, np.asarray(estimate.probability))
+        warned = [warning for model in estimator.models if (warning := model.take_warning())]
+        message = message or "; ".join(warned)
     except FMUError as error:
         seconds = time.perf_counter() - begin
         ending, message = Ending.FMU_FAILED, str(error)

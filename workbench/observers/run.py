@@ -39,7 +39,7 @@ class Run:
     sigma : (n, w) standard deviations, NaN where the method has none.
     nis : (n,) normalised innovation squared, NaN where the method has none.
     ending : how it ended.
-    message : what the FMU said, empty if nothing.
+    message : why it ended so, or what the FMU warned of; empty: nothing.
     seconds : wall time of the estimator.
     claimed : (n,) by estimated quantity that is not always shown, whether it is an estimate;
         elsewhere it is a guess that fits as well as any other, or stands in for something that the
@@ -103,7 +103,7 @@ class Run:
 
     def summary(self) -> str:
         """How it went, in one line."""
-        ending = f"{self.ending.value} {self.message}".strip()
+        ending = f"{self.ending.value}{';' * (self.ending is Ending.OK)} {self.message}".strip("; ")
         return (
             f"{self.estimator} on {self.case}: {ending}; {self.time.size} samples in "
             f"{self.seconds:.2g} s"

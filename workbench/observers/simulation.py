@@ -295,8 +295,7 @@ class Simulation:
                 name: int(max((step.coarse[0] for step in estimator.steps), default=0.0))
                 for name, estimator in estimators.items()
             }
-            models = [model for estimator in estimators.values() for model in estimator.models]
-            warned = [warning for model in models if (warning := model.take_warning())]
+        warned = [run.message for run in runs.values() if run.ending is Ending.OK and run.message]
         scores = {name: score(case, run, self.system) for name, run in runs.items()}
         result = CaseResult(self.system, case, runs, scores, self._reference(case, runs))
         narrow = any(test.narrow for tests in result.contradictions.values() for test in tests)
@@ -305,7 +304,7 @@ class Simulation:
         result = replace(
             result,
             doubts=(
-                *warned,
+                *warned[:1],  # that of one estimator tells
                 *result.doubts,
                 *(
                     f"{name} takes {count} of its steps less accurately than noise allows: the "
