@@ -93,7 +93,6 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
 
 
 def _observers(system: System, cases: Sequence[Case], case: Case, output: Output) -> dict[str, Any]:
-    """Time the observers on one case, processes on all, and print the table; in seconds."""
     from workbench.benchmark.horizon import format_horizon, time_horizon
     from workbench.benchmark.observers import (
         format_observers,
@@ -119,7 +118,6 @@ def _observers(system: System, cases: Sequence[Case], case: Case, output: Output
 
 
 def _tuning(system: System, cases: Sequence[Case], case: Case, output: Output) -> dict[str, Any]:
-    """Time evaluations on one case, workers on all, and print the table; in seconds."""
     from workbench.benchmark.tuning import (
         format_tuning,
         observe_memory,

@@ -123,7 +123,6 @@ def _step(space: StateSpace, fmu: FMU, system: System) -> ca.Function:
 
 
 def _ours(fmu: FMU, name: str) -> str:
-    """Name by which the system knows a variable of the model."""
     ours = {theirs: our for our, theirs in fmu.names.items()}
     return ours.get(name, name)
 

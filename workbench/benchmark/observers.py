@@ -225,7 +225,6 @@ _Prepared = tuple[list[Estimator], list[Samples]]
 
 @contextmanager
 def _prepared(given: tuple[Sequence[Case], System]) -> Iterator[_Prepared]:
-    """All observers, and the cases at 1 kHz."""
     cases, system = given
     with opened(system, tuned_names(system)) as estimators:
         samples = [resample(case, _RATE) for case in cases]
@@ -235,7 +234,6 @@ def _prepared(given: tuple[Sequence[Case], System]) -> Iterator[_Prepared]:
 
 
 def _run(prepared: _Prepared, number: int) -> int:
-    """Run all observers on a case; returns the peak memory of this process [bytes]."""
     estimators, samples = prepared
     for estimator in estimators:
         estimator.run(*samples[number])

@@ -201,16 +201,16 @@ def time_workers(
     rng = np.random.default_rng(_SEED)
     reasoned, order = job.gains.values, tuple(range(len(cases)))
     changed = reasoned * (1.0 + _VARIATION * rng.standard_normal((candidates, reasoned.size)))
-    every = [Candidate(values, np.inf, order) for values in changed]
+    changes = [Candidate(values, np.inf, order) for values in changed]
     with evaluators(job, 1) as alone, evaluators(job, WORKERS) as together:
-        z = [_evaluate(pool, every) for pool in (alone, together)]
-        one, two = _rates([alone, together], every)
+        z = [_evaluate(pool, changes) for pool in (alone, together)]
+        one, two = _rates([alone, together], changes)
     dask = None
     if find_spec("distributed"):
         # Not in turns with the others: a cluster that waits takes 4 % of two processors.
         with _cluster(job) as pool:
-            z.append(_evaluate(pool, every))
-            [dask] = _rates([pool], every)
+            z.append(_evaluate(pool, changes))
+            [dask] = _rates([pool], changes)
     if not np.isfinite(z).all() or any(other != z[0] for other in z):
         raise ArithmeticError("candidates failed, or workers disagree about their z")
     return WorkerRates(len(cases), candidates, one, two, dask)
@@ -218,7 +218,6 @@ def time_workers(
 
 @contextmanager
 def _cluster(job: Job) -> Iterator[Workers]:
-    """A pool on a Dask cluster of this machine."""
     from distributed import LocalCluster
 
     from workbench.runtime.cluster import DaskPool

@@ -108,7 +108,6 @@ def _propose(
     problem: Problem,
     provenance: Mapping[str, Any],
 ) -> None:
-    """Propose a law, if no effect explains what is missing."""
     from workbench.diagnosis.laws import needs_law, propose
     from workbench.diagnosis.laws.report import PROPOSED, write_proposal
 

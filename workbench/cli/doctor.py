@@ -131,7 +131,6 @@ def _inspect() -> Iterator[Inspection]:
 
 
 def _inspect_compiler() -> Inspection:
-    """Compile a model and run it."""
     from workbench.models.compiler import build, native  # an extra
     from workbench.models.fmu import FMU
 
@@ -169,7 +168,6 @@ def _inspect_cache() -> Inspection:
 
 
 def _cached(folder: Path) -> Iterator[tuple[Path, int]]:
-    """Files of the cache and their sizes [byte]."""
     for parent, _, names in os.walk(folder):
         for path in (Path(parent, name) for name in names):
             with suppress(FileNotFoundError):  # other programs keep and delete files meanwhile

@@ -168,7 +168,6 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
 
 
 def _parameters(options: argparse.Namespace, system: System) -> list[FittedParameter]:
-    """What is to be fitted, with what the command line says of it."""
     from workbench.models.description import read_description
     from workbench.studies.fit import resolve_parameters
     from workbench.system.registry import model_path

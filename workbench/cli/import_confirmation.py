@@ -93,7 +93,6 @@ def answers(files: Sequence[RecordedFile], missing: bool) -> list[str]:
 def _complete(
     files: Sequence[RecordedFile], proposed: ProposedRecordings, doubts: Sequence[str]
 ) -> ProposedRecordings:
-    """The proposal, if all that is needed has a channel."""
     if problems := [*proposed.problems, *doubts]:
         raise InputError(
             where=", ".join(str(file.path) for file in files),
@@ -106,7 +105,6 @@ def _complete(
 
 
 def _format(files: Sequence[RecordedFile], proposed: ProposedRecordings, system: System) -> str:
-    """A line for each file, clock and signal of a proposal."""
     lines = [f"{file.path}: {file.kind}" for file in files]
     if len(proposed.held) > 1:
         names = listed([f"'{recording.name}'" for recording in proposed.held])

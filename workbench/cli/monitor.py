@@ -116,7 +116,6 @@ def _diagnose_change(
     result: MonitoringResult,
     provenance: dict[str, Any],
 ) -> dict[str, Any]:
-    """Diagnose the recordings after the change; returns the summary of the diagnosis."""
     from workbench.diagnosis import Problem, catalogue, diagnose, library_of
     from workbench.diagnosis.report import write_diagnosis
     from workbench.recordings.datasets import read_recorded

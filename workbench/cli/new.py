@@ -69,7 +69,6 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
 
 
 def _from_fmu(options: argparse.Namespace, output: Output) -> CommandResult:
-    """Write the system file of an FMU, and import its recordings."""
     from importlib import import_module
 
     from workbench.models.description import MODEL_EXCHANGE, read_description
@@ -118,7 +117,6 @@ def _from_fmu(options: argparse.Namespace, output: Output) -> CommandResult:
 
 
 def _confirmed(options: argparse.Namespace, output: Output, files: list[RecordedFile]) -> Draft:
-    """What is proposed, after one question at most."""
     from workbench.cli.import_confirmation import answers
     from workbench.cli.inputs import step_of
     from workbench.models.description import read_description
@@ -149,7 +147,6 @@ def _confirmed(options: argparse.Namespace, output: Output, files: list[Recorded
 
 
 def _format(draft: Draft) -> str:
-    """A line for each signal, and for what nobody can tell."""
     lines = [f"{draft.description.path}: {draft.description.name}, FMI {draft.description.version}"]
     for signal in draft.signals:
         samples = draft.samples(signal)

@@ -108,7 +108,6 @@ def _run(
 
 
 def _test_case(setup: tuple[System, Mapping[str, Vector], Path], case: Case) -> CaseObservability:
-    """Test all models on one case; writes its CSV and figure."""
     from workbench.observers.observability import case_observability
     from workbench.observers.observability_report import draw_observability, write_windows
 

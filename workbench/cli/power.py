@@ -63,7 +63,6 @@ def add(commands: arguments.Commands, text: str) -> argparse.ArgumentParser:
 
 
 def _add_sets(parser: argparse.ArgumentParser) -> None:
-    """Add which sets of recordings are made."""
     arguments.add_effects(parser, "inject, also those that the catalogue lacks, by the rig's names")
     for option, default, text in (
         ("--clean", 50, "sets without an effect"),
@@ -107,7 +106,6 @@ def _add_sets(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_checks(parser: argparse.ArgumentParser) -> None:
-    """Add what is asked instead of how often the diagnosis is right."""
     checks = parser.add_mutually_exclusive_group()
     for option, text in (
         (

@@ -233,7 +233,6 @@ def _run_live(
     window: LiveWindow,
     write: Callable[[CaseResult], None],
 ) -> Iterator[CaseResult]:
-    """Show each case in the window, then run it."""
     from workbench.observers.simulation import simulate
 
     for case in cases:
@@ -259,7 +258,6 @@ def _models(simulation: Simulation) -> dict[str, Any]:
 
 
 def _settings(simulation: Simulation, case: Case) -> dict[str, Any]:
-    """Settings of each estimator; their loops are compiled on the way."""
     settings = {}
     with simulation.estimators() as running:
         for name, estimator in running.items():

@@ -68,7 +68,6 @@ def add(commands: arguments.Commands, text: str) -> argparse.ArgumentParser:
 
 
 def _add_search(parser: argparse.ArgumentParser) -> None:
-    """Add what decides about the gains."""
     parser.add_argument(
         "--budget",
         type=arguments.positive,
@@ -113,7 +112,6 @@ def _add_search(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_work(parser: argparse.ArgumentParser) -> None:
-    """Add who does the work, and what is shown and kept of it."""
     arguments.add_workers(parser)
     parser.add_argument(
         "--cluster",
@@ -230,7 +228,6 @@ def _run(
 
 
 def _check(options: argparse.Namespace, cases: Sequence[Case]) -> None:
-    """Refuse numbers that make no sense."""
     if options.folds and not 2 <= options.folds <= len(cases):
         raise InputError(
             where="command line, --folds",

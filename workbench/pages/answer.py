@@ -1,5 +1,6 @@
 """The answer of a command: a sentence, and numbers that a second run is compared by."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
@@ -93,6 +94,11 @@ def share_with_interval(counts: Mapping[str, Any], of: str = "sets") -> str:
     low, high = 100.0 * counts["low"], 100.0 * counts["high"]
     share = whole_percent(counts["share"])
     return f"{counts['hits']} of {counts['of']} {of}, {share} (95 %: {low:.0f} to {high:.0f})"
+
+
+def finite(value: float) -> float | None:
+    """A number as JSON has it: None for infinity and NaN."""
+    return value if math.isfinite(value) else None
 
 
 def unit_suffix(unit: str) -> str:

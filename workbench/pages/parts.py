@@ -4,7 +4,7 @@ Texts are escaped; one that holds markup is a `markupsafe.Markup`.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import count
 from pathlib import Path
@@ -362,6 +362,31 @@ def number(value: float | None, digits: str, heat: float | None = None) -> Cell:
     ('25%', 'n/a')
     """
     return Cell("n/a") if value is None else Cell(format(value, digits), value, heat)
+
+
+def tabulated(
+    id: str,
+    caption: str,
+    records: Iterable[Mapping[Any, Any]],
+    columns: Sequence[tuple[object, str | Callable[[Any], object], str]],
+    marked: Sequence[str] = (),
+) -> Table:
+    """A table with a row for each record.
+
+    Parameters
+    ----------
+    columns : heading, entry of a record or what makes one of it, and format of its numbers; without
+        a format the entry stands as it is.
+    """
+
+    def cell(
+        record: Mapping[str, Any], entry: str | Callable[[Any], object], digits: str
+    ) -> object:
+        value: Any = entry(record) if callable(entry) else record[entry]
+        return number(value, digits) if digits else value
+
+    rows = [tuple(cell(record, *column[1:]) for column in columns) for record in records]
+    return Table(id, caption, [heading for heading, _, _ in columns], rows, marked)
 
 
 def joined(separator: str, texts: Sequence[str]) -> Markup:

@@ -157,7 +157,6 @@ def _read(path: Path, folder: Path) -> RunRecord:
 
 
 def _check(run: Mapping[str, Any], measures: list[Measure]) -> None:
-    """Refuse what no command writes."""
     texts = [run[key] for key in ("command", "date", "workbench", "system")]
     commit, data = run["commit"] or "", dict(run["data"])
     numbers = [end for measure in measures for end in (measure.value, measure.low, measure.high)]
@@ -170,7 +169,6 @@ def _check(run: Mapping[str, Any], measures: list[Measure]) -> None:
 
 
 def _files(folder: Path) -> dict[str, int]:
-    """How many files of each kind there are beside a summary."""
     counts: dict[str, int] = {}
     for path in sorted(folder.iterdir()):
         if path.is_file():

@@ -38,7 +38,6 @@ def number_of(summary: Mapping[str, Any]) -> str:
 
 @cache
 def _environment() -> Environment:
-    """Where the pages find templates, filters and the colours of curves."""
     environment = Environment(
         autoescape=True,
         loader=PackageLoader("workbench", "pages"),

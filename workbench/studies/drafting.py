@@ -408,8 +408,10 @@ def system_text(draft: Draft, fmu: str) -> str:
     lines += ['cases = "recordings"', *_reported(draft), "", "[models]"]
     lines += [f"observer = {{ fmu = {json.dumps(fmu)} }}"]
     if MODEL_EXCHANGE not in model.interfaces or model.event_indicators:
-        kind = "has events" if MODEL_EXCHANGE in model.interfaces else "is for Co-Simulation alone"
-        lines += [f"# The model {kind}: of the estimators, the open loop runs on it."]
+        reason = (
+            "has events" if MODEL_EXCHANGE in model.interfaces else "is for Co-Simulation alone"
+        )
+        lines += [f"# The model {reason}: of the estimators, the open loop runs on it."]
     for signal in sorted(draft.signals, key=lambda signal: signal.role):
         lines += _signal_table(draft, signal)
     lines += _missing(draft)
@@ -418,7 +420,6 @@ def system_text(draft: Draft, fmu: str) -> str:
 
 
 def _reported(draft: Draft) -> list[str]:
-    """Outputs of the FMU that nobody measured."""
     model, taken = draft.description, {signal.variable.name for signal in draft.signals}
     names = [
         v.name
@@ -430,7 +431,6 @@ def _reported(draft: Draft) -> list[str]:
 
 
 def _signal_table(draft: Draft, signal: DraftSignal) -> list[str]:
-    """The table of a measured signal."""
     variable, unit = signal.variable, signal.unit
     samples = draft.samples(signal)
     largest = max(float(np.abs(values).max()) for values in samples)

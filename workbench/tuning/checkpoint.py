@@ -141,7 +141,6 @@ def load(
 
 
 def _read(path: Path) -> Checkpoint | None:
-    """A checkpoint, None without a file."""
     if not path.exists():
         return None
     return _parse(read_text(path, "run without --resume"), path)

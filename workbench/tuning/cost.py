@@ -36,7 +36,7 @@ class Recording(NamedTuple):
     case : its name.
     steps : (n,) from the sample before [s].
     u, y : (n, m) and (n, l) measured inputs and outputs.
-    judged : (n, w) measured signals that the objective weighs.
+    reference : (n, w) measured signals that the objective weighs.
     shares : (n,) weight of each sample in the time average (trapezoidal rule) [1].
     conditions : of the case.
     """
@@ -46,19 +46,19 @@ class Recording(NamedTuple):
     steps: Vector
     u: Matrix
     y: Matrix
-    judged: Matrix
+    reference: Matrix
     shares: Vector
     conditions: Mapping[str, Value]
 
     @property
     def sampled(self) -> tuple[Vector, Matrix, Matrix, Matrix, Vector]:
-        """Steps, inputs, outputs, what is judged, and shares."""
-        return self.steps, self.u, self.y, self.judged, self.shares
+        """Steps, inputs, outputs, what scores, and shares."""
+        return self.steps, self.u, self.y, self.reference, self.shares
 
     def part(self, samples: slice) -> "Recording":
         """A piece of it."""
         steps, u, y, reference, shares = (values[samples] for values in self.sampled)
-        return self._replace(steps=steps, u=u, y=y, judged=reference, shares=shares)
+        return self._replace(steps=steps, u=u, y=y, reference=reference, shares=shares)
 
 
 def recordings(
@@ -229,7 +229,7 @@ class Evaluator:
         names = list(estimator.fed(job.system).columns)
         self._settling = Settling(self._fmu, job.system, estimator) if job.follows else None
         scored = [scored_column(job.system, names, n) for n in job.system.objective.weights]
-        self._judged = [names.index(name) for name in scored]
+        self._scored = [names.index(name) for name in scored]
         # The loop is compiled here, so that no candidate's time is spent on it.
         start = job.recordings[0].part(slice(PIECES))
         self._evaluate_case(job_estimator(job, self._fmu, job.gains), start, np.inf)
@@ -282,7 +282,7 @@ class Evaluator:
                 part = slice(begin, end)
                 steps, y = case.steps[part], case.y[part]
                 estimate = estimator.advance(steps, case.u[part], y)
-                deviations = estimate.values[:, self._judged] - case.judged[part]
+                deviations = estimate.values[:, self._scored] - case.reference[part]
                 z = integrate(z, low_pass, deviations, shares, steps, case.shares[part], pole)
                 if not z <= limit:
                     break

@@ -17,6 +17,7 @@ from workbench.observers.gains_file import format_gains
 from workbench.observers.replay import run_on_model
 from workbench.observers.run import Ending
 from workbench.observers.score import with_readings
+from workbench.pages.answer import finite
 from workbench.recordings.case import Case
 from workbench.runtime.pool import NoWorkersError
 from workbench.runtime.progress import StepReporter
@@ -274,8 +275,6 @@ def tune(
 
 @dataclass(frozen=True, eq=False)
 class _Run:
-    """One call of `tune`."""
-
     pool: Workers
     problem: Problem
     plan: Plan
@@ -284,7 +283,6 @@ class _Run:
     progress: Progress
 
     def search(self, fold: int, on: Sequence[int]) -> Search | None:
-        """Search on some cases."""
         self.progress.begins(fold)
         file = self.checkpoints / (f"checkpoint_fold{fold}.json" if fold else "checkpoint.json")
         kept = Checkpointing(file, self.resume, self.progress.evolved, self.progress.warn)
@@ -336,7 +334,7 @@ def summarise_tuning(tuned: TuningResult) -> dict[str, Any]:
         "estimator": job.estimator,
         "label": estimators_of(job.system)[job.estimator].label,
         "judged": job.system.objective.signal,
-        "bandwidth": _finite(job.system.objective.bandwidth),
+        "bandwidth": finite(job.system.objective.bandwidth),
         "follows": None if following is None else vars(following),
         "z": search.z,
         "z_reasoned": max(before.values()),
@@ -351,21 +349,19 @@ def summarise_tuning(tuned: TuningResult) -> dict[str, Any]:
         "gains": _gains(tuned),
         "sensitivity": {
             e.gain: {
-                "less": _finite(e.less),
-                "more": _finite(e.more),
-                "without": _finite(e.without),
+                **{change: finite(getattr(e, change)) for change in ("less", "more", "without")},
                 "matters": e.matters,
             }
             for e in tuned.sensitivities
         },
         "folds": [
-            {name: _finite(v) if isinstance(v, float) else v for name, v in asdict(fold).items()}
+            {name: finite(v) if isinstance(v, float) else v for name, v in asdict(fold).items()}
             for fold in tuned.folds
         ],
         "beside": {
             name: {
                 "label": estimators_of(job.system)[name].label,
-                "z": _finite(float(z_k.max())),
+                "z": finite(float(z_k.max())),
                 "worst": list(after)[int(z_k.argmax())],
             }
             for name, z_k in tuned.beside.items()
@@ -423,11 +419,6 @@ def _as_good(tuned: TuningResult) -> Matrix:
     return tuned.problem.space.gains(last.members[last.z <= (1.0 + NEGLIGIBLE) * last.z[0]])
 
 
-def _finite(value: float) -> float | None:
-    """JSON has no infinity."""
-    return value if np.isfinite(value) else None
-
-
 def with_reference(cases: Sequence[Case], system: System, estimator: str) -> list[Case]:
     """Recordings with the estimate of what is judged in the place of its measurement.
 
@@ -455,7 +446,7 @@ def with_reference(cases: Sequence[Case], system: System, estimator: str) -> lis
             found="none of this name that knows whole recordings",
             expected=f"one of {', '.join(known)}",
         )
-    judged_cases = []
+    referenced = []
     for case in cases:
         run = run_on_model(case, system, known[estimator])
         if run.ending is not Ending.OK:
@@ -466,5 +457,5 @@ def with_reference(cases: Sequence[Case], system: System, estimator: str) -> lis
                 remedy="leave this case out of the tuning with --cases",
             )
         references = [name for name in system.objective.weights if name not in case.outputs]
-        judged_cases.append(case.with_signals({name: run.signal(name) for name in references}))
-    return judged_cases
+        referenced.append(case.with_signals({name: run.signal(name) for name in references}))
+    return referenced

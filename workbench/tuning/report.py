@@ -25,6 +25,7 @@ from workbench.pages.parts import (
     Steps,
     Table,
     number,
+    tabulated,
     term,
 )
 from workbench.pages.views import capital, percent
@@ -127,7 +128,6 @@ def write_tuning_page(summary: Mapping[str, Any], folder: Path) -> Path:
 
 
 def _worst_first(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Cases with their names."""
     cases = [{"name": name, **case} for name, case in summary["cases"].items()]
     return sorted(cases, key=lambda case: -case["z_k"])
 
@@ -142,29 +142,18 @@ def _change(value: float | None) -> Cell:
 
 
 def _cases(summary: Mapping[str, Any]) -> Table:
-    return Table(
+    unstable = "gains with which an estimate diverged or the model failed here first"
+    return tabulated(
         "case-table",
         "Objective of each case. A candidate is unstable where its estimate diverged or the model "
         "failed; it is counted in the case where that showed first.",
-        (
-            "case",
-            Numbers(_z_k(", model-based")),
-            Numbers("z_k, tuned", sorted="descending"),
-            Numbers("change"),
-            Numbers(
-                "unstable candidates",
-                "gains with which an estimate diverged or the model failed here first",
-            ),
-        ),
+        _worst_first(summary),
         [
-            (
-                case["name"],
-                number(case["z_k_reasoned"], ".4f"),
-                number(case["z_k"], ".4f"),
-                _change(case["z_k"] / case["z_k_reasoned"] - 1),
-                number(case["unstable"], ""),
-            )
-            for case in _worst_first(summary)
+            ("case", "name", ""),
+            (Numbers(_z_k(", model-based")), "z_k_reasoned", ".4f"),
+            (Numbers("z_k, tuned", sorted="descending"), "z_k", ".4f"),
+            (Numbers("change"), lambda c: _change(c["z_k"] / c["z_k_reasoned"] - 1), ""),
+            (Numbers("unstable candidates", unstable), lambda c: number(c["unstable"], ""), ""),
         ],
     )
 
@@ -200,7 +189,6 @@ def _dots(summary: Mapping[str, Any]) -> Dots:
 
 
 def _folds(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Folds, the worst first; z is None where an estimate diverges."""
     rows = [
         {**fold, "better": fold["tuned"] is not None and fold["tuned"] < fold["reasoned"]}
         for fold in summary["folds"]
@@ -215,30 +203,26 @@ def _unseen(summary: Mapping[str, Any]) -> Table:
     def error(share: float | None) -> Cell:
         return Cell("not scored", np.inf) if share is None else Cell(percent(share), share)
 
-    return Table(
+    def verdict(fold: Mapping[str, Any]) -> object:
+        return "better" if fold["better"] else Cell("⚠ not better", warning=True)
+
+    untuned = Numbers(f"error of {reference}, model-based")
+    tuned = Numbers(f"error of {reference}, tuned without them")
+    without = Numbers("z, tuned without them", sorted="descending")
+    return tabulated(
         "fold-table",
         "Gains tuned without some of the cases and scored on these, against the model-based gains "
-        "on "
-        f"the same. The error of {reference} is the worst of the cases, rms over mean{below}.",
-        (
-            "left out",
-            Numbers("z, model-based"),
-            Numbers("z, tuned without them", sorted="descending"),
-            Numbers("z of the cases tuned on"),
-            Numbers(f"error of {reference}, model-based"),
-            Numbers(f"error of {reference}, tuned without them"),
-            "worst of them",
-            "verdict",
-        ),
+        f"on the same. The error of {reference} is the worst of the cases, rms over mean{below}.",
+        _folds(summary),
         [
-            (
-                ", ".join(fold["cases"]),
-                *(_z(fold[key]) for key in ("reasoned", "tuned", "z")),
-                *(error(fold[key]) for key in ("error_reasoned", "error")),
-                fold["worst"],
-                "better" if fold["better"] else Cell("⚠ not better", warning=True),
-            )
-            for fold in _folds(summary)
+            ("left out", lambda fold: ", ".join(fold["cases"]), ""),
+            (Numbers("z, model-based"), lambda fold: _z(fold["reasoned"]), ""),
+            (without, lambda fold: _z(fold["tuned"]), ""),
+            (Numbers("z of the cases tuned on"), lambda fold: _z(fold["z"]), ""),
+            (untuned, lambda fold: error(fold["error_reasoned"]), ""),
+            (tuned, lambda fold: error(fold["error"]), ""),
+            ("worst of them", "worst", ""),
+            ("verdict", verdict, ""),
         ],
     )
 
@@ -417,7 +401,6 @@ def _terms(summary: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _run(provenance: Mapping[str, Any]) -> dict[str, str]:
-    """What was run, by what it is."""
     fmu = provenance["fmu"]
     packages = "".join(f", {name} {release}" for name, release in provenance["packages"].items())
     return {

@@ -18,7 +18,6 @@ _ROWS, _FITTED = 1000, 3
 
 
 def _cut(time: Vector, intake: Vector, pressure: Vector, file: str) -> list[PublishedRecording]:
-    """The record in cycles of the compressor."""
     pieces = []
     for number, (a, b) in enumerate(pairwise((*_BEGINS, _ROWS)), start=1):
         columns = {

@@ -40,7 +40,6 @@ def rate(time: Vector, stroke: Vector) -> Vector:
 
 
 def _slope(t: Vector, s: Vector) -> Vector:
-    """Slope of a line through each row."""
     centred = t - t.mean(axis=1, keepdims=True)
     slopes: Vector = (centred * s).sum(axis=1) / np.square(centred).sum(axis=1)
     return slopes

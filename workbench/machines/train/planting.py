@@ -143,7 +143,6 @@ def virtual_rig(names: Sequence[str], model: Path | None) -> PlantedTrain:
 
 
 def _faults(gains: Mapping[str, float]) -> Faults:
-    """Faults by their names, `NAME[PLACE]` where there are several places."""
     faults: dict[str, Any] = {}
     for name, gain in gains.items():
         fault, _, place = name.partition("[")

@@ -221,7 +221,6 @@ def _press(train, state, braking):  # type: ignore[no-untyped-def]
 
 @compiled
 def _pads(train, state, i, v):  # type: ignore[no-untyped-def]
-    """Torque of an axle's pads, disc by disc; isolated units press none."""
     force = 0.1086 * max(0.0, state.cylinder[i] * state.passed[i] - 25e3)
     speed, exponent, fade, glazing = train.law[0], train.law[1], train.law[2], train.law[3]
     common = train.friction[i] * (1.0 + speed * (1.0 - v / 22.0)) * force * _BRAKE_RADIUS

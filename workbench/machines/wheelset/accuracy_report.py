@@ -21,7 +21,7 @@ from workbench.machines.wheelset.accuracy import (
     worst,
 )
 from workbench.observers import label
-from workbench.pages.answer import Answer, Measure, with_answer
+from workbench.pages.answer import Answer, Measure, finite, with_answer
 from workbench.pages.figures import ESTIMATORS
 from workbench.pages.parts import Definitions, Dot, Dots, Numbers, Page, Part, Table, number
 from workbench.pages.views import percent
@@ -74,7 +74,7 @@ def write_accuracy(
             name: {
                 row.text: {
                     "quantity": row.quantity,
-                    "value": _finite(worst_stop.value),
+                    "value": finite(worst_stop.value),
                     "stop": worst_stop.stop,
                 }
                 for row in ROWS
@@ -103,7 +103,7 @@ def _answer(system: System, stops: Sequence[StopAccuracy]) -> Answer:
                 factor = 1.0
                 if unit == "1" and row.quantity != "muDC":
                     unit, factor = "%", 100.0
-                value = _finite(factor * row.badness(worst_stop.value))
+                value = finite(factor * row.badness(worst_stop.value))
                 headline[f"{row.text}, {name}"] = Measure(value, unit, "lower")
         errors = [stop.estimators[name].force for stop in stops]
         if all(error is not None and math.isfinite(error) for error in errors):
@@ -132,14 +132,9 @@ def _numbers(result: Accuracy) -> dict[str, Any]:
     if result.failure:
         return {"failure": result.failure}
     values = {name: getattr(result, name) for name in _QUANTITIES}
-    numbers = {name: _finite(value) for name, value in values.items() if value is not None}
+    numbers = {name: finite(value) for name, value in values.items() if value is not None}
     shares = {name: band.share for name, band in result.bands.items()}
     return numbers | ({"covers": shares} if shares else {})
-
-
-def _finite(value: float) -> float | None:
-    """JSON has neither infinity nor NaN."""
-    return value if math.isfinite(value) else None
 
 
 def format_accuracy(stops: Sequence[StopAccuracy]) -> str:

@@ -44,11 +44,11 @@ class RankedExperiment:
             return f"precision gain {_ratio(prediction):.2g}, {cost}"
         several = 1 < len(prediction.groups) < len(prediction.pairwise)
         group = " or its group" if several else ""
-        apart = f"separation {prediction.separation:.1f} standard deviations"
+        separation = f"separation {prediction.separation:.1f} standard deviations"
         if prediction.separation < _LEAST:
-            apart = "no separation beside what the models leave unexplained"
+            separation = "no separation beside what the models leave unexplained"
         named = f"chance {prediction.right:.0%} that the right one{group} is then named"
-        return f"{apart}, {named}, {cost}"
+        return f"{separation}, {named}, {cost}"
 
     def to_dict(self) -> dict[str, Any]:
         """All of it as plain numbers and texts."""

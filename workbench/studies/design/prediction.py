@@ -440,7 +440,6 @@ class ExperimentPredictor:
     def _record(
         self, problem: DesignProblem, candidate: Experiment, rival: Rival, number: int
     ) -> Case:
-        """A recording of an experiment as a rival predicts it."""
         system, names = problem.system, set(problem.rivals.signals)
         if system.experiments:
             names |= {sensor.name for sensor in system.experiments.sensors}
@@ -457,7 +456,6 @@ def open_predictor(problem: DesignProblem) -> Iterator[ExperimentPredictor]:
 
 
 def _values(problem: DesignProblem, candidate: Experiment, rival: Rival) -> dict[str, float]:
-    """Parameters of a rival in an experiment."""
     system, rivals, effects = problem.system, problem.rivals, problem.effects
     values = dict(rivals.given)
     for condition in system.conditions:

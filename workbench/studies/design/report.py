@@ -121,7 +121,6 @@ def write_next_stop_page(proposal: NextStop, summary: Mapping[str, Any], out: Pa
 
 
 def _figure(proposal: NextStop, experiment: RankedExperiment, place: int) -> CaseFigure:
-    """Inputs and what each model leaves by channel, at the blocks."""
     prediction = experiment.prediction
     time = prediction.block_time
     panels = []

@@ -394,7 +394,6 @@ class Distance:
 
 
 def _format_quantity(value: float, asked: AskedQuantity) -> str:
-    """A quantity for people."""
     unit = f" {asked.shown}" * (asked.shown != "1")
     return f"{value / si_factor(asked.shown, asked.unit, asked.name):.4g}{unit}"
 

@@ -18,7 +18,7 @@ from workbench.pages.parts import (
     Page,
     Part,
     Table,
-    number,
+    tabulated,
     zoomable,
 )
 from workbench.recordings.csv import csv_text
@@ -130,7 +130,6 @@ def _past(past: Sequence[PastStop]) -> Dots:
 
 
 def _distribution(result: Distance) -> CaseFigure:
-    """Share of stops that are shorter, over the distance."""
     ahead = result.ahead
     # Its far ends are those of the safety level, which say more than what was drawn there.
     at = np.linspace(ahead.quantile(0.001), ahead.quantile(0.999), _POINTS)
@@ -151,41 +150,45 @@ def _distribution(result: Distance) -> CaseFigure:
 
 
 def _quantiles(result: Distance) -> Table:
-    rows = [
-        (f"{100.0 * share:g} %", number(distance, ".1f"), number(rate, ".3f"))
-        for share, distance, rate in result.quantiles().to_numpy()
-    ]
-    columns = (_LESS, Numbers("distance [m]"), _RATE)
-    return Table("quantile-table", "The stop that was asked for.", columns, rows)
+    return tabulated(
+        "quantile-table",
+        "The stop that was asked for.",
+        result.quantiles().to_dict("records"),
+        [
+            (_LESS, lambda quantile: f"{100.0 * quantile['share']:g} %", ""),
+            (Numbers("distance [m]"), "distance [m]", ".1f"),
+            (_RATE, "deceleration [m/s2]", ".3f"),
+        ],
+    )
 
 
 def _stops(result: Distance) -> Table:
-    columns = (
-        "stop",
-        Numbers("speed [km/h]"),
-        Numbers("measured [m]"),
-        Numbers("predicted [m]", "middle of what the other stops say"),
-        Numbers("95 % from [m]"),
-        Numbers("to [m]"),
-        _RATE,
-        Numbers("corrected [m]", "to nominal speed, mass and a level, straight way"),
-        "remark",
+    corrected = Numbers("corrected [m]", "to nominal speed, mass and a level, straight way")
+
+    def nominal(stop: Mapping[str, Any]) -> float | None:
+        distance = float(stop["nominal_distance [m]"])
+        return None if np.isnan(distance) else distance
+
+    return tabulated(
+        "stop-table",
+        "Past stops, each as it was measured and as the others predict it.",
+        result.to_frame().to_dict("records"),
+        [
+            ("stop", lambda stop: str(stop["stop"]), ""),
+            (Numbers("speed [km/h]"), lambda stop: 3.6 * stop["speed [m/s]"], ".1f"),
+            (Numbers("measured [m]"), "distance [m]", ".1f"),
+            (
+                Numbers("predicted [m]", "middle of what the other stops say"),
+                "predicted [m]",
+                ".1f",
+            ),
+            (Numbers("95 % from [m]"), "low [m]", ".1f"),
+            (Numbers("to [m]"), "high [m]", ".1f"),
+            (_RATE, "deceleration [m/s2]", ".3f"),
+            (corrected, nominal, ".1f"),
+            ("remark", lambda s: s["outside"] or ("" if s["held"] else "not in its range"), ""),
+        ],
     )
-    rows = []
-    for stop in result.to_frame().to_dict("records"):
-        nominal = stop["nominal_distance [m]"]
-        distances = (stop[f"{key} [m]"] for key in ("distance", "predicted", "low", "high"))
-        row = (
-            str(stop["stop"]),
-            number(3.6 * stop["speed [m/s]"], ".1f"),
-            *(number(distance, ".1f") for distance in distances),
-            number(stop["deceleration [m/s2]"], ".3f"),
-            number(None if np.isnan(nominal) else nominal, ".1f"),
-            stop["outside"] or ("" if stop["held"] else "not in its range"),
-        )
-        rows.append(row)
-    caption = "Past stops, each as it was measured and as the others predict it."
-    return Table("stop-table", caption, columns, rows)
 
 
 def _levels(safety: Sequence[Mapping[str, Any]]) -> Dots:
@@ -208,22 +211,17 @@ def _levels(safety: Sequence[Mapping[str, Any]]) -> Dots:
 
 
 def _safety(safety: Sequence[Mapping[str, Any]]) -> Table:
-    columns = (
-        "one stop in",
-        Numbers("ratio"),
-        Numbers("95 % from"),
-        Numbers("to"),
-        Numbers("variation [%]", "of the probability, from run to run"),
-        Numbers("by plain sampling [stops]", "that would tell as much"),
+    variation = Numbers("variation [%]", "of the probability, from run to run")
+    return tabulated(
+        "safety-table",
+        "Deceleration over the nominal one that all but one stop in so many reach.",
+        safety,
+        [
+            ("one stop in", lambda level: f"1e{level['decade']}", ""),
+            (Numbers("ratio"), "ratio", ".4f"),
+            (Numbers("95 % from"), "low", ".4f"),
+            (Numbers("to"), "high", ".4f"),
+            (variation, lambda level: 100.0 * level["variation"], ".1f"),
+            (Numbers("by plain sampling [stops]", "that would tell as much"), "plain_stops", ".1e"),
+        ],
     )
-    rows = [
-        (
-            f"1e{level['decade']}",
-            *(number(level[key], ".4f") for key in ("ratio", "low", "high")),
-            number(100.0 * level["variation"], ".1f"),
-            number(level["plain_stops"], ".1e"),
-        )
-        for level in safety
-    ]
-    caption = "Deceleration over the nominal one that all but one stop in so many reach."
-    return Table("safety-table", caption, columns, rows)

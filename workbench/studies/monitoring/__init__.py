@@ -118,7 +118,6 @@ def _estimate(
 def _estimate_folder(
     read: Reader, estimator: RecordingEstimator, recording: RecordingFolder
 ) -> RecordingResult:
-    """Estimate a recording, in a worker."""
     date, estimate, refusal = "", None, ""
     try:
         case = read(recording.path, estimator.system)

@@ -11,6 +11,7 @@ import pandas as pd
 
 from workbench.arrays import Matrix, Vector
 from workbench.errors import InputError
+from workbench.pages.answer import finite
 from workbench.studies.monitoring.chart import LevelChange
 from workbench.studies.monitoring.estimate import watched
 from workbench.studies.monitoring.state import RecordingResult
@@ -269,8 +270,4 @@ def _quantity_name(track: Track) -> str:
 
 
 def _without_nan(values: Mapping[Any, Any]) -> dict[Any, Any]:
-    """The same with None for each number that is not finite."""
-    return {
-        key: None if isinstance(value, float) and not np.isfinite(value) else value
-        for key, value in values.items()
-    }
+    return {key: finite(v) if isinstance(v, float) else v for key, v in values.items()}

@@ -17,7 +17,7 @@ from workbench.pages.parts import (
     Part,
     Strip,
     Table,
-    number,
+    tabulated,
     zoomable,
 )
 from workbench.pages.views import capital
@@ -108,7 +108,6 @@ def _change_text(track: Track, result: MonitoringResult) -> str:
 
 
 def _figure(track: Track, result: MonitoringResult) -> CaseFigure:
-    """Estimates of a quantity and its levels, over the recordings."""
     count = len(result.names)
     sound, changed = _levels(track, count)
     reach = BAND * track.scale * track.deviations
@@ -150,67 +149,60 @@ def _levels(track: Track, count: int) -> tuple[Vector, Vector]:
 
 
 def _alarms(alarms: Sequence[Mapping[str, Any]]) -> Table:
-    texts = ("reported at", "quantity", "changed after", "with 95 %, after")
-    numbers = map(Numbers, ("change", "95 % from", "to", "of nominal [%]"))
-    columns = (*texts, *numbers, "unit")
-    rows = []
-    for alarm in alarms:
-        size, reach = alarm["change"], BAND * alarm["standard_error"]
-        share = alarm["share_of_nominal"]
-        between = dict.fromkeys((alarm["earliest"], alarm["latest"]))
-        row = (
-            str(alarm["told_at"]),
-            alarm["quantity"],
-            alarm["changed_after"],
-            " to ".join(between),
-            *(number(value, "+.3g") for value in (size, size - reach, size + reach)),
-            number(None if share is None else 100.0 * share, "+.1f"),
-            alarm["unit"],
-        )
-        rows.append(row)
-    caption = "All alarms in their order: the recording at which each was reported."
-    return Table("alarm-table", caption, columns, rows)
+    def reach(alarm: Mapping[str, Any]) -> float:
+        return float(BAND * alarm["standard_error"])
+
+    def share(alarm: Mapping[str, Any]) -> float | None:
+        value = alarm["share_of_nominal"]
+        return None if value is None else 100.0 * value
+
+    return tabulated(
+        "alarm-table",
+        "All alarms in their order: the recording at which each was reported.",
+        alarms,
+        [
+            ("reported at", lambda alarm: str(alarm["told_at"]), ""),
+            ("quantity", "quantity", ""),
+            ("changed after", "changed_after", ""),
+            ("with 95 %, after", lambda a: " to ".join({a["earliest"]: 0, a["latest"]: 0}), ""),
+            (Numbers("change"), "change", "+.3g"),
+            (Numbers("95 % from"), lambda alarm: alarm["change"] - reach(alarm), "+.3g"),
+            (Numbers("to"), lambda alarm: alarm["change"] + reach(alarm), "+.3g"),
+            (Numbers("of nominal [%]"), share, "+.1f"),
+            ("unit", "unit", ""),
+        ],
+    )
 
 
 def _quantities(summary: Mapping[str, Any]) -> Table:
-    columns = (
-        "quantity",
-        "what it is",
-        Numbers("level"),
-        Numbers("standard error"),
-        Numbers("trend", "by recording, since the last change"),
-        "unit",
-        Numbers("reported in", "recordings that tell it"),
+    return tabulated(
+        "quantity-table",
+        "Mean level of each quantity since its last change.",
+        [{"name": name, **quantity} for name, quantity in summary["quantities"].items()],
+        [
+            ("quantity", "name", ""),
+            ("what it is", "label", ""),
+            (Numbers("level"), "level", ".4g"),
+            (Numbers("standard error"), "standard_error", ".4g"),
+            (Numbers("trend", "by recording, since the last change"), "trend_by_recording", "+.2g"),
+            ("unit", "unit", ""),
+            (Numbers("reported in", "recordings that tell it"), "told_in", ".0f"),
+        ],
     )
-    rows = [
-        (
-            name,
-            quantity["label"],
-            *(number(quantity[key], ".4g") for key in ("level", "standard_error")),
-            number(quantity["trend_by_recording"], "+.2g"),
-            quantity["unit"],
-            number(quantity["told_in"], ".0f"),
-        )
-        for name, quantity in summary["quantities"].items()
-    ]
-    caption = "Mean level of each quantity since its last change."
-    return Table("quantity-table", caption, columns, rows)
 
 
 def _work(work: Mapping[str, Any]) -> Table:
     relative = Numbers("over the mean", "wear relative to the others, of one material")
-    rows = [
-        (
-            name,
-            part["label"],
-            number(1e-6 * part["work"], ".4g"),
-            number(part["of_the_mean"], ".3f"),
-        )
-        for name, part in work.items()
-    ]
-    caption = "Friction work in all recordings together."
-    return Table(
-        "work-table", caption, ("where", "what it is", Numbers("work [MJ]"), relative), rows
+    return tabulated(
+        "work-table",
+        "Friction work in all recordings together.",
+        [{"name": name, **part} for name, part in work.items()],
+        [
+            ("where", "name", ""),
+            ("what it is", "label", ""),
+            (Numbers("work [MJ]"), lambda part: 1e-6 * part["work"], ".4g"),
+            (relative, "of_the_mean", ".3f"),
+        ],
     )
 
 

@@ -134,22 +134,21 @@ class State:
 
 
 def _read_result(text: str) -> RecordingResult:
-    """What `State.add` wrote."""
     content = check_checksum(text)
-    said = content.pop("estimate")
+    entries = content.pop("estimate")
     if not all(isinstance(value, str) for value in content.values()):
         raise ValueError("other than texts")
     if content["date"]:
         datetime.fromisoformat(content["date"])
-    if said is None and not content["refusal"]:
+    if entries is None and not content["refusal"]:
         raise ValueError("neither an estimate nor a refusal")
-    if said is None:
+    if entries is None:
         return RecordingResult(estimate=None, **content)
     estimate = RecordingEstimate(
-        values=np.array(said["values"], float),
-        covariance=np.array(said["covariance"], float),
-        work=np.array(said["work"], float).reshape(-1),
-        counted=float(said["counted"]),
+        values=np.array(entries["values"], float),
+        covariance=np.array(entries["covariance"], float),
+        work=np.array(entries["work"], float).reshape(-1),
+        counted=float(entries["counted"]),
     )
     q = estimate.values.size
     finite = all(np.isfinite(value).all() for value in vars(estimate).values())

@@ -121,7 +121,7 @@ def limits_of_effects(
     at = _columns_of_effects(study.effects, joint)
     left = beside(joint.total().N, range(len(joint.known)))
     decides = of_system(study.system.comparison, len(study.effects))
-    found = clear(1, decides)
+    multiple = clear(1, decides)
     limits = []
     for plantable in wanted:
         if plantable.effect not in at:
@@ -131,15 +131,19 @@ def limits_of_effects(
         own = _of_shape(at[plantable.effect], plantable, study.effects)
         sigma = len(own) / float(np.trace(left[np.ix_(own, own)]))
         sigma = float(np.sqrt(sigma))
-        apart = {
+        differences = {
             name: min(_unlike(left, own, other) for other in variants)
             for name, variants in at.items()
             if name != plantable.effect
         }
-        like = min(apart, key=lambda name: apart[name], default="")
-        told = found * sigma / np.sqrt(apart[like]) if like and apart[like] > _ALIKE else None
+        like = min(differences, key=lambda name: differences[name], default="")
+        least = (
+            multiple * sigma / np.sqrt(differences[like])
+            if like and differences[like] > _ALIKE
+            else None
+        )
         limits.append(
-            EffectLimit(plantable.effect, plantable.unit, sigma, found * sigma, like, told)
+            EffectLimit(plantable.effect, plantable.unit, sigma, multiple * sigma, like, least)
         )
     return limits
 
@@ -161,8 +165,8 @@ def _of_shape(
 ) -> list[int]:
     """Columns of an effect in the shape that the rig has, or else in its middle one."""
     effect = next(effect for effect in effects if effect.name == planted.effect)
-    every = shapes(effect)
-    index = every.index(dict(planted.shapes)) if dict(planted.shapes) in every else len(every) // 2
+    forms = shapes(effect)
+    index = forms.index(dict(planted.shapes)) if dict(planted.shapes) in forms else len(forms) // 2
     return variants[index]
 
 

@@ -1,8 +1,6 @@
 """Whether the recording that is proposed next discriminates what a set leaves together."""
 
 from collections.abc import Mapping, Sequence
-from concurrent.futures import as_completed
-from contextlib import nullcontext
 from dataclasses import replace
 from typing import Any, TypedDict
 
@@ -13,7 +11,6 @@ from workbench.diagnosis.inference.rivals import Rivals
 from workbench.errors import InputError, WorkerError
 from workbench.recordings.case import Case
 from workbench.runtime.engine import ALONE, Engine
-from workbench.runtime.pool import Pool
 from workbench.runtime.progress import StepReporter
 from workbench.studies.design import RankedExperiment, next_stop, predict_experiments, with_sensor
 from workbench.studies.design.candidates import draw_experiment
@@ -23,7 +20,7 @@ from workbench.studies.power.diagnosing import (
     rivals_of_set,
 )
 from workbench.studies.power.planting import Group, Planting
-from workbench.studies.power.run import PowerStudy, Setup
+from workbench.studies.power.run import PowerStudy, Setup, work_off
 from workbench.studies.power.statistics import share
 from workbench.studies.power.virtual_rig import FollowingRig
 
@@ -125,26 +122,19 @@ def follow_proposals(
     sets = [planting for group in groups for planting in group if planting.kind == "single"]
     rows: dict[int, FollowingRow] = {}
     progress = StepReporter(engine.report, len(sets))
-    with (
-        study.setup() as setup,
-        Pool(engine.workers, nullcontext, setup, isolated=True) as pool,
-    ):
-        numbers = {pool.submit(_row, planting): k for k, planting in enumerate(sets)}
-        try:
-            for task in as_completed(numbers):
-                k = numbers[task]
-                try:
-                    rows[k] = task.result()
-                except WorkerError as error:
-                    rows[k] = _empty_row(sets[k], repr(error))
-                row, proposed = rows[k], rows[k]["proposed"]
-                group = " or ".join(row["group"]) or row["verdict"]
-                if proposed is not None:
-                    group += f" -> {' or '.join(proposed['named']) or proposed['verdict']}"
-                progress.step(f"{row['planted']}: {group}{row['error']}")
-        except KeyboardInterrupt:
-            return [rows[k] for k in sorted(rows)], True
-    return [rows[k] for k in sorted(rows)], False
+
+    def collect(planting: Planting, row: FollowingRow | WorkerError) -> None:
+        if isinstance(row, WorkerError):
+            row = _empty_row(planting, repr(row))
+        rows[sets.index(planting)] = row
+        text = " or ".join(row["group"]) or row["verdict"]
+        if (proposed := row["proposed"]) is not None:
+            text += f" -> {' or '.join(proposed['named']) or proposed['verdict']}"
+        progress.step(f"{row['planted']}: {text}{row['error']}")
+
+    with study.setup() as setup:
+        interrupted = work_off(setup, engine, _row, sets, collect)
+    return [rows[k] for k in sorted(rows)], interrupted
 
 
 def summarise_following(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:

@@ -163,7 +163,6 @@ class OwnModel:
         return y
 
     def _description(self, case: Case) -> str:
-        """case.toml of a recording like another one."""
         lines = [f"title = {json.dumps(f'{case.title}, simulated')}", "", "[conditions]"]
         lines += [f"{name} = {self._value(name, value)}" for name, value in case.conditions.items()]
         lines += ["", "[measurement]", 'file = "measured.csv"']
@@ -181,8 +180,8 @@ class OwnModel:
 
 def _middle_shape(effect: Effect) -> dict[str, float]:
     """The shape, of those that a diagnosis begins with, that is planted."""
-    tried = shapes(effect)
-    return dict(tried[len(tried) // 2])
+    forms = shapes(effect)
+    return dict(forms[len(forms) // 2])
 
 
 def template_cases(system: System, names: Sequence[str]) -> list[Case]:

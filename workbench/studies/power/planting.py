@@ -216,7 +216,7 @@ def plan(
         _each(repertoire, unknown, largest_first, repeats, seed),
     ]
     # All kinds advance alike, so that a run that is cut short has something of each.
-    ranked = [((i + 0.5) / len(kind), group) for kind in kinds for i, group in enumerate(kind)]
+    ranked = [((i + 0.5) / len(sets), group) for sets in kinds for i, group in enumerate(sets)]
     return [group for _, group in sorted(ranked, key=lambda entry: entry[0])]
 
 
@@ -236,7 +236,7 @@ def draw_sets(groups: Sequence[Group], count: int, seed: int) -> list[Planting]:
     kinds: dict[Kind, list[Planting]] = {}
     for i in order:
         kinds.setdefault(groups[i][0].kind, []).append(groups[i][0])
-    ranked = [(i, planting) for kind in kinds.values() for i, planting in enumerate(kind)]
+    ranked = [(i, planting) for sets in kinds.values() for i, planting in enumerate(sets)]
     return [planting for _, planting in sorted(ranked, key=lambda entry: entry[0])[:count]]
 
 
@@ -268,7 +268,6 @@ def _single(repertoire: Repertoire, plantable: Plantable, multiple: float, seed:
 
 
 def _pair(repertoire: Repertoire, seed: int, multiple: float) -> Planting:
-    """Two effects, drawn from those that recordings can show."""
     rng = np.random.default_rng(seed)
     able = repertoire.able
     both = [able[i] for i in rng.choice(len(able), 2, replace=False)]

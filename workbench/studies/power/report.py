@@ -163,7 +163,6 @@ def following_check(rows: Sequence[Mapping[str, Any]]) -> Check:
 def _measures(
     summary: Mapping[str, Any], texts: Mapping[str, str], lower: Sequence[str]
 ) -> dict[str, Measure]:
-    """Shares as numbers of an answer."""
     return {
         texts[name]: Measure(
             entry["share"], "1", "lower" if name in lower else "higher", entry["low"], entry["high"]
@@ -224,8 +223,8 @@ def oracle_check(rows: Sequence[EffectLimit]) -> Check:
             lines.append(f"{row.effect:<30}  these recordings cannot show it")
             continue
         sizes = [with_unit(row.sigma, row.unit), with_unit(row.found, row.unit)]
-        told = "never" if row.told is None else f"from {with_unit(row.told, row.unit)}"
-        lines.append(f"{row.effect:<30}{sizes[0]:>18}{sizes[1]:>24}  {row.like}: {told}")
+        discriminated = "never" if row.told is None else f"from {with_unit(row.told, row.unit)}"
+        lines.append(f"{row.effect:<30}{sizes[0]:>18}{sizes[1]:>24}  {row.like}: {discriminated}")
     return Check(
         "oracle", Answer(sentence, headline), {"effects": list(map(asdict, rows))}, "\n".join(lines)
     )
@@ -282,7 +281,6 @@ def write_power_page(summary: Mapping[str, Any], out: Path) -> Path:
 
 
 def _share_dots(answer: Mapping[str, Any]) -> Dots:
-    """The headline as dots with their intervals."""
     rows, shares = [], []
     for name, measure in answer["headline"].items():
         dots: tuple[Dot, ...] = ()
@@ -295,7 +293,6 @@ def _share_dots(answer: Mapping[str, Any]) -> Dots:
 
 
 def _effects(summary: Mapping[str, Any]) -> Table:
-    """Effects by sizes, a cell for each share."""
     effects = summary["effects"]
     sizes = sorted(
         {size for effect in effects.values() for size in effect["right_first"]}, key=float
@@ -333,7 +330,6 @@ def _share(share: Mapping[str, Any] | None) -> Cell:
 
 
 def _confusion_rows(summary: Mapping[str, Any]) -> Table:
-    """Planted by named."""
     names = dict.fromkeys(name for row in summary["confusion"].values() for name in row)
     rows = []
     for planted, row in summary["confusion"].items():

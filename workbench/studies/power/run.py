@@ -3,12 +3,12 @@
 import hashlib
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, as_completed
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from workbench import diagnosis
 from workbench.diagnosis import Effect
@@ -25,6 +25,9 @@ from workbench.studies.power.virtual_rig import VirtualRig
 from workbench.system.system import System
 
 _JOURNAL = "sets.jsonl"
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
 
 
 @dataclass(frozen=True)
@@ -120,37 +123,55 @@ def diagnose_sets(
             )
         known = {result.planting.options for result in journal.results}
         left = [tuple(p for p in group if p.options not in known) for group in groups]
-        interrupted = _run([group for group in left if group], setup, journal, engine)
-        return journal.results, interrupted
+        progress = StepReporter(engine.report, sum(map(len, left)))
+
+        def collect(group: Group, verdicts: list[SetVerdict] | WorkerError) -> None:
+            if isinstance(verdicts, WorkerError):
+                verdicts = [_failure(planting, verdicts) for planting in group]
+            for result in verdicts:
+                journal.append(result)
+                name = " ".join(f"{n}={gain:g}" for n, gain in result.planting.gains.items())
+                causes = ", ".join(cause.effect for cause in result.causes) or result.verdict
+                progress.step(f"{name or 'clean':<40} {causes}")
+
+        groups = [group for group in left if group]
+        return journal.results, work_off(setup, engine, _evaluate, groups, collect)
 
 
-def _run(groups: Sequence[Group], setup: Setup, journal: Journal, engine: Engine) -> bool:
-    """Diagnose all groups; returns whether the run was interrupted."""
-    progress = StepReporter(engine.report, sum(map(len, groups)))
+def work_off(
+    setup: Setup,
+    engine: Engine,
+    function: Callable[[Setup, Item], Result],
+    items: Sequence[Item],
+    collect: Callable[[Item, Result | WorkerError], None],
+) -> bool:
+    """Have workers take items, and collect what comes of each, in the order in which it does.
 
-    def collect(task: Future[list[SetVerdict]]) -> None:
-        group = open_tasks.pop(task)
-        try:
-            verdicts = task.result()
-        except WorkerError as error:  # a crash must not end a run of hours; it is counted
-            verdicts = [_failure(planting, error) for planting in group]
-        for result in verdicts:
-            journal.append(result)
-            name = " ".join(f"{n}={gain:g}" for n, gain in result.planting.gains.items())
-            causes = ", ".join(cause.effect for cause in result.causes) or result.verdict
-            progress.step(f"{name or 'clean':<40} {causes}")
+    Isolated: Ctrl-C leaves alone what is under way, which is collected, and a crash costs one item.
 
-    # Isolated: Ctrl-C is to leave alone what is under way, and a crash is to cost one group.
+    Returns
+    -------
+    interrupted : whether Ctrl-C ended it.
+    """
     with Pool(engine.workers, nullcontext, setup, isolated=True) as pool:
-        open_tasks = {pool.submit(_evaluate, group): group for group in groups}
+        open_tasks = {pool.submit(function, item): item for item in items}
+
+        def finish(task: Future[Result]) -> None:
+            item = open_tasks.pop(task)
+            try:
+                result: Result | WorkerError = task.result()
+            except WorkerError as error:  # a crash must not end a run of hours; it is counted
+                result = error
+            collect(item, result)
+
         try:
             for task in as_completed(list(open_tasks)):
-                collect(task)
+                finish(task)
         except KeyboardInterrupt:
             engine.report("interrupted, finishing the sets that are under way")
             pool.finish()
             for task in [open_task for open_task in open_tasks if not open_task.cancelled()]:
-                collect(task)
+                finish(task)
             return True
     return False
 

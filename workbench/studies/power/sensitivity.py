@@ -2,9 +2,8 @@
 
 import dataclasses
 from collections.abc import Mapping, Sequence
-from concurrent.futures import as_completed
-from contextlib import nullcontext
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -21,10 +20,9 @@ from workbench.diagnosis.simulation.simulator import WhitenedResiduals
 from workbench.errors import InputError, WorkerError
 from workbench.recordings.case import Case
 from workbench.runtime.engine import Engine, silent
-from workbench.runtime.pool import Pool
 from workbench.runtime.progress import StepReporter
 from workbench.studies.power.planting import Planting
-from workbench.studies.power.run import PowerStudy, Setup
+from workbench.studies.power.run import PowerStudy, Setup, work_off
 from workbench.system.system import System
 
 FACTORS = (0.5, 2.0)
@@ -179,23 +177,15 @@ def vary_sets(
     """
     results: list[ThresholdSensitivity] = []
     progress = StepReporter(engine.report, len(plantings))
+
+    def collect(planting: Planting, result: ThresholdSensitivity | WorkerError) -> None:
+        if isinstance(result, WorkerError):
+            text = f"failed: {result}"
+        else:
+            results.append(result)
+            text = f"{', '.join(result.said)}; {len(result.changed)} changes"
+        progress.step(f"{planting.options}: {text}")
+
     names = list(threshold_values(of_system(study.system.comparison, len(study.effects))))
-    with (
-        study.setup() as setup,
-        Pool(engine.workers, nullcontext, setup, isolated=True) as pool,
-    ):
-        tasks = {pool.submit(vary, planting, names): planting for planting in plantings}
-        try:
-            for task in as_completed(tasks):
-                try:
-                    result = task.result()
-                except WorkerError as error:
-                    text = f"failed: {error}"
-                else:
-                    results.append(result)
-                    text = f"{', '.join(result.said)}; {len(result.changed)} changes"
-                progress.step(f"{tasks[task].options}: {text}")
-        except KeyboardInterrupt:
-            engine.report("interrupted")
-            return results, True
-    return results, False
+    with study.setup() as setup:
+        return results, work_off(setup, engine, partial(vary, names=names), plantings, collect)

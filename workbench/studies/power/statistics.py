@@ -125,12 +125,10 @@ def summarise(results: Sequence[SetVerdict], repertoire: Repertoire) -> dict[str
 
 
 def _coverage(results: Iterable[SetVerdict], repertoire: Repertoire) -> dict[str, Any]:
-    """Share of intervals that hold what was planted."""
     return share(held for result in results for held in intervals_cover(result, repertoire))
 
 
 def _by_effect(by_name: dict[str, list[SetVerdict]], repertoire: Repertoire) -> dict[str, Any]:
-    """Shares of each planted effect of the library."""
     return {
         plantable.effect: {
             "rig": plantable.name,
@@ -149,7 +147,6 @@ def _by_effect(by_name: dict[str, list[SetVerdict]], repertoire: Repertoire) -> 
 
 
 def _outside(by_name: dict[str, list[SetVerdict]], repertoire: Repertoire) -> dict[str, Any]:
-    """Verdicts on each planted effect that the library does not have."""
     return {
         plantable.name: {
             "size": repertoire.size(plantable),

@@ -64,7 +64,6 @@ class CLoop:
 
 
 def _compile(path: Path) -> "ctypes._NamedFuncPointer":
-    """Compile the model of an FMU with the loop, and load it."""
     with tempfile.TemporaryDirectory() as scratch:
         with zipfile.ZipFile(path) as archive:
             archive.extractall(scratch, [n for n in archive.namelist() if n.startswith("sources/")])

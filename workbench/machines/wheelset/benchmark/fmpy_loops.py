@@ -220,7 +220,6 @@ def _correct(
 
 
 def _sigma(model: FMPyModel, P: Matrix) -> Vector:
-    """Standard deviations of the columns of an estimate, (8,)."""
     C = model.jacobian(model.outputs)
     variance = np.diag(P)
     friction = variance[model.n :]

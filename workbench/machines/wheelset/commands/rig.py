@@ -103,7 +103,6 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
 
 
 def _format_list() -> str:
-    """Scenarios and effects, for people."""
     from workbench.machines.wheelset.rig import ORDINARY_PADS, SCENARIOS, STANDARD, Effects
 
     effects = "\n".join(
