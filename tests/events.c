@@ -94,10 +94,17 @@ fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference k[], size_t 
 fmi2Status fmi2SetBoolean(fmi2Component c, const fmi2ValueReference k[], size_t n, const fmi2Boolean v[]) { ((Room *)c)->flag = v[0]; return fmi2OK; }
 fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference k[], size_t n, fmi2Integer v[]) { v[0] = 10 + ((Room *)c)->flag; return fmi2OK; }
 fmi2Status fmi2GetBoolean(fmi2Component c, const fmi2ValueReference k[], size_t n, fmi2Boolean v[]) { v[0] = ((Room *)c)->flag; return fmi2OK; }
+fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *s) {
+    if (!*s) *s = malloc(sizeof(Room));
+    memcpy(*s, c, sizeof(Room));
+    return fmi2OK;
+}
+fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate s) { memcpy(c, s, sizeof(Room)); return fmi2OK; }
+fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *s) { free(*s), *s = NULL; return fmi2OK; }
 /* FMPy looks for all functions; these are never called. */
 #define NEVER(name) fmi2Status name(void) { return fmi2Error; }
 NEVER(fmi2SetDebugLogging) NEVER(fmi2GetString)
-NEVER(fmi2SetString) NEVER(fmi2GetFMUstate) NEVER(fmi2SetFMUstate) NEVER(fmi2FreeFMUstate)
+NEVER(fmi2SetString)
 NEVER(fmi2SerializedFMUstateSize) NEVER(fmi2SerializeFMUstate) NEVER(fmi2DeSerializeFMUstate)
 NEVER(fmi2GetDirectionalDerivative)
 #ifdef ALONE /* Co-Simulation that always heats; each step is exact for inputs that stay */

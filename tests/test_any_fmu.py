@@ -48,6 +48,7 @@ def build(tmp_path) -> Build:
         correction: str = "dG",
         variables: str = VARIABLES,
         flags: Sequence[str] = (),
+        saves: bool = False,
     ) -> Path:
         library = tmp_path / f"Room{fmpy.sharedLibraryExtension}"
         headers = Path(fmpy.__file__).parent / "c-code"
@@ -60,6 +61,9 @@ def build(tmp_path) -> Build:
             start=start,
             variables=variables,
         )
+        if saves:
+            offered = 'modelIdentifier="Room" canGetAndSetFMUstate="true"/>'
+            description = description.replace('modelIdentifier="Room"/>', offered)
         with zipfile.ZipFile(tmp_path / "Room.fmu", "w") as archive:
             archive.writestr("modelDescription.xml", description)
             archive.write(library, f"binaries/{fmpy.platform}/{library.name}")
@@ -291,6 +295,96 @@ def test_other_estimators_refuse_a_run_with_an_event(what, name, build):
         fmu.set_states(np.array([296.0]))
         with pytest.raises(EventError, match="or the model asks for Event Mode"):
             fmu.check_event()
+
+
+def consistency(law: Estimator, time: np.ndarray, truth: dict[str, np.ndarray], y: str) -> tuple:
+    """Of eight runs with noise: mean of normalised innovations squared, shares in 95 % bands."""
+    noise, squares, inside = law.system.signals[y].noise, [], []
+    at = [list(law.system.columns).index(name) for name in truth]
+    for seed in range(8):
+        noisy = truth[y] + noise * np.random.default_rng(seed).standard_normal(time.size)
+        u = np.full((time.size, len(law.system.inputs)), 280.0)
+        estimate = law.run(time, u, noisy[:, None])
+        error = np.asarray(estimate.values)[1:, at] - np.column_stack(list(truth.values()))[1:]
+        inside.append(np.abs(error) < 1.96 * np.asarray(estimate.sigma)[1:, at])
+        squares.append(np.asarray(estimate.nis)[1:])
+    return np.mean(squares), np.mean(inside, axis=(0, 1))
+
+
+@pytest.mark.parametrize("name", ["ekf", "ukf"])
+@pytest.mark.parametrize("what", ["THERMOSTAT", "TIMETABLE"])
+def test_kalman_filters_go_through_events(what, name, build):
+    """A heat loss of 60 W/K in place of 50, by the closed form; six events in an hour.
+
+    Chi-squared of 2880 innovations to five standard deviations. Walks are declared, of which the
+    room has none, so that bands are somewhat wide.
+    """
+    time = 10.0 * np.arange(361.0)
+    truth = {"T": along(what, time, 60.0), "G": np.full(time.size, 60.0)}
+    with FMU(build(what, saves=True)) as fmu:
+        square, inside = consistency(estimator(fmu, name), time, truth, "T")
+    assert square == pytest.approx(1.0, abs=5.0 * np.sqrt(2.0 / 2880.0))
+    assert (inside > 0.93).all()
+
+
+def fall(times: np.ndarray, g: float) -> np.ndarray:
+    """Height and speed of a ball from 1 m that keeps 0.8 of its speed, from impact to impact."""
+    rows, h, v, t = [], 1.0, 0.0, 0.0
+    for sample in times:
+        while (impact := t + (v + np.sqrt(v * v + 2.0 * g * h)) / g) <= sample:
+            h, v, t = 0.0, 0.8 * np.sqrt(v * v + 2.0 * g * h), impact
+        d = sample - t
+        h, v, t = h + v * d - 0.5 * g * d * d, v - g * d, sample
+        rows.append((h, v))
+    return np.array(rows).T
+
+
+@pytest.mark.parametrize("name", ["ekf", "ukf"])
+def test_kalman_filters_go_through_impacts_that_reverse_a_speed(name, tmp_path):
+    """Three impacts in two seconds; neither the speed nor gravity, 9.5 m/s2, is measured."""
+    time = 0.01 * np.arange(200.0)
+    h, v = fall(time, 9.5)
+    with FMU(bouncing(tmp_path)) as fmu:
+        law = estimator(fmu, name)
+        truth = {"h": h, "v": v, "g": np.full(time.size, 9.5)}
+        square, inside = consistency(law, time, truth, "h")
+    assert square == pytest.approx(1.0, abs=5.0 * np.sqrt(2.0 / 1592.0))
+    assert (inside > 0.93).all()
+
+
+def bouncing(folder: Path) -> Path:
+    """The FMU of a ball, with its system file beside it."""
+    library = folder / f"Ball{fmpy.sharedLibraryExtension}"
+    headers = Path(fmpy.__file__).parent / "c-code"
+    source = Path(__file__).with_name("ball.c")
+    flags = ["-shared", "-fPIC", "-w", "-I", headers]
+    subprocess.run([str(COMPILER), *flags, source, "-o", library], check=True)
+    with zipfile.ZipFile(folder / "Ball.fmu", "w") as archive:
+        archive.writestr("modelDescription.xml", machine_file("ball/modelDescription.xml"))
+        archive.write(library, f"binaries/{fmpy.platform}/{library.name}")
+    (folder / "system.toml").write_text(machine_file("ball/system.toml"))
+    return folder / "Ball.fmu"
+
+
+def test_a_filter_beside_a_running_machine_goes_on_through_events(build):
+    """Sample by sample, a model without events until the first one, then as over a recording."""
+    time = 10.0 * np.arange(361.0)
+    y, u = along("THERMOSTAT", time, 60.0)[:, None], np.full((time.size, 1), 280.0)
+    with FMU(build("THERMOSTAT", saves=True)) as fmu:
+        law = estimator(fmu, "ekf")
+        whole = law.run(time, u, y)
+        estimate = law.init(0.0, u[0], y[0])
+        for k in range(1, time.size):
+            estimate = law.step(time[k], u[k], y[k])
+    off = np.asarray(estimate.values) - np.asarray(whole.values)[-1]
+    assert (np.abs(off) < 0.1 * np.asarray(estimate.sigma)).all()
+
+
+@pytest.mark.parametrize("name", ["disturbance_observer", "mhe", "smoother"])
+def test_what_does_not_go_through_events_says_so_of_an_fmu_that_saves_its_state_too(name, build):
+    wrong = "results of other estimators would be wrong"
+    with FMU(build("TIMETABLE", saves=True)) as fmu, pytest.raises(EventError, match=wrong):
+        run(fmu, name, 900.0)
 
 
 def test_the_open_loop_stops_where_a_model_asks_for_event_mode_that_has_no_indicators(build):

@@ -614,7 +614,8 @@ def _start(path: Path, instantiations: int) -> Iterator[CheckResult]:
     count, timed = fmu.description.event_indicators, float(fmu.next_event[0])
     smooth = not count and timed == np.inf
     reason = "" if timed == np.inf else f"a time event at {timed:g} s; "
-    reason += "only open loop, fit, diagnose go through events; replace jumps by smooth functions"
+    reason += "only open loop, fit, diagnose go through events, and filters ekf and ukf if the FMU "
+    reason += "saves its state; replace jumps by smooth functions"
     yield replace(EVENTS, passed=smooth, value=count, reason="" if smooth else reason)
 
 

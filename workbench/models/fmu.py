@@ -594,6 +594,7 @@ class FMU:
         ]
         self._rates = np.array([self._references[r] for r in self.description.rates], np.uint32)
         self.needs_completed_steps = offered.completed_steps
+        self.saves_state = offered.saves_state
         self._x = np.zeros(len(self.states))
         self._dx = np.zeros(len(self.states))
         self._z = np.zeros(self.description.event_indicators)
@@ -833,8 +834,9 @@ class FMU:
         return EventError(
             f"{self.path.name}: an event of the model by {self.time[0]:.6g} s of its time, or in "
             "the step after: an event indicator changes its sign, a time event is due, or the "
-            "model asks for Event Mode. Only the open loop, fit and diagnose go through events; "
-            "results of other estimators would be wrong from there on. "
+            "model asks for Event Mode. Only the open loop, fit and diagnose go through events, "
+            "and the Kalman filters ekf and ukf on an FMU that saves its state "
+            "(canGetAndSetFMUState); results of other estimators would be wrong from there on. "
             "Replace jumps of the model by smooth functions, or cut the recording before the event"
         )
 
@@ -975,9 +977,14 @@ class FMU:
         self.set_states(x)
         return x
 
-    def save(self) -> ctypes.c_void_p:
-        """Save the complete state of the instance; hand it to `restore`, then to `release`."""
-        saved = ctypes.c_void_p()
+    def save(self, over: ctypes.c_void_p | None = None) -> ctypes.c_void_p:
+        """Save the complete state of the instance; hand it to `restore`, then to `release`.
+
+        Parameters
+        ----------
+        over : a saved state that is no longer needed, whose place it takes.
+        """
+        saved = ctypes.c_void_p() if over is None else over
         self._loaded.call("save", ctypes.byref(saved))
         return saved
 

@@ -6,7 +6,9 @@ Mode there. A Co-Simulation makes a step of its own from sample to sample.
 Source: FMI 2.0.4, section 3.2; FMI 3.0, sections 2.5 and 3.
 """
 
+import ctypes
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 from scipy.integrate import RK45, Radau
@@ -22,6 +24,17 @@ _LOOKS = 4
 # Between two samples; a model that needs more comes to rest by ever more events (Zeno).
 _MOST_EVENTS = 10_000
 _PILED = 500  # events from which on the pace of the last so many tells whether that comes
+
+
+class _Kept(NamedTuple):
+    """A point between two steps: the FMU's saved state, and what is known of it."""
+
+    saved: ctypes.c_void_p
+    t: float
+    before: Vector
+    signs: Vector
+    nominal: Vector
+    next_event: float
 
 
 class HybridSimulation:
@@ -52,6 +65,7 @@ class HybridSimulation:
         self._signs = np.sign(fmu.event_indicators())
         self._step: float | None = None
         self._events, self._piled = 0, self._t  # in this interval, and when so many were over
+        self._kept: _Kept | None = None
 
     def begin(self, u: Vector) -> None:
         """Take the inputs of the first sample, (m,)."""
@@ -76,6 +90,40 @@ class HybridSimulation:
         self._before = self._after
         self._jump(u)
         return self._x.copy()
+
+    def keep(self) -> None:
+        """Keep the present point, to which `start_from` goes back; the FMU must save its state."""
+        fmu, over = self._fmu, self._kept
+        self._kept = _Kept(
+            saved=fmu.save(over.saved if over else None),
+            t=self._t,
+            before=self._before.copy(),
+            signs=self._signs.copy(),
+            nominal=self._nominal,
+            next_event=float(fmu.next_event[0]),
+        )
+
+    def start_from(self, x: Vector, held: Vector) -> None:
+        """Go back to the point that was kept, with other states, (n,), and other last inputs, (q,).
+
+        A point beyond an event passes it there.
+        """
+        kept = self._kept
+        assert kept is not None
+        self._fmu.restore(kept.saved)
+        self._fmu.next_event[0] = kept.next_event
+        self._t, self._nominal, self._signs = kept.t, kept.nominal, kept.signs
+        self._x, self._step, self._events = x.copy(), None, 0
+        self._before = np.concatenate([kept.before[: kept.before.size - held.size], held])
+        self._after = self._before
+        self._place(self._t, self._x)
+        self._handle_event(self._before)
+
+    def release(self) -> None:
+        """Free what was kept."""
+        if self._kept is not None:
+            self._fmu.release(self._kept.saved)
+            self._kept = None
 
     def _jump(self, u: Vector) -> None:
         """Let inputs jump to u, which is an event."""

@@ -90,6 +90,7 @@ class Estimator(ABC):
     modes : what it weighs models by, in columns and figures; none if it runs on one model.
     finds : conditions that it finds out by itself.
     coarse_steps : whether it takes one step of first order from sample to sample, whatever swings.
+    passes_events : whether it goes through events of a model that saves its state.
     aided : whether samples may be missing, so that it takes aids as outputs, too.
     bands : (w,) what the law's standard deviations are multiplied by, see `System.bands`.
 
@@ -112,6 +113,7 @@ class Estimator(ABC):
     sticks: ClassVar[bool] = False
     co_simulates: ClassVar[bool] = False
     coarse_steps: ClassVar[bool] = False
+    passes_events: ClassVar[bool] = False
     aided: ClassVar[bool] = False
     modes: tuple[str, ...] = ()
     finds: frozenset[str] = frozenset()
@@ -125,9 +127,9 @@ class Estimator(ABC):
         self.gains = gains
         inputs = [signal.name for signal in system.inputs]
         unseen = [output.name for output in system.outputs if output.name not in fmu.states]
-        outputs = [*system.reported, *unseen]
+        self._outputs = [*system.reported, *unseen]
         self._model: Any = instance(
-            fmu, inputs, system.corrections, outputs, only_read=self.co_simulates
+            fmu, inputs, system.corrections, self._outputs, only_read=self.co_simulates
         )
         self._layout = layout(fmu, system)
         self._t = 0.0

@@ -13,7 +13,7 @@ import pandas as pd
 
 from workbench.arrays import Vector
 from workbench.errors import FMUError, InputError
-from workbench.models.fmu import FMU
+from workbench.models.fmu import FMU, EventError
 from workbench.observers import Estimator, Gains, label
 from workbench.observers.estimators.open_loop import OpenLoop
 from workbench.observers.estimators.smoother import Smoother
@@ -356,6 +356,11 @@ class Simulation:
                 share, step = 0.0, ""
                 if open_loop is not None:
                     share, step = step_doubt(fmu, self.system, case, open_loop, coarse)
+        except EventError:
+            unchecked = (
+                "not checked, as the model has events: what the recording tells of quantities"
+            )
+            return {"doubts": (unchecked,)} if self.system.estimated else {}
         except (InputError, FMUError, np.linalg.LinAlgError):
             return {"doubts": (unit,) if unit else ()}
         return {

@@ -230,6 +230,7 @@ class InteractingMultipleModel(ExtendedKalmanFilter):
     gains : see ExtendedKalmanFilter.
     """
 
+    passes_events = False
     name = "imm"
     label = "interacting multiple model"
     rank = 47

@@ -98,8 +98,7 @@ class OpenLoop(Estimator):
         super().__init__(fmu, system, gains)
         n = len(fmu.states)
         self._simulation: HybridSimulation | CoSimulationRun | None = None
-        unseen = [output.name for output in system.outputs if output.name not in fmu.states]
-        self._read = fmu.typed([*system.reported, *unseen])
+        self._read = fmu.typed(self._outputs)
         # Whether the compiled loop can set and read all that there is.
         self._plain = (
             not self._read.others

@@ -335,6 +335,17 @@ class UnscentedKalmanFilter(ExtendedKalmanFilter):
             triangle=np.zeros((size + outputs, size + outputs)),
         )
 
+    @staticmethod
+    def _distance(size: int) -> float:
+        """That of the cubature rule: a mean that all points share lies within them."""
+        return float(np.sqrt(size))
+
+    @staticmethod
+    def _moments(values: Matrix, distance: float) -> tuple[Vector, Matrix]:
+        """Mean and deviations of points of equal weight; see the extended filter."""
+        mean = values[1:].mean(axis=0)
+        return mean, (values[1:] - mean) / (np.sqrt(2.0) * distance)
+
     def _begin(self, u: Vector, y: Vector) -> None:
         super()._begin(u, y)
         self._state.root[:] = 0.0

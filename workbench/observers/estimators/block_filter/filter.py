@@ -212,6 +212,7 @@ class BlockKalmanFilter(ExtendedKalmanFilter):
     coarse_steps = True
     rank = 42
     standard = False
+    passes_events = False
     tunable = False
     tuned_as = ExtendedKalmanFilter.name
 

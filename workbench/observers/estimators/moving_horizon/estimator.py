@@ -313,6 +313,7 @@ class MovingHorizonEstimator(ExtendedKalmanFilter):
         the design.
     """
 
+    passes_events = False
     name = "mhe"
     label = "moving horizon estimator"
     rank = 46
