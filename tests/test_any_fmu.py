@@ -387,6 +387,21 @@ def test_what_does_not_go_through_events_says_so_of_an_fmu_that_saves_its_state_
         run(fmu, name, 900.0)
 
 
+def test_a_tuning_names_the_events_that_it_does_not_go_through(build, tmp_path, capsys):
+    folder = build("TIMETABLE", saves=True).parent
+    (folder / "day").mkdir()
+    time = 10.0 * np.arange(91.0)
+    columns = {"time [s]": time, "Ta [K]": 280.0 + 0.0 * time, "T [K]": along("TIMETABLE", time)}
+    pd.DataFrame(columns).to_csv(folder / "day" / "measured.csv", index=False)
+    (folder / "day" / "case.toml").write_text('title = "day"\nmeasurement.file = "measured.csv"\n')
+    options = ["--system", folder, "--cases", folder / "day", "--workers", "1", "--quiet"]
+    out = ["--out", tmp_path / "tuned"]
+    assert main(["tune", "disturbance_observer", *map(str, [*options, *out])]) == 1
+    assert (
+        "it has events, which disturbance_observer does not go through" in capsys.readouterr().err
+    )
+
+
 def test_the_open_loop_stops_where_a_model_asks_for_event_mode_that_has_no_indicators(build):
     """The fuse blows at 295 K, after 470 s, which only the end of a step tells."""
     with FMU(build("FUSE")) as fmu:

@@ -24,7 +24,7 @@ from workbench.runtime.progress import StepReporter
 from workbench.system.registry import open_model
 from workbench.system.system import System
 from workbench.tuning.checkpoint import Generation
-from workbench.tuning.cost import Job, Workers, recordings
+from workbench.tuning.cost import Job, Workers, load_model, recordings
 from workbench.tuning.search import Checkpointing, Plan, Search, search
 from workbench.tuning.validation import (
     NEGLIGIBLE,
@@ -261,9 +261,10 @@ def tune(
     job = problem.job
     before = evaluate_gains(pool, job, [job.gains.values])[0]
     if not np.isfinite(before).all():
+        reason = _events(job) or "see 'workbench simulate'"
         raise FMUError(
             f"{problem.provenance['fmu']['file']}: the FMU fails, hangs or diverges with the "
-            "untuned gains, so there is nothing to start from; see 'workbench simulate'"
+            f"untuned gains, so there is nothing to start from; {reason}"
         )
     result = run.search(0, range(len(job.recordings)))
     if result is None:
@@ -271,6 +272,19 @@ def tune(
     tuned = TuningResult(problem, plan, result, before, result.interrupted)
     run.progress.found(tuned)
     return tuned if result.interrupted else run.examine(tuned)
+
+
+def _events(job: Job) -> str:
+    """What is said of a model whose events the estimator does not go through; empty for others."""
+    with load_model(job) as fmu:
+        fmu.start({})
+        passes = estimators_of(job.system)[job.estimator].passes_events and fmu.saves_state
+        if passes or not fmu.has_events:
+            return ""
+    return (
+        f"it has events, which {job.estimator} does not go through. Tune ekf or ukf with an FMU "
+        "that saves its state (canGetAndSetFMUState), or replace jumps by smooth functions"
+    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from workbench.arrays import Matrix, Vector
+from workbench.errors import FMUError
 from workbench.models.fmu import FMU, EventError
 from workbench.models.native import (
     compiled,
@@ -609,9 +610,20 @@ class ExtendedKalmanFilter(Estimator):
             self._events = EventMap(fmu, self.system, self._layout, self._outputs, first)
         rows = np.full((steps.size, self._width), np.nan)
         samples, y = self._samples(steps, u, y)
-        for h, sample, measured, row in zip(steps, samples, y, rows, strict=True):
-            self._step_through_events(float(h), sample, measured, row)
+        try:
+            for h, sample, measured, row in zip(steps, samples, y, rows, strict=True):
+                self._step_through_events(float(h), sample, measured, row)
+        except (
+            FMUError
+        ):  # the instance may be replaced, and what it keeps is then none of the new one
+            self._forget_events()
+            raise
         return rows
+
+    def _forget_events(self) -> None:
+        if self._events is not None:
+            self._events.release()
+            self._events = None
 
     def _step_through_events(self, h: float, u: Vector, y: Vector, row: Vector) -> None:
         """Predict and correct by points, each of which goes through the events on its way.
@@ -684,9 +696,7 @@ class ExtendedKalmanFilter(Estimator):
         return known
 
     def _begin(self, u: Vector, y: Vector) -> None:
-        if self._events is not None:
-            self._events.release()
-            self._events = None
+        self._forget_events()
         self._state.z[:] = self._start_values()
         self._state.P[:] = np.diag(self._settings.spread**2)
 
