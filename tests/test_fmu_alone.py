@@ -31,7 +31,17 @@ from .built import build_text, machine_file, write_case
 SYSTEM = machine_file("tank_alone/system.toml")
 
 
-def record(folder: Path, seed: int, area=0.5, outlet=1e-3, gain=0.0, zero=0.0, late=0.0) -> Path:
+def behind(signal: np.ndarray, h: float, tau: float) -> np.ndarray:
+    """A signal on a fine grid behind a lag of first order, by Euler's method."""
+    y = signal.copy()
+    for k in range(1, y.size):
+        y[k] = y[k - 1] + h / tau * (signal[k - 1] - y[k - 1])
+    return y
+
+
+def record(
+    folder: Path, seed: int, area=0.5, outlet=1e-3, gain=0.0, zero=0.0, late=0.0, lag=0.0
+) -> Path:
     """Four recordings of 200 s, of which each starts at another level."""
     rng = np.random.default_rng(seed)
     time = np.arange(0.0, 200.25, 0.5)
@@ -45,6 +55,9 @@ def record(folder: Path, seed: int, area=0.5, outlet=1e-3, gain=0.0, zero=0.0, l
 
             level.append(solve_ivp(rate, (0.0, 0.5), [level[-1]], rtol=1e-8, atol=1e-10).y[0, -1])
         flows = np.append(inflow, inflow[-1])
+        if lag:
+            fine = np.arange(0.0, 200.005, 0.01)
+            level = np.interp(time, fine, behind(np.interp(fine, time, level), 0.01, lag))
         columns = {
             "time [s]": time,
             "inflow [m3/s]": (1.0 + gain) * flows + 5e-5 * rng.standard_normal(time.size),
@@ -98,6 +111,16 @@ def test_a_late_sensor_and_an_input_that_acts_late_are_one_cause(tank, tmp_path)
     delay = cause.parameters["delay"]
     assert delay.low < 3.0 < delay.high
     assert outcome.extension is None
+
+
+def test_a_sensor_that_lags_is_never_named_as_an_input_alone(tank, tmp_path):
+    """A recording begins in motion: nothing says where the lag of a sensor begins."""
+    outcome = diagnosed(tank, tmp_path, seed=3, lag=6.0)
+    (cause,) = outcome.diagnosis.causes
+    names = {cause.effect.name, *cause.confusable_with}
+    assert names == {"InputLag[inflow]", "SensorLag[level]"}
+    lag = cause.parameters["lag"]
+    assert lag.low < 6.0 < lag.high
 
 
 def test_parameters_that_act_alike_are_named_together(tank, tmp_path):
@@ -271,14 +294,6 @@ def test_a_missing_friction_is_named_with_its_size(swing, tmp_path, form, size):
     expected = np.interp(run["time"], time, swung(LAWS[form], 0.5, time))
     assert_allclose(run["s"], expected, atol=4e-3)
     assert validate_fmu(str(outcome.extension.fmu)) == []
-
-
-def behind(signal: np.ndarray, h: float, tau: float) -> np.ndarray:
-    """A signal on a fine grid behind a lag of first order, by Euler's method."""
-    y = signal.copy()
-    for k in range(1, y.size):
-        y[k] = y[k - 1] + h / tau * (signal[k - 1] - y[k - 1])
-    return y
 
 
 SENSORS = {

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.stats import bootstrap
 
 from workbench.arrays import Matrix, Vector
-from workbench.diagnosis.effects.candidates import SHARES
+from workbench.diagnosis.effects.candidates import LAG, SHARES
 from workbench.diagnosis.effects.catalogue import Effect
 from workbench.diagnosis.inference.discrepancy import correlated_deviations, share_by_form
 from workbench.diagnosis.inference.fit import Fit
@@ -571,6 +571,18 @@ def _set_by_nature(value: float, unit: str) -> bool:
     return value == 0.0 or (unit == "1" and abs(value) == 1.0)
 
 
+def _apart_by_starts(fit: Fit, effect: Effect) -> list[str]:
+    """Lags that differ in how a recording begins alone: of the one input, and the one output.
+
+    A linear model behind a lag is a lag behind that model. A recording that begins in motion does
+    not say where either lag begins.
+    """
+    if effect.size != LAG or len(fit.recorded) != 2:
+        return []
+    others = fit.unknowns.effects.values()
+    return [e.name for e in others if e.size == LAG and e.model != effect.model]
+
+
 def _cause(fit: Fit, chosen: Selection, effect: Effect, *, noise_alone: bool) -> Cause:
     """A cause with intervals, which what is left widens unless that is noise alone."""
     best, trial, unknowns = chosen.best, chosen.trial, fit.unknowns
@@ -612,7 +624,9 @@ def _cause(fit: Fit, chosen: Selection, effect: Effect, *, noise_alone: bool) ->
     return Cause(
         effect=effect,
         parameters=parameters,
-        confusable_with=tuple(chosen.twins[effect]),
+        confusable_with=tuple(
+            dict.fromkeys([*chosen.twins[effect], *_apart_by_starts(fit, effect)])
+        ),
         explained=chosen.validation.explained(chosen.less[effect], best, fast=fast)[0],
         phases=best.point.phases.get(effect.name),
     )
