@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import openpyxl
+import pandas as pd
 import pytest
 from nptdms import ChannelObject, TdmsWriter
 from numpy.testing import assert_allclose
@@ -218,11 +219,10 @@ Fx = { channel = "Längskraft", reversed = true }
 
 
 def test_a_bare_file_is_a_case_with_its_conditions_as_options(tmp_path, stop, system):
-    lines = ["time [s],pB [bar],tauR [kN.m],omegaW [rad/s],omegaR [1/min]"]
-    values = stop.time, stop["pB"] / 1e5, stop["tauR"] / 1e3, stop["omegaW"]
-    columns = (*values, stop["omegaR"] * 30 / np.pi)
-    lines += [",".join(map(repr, row)) for row in zip(*(c.tolist() for c in columns), strict=True)]
-    (tmp_path / "stop.csv").write_text("\n".join(lines))
+    columns = {"time [s]": stop.time, "pB [bar]": stop["pB"] / 1e5}
+    columns |= {"tauR [kN.m]": stop["tauR"] / 1e3, "omegaW [rad/s]": stop["omegaW"]}
+    columns["omegaR [1/min]"] = stop["omegaR"] * 30 / np.pi
+    pd.DataFrame(columns).to_csv(tmp_path / "stop.csv", index=False)
     conditions = {"wheel_rail": "dry", "discs": "unknown"}
     (case,) = wb.read_cases(tmp_path / "stop.csv", system, conditions=conditions)
     assert case.name == "stop"
@@ -311,9 +311,7 @@ def test_channels_of_a_train_are_known_by_the_names_of_a_laboratory(
                 columns[name.format(i)] = factor * train_stop[f"{kind}{i}"]
     columns |= {curve: train_stop["curve"], acceleration: train_stop["a"]}
     assert len(columns) == 1 + len(train_stop.signals)
-    rows = zip(*(values.tolist() for values in columns.values()), strict=True)
-    lines = [",".join(columns), *(",".join(map(repr, row)) for row in rows)]
-    (tmp_path / "stop.csv").write_text("\n".join(lines))
+    pd.DataFrame(columns).to_csv(tmp_path / "stop.csv", index=False)
     out = tmp_path / "cases"
     command = ["import", str(tmp_path / "stop.csv"), "--system", "train", "--out", str(out)]
     assert main([*command, "--condition", "rail=dry", "--yes"]) == 0

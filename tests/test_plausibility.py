@@ -42,10 +42,7 @@ def stop(root) -> tuple[str, Table]:
 def write(folder: Path, toml: str, table: Table) -> Path:
     folder.mkdir()
     (folder / "case.toml").write_text(toml)
-    rows = (
-        ",".join(map(repr, row)) for row in zip(*(c.tolist() for c in table.values()), strict=True)
-    )
-    (folder / "measured.csv").write_text("\n".join([",".join(table), *rows]) + "\n")
+    pd.DataFrame(table).to_csv(folder / "measured.csv", index=False, na_rep="nan")
     return folder
 
 

@@ -3,7 +3,6 @@
 import dataclasses
 import json
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +15,7 @@ from workbench.diagnosis.data.clocks import late_signals
 from workbench.diagnosis.effects.extension import variables
 from workbench.diagnosis.inference.thresholds import thresholds
 from workbench.errors import InputError
-from workbench.machines.wheelset.planting import PLANTABLE, SHEET_ERRORS, PlantedStops
+from workbench.machines.wheelset.planting import PLANTABLE, SHEET_ERRORS
 from workbench.machines.wheelset.rig import (
     CONSTANT_PADS,
     Effects,
@@ -25,14 +24,12 @@ from workbench.machines.wheelset.rig import (
 )
 from workbench.models.fmu import FMU
 from workbench.pages.provenance import run_of
-from workbench.runtime.engine import Engine
 from workbench.studies.power import (
     Journal,
     NamedCause,
     Planting,
     Repertoire,
     SetVerdict,
-    diagnose_sets,
     plan,
     share,
     summarise,
@@ -49,11 +46,11 @@ from workbench.studies.power.report import (
     oracle_check,
     write_power,
 )
-from workbench.studies.power.run import PowerStudy
 from workbench.studies.power.statistics import intervals_cover, named_all, named_right
 from workbench.system.registry import load_system
 from workbench.system.template import write_system
 
+from .chaos import sets
 from .page_rules import check_page
 from .processes import ROOT, comes_true, living, running
 from .scenarios import short
@@ -70,9 +67,6 @@ PROVENANCE = {
     "stops": [],
     "interrupted": False,
 }
-
-
-STOPS = [short("01_dry_80_1.5", 30.0), short("03_dry_120_3.6", 40.0)]
 
 
 def said(
@@ -341,22 +335,12 @@ def test_verdicts_of_another_run_are_refused(tmp_path):
 
 # --- all of it ---
 
-_GROUPS = [
-    (Planting("clean", 11, 0.0, {}, ()),),
-    tuple(Planting("single", 12, x, {"fx_gain": 0.002 * x}, ("FxGain",)) for x in (8.0, 0.25)),
-]
-
-
-def run(out: Path, report: Callable[[str], None]) -> tuple[list[SetVerdict], bool]:
-    study = PowerStudy(SYSTEM, PlantedStops(tuple(STOPS), REFERENCE), library_effects(SYSTEM))
-    return diagnose_sets(_GROUPS, study, Engine(report=report, out=out), seed=1, resume=True)
-
 
 def test_killed_run_leaves_no_process_and_goes_on_where_it_was(tmp_path):
     """Two short stops: a load cell's gain of 1.6 % is plain, one of 0.05 % is not worth a word."""
     script = (
-        "import sys; from pathlib import Path; from tests import test_power; "
-        "test_power.run(Path(sys.argv[1]), lambda line: print(line, flush=True))"
+        "import sys; from pathlib import Path; from tests.chaos import sets; "
+        "sets.run(Path(sys.argv[1]), lambda line: print(line, flush=True))"
     )
     with running("-c", script, tmp_path, TMPDIR=str(tmp_path)) as process:
         assert "clean" in process.stdout.readline()
@@ -367,7 +351,7 @@ def test_killed_run_leaves_no_process_and_goes_on_where_it_was(tmp_path):
     assert comes_true(lambda: not living(process.pid))
 
     lines: list[str] = []
-    results, interrupted = run(tmp_path, lines.append)
+    results, interrupted = sets.run(tmp_path, lines.append)
     assert not interrupted
     assert len(lines) == 2
     assert lines[0].startswith("[1/2] fx_gain=0.016")
@@ -378,8 +362,7 @@ def test_killed_run_leaves_no_process_and_goes_on_where_it_was(tmp_path):
 
 def test_a_plan_foresees_what_its_recordings_show(tmp_path):
     """Of the two short stops above: a gain of 1.6 % is plain in them, one of 0.05 % is not."""
-    study = PowerStudy(SYSTEM, PlantedStops(tuple(STOPS), REFERENCE), library_effects(SYSTEM))
-    sizes = (0.25, 8.0)
+    study, sizes = sets.study(), (0.25, 8.0)
     rows = predict_campaign(study, PLANTABLE, sizes, 1)
     by_name = {row.effect: row for row in rows}
     (faint, small), (plain, large) = by_name["FxGain"].chances
