@@ -1,16 +1,13 @@
 """Observers as products: the FMU against the Python observer, and the package in an SSP tool."""
 
 import json
-import shutil
 import zipfile
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterator
 from pathlib import Path
 
 import fmpy
 import numpy as np
 import pytest
-from fmpy.fmi2 import FMU2Slave
 from fmpy.ssp.simulation import simulate_ssp
 from fmpy.ssp.ssd import read_ssd, read_ssv
 from fmpy.validation import validate_fmu
@@ -26,7 +23,7 @@ from workbench.observers.gains_file import format_gains
 from workbench.recordings.case import Case, read_cases
 from workbench.system.registry import load_system, open_model
 
-from .exported import Exported, write_fmu
+from .exported import Exported, instance, run_fmu, write_fmu
 
 SYSTEM = load_system("wheelset")
 KINDS = choose(SYSTEM, list(SYSTEM.export.classes))
@@ -77,43 +74,6 @@ def cases(root) -> list[Case]:
     return read_cases([root / "cases"], SYSTEM)
 
 
-@contextmanager
-def instance(path: Path) -> Iterator[tuple[FMU2Slave, Callable[[Sequence[str]], list[int]]]]:
-    """The FMU in Co-Simulation, ready to step, and the references of names."""
-    description = fmpy.read_model_description(str(path))
-    references = {v.name: v.valueReference for v in description.modelVariables}
-    folder = fmpy.extract(str(path))
-    fmu = FMU2Slave(
-        guid=description.guid,
-        modelIdentifier=description.coSimulation.modelIdentifier,
-        unzipDirectory=folder,
-        instanceName="observer",
-    )
-    fmu.instantiate()
-    fmu.setupExperiment(startTime=0.0)
-    fmu.enterInitializationMode()
-    fmu.exitInitializationMode()
-    yield fmu, lambda names: [references[name] for name in names]
-    fmu.terminate()
-    fmu.freeInstance()
-    shutil.rmtree(folder)
-
-
-def run_fmu(path: Path, time: np.ndarray, u: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Outputs after each sample, (n, 6): one communication step for each."""
-    rows = []
-    samples = np.hstack([u, y])
-    with instance(path) as (fmu, references):
-        inputs, outputs = references(INPUTS), references(tuple(OUTPUTS))
-        # The last step has no sample after it; any size will do.
-        ends = np.append(time[1:], time[-1] + 0.005) - time[0]
-        for sample, start, end in zip(samples, time - time[0], ends, strict=True):
-            fmu.setReal(inputs, sample.tolist())
-            fmu.doStep(currentCommunicationPoint=start, communicationStepSize=end - start)
-            rows.append(fmu.getReal(outputs))
-    return np.array(rows)
-
-
 def run_python(estimator: Estimator, time: np.ndarray, u: np.ndarray, y: np.ndarray) -> np.ndarray:
     columns = [list(SYSTEM.columns).index(name) for name in OUTPUTS.values()]
     return estimator.run(time, u, y).values[:, columns]
@@ -127,7 +87,7 @@ def disagreement(values: np.ndarray, expected: np.ndarray) -> float:
 def test_fmu_reproduces_python_on_all_recorded_stops(exported, cases):
     for case in cases:
         recording = case.time, case.u, case.y
-        estimate = run_fmu(exported.path, *recording)
+        estimate = run_fmu(exported.path, *recording, list(OUTPUTS))
         assert disagreement(estimate, run_python(exported.python, *recording)) < AGREEMENT, (
             case.name
         )
@@ -136,14 +96,14 @@ def test_fmu_reproduces_python_on_all_recorded_stops(exported, cases):
 def test_fmu_reproduces_python_on_samples_that_are_not_even(exported, dry_case):
     keep = np.flatnonzero(np.random.default_rng(1).random(dry_case.time.size) < 0.7)
     recording = dry_case.time[keep], dry_case.u[keep], dry_case.y[keep]
-    estimate = run_fmu(exported.path, *recording)
+    estimate = run_fmu(exported.path, *recording, list(OUTPUTS))
     assert disagreement(estimate, run_python(exported.python, *recording)) < AGREEMENT
 
 
 def test_limits_of_friction_are_kept_and_reached(exported, dry_case):
     """A pressure sensor that reads 0.4 of the pressure wants more friction than pads have."""
     recording = dry_case.time, dry_case.u * [0.4, 1.0], dry_case.y
-    estimate = run_fmu(exported.path, *recording)
+    estimate = run_fmu(exported.path, *recording, list(OUTPUTS))
     assert estimate[:, list(OUTPUTS).index("muDC")].max() == 0.45
     assert disagreement(estimate, run_python(exported.python, *recording)) < AGREEMENT
 
@@ -172,23 +132,17 @@ def test_a_tool_without_python_of_ours_gets_the_same(tmp_path, dry_case, name, f
 
 def test_a_restored_state_repeats_the_steps(exported, dry_case):
     samples = np.hstack([dry_case.u, dry_case.y])
-    with instance(exported.path) as (fmu, references):
-        inputs, outputs = references(INPUTS), references(tuple(OUTPUTS))
+    with instance(exported.path, list(OUTPUTS)) as fmu:
 
         def steps(numbers: range) -> list[list[float]]:
-            rows = []
-            for k in numbers:
-                fmu.setReal(inputs, samples[k].tolist())
-                fmu.doStep(currentCommunicationPoint=0.005 * k, communicationStepSize=0.005)
-                rows.append(list(fmu.getReal(outputs)))
-            return rows
+            return [fmu.step(samples[k], 0.005 * k, 0.005) for k in numbers]
 
         steps(range(800))
-        state = fmu.getFMUState()
+        state = fmu.fmi.getFMUState()
         first = steps(range(800, 1000))
-        fmu.setFMUState(state)
+        fmu.fmi.setFMUState(state)
         assert steps(range(800, 1000)) == first
-        fmu.freeFMUState(state)
+        fmu.fmi.freeFMUState(state)
 
 
 def test_gains_are_parameters_that_another_tool_may_set(exported, tmp_path, dry_case):
@@ -373,7 +327,7 @@ def test_steps_before_the_inputs_are_connected_do_not_start_the_observer(exporte
     time, u, y = dry_case.time[:count], dry_case.u[:count], dry_case.y[:count]
     earlier = np.append(time[0] - 0.005 * np.arange(3, 0, -1), time)
     padded = np.vstack([np.zeros((3, 2)), u]), np.vstack([np.zeros((3, 2)), y])
-    estimate = run_fmu(exported.path, earlier, *padded)[3:]
+    estimate = run_fmu(exported.path, earlier, *padded, list(OUTPUTS))[3:]
     assert disagreement(estimate, run_python(exported.python, time, u, y)) < AGREEMENT
 
 

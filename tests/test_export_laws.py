@@ -3,10 +3,9 @@
 import importlib.util
 import json
 import re
-import shutil
 import subprocess
 import zipfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -14,8 +13,6 @@ import fmpy
 import numpy as np
 import pytest
 from fmpy.fmi1 import FMICallException
-from fmpy.fmi2 import FMU2Slave
-from fmpy.fmi3 import FMU3Slave
 from fmpy.ssp.ssd import read_ssd
 from fmpy.validation import validate_fmu
 from numpy.testing import assert_array_equal
@@ -33,7 +30,7 @@ from workbench.system.registry import load_system, open_model
 from workbench.system.system import System
 
 from . import heater
-from .exported import Exported, write_fmu
+from .exported import Exported, instance, run_fmu, run_python, write_fmu
 from .processes import COMPILER
 
 ROOT = Path(__file__).parent.parent
@@ -70,73 +67,6 @@ def horizon(tmp_path_factory) -> Iterator[Exported]:
 def slide(root) -> Case:
     """A wet stop in which the wheel slides."""
     return read_case(root / "cases" / "09_wet_160_4.2_wsp", SYSTEM)
-
-
-class Instance:
-    """A Co-Simulation instance of either version."""
-
-    def __init__(self, path: Path) -> None:
-        description = fmpy.read_model_description(str(path))
-        listed = description.modelVariables
-        self.inputs = [v.valueReference for v in listed if v.causality == "input"]
-        self.outputs = [v.valueReference for v in listed if v.causality == "output"]
-        self._fmi3 = description.fmiVersion.startswith("3")
-        self._folder = fmpy.extract(str(path))
-        self.fmi = (FMU3Slave if self._fmi3 else FMU2Slave)(
-            guid=description.guid,
-            modelIdentifier=description.coSimulation.modelIdentifier,
-            unzipDirectory=self._folder,
-            instanceName="estimator",
-        )
-        self.fmi.instantiate()
-        if not self._fmi3:
-            self.fmi.setupExperiment(startTime=0.0)
-        self.fmi.enterInitializationMode()
-        self.fmi.exitInitializationMode()
-
-    def step(self, sample: Sequence[float], start: float, size: float) -> list[float]:
-        """The estimate of a sample."""
-        set_, get = (
-            (self.fmi.setFloat64, self.fmi.getFloat64)
-            if self._fmi3
-            else (self.fmi.setReal, self.fmi.getReal)
-        )
-        set_(self.inputs, list(sample))
-        self.fmi.doStep(currentCommunicationPoint=start, communicationStepSize=size)
-        return list(get(self.outputs))
-
-    def close(self) -> None:
-        self.fmi.terminate()
-        self.fmi.freeInstance()
-        shutil.rmtree(self._folder)
-
-
-@contextmanager
-def instance(path: Path) -> Iterator[Instance]:
-    fmu = Instance(path)
-    try:
-        yield fmu
-    finally:
-        fmu.close()
-
-
-def run_fmu(path: Path, time: np.ndarray, u: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """All outputs after each sample: one communication step for each."""
-    # The last step has no sample after it; any size will do.
-    ends = np.append(time[1:], time[-1] + 0.005) - time[0]
-    with instance(path) as fmu:
-        return np.array(
-            [
-                fmu.step(sample, start, end - start)
-                for sample, start, end in zip(np.hstack([u, y]), time - time[0], ends, strict=True)
-            ]
-        )
-
-
-def run_python(estimator: Estimator, time: np.ndarray, u: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """All that an estimate has, in the order of the FMU's outputs."""
-    estimate = estimator.run(time, u, y)
-    return np.column_stack([estimate.values, estimate.sigma, estimate.probability, estimate.nis])
 
 
 def assert_same(values: np.ndarray, expected: np.ndarray) -> None:

@@ -23,7 +23,8 @@ from workbench.system.registry import load_system, open_model
 from workbench.system.system import System
 
 from .built import MACHINES
-from .test_export_laws import assert_same, run_fmu, run_python, write_fmu
+from .exported import run_fmu, run_python, write_fmu
+from .test_export_laws import assert_same
 
 pytest.importorskip("rumoca", reason="needs the extra [compiler]")
 pytest.importorskip("ziglang", reason="needs the extra [compiler]")
