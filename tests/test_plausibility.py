@@ -22,8 +22,9 @@ from workbench.studies.power import Repertoire
 from workbench.studies.power.diagnosing import library_effects
 from workbench.system.registry import load_system
 
+from .scenarios import REFERENCE
+
 RECORDINGS = Path(__file__).parent.parent.parent / "shared" / "recordings"
-REFERENCE = Path(__file__).parent.parent / "fmus" / "fmi2" / "Reference.fmu"
 NAME = "03_dry_120_3.6"
 SPEEDS = ("omegaW [rad/s]", "omegaR [rad/s]")
 

@@ -52,11 +52,10 @@ from workbench.system.template import write_system
 
 from .chaos import sets
 from .page_rules import check_page
-from .processes import ROOT, comes_true, living, running
-from .scenarios import short
+from .processes import comes_true, living, running
+from .scenarios import REFERENCE, short
 from .schemas import check
 
-REFERENCE = ROOT / "fmus" / "fmi2" / "Reference.fmu"
 SYSTEM = load_system("wheelset")
 REPERTOIRE = Repertoire(PLANTABLE, library_effects(SYSTEM))
 IDENTITY = {"seed": 1}

@@ -34,13 +34,11 @@ from workbench.studies.design import with_sensor
 from workbench.system.registry import load_system
 
 from .processes import LONGEST, ROOT, running
+from .scenarios import BRAKE_RADIUS, REFERENCE, ROLLER_RADIUS, SEED, normal_force
 
-REFERENCE = ROOT / "fmus" / "fmi2" / "Reference.fmu"
 CASES = ROOT / "cases"  # of the rig with this seed, which is asked below
-SEED = 1
 SYSTEM = load_system("wheelset")
 TRAIN_INERTIA, ROLLER_INERTIA, WHEELSET_INERTIA = 7840.0, 1500.0, 110.0  # kg.m2, data sheet
-ROLLER_RADIUS, BRAKE_RADIUS = 0.70, 0.30  # m, data sheet
 
 
 @cache
@@ -50,11 +48,6 @@ def make(name: str) -> StopTruth:
 
 def braking_time(stop: StopTruth) -> float:
     return stop.standstill - stop.drawn.coasting
-
-
-def normal_force(stop: StopTruth) -> np.ndarray:
-    """Of one brake unit [N], data sheet."""
-    return 0.1086 * np.maximum(0.0, stop.truth["pads"] - 25e3)
 
 
 def friction_power(stop: StopTruth, disc: int) -> np.ndarray:

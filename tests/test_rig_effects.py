@@ -12,7 +12,6 @@ from workbench.machines.wheelset.rig import (
     CONSTANT_PADS,
     SCENARIOS,
     Effects,
-    Scenario,
     StopTruth,
     plant,
     simulate,
@@ -24,39 +23,31 @@ from workbench.machines.wheelset.rig.run import MODE
 from workbench.machines.wheelset.rig.wheel import OutOfRoundWheel
 from workbench.models.fmu import FMU
 
+from .scenarios import (
+    BRAKE_RADIUS,
+    REFERENCE,
+    ROLLER_RADIUS,
+    SEED,
+    WHEEL_RADIUS,
+    normal_force,
+    short,
+)
+
 ROOT = Path(__file__).parents[1]
-REFERENCE = ROOT / "fmus" / "fmi2" / "Reference.fmu"
-SEED = 1
-ROLLER_RADIUS, WHEEL_RADIUS, BRAKE_RADIUS = 0.70, 0.46, 0.30  # m, data sheet
 TRAIN, WHEELSET_INERTIA = 16000.0, 110.0  # kg, kg.m2, data sheet
 
 
-def scenario(name: str, speed: float, direction: int = 1) -> Scenario:
-    """A stop from another speed [km/h]: the lower, the shorter."""
-    usual = SCENARIOS[name]
-    conditions = dataclasses.replace(
-        usual.conditions, initial_speed=speed / 3.6, direction=direction
-    )
-    return dataclasses.replace(usual, conditions=conditions)
-
-
-@cache
 @cache
 def make(
     *planted: str, name: str = "03_dry_120_3.6", speed: float = 40.0, direction: int = 1
 ) -> StopTruth:
     """A stop of ten seconds on constant pads, unless said otherwise."""
     effects = plant(CONSTANT_PADS, planted)
-    return simulate(scenario(name, speed, direction), SEED, effects, REFERENCE)
+    return simulate(short(name, speed, direction=direction), SEED, effects, REFERENCE)
 
 
 def coasting(stop: StopTruth) -> np.ndarray:
     return (stop.time > 0.5) & (stop.time < stop.drawn.coasting)
-
-
-def normal_force(stop: StopTruth) -> np.ndarray:
-    """Of one brake unit [N], data sheet."""
-    return 0.1086 * np.maximum(0.0, stop.truth["pads"] - 25e3)
 
 
 def friction(stop: StopTruth, disc: int) -> np.ndarray:
@@ -102,7 +93,7 @@ def test_constant_pads_have_the_nominal_friction():
 
 def test_phases_differ_from_stop_to_stop_and_effect_to_effect():
     stops = [make(), make(speed=20.0), make(name="02_dry_100_2.7", speed=20.0)]
-    stops.append(simulate(scenario("03_dry_120_3.6", 20.0), SEED + 1, CONSTANT_PADS, REFERENCE))
+    stops.append(simulate(short("03_dry_120_3.6", 20.0), SEED + 1, CONSTANT_PADS, REFERENCE))
     phases = [dataclasses.astuple(stop.phases) for stop in stops]
     assert phases[0] == phases[1]  # of one scenario and one seed
     values = np.concatenate(phases[1:])

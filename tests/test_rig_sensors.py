@@ -2,7 +2,6 @@
 
 import dataclasses
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -21,20 +20,15 @@ from workbench.machines.wheelset.rig.sensors import FURTHER
 from workbench.recordings.case import read_case
 from workbench.system.registry import load_system
 
-REFERENCE = Path(__file__).parents[1] / "fmus" / "fmi2" / "Reference.fmu"
-SEED = 1
-ROLLER_RADIUS, WHEEL_RADIUS = 0.70, 0.46  # m, data sheet
+from .scenarios import REFERENCE, ROLLER_RADIUS, SEED, WHEEL_RADIUS, short
+
 CHANNELS = ("pB", "tauR", "omegaW", "omegaR", "Fx")
 
 
 @cache
 def make(speed: float = 40.0, direction: int = 1, load: float = 80e3) -> StopTruth:
     """A stop from a speed [km/h] on constant pads, of ten seconds unless said otherwise."""
-    usual = SCENARIOS["03_dry_120_3.6"]
-    conditions = dataclasses.replace(
-        usual.conditions, initial_speed=speed / 3.6, direction=direction, wheel_load=load
-    )
-    scenario = dataclasses.replace(usual, conditions=conditions)
+    scenario = short("03_dry_120_3.6", speed, direction=direction, wheel_load=load)
     return simulate(scenario, SEED, CONSTANT_PADS, REFERENCE)
 
 

@@ -35,10 +35,9 @@ from workbench.studies.power.statistics import named_wrong, summarise_sheet
 from workbench.system.comparison import RATE
 from workbench.system.registry import load_system
 
-from .scenarios import short
+from .scenarios import REFERENCE, short
 
 ROOT = Path(__file__).parents[1]
-REFERENCE = ROOT / "fmus" / "fmi2" / "Reference.fmu"
 SYSTEM = load_system("wheelset")
 EFFECTS = library_effects(SYSTEM)
 DERIVED = ("significant", "fall", "immaterial", "tied")
