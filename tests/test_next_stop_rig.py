@@ -61,15 +61,20 @@ def alike(system, tmp_path_factory) -> list[Case]:
     return two_stops(system, PLANTED, tmp_path_factory.mktemp("alike"))
 
 
-@pytest.fixture(scope="module")
-def undecided(one_speed, alike, tmp_path_factory) -> Outcome:
-    out = tmp_path_factory.mktemp("undecided")
-    return wb.diagnose(one_speed, alike, effects=EFFECTS, out=out, workers=1, report=lambda _: None)
+QUIET = {"workers": 1, "report": lambda _: None}
 
 
 @pytest.fixture(scope="module")
-def proposed(undecided) -> NextStop:
-    return wb.next_stop(undecided, workers=1, report=lambda _: None)
+def undecided(one_speed, alike, once) -> Outcome:
+    return once(
+        "undecided stops",
+        lambda out: wb.diagnose(one_speed, alike, effects=EFFECTS, out=out, **QUIET),
+    )
+
+
+@pytest.fixture(scope="module")
+def proposed(undecided, once) -> NextStop:
+    return once("next stop", lambda _: wb.next_stop(undecided, **QUIET))
 
 
 def made(experiment: RankedExperiment, system: System, folder: Path) -> Case:
@@ -86,9 +91,8 @@ def test_the_proposed_stop_parts_what_stops_alike_did_not(
     (cause,) = undecided.diagnosis.causes
     assert {cause.effect.name, *cause.confusable_with} == set(EFFECTS)
     cases = [*alike, made(proposed.tried[0], one_speed, tmp_path)]
-    (cause,) = wb.diagnose(
-        one_speed, cases, effects=EFFECTS, out=tmp_path, workers=1, report=lambda _: None
-    ).diagnosis.causes
+    outcome = wb.diagnose(one_speed, cases, effects=EFFECTS, out=tmp_path, **QUIET)
+    (cause,) = outcome.diagnosis.causes
     assert (cause.effect.name, cause.confusable_with) == (EFFECTS[0], ())
 
 
@@ -133,10 +137,10 @@ def test_what_no_stop_parts_is_said_and_the_sensor_that_would(one_speed, tmp_pat
     rig = replace(one_speed, experiments=replace(asked, inputs=steps))
     cases = two_stops(rig, plant(CONSTANT_PADS, ["fx_gain=0.02"]), tmp_path / "stops")
     names = ["FxGain", "DriveTorqueGain"]
-    outcome = wb.diagnose(rig, cases, effects=names, out=tmp_path, workers=1, report=lambda _: None)
+    outcome = wb.diagnose(rig, cases, effects=names, out=tmp_path, **QUIET)
     (cause,) = outcome.diagnosis.causes
     assert {cause.effect.name, *cause.confusable_with} == set(names)
-    proposed = wb.next_stop(outcome, workers=1, report=lambda _: None)
+    proposed = wb.next_stop(outcome, **QUIET)
     assert not proposed.parts
     assert proposed.sentence.startswith(
         "No experiment here likely discriminates FxGain and DriveTorqueGain"
@@ -165,9 +169,7 @@ def of_two(
     """Two stops alike with something planted, what they leave undecided, and what was planted."""
     effects = plant(CONSTANT_PADS, [planted])
     cases = two_stops(system, effects, folder / "stops")
-    outcome = wb.diagnose(
-        system, cases, effects=names, out=folder, workers=1, report=lambda _: None
-    )
+    outcome = wb.diagnose(system, cases, effects=names, out=folder, **QUIET)
     assert [model.effects for model in outcome.rivals.models] in (
         [(a,), (b,)] for a, b in permutations(names)
     )
