@@ -5,7 +5,7 @@ adds to them, so that recordings of one block tell only the sum: what a draught 
 hardly be.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,6 +15,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
+from workbench.arrays import Vector
 from workbench.diagnosis.data.motion import ModelSource
 from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.thresholds import Thresholds
@@ -41,23 +42,29 @@ def block(folder: Path, more: str) -> System:
     return declare(folder, library.replace("- loss.Q;", "- (Ga + Gb)*T - loss.Q;"), file + more)
 
 
-def recorded(conductance: float, seed: int, share: float = 1.0) -> pd.DataFrame:
-    """Temperatures of a block with so much of it, by SciPy, while powers change."""
-    rng = np.random.default_rng(seed)
-    powers, x, temperatures = share * rng.uniform(10.0, 90.0, 12), np.zeros(2), []
+def heated(
+    powers: Vector, lost: Callable[[float], float], begin: float, rng: np.random.Generator
+) -> pd.DataFrame:
+    """Temperatures of a block that loses heat [W], by SciPy, each power held for a minute."""
+    x, temperatures = np.full(2, begin), []
     for power in powers:
 
-        def rates(_: float, x: np.ndarray, power: float = power) -> list[float]:
+        def rates(_: float, x: Vector, power: float = power) -> list[float]:
             T, casing = x
             into = 2.0 * (T - casing)
-            return [(power - into - conductance * T) / 100.0, (into - 0.5 * casing) / 200.0]
+            return [(power - into - lost(T)) / 100.0, (into - 0.5 * casing) / 200.0]
 
         run = solve_ivp(rates, (0.0, 60.0), x, t_eval=np.arange(61), rtol=1e-9, atol=1e-9)
         temperatures.append(run.y[0, :-1])
         x = run.y[:, -1]
-    measured = np.concatenate(temperatures) + NOISE * rng.standard_normal(720)
-    time = np.arange(measured.size, dtype=float)
+    time = np.arange(60.0 * powers.size)
+    measured = np.concatenate(temperatures) + NOISE * rng.standard_normal(time.size)
     return pd.DataFrame({"time [s]": time, "P [W]": np.repeat(powers, 60), "T [K]": measured})
+
+
+def recorded(conductance: float, seed: int, share: float = 1.0) -> pd.DataFrame:
+    rng = np.random.default_rng(seed)
+    return heated(share * rng.uniform(10.0, 90.0, 12), lambda T: conductance * T, 0.0, rng)
 
 
 def found(frames: Sequence[pd.DataFrame], folder: Path) -> list[str]:
@@ -198,28 +205,12 @@ def test_a_level_of_known_spread_hides_nothing(tmp_path):
 
 
 DRAUGHT, S = 0.3, 0.006  # planted [W/K], [W/K2]
-HELD, COUNT = 60, 20  # [s] and number of powers
 
 
 def radiating(seed: int) -> pd.DataFrame:
-    """Temperatures while the power is held for a minute each time, with noise."""
     rng = np.random.default_rng(seed)
-    powers = rng.uniform(0.0, 90.0, COUNT)
-    x, temperatures = np.array([5.0, 5.0]), []
-    for power in powers:
-
-        def rates(_: float, x: np.ndarray, power: float = power) -> list[float]:
-            T, casing = x
-            lost = DRAUGHT * T + S * T * abs(T)
-            into = 2.0 * (T - casing)
-            return [(power - into - lost) / 100.0, (into - 0.5 * casing) / 200.0]
-
-        run = solve_ivp(rates, (0.0, HELD), x, t_eval=np.arange(HELD + 1), rtol=1e-9)
-        temperatures.append(run.y[0, :-1])
-        x = run.y[:, -1]
-    measured = np.concatenate(temperatures) + NOISE * rng.standard_normal(HELD * COUNT)
-    time = np.arange(measured.size, dtype=float)
-    return pd.DataFrame({"time [s]": time, "P [W]": np.repeat(powers, HELD), "T [K]": measured})
+    powers = rng.uniform(0.0, 90.0, 20)
+    return heated(powers, lambda T: DRAUGHT * T + S * T * abs(T), 5.0, rng)
 
 
 def test_a_law_that_stands_for_two_gives_way_to_them(tmp_path):
