@@ -29,6 +29,7 @@ from workbench.runtime import pool as pools
 from workbench.runtime.pool import Pool
 from workbench.system.registry import load_system, open_model
 from workbench.system.system import System
+from workbench.system.template import write_system
 from workbench.tuning import Evaluator, Job, Problem, pose, tunable
 
 # Before they are imported, for asserts in them to tell values as those of the tests do.
@@ -103,6 +104,19 @@ def reference_path() -> Path:
 @pytest.fixture(scope="session")
 def system() -> System:
     return load_system("wheelset")
+
+
+@pytest.fixture(scope="session")
+def train() -> System:
+    return load_system("train")
+
+
+@pytest.fixture(scope="session")
+def tank(tmp_path_factory) -> System:
+    """The tank that `workbench new` writes, with an inflow and a level, sampled each 0.5 s."""
+    folder = tmp_path_factory.mktemp("systems") / "tank"
+    write_system(folder)
+    return load_system(folder)
 
 
 @pytest.fixture

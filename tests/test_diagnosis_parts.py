@@ -213,10 +213,8 @@ def test_spikes_are_set_aside_with_their_blocks():
         assert samples.gain[k] == 0.0
 
 
-def test_blocks_span_equal_times_where_steps_do_not(tmp_path):
+def test_blocks_span_equal_times_where_steps_do_not(tank):
     """A cycler: 0.5 s while it pulses, one sample in 60 s while it rests; nearly all counts."""
-    write_system(tmp_path / "tank")
-    tank = load_system(tmp_path / "tank")
     time = np.concatenate(
         [3060.0 * k + np.append(np.arange(0.0, 60.0, 0.5), 60.0 * np.arange(1, 51)) for k in (0, 1)]
     )
@@ -244,9 +242,7 @@ def test_samples_that_are_lost_at_random_are_no_other_rate():
     assert not uneven_steps(np.flatnonzero(kept) * 0.01, 0.01).any()
 
 
-def test_a_gap_is_in_no_block_and_leaves_others_as_they_are(tmp_path):
-    write_system(tmp_path / "tank")
-    tank = load_system(tmp_path / "tank")
+def test_a_gap_is_in_no_block_and_leaves_others_as_they_are(tank):
     time = np.delete(np.arange(0.0, 600.0, 0.5), slice(400, 440))
     noise = np.random.default_rng(1)
     signals = {

@@ -23,15 +23,6 @@ from workbench.system.registry import load_system
 from workbench.system.system import System
 from workbench.system.template import write_system
 
-
-@pytest.fixture(scope="module")
-def tank(tmp_path_factory) -> System:
-    """A tank with an inflow and a level, sampled each 0.5 s."""
-    folder = tmp_path_factory.mktemp("systems") / "tank"
-    write_system(folder)
-    return load_system(folder)
-
-
 # --- names above samples ---
 
 

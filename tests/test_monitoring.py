@@ -30,7 +30,6 @@ from workbench.studies.monitoring.chart import LARGEST, Chart, Scatter, run_leng
 from workbench.studies.monitoring.report import write_monitoring
 from workbench.studies.monitoring.watch import Track, watch
 from workbench.system.registry import load_system
-from workbench.system.system import System
 
 from .page_rules import check_page, script
 from .schemas import check
@@ -188,11 +187,6 @@ def test_a_lower_rate_of_false_alarms_asks_for_more():
 
 
 # --- a folder of recordings ---
-
-
-@pytest.fixture(scope="module")
-def train() -> System:
-    return load_system("train")
 
 
 @pytest.fixture(scope="module")

@@ -30,19 +30,12 @@ from .page_rules import check_page
 from .schemas import check
 
 ROOT = Path(__file__).parents[1]
-MINIMAL = ROOT / "fmus/fmi2/MinimalObserver.fmu"
 FULL = ROOT / "fmus/fmi2/FullObserver.fmu"
 CASE = ROOT / "cases/02_dry_100_2.7"
 SYSTEM = load_system("wheelset")
 FRICTION_PRIOR = prior(SYSTEM)
 FIRST = np.zeros(1, int)
 HALF_A_SECOND = 100
-
-
-@pytest.fixture
-def minimal():
-    with FMU(MINIMAL) as fmu:
-        yield fmu
 
 
 @pytest.fixture

@@ -44,7 +44,6 @@ from workbench.studies.distance.standard import (
     stopping_distance,
 )
 from workbench.system.reader import read_system
-from workbench.system.registry import load_system
 from workbench.system.stopping import Stopping
 from workbench.system.system import OBSERVER, System
 
@@ -52,11 +51,6 @@ from .page_rules import check_page
 from .schemas import check
 
 RECORDINGS = Path(__file__).parent.parent.parent / "shared" / "recordings" / "train"
-
-
-@pytest.fixture(scope="module")
-def train() -> System:
-    return load_system("train")
 
 
 @pytest.fixture(scope="module")

@@ -16,7 +16,6 @@ from workbench.errors import InputError
 from workbench.models.modelica import read_library
 from workbench.recordings.case import Case, read_cases
 from workbench.recordings.datasets import write_cases
-from workbench.system.registry import load_system
 from workbench.system.system import OBSERVER, System
 
 RECORDINGS = Path(__file__).parent.parent.parent / "shared" / "recordings" / "train"
@@ -35,11 +34,6 @@ file = "measured.csv"
 [track]
 file = "track.csv"
 """
-
-
-@pytest.fixture(scope="module")
-def train() -> System:
-    return load_system("train")
 
 
 def cases_of(name: str, train: System, out: Path) -> tuple[list[Case], dict[str, Any]]:
