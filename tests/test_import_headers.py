@@ -312,6 +312,17 @@ def test_workbooks_of_other_programs_have_sheets_names_and_gaps(tmp_path, made):
     assert np.flatnonzero(np.isnan(level.values)).tolist() == [30]
 
 
+def test_a_panic_of_the_reader_of_workbooks_is_a_refusal(tmp_path, capfd):
+    """Of a sheet that the workbook names and does not hold."""
+    pytest.importorskip("python_calamine", reason="an extra of [files]")
+    with zipfile.ZipFile(tmp_path / "a", "w") as archive:
+        for name, content in binary_excel([["Time [s]", "h [mm]"], [0.0, 1.0]]).items():
+            archive.writestr(name, content.replace(b'Id="r1"', b'Id="r2"'))
+    with pytest.raises(InputError, match=r"a workbook \(.ods, .xlsb\) that cannot be read"):
+        read_recorded_file(tmp_path / "a")
+    assert capfd.readouterr().err == ""
+
+
 def test_a_waveform_begins_with_those_beside_it(tmp_path):
     """Some recorders state only of the first one when it began."""
     began = {"wf_start_time": np.datetime64("2025-06-06T08:00:00")}

@@ -4,6 +4,7 @@ Formulas are as their program last computed them. Each reader imports the packag
 """
 
 import io
+import os
 from collections.abc import Collection, Mapping, Sequence
 from datetime import date, datetime, time, timedelta
 from pathlib import Path
@@ -55,15 +56,28 @@ def read_excel_97(path: Path, raw: bytes) -> Contents:
 
 
 def read_others(path: Path, raw: bytes) -> Contents:
-    """The same of OpenDocument (.ods), and of binary workbooks of Excel (.xlsb)."""
+    """The same of OpenDocument (.ods), and of binary workbooks of Excel (.xlsb).
+
+    Its library ends with a panic at some damaged files, which is no Exception, and says so on
+    standard error.
+    """
     from python_calamine import CalamineWorkbook, SheetTypeEnum, SheetVisibleEnum
 
-    book = CalamineWorkbook.from_filelike(io.BytesIO(raw))
-    entries = [entry for entry in book.sheets_metadata if entry.typ == SheetTypeEnum.WorkSheet]
-    sheets = {
-        entry.name: book.get_sheet_by_name(entry.name).to_python(skip_empty_area=False)
-        for entry in entries
-    }
+    shown = os.dup(2)
+    try:
+        with open(os.devnull, "wb") as nowhere:
+            os.dup2(nowhere.fileno(), 2)
+        book = CalamineWorkbook.from_filelike(io.BytesIO(raw))
+        entries = [entry for entry in book.sheets_metadata if entry.typ == SheetTypeEnum.WorkSheet]
+        sheets = {
+            entry.name: book.get_sheet_by_name(entry.name).to_python(skip_empty_area=False)
+            for entry in entries
+        }
+    except BaseException as error:
+        raise error if isinstance(error, Exception) else ValueError(str(error)) from None
+    finally:
+        os.dup2(shown, 2)
+        os.close(shown)
     hidden = {entry.name for entry in entries if entry.visible != SheetVisibleEnum.Visible}
     called = "OpenDocument" if b"opendocument.spreadsheet" in raw[:200] else "binary Excel"
     return _read_sheets(path, called, sheets, hidden)
