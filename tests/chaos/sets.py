@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from pathlib import Path
 
+from tests.scenarios import short
 from workbench.machines.wheelset.planting import PlantedStops
 from workbench.runtime import resources
 from workbench.runtime.engine import Engine
@@ -10,8 +11,6 @@ from workbench.studies.power import Planting, SetVerdict, diagnose_sets
 from workbench.studies.power.diagnosing import library_effects
 from workbench.studies.power.run import PowerStudy
 from workbench.system.registry import load_system
-
-from ..scenarios import short
 
 GROUPS = [
     (Planting("clean", 11, 0.0, {}, ()),),
