@@ -136,6 +136,28 @@ def test_times_in_another_unit_are_asked_about_by_the_models_time_constants(tmp_
     assert any("motion of the model" in text for text in result.warnings())
 
 
+@pytest.mark.parametrize(
+    ("nominal", "more", "said"),
+    [
+        ("", "", True),
+        (", nominal=3.0", "", False),
+        ("", '[states.v]\nspread = "3 m/s"\n', False),
+    ],
+)
+def test_what_filters_assume_of_a_hidden_start_is_said(tmp_path, nominal, more, said):
+    package, text = machine("swing", step=0.05)
+    package = package.replace(", nominal=3.0", nominal)
+    system = declare(tmp_path / "swing", package, f"{text}\n{more}")
+    time = 0.05 * np.arange(100)
+    place = 0.5 * np.cos(2.0 * np.pi * time)
+    columns = {"time [s]": time, "f [m/s2]": 0.0 * time, "s [m]": place}
+    case = case_from_frame(system, pd.DataFrame(columns), name="swing")
+    warnings = prepare(system, choose(system, ["ekf"])).warnings(case)
+    assumed = [text for text in warnings if "filters assume v by 1 m/s" in text]
+    assert len(assumed) == said
+    assert not prepare(system, choose(system, ["open_loop"])).warnings(case)
+
+
 def test_a_first_sample_that_contradicts_the_start_is_told_first(tmp_path):
     """The kettle's water is 35 K above the room, its model says 10 K, and how sure that is."""
     result, _, _ = ran(tmp_path / "kettle", "ekf", 1.0, '[states.water]\nspread = "1 K"\n')

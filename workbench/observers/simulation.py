@@ -42,6 +42,7 @@ from workbench.observers.trust import (
     contradictions,
     normalised_innovations,
     sampling_doubt,
+    spread_doubt,
     start_doubt,
     step_doubt,
     time_doubt,
@@ -344,10 +345,12 @@ class Simulation:
         open_loop : its run, where its error is shown.
         coarse : estimators whose steps may not do, see `step_doubt`.
         """
-        unit = ""
+        unit = assumed = ""
         try:
             with open_model(self.system) as fmu:
                 unit = unit_doubt(fmu, self.system, case)
+                if any(estimator.adapts for estimator in self.kinds.values()):
+                    assumed = spread_doubt(fmu, self.system, case)
                 known = information(fmu, self.system, case)
                 path = trajectory(fmu, self.system, case)
                 clock = "" if path is None else time_doubt(fmu, self.system, case, path)
@@ -358,15 +361,16 @@ class Simulation:
                     share, step = step_doubt(fmu, self.system, case, open_loop, coarse)
         except EventError:
             unchecked = (
-                "not checked, as the model has events: what the recording tells of quantities"
+                "what the recording tells of quantities is not checked: the model has events"
             )
-            return {"doubts": (unchecked,)} if self.system.estimated else {}
+            doubts = (unit, unchecked if self.system.estimated else "", assumed)
+            return {"doubts": tuple(filter(None, doubts))}
         except (InputError, FMUError, np.linalg.LinAlgError):
-            return {"doubts": (unit,) if unit else ()}
+            return {"doubts": tuple(filter(None, (unit, assumed)))}
         return {
             "inseparable": {} if known is None else known.inseparable,
             "untold": () if known is None else known.untold,
-            "doubts": tuple(doubt for doubt in (clock, unit, start, sampling, step) if doubt),
+            "doubts": tuple(filter(None, (clock, unit, start, sampling, step, assumed))),
             "resolved": not (sampling or clock),
             "step_share": share,
         }

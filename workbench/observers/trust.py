@@ -20,10 +20,11 @@ from workbench.observers import estimators_of
 from workbench.observers.estimators.kalman import ExtendedKalmanFilter
 from workbench.observers.estimators.open_loop import OpenLoop
 from workbench.observers.observability import Trajectory
-from workbench.observers.operating import start_spreads
+from workbench.observers.operating import shown_states, start_spreads
 from workbench.observers.replay import replay
 from workbench.observers.run import Ending, Run
 from workbench.observers.score import judged_window
+from workbench.pages.views import rounded
 from workbench.recordings.case import Case
 from workbench.system.system import System
 
@@ -437,6 +438,33 @@ def unit_doubt(fmu: FMU, system: System, case: Case) -> str:
                     "the column, and its scale in the system file"
                 )
     return ""
+
+
+def spread_doubt(fmu: FMU, system: System, case: Case) -> str:
+    """What filters assume of the start of states whose size nothing says, in words.
+
+    Of such a state no output shows the start, the model has neither a nominal value nor limits nor
+    a start of more than 1, and `[states]` says nothing.
+    """
+    measured = {output.name: float(case[output.name][0]) for output in system.outputs}
+    fmu.begin_at(case.model_time)
+    fmu.start({})
+    shown = shown_states(fmu, system, case.u[0], measured, measured.keys())
+    variables = {variable.name: variable for variable in fmu.description.variables}
+    assumed = [
+        f"{name} by {rounded(spread)} {variables[name].unit or ''}".rstrip()
+        for name, spread in zip(fmu.states, start_spreads(fmu, system), strict=True)
+        if name not in {*measured, *shown, *system.spreads}
+        and not variables[name].nominal
+        and spread == 1.0
+    ]
+    if not assumed:
+        return ""
+    return (
+        "nothing says how far from the model states may start; filters assume "
+        f"{', '.join(assumed)} (a standard deviation). Say it in [states.NAME] spread, "
+        "or as nominal value in the model"
+    )
 
 
 def start_doubt(fmu: FMU, system: System, case: Case) -> str:
