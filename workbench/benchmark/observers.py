@@ -8,9 +8,10 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -170,15 +171,20 @@ def _time(case: Case, estimator: Estimator, loop: Loop | None, plain: Loop | Non
     )
 
 
-def _per_step(runs: Sequence[Loop], samples: Samples, repeats: int = _REPEATS) -> list[float]:
-    """Median time per step [s] of each; in turns, so that they meet the same load."""
-    spent: list[list[float]] = [[] for _ in runs]
+def in_turns(calls: Sequence[Callable[[], object]], repeats: int) -> list[float]:
+    """Median time of each call [s]; in turns, so that they meet the same load."""
+    spent: list[list[float]] = [[] for _ in calls]
     for _ in range(repeats):
-        for run, times in zip(runs, spent, strict=True):
+        for call, times in zip(calls, spent, strict=True):
             begin = time.perf_counter()
-            run(*samples)
+            call()
             times.append(time.perf_counter() - begin)
-    return [statistics.median(times) / samples[0].size for times in spent]
+    return list(map(statistics.median, spent))
+
+
+def _per_step(runs: Sequence[Loop], samples: Samples, repeats: int = _REPEATS) -> list[float]:
+    times = in_turns([partial(run, *samples) for run in runs], repeats)
+    return [spent / samples[0].size for spent in times]
 
 
 def time_compilation(system: System, case: Case) -> dict[str, float]:

@@ -15,6 +15,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from workbench.benchmark.memory import watch_command
+from workbench.benchmark.observers import in_turns
 from workbench.benchmark.other_loops import by_fmpy
 from workbench.observers import Estimate, Estimator, choose
 from workbench.observers.score import samples
@@ -237,14 +238,9 @@ def _evaluate(pool: Workers, candidates: Sequence[Candidate]) -> list[float]:
 
 
 def _rates(pools: Sequence[Workers], candidates: Sequence[Candidate]) -> list[float]:
-    """Candidates per second of each pool; in turns, so that they meet the same load."""
-    spent: list[list[float]] = [[] for _ in pools]
-    for _ in range(_REPEATS):
-        for pool, times in zip(pools, spent, strict=True):
-            begin = time.perf_counter()
-            _evaluate(pool, candidates)
-            times.append(time.perf_counter() - begin)
-    return [len(candidates) / statistics.median(times) for times in spent]
+    """Candidates per second of each pool."""
+    calls = [functools.partial(_evaluate, pool, candidates) for pool in pools]
+    return [len(candidates) / spent for spent in in_turns(calls, _REPEATS)]
 
 
 def observe_memory(folders: Sequence[Path], system: System) -> TuningMemory:

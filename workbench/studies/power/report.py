@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from workbench.arrays import Matrix
 from workbench.diagnosis.outcome import draw_heat
 from workbench.pages.answer import Answer, Measure, share_measure, share_with_interval, with_answer
 from workbench.pages.figures import LIGHT, in_style, save_figure, styled
@@ -30,6 +31,7 @@ from workbench.studies.power.sensitivity import FACTORS, ThresholdSensitivity
 from workbench.system.units import with_unit
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 
@@ -236,15 +238,22 @@ def draw_chances(rows: Sequence[EffectChance], sizes: Sequence[float], out: Path
         [[100.0 * c for _, c in row.chances] or [0.0] * len(sizes) for row in rows]
     ).reshape(len(rows), len(sizes))
     with styled(3.5 + 0.5 * len(sizes), 1.5 + 0.25 * len(rows)) as sheet:
-        axes = sheet.subplots()
-        axes.grid(visible=False)
-        draw_heat(axes, table, 100.0)
-        axes.set_xticks(range(len(sizes)), [f"{size:g}" for size in sizes])
-        axes.set_yticks(range(len(rows)), [row.effect for row in rows])
+        axes = _heat(sheet, table, [f"{size:g}" for size in sizes], [row.effect for row in rows])
         axes.set_xlabel("size over the least that matters")
         sheet.suptitle("Chance that the planned recordings show it [%]")
     with in_style():
         save_figure(sheet, [out / "plan.png", out / "plan.svg"])
+
+
+def _heat(
+    sheet: "Figure", table: Matrix, columns: Sequence[str], rows: Sequence[str], turned: float = 0.0
+) -> "Axes":
+    axes = sheet.subplots()
+    axes.grid(visible=False)
+    draw_heat(axes, table, 100.0)
+    axes.set_xticks(range(len(columns)), columns, rotation=turned)
+    axes.set_yticks(range(len(rows)), rows)
+    return axes
 
 
 _STYLE = "2"
@@ -418,12 +427,8 @@ def _confusion(confusion: Mapping[str, Mapping[str, int]], names: Sequence[str])
         ]
     ).reshape(len(confusion), len(columns))
     with styled(3.0 + 0.3 * len(columns), 2.5 + 0.25 * len(confusion), font_size=8) as sheet:
-        axes = sheet.subplots()
-        axes.grid(visible=False)
-        draw_heat(axes, table, 100.0)
-        axes.set_xticks(range(len(columns)), columns, rotation=90)
         labels = [f"{name} ({sum(row.values())})" for name, row in confusion.items()]
-        axes.set_yticks(range(len(confusion)), labels)
+        axes = _heat(sheet, table, columns, labels, turned=90.0)
         axes.set_xlabel("named first; indistinguishable effects under their own name")
         axes.set_ylabel("injected (sets)")
         sheet.suptitle(f"Named first [%], from size {VISIBLE:g} on")
