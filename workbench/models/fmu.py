@@ -537,6 +537,7 @@ class FMU:
     time : (1,) that the FMU was set to last [s].
     next_event : (1,) time of the next time event [s], of the last start; infinite for none.
     warned : (1,) calls that it answered with a warning.
+    rate_references : (n,) value references of the derivatives of the states.
 
     Raises
     ------
@@ -592,7 +593,9 @@ class FMU:
             for v in self.description.variables
             if v.type in _ACCESSORS and not v.array and not v.real
         ]
-        self._rates = np.array([self._references[r] for r in self.description.rates], np.uint32)
+        self.rate_references = np.array(
+            [self._references[r] for r in self.description.rates], np.uint32
+        )
         self.needs_completed_steps = offered.completed_steps
         self.saves_state = offered.saves_state
         self._x = np.zeros(len(self.states))
@@ -747,11 +750,6 @@ class FMU:
             v.name == name and v.real and v.variability == "continuous"
             for v in self.description.variables
         )
-
-    @property
-    def rate_references(self) -> NDArray[np.uint32]:
-        """Value references of the derivatives of the states, (n,)."""
-        return self._rates
 
     def take_warning(self) -> str:
         """How often it warned since this was asked last, and its first message; or nothing."""
@@ -949,11 +947,11 @@ class FMU:
 
     def state_jacobian(self) -> Matrix:
         """A = d(dx/dt)/dx at the present point, (n, n)."""
-        return self.jacobian(self._rates, self._state_variables)
+        return self.jacobian(self.rate_references, self._state_variables)
 
     def input_jacobian(self, inputs: Variables) -> Matrix:
         """B = d(dx/dt)/du at the present point, (n, m)."""
-        return self.jacobian(self._rates, inputs)
+        return self.jacobian(self.rate_references, inputs)
 
     def linearise(self, inputs: Variables, outputs: Variables) -> Linearisation:
         """Linearise about the present point."""

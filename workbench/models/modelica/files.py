@@ -5,7 +5,7 @@ import re
 from pathlib import Path
 
 from workbench.errors import InputError
-from workbench.models.modelica.tokens import Cursor
+from workbench.models.modelica.source import Cursor
 from workbench.runtime import resources
 
 PACKAGE = "package.mo"
