@@ -42,28 +42,17 @@ def add(commands: arguments.Commands, text: str) -> argparse.ArgumentParser:
         help="what the stop is asked for, or a condition, by the names of the system file; the "
         "rest is usual; may be repeated",
     )
-    parser.add_argument(
-        "--safety",
-        type=arguments.count,
-        default=9,
-        metavar="K",
-        help="safety level down to one stop in 10^K; 0: none (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--samples",
-        type=arguments.positive,
-        default=4000,
-        metavar="N",
-        help="stops of the distribution (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--plain",
-        type=arguments.count,
-        default=0,
-        metavar="N",
-        help="check the safety level by this many independent random stops. 1e5 take minutes, 1e7 "
-        "hours; Ctrl-C keeps the finished ones (default: %(default)s)",
-    )
+    numbers = {
+        ("--safety", "K", arguments.count, 9): "safety level down to one stop in 10^K; 0: none "
+        "(default: %(default)s)",
+        ("--samples", "N", arguments.positive, 4000): "stops of the distribution (default: "
+        "%(default)s)",
+        ("--plain", "N", arguments.count, 0): "check the safety level by this many independent "
+        "random stops. 1e5 take minutes, 1e7 hours; Ctrl-C keeps the finished ones (default: "
+        "%(default)s)",
+    }
+    for (option, metavar, number, default), text in numbers.items():
+        parser.add_argument(option, type=number, default=default, metavar=metavar, help=text)
     arguments.add_model(parser)
     arguments.add_seed(parser, "all that is drawn")
     arguments.add_run(parser)

@@ -48,36 +48,18 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
     add_recordings(parser, out="results/fit")
     add_system(parser)
     add_model(parser)
-    parser.add_argument(
-        "--parameter",
-        action="append",
-        default=[],
-        metavar="NAME",
-        help="parameter to fit, or state whose start is, or a pattern such as 'motor.*'; may be "
-        "repeated (default: [fit] of the system file)",
-    )
-    parser.add_argument(
-        "--range",
-        action="append",
-        default=[],
-        metavar="NAME=LOW to HIGH",
-        help="bounds of a parameter, such as 'R=0.1 Ohm to 5 Ohm'; may be repeated (default: "
-        "[fit], else min and max of the model)",
-    )
-    parser.add_argument(
-        "--prior",
-        action="append",
-        default=[],
-        metavar="NAME=VALUE +- SPREAD",
-        help="what is known of a parameter, such as 'R=2 Ohm +- 0.1 Ohm'; may be repeated",
-    )
-    parser.add_argument(
-        "--by-recording",
-        action="append",
-        default=[],
-        metavar="NAME",
-        help="a parameter of which each recording has a value of its own; may be repeated",
-    )
+    repeated = {
+        ("--parameter", "NAME"): "parameter to fit, or state whose start is, or a pattern such as "
+        "'motor.*'; may be repeated (default: [fit] of the system file)",
+        ("--range", "NAME=LOW to HIGH"): "bounds of a parameter, such as 'R=0.1 Ohm to 5 Ohm'; may "
+        "be repeated (default: [fit], else min and max of the model)",
+        ("--prior", "NAME=VALUE +- SPREAD"): "what is known of a parameter, such as 'R=2 Ohm +- "
+        "0.1 Ohm'; may be repeated",
+        ("--by-recording", "NAME"): "a parameter of which each recording has a value of its own; "
+        "may be repeated",
+    }
+    for (option, metavar), text in repeated.items():
+        parser.add_argument(option, action="append", default=[], metavar=metavar, help=text)
     parser.add_argument(
         "--held-out",
         nargs="+",

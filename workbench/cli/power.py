@@ -107,38 +107,21 @@ def _add_sets(parser: argparse.ArgumentParser) -> None:
 
 def _add_checks(parser: argparse.ArgumentParser) -> None:
     checks = parser.add_mutually_exclusive_group()
-    for option, text in (
-        (
-            "--thresholds",
-            "halve and double each threshold of the diagnosis on the same recordings, "
-            "and report what changes (into OUT/thresholds)",
-        ),
-        (
-            "--leave-out-effect",
-            "leave the injected effect out of the catalogue, and report the law proposed instead, "
-            "on --repeats sets at the largest size (into OUT/left_out)",
-        ),
-        (
-            "--plan",
-            "before recording: the chance that the recordings of --case show each effect at "
-            "--sizes, from one set without effects (into OUT/plan)",
-        ),
-        (
-            "--oracle",
-            "smallest size of each effect that the recordings of --case can show, by the exact "
-            "model, sensor noise and tolerances (into OUT/oracle)",
-        ),
-        (
-            "--follow",
-            "if a set leaves several candidates, simulate the proposed next experiment and some "
-            "random ones, and report which discriminate (into OUT/followed)",
-        ),
-        (
-            "--sheet-error",
-            "make recordings of a rig that differs from its data sheet in --repeats sets of each "
-            "error, and report the verdicts (into OUT/sheet_error)",
-        ),
-    ):
+    texts = {
+        "--thresholds": "halve and double each threshold of the diagnosis on the same recordings, "
+        "and report what changes (into OUT/thresholds)",
+        "--leave-out-effect": "leave the injected effect out of the catalogue, and report the law "
+        "proposed instead, on --repeats sets at the largest size (into OUT/left_out)",
+        "--plan": "before recording: the chance that the recordings of --case show each effect at "
+        "--sizes, from one set without effects (into OUT/plan)",
+        "--oracle": "smallest size of each effect that the recordings of --case can show, by the "
+        "exact model, sensor noise and tolerances (into OUT/oracle)",
+        "--follow": "if a set leaves several candidates, simulate the proposed next experiment and "
+        "some random ones, and report which discriminate (into OUT/followed)",
+        "--sheet-error": "make recordings of a rig that differs from its data sheet in --repeats "
+        "sets of each error, and report the verdicts (into OUT/sheet_error)",
+    }
+    for option, text in texts.items():
         checks.add_argument(
             option,
             action="store_const",

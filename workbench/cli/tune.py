@@ -68,20 +68,14 @@ def add(commands: arguments.Commands, text: str) -> argparse.ArgumentParser:
 
 
 def _add_search(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--budget",
-        type=arguments.positive,
-        default=100,
-        metavar="GENERATIONS",
-        help="most generations to search (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--population",
-        type=arguments.positive,
-        default=15,
-        metavar="N",
-        help="candidates per gain (default: %(default)s)",
-    )
+    numbers = {
+        ("--budget", "GENERATIONS", 100): "most generations to search (default: %(default)s)",
+        ("--population", "N", 15): "candidates per gain (default: %(default)s)",
+    }
+    for (option, metavar, default), text in numbers.items():
+        parser.add_argument(
+            option, type=arguments.positive, default=default, metavar=metavar, help=text
+        )
     arguments.add_seed(parser, "the search")
     parser.add_argument(
         "--scale-error",

@@ -14,14 +14,12 @@ from workbench.recordings.case import Case, read_case
 from workbench.runtime.engine import Engine
 from workbench.runtime.pool import Pool
 from workbench.runtime.progress import StepReporter
-from workbench.studies.monitoring.chart import LevelChange
-from workbench.studies.monitoring.estimate import (
-    RecordingEstimate,
-    RecordingEstimator,
-    open_estimator,
-    watched,
-)
-from workbench.studies.monitoring.outcome import MonitoringResult, conclude
+from workbench.studies.monitoring.chart import LevelChange as LevelChange
+from workbench.studies.monitoring.estimate import RecordingEstimate as RecordingEstimate
+from workbench.studies.monitoring.estimate import RecordingEstimator, open_estimator
+from workbench.studies.monitoring.estimate import watched as watched
+from workbench.studies.monitoring.outcome import MonitoringResult as MonitoringResult
+from workbench.studies.monitoring.outcome import conclude
 from workbench.studies.monitoring.state import (
     RecordingFolder,
     RecordingResult,
@@ -29,19 +27,9 @@ from workbench.studies.monitoring.state import (
     open_state,
     recording_folders,
 )
-from workbench.studies.monitoring.watch import Track
+from workbench.studies.monitoring.watch import Track as Track
 from workbench.system.registry import open_model
 from workbench.system.system import OBSERVER, System
-
-__all__ = [
-    "RATE",
-    "LevelChange",
-    "MonitoringResult",
-    "RecordingEstimate",
-    "Track",
-    "monitor",
-    "watched",
-]
 
 RATE = 0.01
 """Alarms per recording of a healthy machine, all quantities together: one in a hundred stops."""

@@ -82,20 +82,13 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         help="friction of dry pads: with speed, temperature and force, or constant as in the "
         "nominal model (default: %(default)s)",
     )
-    rig.add_argument(
-        "--rate",
-        type=positive,
-        default=200,
-        metavar="HZ",
-        help="of the recording, a divisor of 1000 (default: %(default)s)",
-    )
-    rig.add_argument(
-        "--truth-every",
-        type=positive,
-        default=1,
-        metavar="N",
-        help="write the truth of every Nth sample only (default: %(default)s)",
-    )
+    numbers = {
+        ("--rate", "HZ", 200): "of the recording, a divisor of 1000 (default: %(default)s)",
+        ("--truth-every", "N", 1): "write the truth of every Nth sample only (default: "
+        "%(default)s)",
+    }
+    for (option, metavar, default), meaning in numbers.items():
+        rig.add_argument(option, type=positive, default=default, metavar=metavar, help=meaning)
     add_reference(rig, "that makes the recordings")
     add_system(rig)
     add_workers(rig)
