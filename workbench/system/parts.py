@@ -199,8 +199,8 @@ class Signal:
     )
     held: bool | str = key(
         "true: an input keeps the value of a sample until the next one. `before`: a sample is the "
-        "mean since the sample before, as of cyclers and energy meters. false: it is interpolated "
-        "linearly, which attenuates an oscillation of nine samples a period by 4 %",
+        "mean since the sample before, as of cyclers and energy meters. `false`: it is "
+        "interpolated linearly, which attenuates an oscillation of nine samples a period by 4 %",
         absent=False,
         choices=("before",),
     )
