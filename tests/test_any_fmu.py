@@ -18,7 +18,7 @@ from workbench.__main__ import main
 from workbench.errors import FMUError, InputError
 from workbench.models.fmu import FMU, CoSimulation, EventError
 from workbench.models.simulation import Drive, Simulation
-from workbench.observers import estimators_of
+from workbench.observers import choose, estimators_of
 from workbench.observers.contract import Estimator
 from workbench.observers.fmpy_comparison import RIGHT, compare_with_fmpy
 from workbench.observers.gains_file import usual_gains
@@ -322,7 +322,9 @@ def test_kalman_filters_go_through_events(what, name, build):
     time = 10.0 * np.arange(361.0)
     truth = {"T": along(what, time, 60.0), "G": np.full(time.size, 60.0)}
     with FMU(build(what, saves=True)) as fmu:
-        square, inside = consistency(estimator(fmu, name), time, truth, "T")
+        law = estimator(fmu, name)
+        square, inside = consistency(law, time, truth, "T")
+        assert not law.doubt
     assert square == pytest.approx(1.0, abs=5.0 * np.sqrt(2.0 / 2880.0))
     assert (inside > 0.93).all()
 
@@ -348,6 +350,7 @@ def test_kalman_filters_go_through_impacts_that_reverse_a_speed(name, tmp_path):
         law = estimator(fmu, name)
         truth = {"h": h, "v": v, "g": np.full(time.size, 9.5)}
         square, inside = consistency(law, time, truth, "h")
+        assert not law.doubt
     assert square == pytest.approx(1.0, abs=5.0 * np.sqrt(2.0 / 1592.0))
     assert (inside > 0.93).all()
 
@@ -364,6 +367,23 @@ def bouncing(folder: Path) -> Path:
         archive.write(library, f"binaries/{fmpy.platform}/{library.name}")
     (folder / "system.toml").write_text(machine_file("ball/system.toml"))
     return folder / "Ball.fmu"
+
+
+@pytest.mark.parametrize("name", ["ekf", "ukf"])
+def test_a_filter_that_does_not_know_when_a_thermostat_switches_says_so(name, build):
+    """A sensor of 0.3 K: the room takes three samples or more to change by what is not known."""
+    folder = build("THERMOSTAT", saves=True).parent
+    system = load_system(folder)
+    (outside,), (inside,) = system.inputs, system.outputs
+    exact, poor = replace(outside, noise=0.0), replace(inside, noise=0.3)
+    system = replace(system, inputs=(exact,), outputs=(poor,))
+    time = 10.0 * np.arange(361.0)
+    noisy = along("THERMOSTAT", time, 60.0) + 0.3 * np.random.default_rng(1).standard_normal(361)
+    columns = {"time [s]": time, "Ta [K]": 280.0 + 0.0 * time, "T [K]": noisy}
+    result = prepare(system, choose(system, [name])).run(
+        wb.case_from_frame(system, pd.DataFrame(columns))
+    )
+    assert any(f"{name} does not know at which sample" in said for said in result.warnings())
 
 
 def test_a_filter_beside_a_running_machine_goes_on_through_events(build):

@@ -240,6 +240,17 @@ class Estimator(ABC):
         return ()
 
     @property
+    def doubt(self) -> str:
+        """What is said of its last run; empty for nothing."""
+        count = int(max((step.coarse[0] for step in self.steps), default=0.0))
+        if not count:
+            return ""
+        return (
+            f"{self.name} takes {count} of its steps less accurately than noise allows: the model "
+            "moves too fast there. Record more often"
+        )
+
+    @property
     def parts(self) -> Parts:
         """The compiled step and what it takes."""
         settings, state = self._arguments()

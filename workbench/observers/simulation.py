@@ -292,10 +292,7 @@ class Simulation:
         """All estimators on one case, in this process."""
         with self.estimators() as estimators:
             runs = {name: replay(case, estimator) for name, estimator in estimators.items()}
-            rough = {
-                name: int(max((step.coarse[0] for step in estimator.steps), default=0.0))
-                for name, estimator in estimators.items()
-            }
+            doubts = [estimator.doubt for estimator in estimators.values()]
         warned = [run.message for run in runs.values() if run.ending is Ending.OK and run.message]
         scores = {name: score(case, run, self.system) for name, run in runs.items()}
         result = CaseResult(self.system, case, runs, scores, self._reference(case, runs))
@@ -307,12 +304,7 @@ class Simulation:
             doubts=(
                 *warned[:1],  # that of one estimator tells
                 *result.doubts,
-                *(
-                    f"{name} takes {count} of its steps less accurately than noise allows: the "
-                    "model moves too fast there. Record more often"
-                    for name, count in rough.items()
-                    if count
-                ),
+                *filter(None, doubts),
             ),
         )
         guessed = {name: np.zeros(case.time.size, bool) for name in result.guessed}

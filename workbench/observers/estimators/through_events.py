@@ -23,6 +23,12 @@ class EventMap:
     fmu : at the last sample; it must save its state.
     outputs : of the model, whose place `layout.seen` says.
     u : (m,) inputs of the last sample.
+
+    Attributes
+    ----------
+    passed : events that the mean passed.
+    unsure : samples at which some points had passed an event that others had not, as at the sample
+        before. Where that is no passing moment, no Gaussian holds what is known.
     """
 
     def __init__(
@@ -35,6 +41,7 @@ class EventMap:
         self._simulation = HybridSimulation(fmu, inputs, holds)
         self._simulation.begin(np.concatenate([u, fmu.get_typed(inputs)[u.size :]]))
         self._simulation.keep()
+        self.passed = self.unsure = self._parted = 0
 
     def ends(self, points: Matrix, t: float, u: Vector) -> tuple[Matrix, Matrix]:
         """Go from the last sample to the one at t [s] with inputs u, (m,); keep where the mean is.
@@ -58,13 +65,18 @@ class EventMap:
             points.copy(),
             np.empty((len(points), len(self._seen))),
         )
+        passed = []
         for k in range(len(points) - 1, -1, -1):
             corrections = points[k, n:]
             self._simulation.start_from(points[k, :n], corrections)
             ends[k, :n] = self._simulation.advance(t, np.concatenate([u, corrections]))
+            passed.append(self._simulation.passed)
             read = self._fmu.get_typed(self._read)
             seen[k] = [ends[k, at] if at >= 0 else read[-1 - at] for at in self._seen]
         self._simulation.keep()
+        self.passed += passed[-1]
+        self._parted = self._parted + 1 if len(set(passed)) > 1 else 0
+        self.unsure += self._parted > 1
         return ends, seen
 
     def release(self) -> None:
