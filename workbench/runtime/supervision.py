@@ -267,6 +267,21 @@ def supervised(
 
 
 @contextmanager
+def quiet_panics() -> Iterator[None]:
+    """Keep what a panic of foreign code writes to the process's standard error from the user's."""
+    if sys.stderr is not None:
+        sys.stderr.flush()
+    shown = os.dup(2)
+    with open(os.devnull, "wb") as nowhere:
+        os.dup2(nowhere.fileno(), 2)
+    try:
+        yield
+    finally:
+        os.dup2(shown, 2)
+        os.close(shown)
+
+
+@contextmanager
 def blaming(error: InputError) -> Iterator[None]:
     """Say what is told if foreign code ends this process meanwhile, where a command is supervised.
 

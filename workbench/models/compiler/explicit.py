@@ -374,7 +374,11 @@ class _Solver:
         incidence = _incidence(self.residuals, left)
         rank = ca.sprank(ca.DM(_pattern(incidence), 1))
         if not incidence.shape[0] == incidence.shape[1] == rank:
-            raise self._structurally_singular(incidence, left)
+            names = [symbol.name() for symbol in ca.vertsplit(left)]
+            unused = [name for j, name in enumerate(names) if not incidence[:, j].any()]
+            rows, columns = incidence.shape
+            why = f"{rows} equations for {columns} unknowns"
+            raise _singular(self.model, unused or names, why)
         _, row_order, column_order, row_blocks, column_blocks, _, _ = _pattern(incidence).btf()
         self._solve_blocks(
             row_order, column_order, row_blocks, column_blocks, left, slice(0, incidence.shape[0])
@@ -382,12 +386,6 @@ class _Solver:
 
     def _unsolved(self, unknowns: ca.SX) -> ca.SX:
         return _column([s for s in ca.vertsplit(unknowns) if s.name() not in self.solution])
-
-    def _structurally_singular(self, incidence: Incidence, unknowns: ca.SX) -> InputError:
-        unused = [unknowns[j].name() for j in range(unknowns.numel()) if not incidence[:, j].any()]
-        names = unused or [symbol.name() for symbol in ca.vertsplit(unknowns)]
-        rows, columns = incidence.shape
-        return _singular(self.model, names, f"{rows} equations for {columns} unknowns")
 
     def _solve_blocks(
         self,

@@ -137,16 +137,6 @@ REWRITE = (
 )
 
 
-def _defined(owners: Sequence[Mapping[str, Any]]) -> dict[int, int]:
-    """Expressions of discrete variables that hold always, by the variable's number."""
-    return {
-        target: value["value"]
-        for owner in owners
-        if [branch["activation"] for branch in owner["branches"]] == ["always"]
-        for target, value in zip(owner["targets"], owner["branches"][0]["values"], strict=True)
-    }
-
-
 def _matrix(value: Value) -> Value:
     """Promote to rank 2 as `cat` inside `[...]` does: a vector becomes a column."""
     return value if value.ndim == 2 else value.reshape(-1, 1)
@@ -188,7 +178,12 @@ class Arena:
         self.symbols: list[Value] = []
         self.rates: dict[int, Value] = {}
         self.binders: dict[tuple[int, int], int] = {}
-        self.defined = _defined(storage["discrete_value_owners"])
+        self.defined: dict[int, int] = {  # where one branch holds always
+            target: value["value"]
+            for owner in storage["discrete_value_owners"]
+            if [branch["activation"] for branch in owner["branches"]] == ["always"]
+            for target, value in zip(owner["targets"], owner["branches"][0]["values"], strict=True)
+        }
         self._depth = 0  # of the function call that is being evaluated
 
     def _deal_arenas(self, expressions: Mapping[str, Any]) -> None:

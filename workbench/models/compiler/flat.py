@@ -7,10 +7,7 @@ here, with file and line.
 
 import contextlib
 import io
-import os
 import re
-import sys
-import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,7 +21,7 @@ from workbench.errors import InputError
 from workbench.models.compiler.expressions import BINARY, NO_EVENT, REWRITE, Arena, Value, each
 from workbench.models.modelica import Library, check, files, packages, read_library
 from workbench.models.modelica.classes import Class, Component, Modifier
-from workbench.runtime.supervision import blaming, limited_memory
+from workbench.runtime.supervision import blaming, limited_memory, quiet_panics
 
 SCHEMA = 43
 # Bytes beyond which the front end overflows; 65 MB do for the reference model.
@@ -158,7 +155,7 @@ def flatten(package: Path, model: str) -> FlatModel:
         remedy="make it smaller, or leave out what needs itself",
     )
     try:
-        with _quiet_panic(), blaming(refusal), limited_memory(_MEMORY):
+        with quiet_panics(), blaming(refusal), limited_memory(_MEMORY):
             roots = [str(used.parent) for used in packages(package)[1:]]
             dae = rumoca.Session(roots=roots).load(str(package), model=model).to_dict("dae")
     except rumoca.RumocaError as error:
@@ -177,20 +174,6 @@ def flatten(package: Path, model: str) -> FlatModel:
             remedy="install the rumoca release that the extra [compiler] pins",
         )
     return _Reader(dae, library, source, model).flat_model()
-
-
-@contextlib.contextmanager
-def _quiet_panic() -> Iterator[None]:
-    """Keep the report that a panic writes to the process's standard error from the user's."""
-    sys.stderr.flush()
-    shown = os.dup(2)
-    with tempfile.TemporaryFile() as report:
-        os.dup2(report.fileno(), 2)
-        try:
-            yield
-        finally:
-            os.dup2(shown, 2)
-            os.close(shown)
 
 
 def _front_end_refusal(place: str, message: str) -> InputError:

@@ -4,7 +4,6 @@ Formulas are as their program last computed them. Each reader imports the packag
 """
 
 import io
-import os
 from collections.abc import Collection, Mapping, Sequence
 from datetime import date, datetime, time, timedelta
 from pathlib import Path
@@ -13,6 +12,7 @@ from typing import Any
 from workbench.errors import InputError
 from workbench.recordings.formats.cells import by_tag, find_table, read_group
 from workbench.recordings.formats.contents import Contents, Group
+from workbench.runtime.supervision import quiet_panics
 
 _HOUR = timedelta(hours=1)
 _MOST = 1_048_576  # rows of a sheet of Excel
@@ -63,22 +63,17 @@ def read_others(path: Path, raw: bytes) -> Contents:
     """
     from python_calamine import CalamineWorkbook, SheetTypeEnum, SheetVisibleEnum
 
-    shown = os.dup(2)
     try:
-        with open(os.devnull, "wb") as nowhere:
-            os.dup2(nowhere.fileno(), 2)
-        book = CalamineWorkbook.from_filelike(io.BytesIO(raw))
-        entries = [entry for entry in book.sheets_metadata if entry.typ == SheetTypeEnum.WorkSheet]
-        sheets = {
-            entry.name: book.get_sheet_by_name(entry.name).to_python(skip_empty_area=False)
-            for entry in entries
-        }
+        with quiet_panics():
+            book = CalamineWorkbook.from_filelike(io.BytesIO(raw))
+            kept = [sheet for sheet in book.sheets_metadata if sheet.typ == SheetTypeEnum.WorkSheet]
+            sheets = {
+                sheet.name: book.get_sheet_by_name(sheet.name).to_python(skip_empty_area=False)
+                for sheet in kept
+            }
     except BaseException as error:
         raise error if isinstance(error, Exception) else ValueError(str(error)) from None
-    finally:
-        os.dup2(shown, 2)
-        os.close(shown)
-    hidden = {entry.name for entry in entries if entry.visible != SheetVisibleEnum.Visible}
+    hidden = {sheet.name for sheet in kept if sheet.visible != SheetVisibleEnum.Visible}
     called = "OpenDocument" if b"opendocument.spreadsheet" in raw[:200] else "binary Excel"
     return _read_sheets(path, called, sheets, hidden)
 
