@@ -291,9 +291,16 @@ def test_a_sensor_that_is_a_mean_is_refused(tmp_path):
         declare(tmp_path / "typo", package, text.replace("held = true", 'held = "after"'))
 
 
-def test_an_exported_observer_holds_the_input_too(vessel, fmu, filled, tmp_path):
-    cls = estimators_of(vessel)["disturbance_observer"]
-    estimator = cls(fmu, vessel, cls.default_gains(fmu, vessel))
+@pytest.mark.parametrize(
+    ("name", "held", "recording"),
+    [("disturbance_observer", True, "filled"), ("ekf", "before", "counted")],
+)
+def test_an_exported_observer_takes_inputs_as_declared(
+    vessel, fmu, tmp_path, name, held, recording, request
+):
+    filled, system = request.getfixturevalue(recording), metered(vessel, held)
+    cls = estimators_of(vessel)[name]
+    estimator = cls(fmu, system, cls.default_gains(fmu, system))
     path = tmp_path / "observer.fmu"
     build_observer(estimator, path, 2, platforms=[native()])
     names = [signal.name for signal in (*vessel.inputs, *vessel.outputs)]
