@@ -40,7 +40,7 @@ def behind(signal: np.ndarray, h: float, tau: float) -> np.ndarray:
 
 
 def record(
-    folder: Path, seed: int, area=0.5, outlet=1e-3, gain=0.0, zero=0.0, late=0.0, lag=0.0
+    folder: Path, seed: int, area=0.5, outlet=1e-3, gain=0.0, zero=0.0, late=0.0, lag=0.0, top=9.0
 ) -> Path:
     """Four recordings of 200 s, of which each starts at another level."""
     rng = np.random.default_rng(seed)
@@ -61,10 +61,9 @@ def record(
         columns = {
             "time [s]": time,
             "inflow [m3/s]": (1.0 + gain) * flows + 5e-5 * rng.standard_normal(time.size),
-            "level [m]": np.interp(time - late, time, level)
-            + zero
-            + 2e-3 * rng.standard_normal(time.size),
         }
+        read = np.interp(time - late, time, level) + zero + 2e-3 * rng.standard_normal(time.size)
+        columns["level [m]"] = np.minimum(read, top)
         write_case(folder / f"{number}", columns, "Steps of the pump")
     return folder
 
@@ -92,6 +91,7 @@ def test_nothing_is_missing_where_only_unknown_starts_differ(tank, tmp_path):
         ({"seed": 2, "area": 0.55}, "A", "change", 0.05),
         ({"seed": 3, "gain": 0.05}, "SensorGain[inflow]", "gain", 0.05),
         ({"seed": 4, "zero": 0.15}, "SensorOffset[level]", "offset", 0.15),
+        ({"seed": 2, "top": 1.28}, "SensorSaturation[level]", "limit", 1.28),
     ],
 )
 def test_what_is_wrong_is_named_with_its_size(tank, tmp_path, truth, effect, size, value):

@@ -504,7 +504,6 @@ def duration(seconds: float) -> str:
 
 
 def _told(cause: Cause) -> list[str]:
-    """Lines on a cause."""
     lines = [f"{cause.effect.name}: {cause.effect.text}"]
     lines += [
         f"  {name}: {p.text}" if p.limit else f"  {name} = {p.text}"
@@ -777,7 +776,6 @@ def draw_gain(gain: Mapping[str, Any], paths: Iterable[Path]) -> None:
 
 
 def _runs(time: Vector) -> list[slice]:
-    """Blocks that follow each other."""
     step = np.diff(time)
     ends = np.flatnonzero(step > 1.5 * np.median(step)) + 1
     edges = [0, *(int(end) for end in ends), time.size]
@@ -805,7 +803,6 @@ def _measured(
     case: Case,
     parted: Callable[[Vector], Vector],
 ) -> Panel:
-    """A signal as measured, at the blocks."""
     unit = shown_unit(system, signal)
     factor = per_shown(system, signal, unit)
     values = system.under(case.conditions).signal(signal, case.signals)

@@ -151,7 +151,6 @@ def _warnings(system: System, summary: Mapping[str, Any]) -> list[str]:
 
 
 def _balanced(figures: Sequence[CaseFigure]) -> bool:
-    """Whether balances stand below the errors of channels."""
     return figures[0].panels[-1].curves[0].style == "measured"
 
 
@@ -393,7 +392,6 @@ def _traded(certainty: Mapping[str, Any], effect: str, name: str) -> str:
 
 
 def _starts(starts: Mapping[str, Any]) -> Text:
-    """How fits ended that began elsewhere."""
     text = (
         f"{starts['sentence']} They began with levels as usual, and with sizes from the negative "
         "of what was found to three times that."
@@ -473,7 +471,6 @@ def _candidates(summary: Mapping[str, Any]) -> Table:
 
 
 def _confusable(summary: Mapping[str, Any]) -> list[Block]:
-    """Similarity of effects, and the most similar pairs."""
     names, cosines = summary["confusability"]["effects"], summary["confusability"]["cosines"]
     if not names:
         return ["No effect of the catalogue was compared."]

@@ -90,7 +90,6 @@ def relate_diagnosis(outcome: Outcome, out: Path, related: Mapping[str, str]) ->
 def _drawn(
     _: None, drawing: Callable[..., None], shown: Sequence[Any], pictures: Sequence[Path]
 ) -> None:
-    """Draw what is shown, in a worker."""
     drawing(*shown, pictures)
 
 
@@ -112,7 +111,6 @@ def _write_recording(residuals: Residuals, span: int, path: Path) -> None:
 
 
 def _write_tables(summary: Mapping[str, Any], out: Path) -> None:
-    """Data of the figures that show all recordings."""
     nested = ("shape", "shape_units")
     rows = [
         {**candidate, **{k: json.dumps(candidate[k]) for k in nested}}

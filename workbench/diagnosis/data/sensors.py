@@ -190,11 +190,12 @@ def starts(values: Mapping[str, float], wrong: Mapping[str, SensorReading]) -> d
 
 
 def sensed(samples: Samples, signals: Matrix, wrong: Mapping[str, SensorReading]) -> Matrix:
-    """What sensors read of signals (n, c), but for their zeros."""
+    """What sensors read of signals (n, c)."""
     signals = signals.copy()
     for j, name in enumerate(samples.signals):
         if name in wrong:
-            signals[:, j] = wrong[name].factor * wrong[name].bent(samples.time, signals[:, j])
+            bent = wrong[name].bent(samples.time, signals[:, j])
+            signals[:, j] = wrong[name].factor * bent + wrong[name].offset
     return signals
 
 
@@ -209,12 +210,6 @@ def sensed_changes(
             behind = lagged(samples.time, changes[:, j], reading.lag)
             changes[:, j] = slopes[:, None] * behind
     return changes
-
-
-def shifted(samples: Samples, signals: Matrix, wrong: Mapping[str, SensorReading]) -> Matrix:
-    """Signals (n, c) plus the offsets of their sensors."""
-    offsets = [wrong.get(name, SensorReading()).offset for name in samples.signals]
-    return signals + offsets if any(offsets) else signals
 
 
 def step_of(values: Vector) -> float:

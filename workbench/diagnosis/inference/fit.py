@@ -335,7 +335,6 @@ class Fit:
         return RecordingSystem(r, J, local, deviations, furthest, m, rests=q)
 
     def _prior(self, point: Point, shared: Sequence[Key]) -> Quadratic:
-        """What is known of the common unknowns beforehand."""
         N, g, c = np.zeros((len(shared),) * 2), np.zeros(len(shared)), 0.0
         for effect in {name: self.unknowns.effects.get(name) for name, _ in point.sizes}.values():
             if effect is None or not len(effect.precision):

@@ -154,7 +154,6 @@ def dependences(simulations: ResidualModel, residuals: Sequence[Residuals]) -> l
 
 
 def _influences(simulations: ResidualModel, k: int) -> dict[str, Vector]:
-    """Each influence at the blocks of one recording."""
     case, recording, system = simulations.cases[k], simulations.recordings[k], simulations.system
     time, h = case.time, np.gradient(case.time)
     measured = dict(zip(recording.inputs, recording.u.T, strict=True))

@@ -171,7 +171,6 @@ def _rival(fit: Fit, base: FittedModel, fitted: FittedModel, variance_factors: V
 
 
 def _told(system: RecordingSystem) -> dict[str, Any]:
-    """A recording's errors and derivatives as numbers."""
     return {
         "errors": system.r.tolist(),
         "common": system.J.tolist(),

@@ -228,7 +228,6 @@ def _fixed(quadratic: Quadratic, last: float) -> Quadratic:
 
 
 def _without_each(total: Quadratic, stops: Sequence[Quadratic]) -> list[Quadratic]:
-    """Chi-squared without each of the stops."""
     return [
         Quadratic(total.N - stop.N, total.g - stop.g, total.c - stop.c, total.rows - stop.rows)
         for stop in stops

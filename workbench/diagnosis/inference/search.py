@@ -9,6 +9,7 @@ from typing import TypeVar
 import numpy as np
 
 from workbench.arrays import Matrix, Vector
+from workbench.diagnosis.effects.candidates import LOSS, RECTIFIED
 from workbench.diagnosis.effects.catalogue import Effect, variant
 from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.linearized import LinearizedPoint, Point
@@ -203,6 +204,8 @@ def _simulated_start(fit: Fit, best: FittedModel, score: CandidateScore) -> Cand
         return None
     if fit.free:
         return _grown_start(fit, best, score)
+    if effect.size in (LOSS, RECTIFIED):
+        return replace(score, size=1.0)  # other starts fit what is cut off: only a fit tells
     tried = [
         float(np.clip(way * effect.matters * step, low, high)) for way in ways for step in _SIZES
     ]
@@ -250,7 +253,6 @@ def _grown_start(fit: Fit, best: FittedModel, score: CandidateScore) -> Candidat
 
 
 def _gains(fit: Fit, before: FittedModel, after: FittedModel) -> bool:
-    """Whether an effect is worth a step."""
     return before.linearised.deviance - after.linearised.deviance > fit.decides.fall
 
 

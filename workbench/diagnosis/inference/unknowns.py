@@ -239,16 +239,14 @@ class Unknowns:
                 parts = {parameter: size}
             for part, value in parts.items():
                 names = variables(effect, part)
-                start = self._present(effect, names[0]) if part in effect.sizes else 0.0
+                start = 0.0
                 if names[0] in self._starts:
                     start = values[names[0]]
+                elif part in effect.sizes:  # in the model that is diagnosed
+                    nominal = self._simulations.nominal[names[0]] if effect.parameter else 0.0
+                    start = self._simulations.given.get(names[0], nominal)
                 values |= dict.fromkeys(names, start + float(value))
         return values
-
-    def _present(self, effect: Effect, variable: str) -> float:
-        """Value of a size in the model that is diagnosed."""
-        nominal = self._simulations.nominal[variable] if effect.parameter else 0.0
-        return self._simulations.given.get(variable, nominal)
 
     def _middle(self, point: Point, name: str, k: int) -> float:
         """Value of what differs between recordings, without the deviation of this one."""

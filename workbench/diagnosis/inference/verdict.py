@@ -237,7 +237,9 @@ def conclude(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnos
         if not chosen.interrupted and (verdict == "unexplained" or len(best.active) > 1):
             worse, left = _objections(fit, chosen, gain, whole=verdict == "found")
             objections = [*worse, *left]
-            part = not worse and not astray and _removed(gain) > _MOST
+            before, after = gain.before**2 - 1.0, gain.after**2 - 1.0
+            removed = (before - after) / max(before, 1e-9)
+            part = not worse and not astray and removed > _MOST
             if objections:
                 verdict = "partly explained" if part else "unexplained"
     causes: list[Cause] = []
@@ -294,7 +296,6 @@ def conclude(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnos
 
 
 def _clean(fit: Fit, chosen: Selection) -> bool:
-    """Whether what was found leaves nothing that lasts."""
     return float(chosen.best.linearised.variance_factors.max()) < fit.decides.wrong
 
 
@@ -360,17 +361,10 @@ def _fewest(
 
 
 def _only(best: FittedModel, effect: Effect) -> Point:
-    """The point with one of its effects."""
     point = best.point
     for other in best.active:
         point = point if other is effect else without(point, other)
     return point
-
-
-def _removed(gain: Gain) -> float:
-    """Share of the explainable that is gone on held-out recordings."""
-    before, after = gain.before**2 - 1.0, gain.after**2 - 1.0
-    return float(np.clip((before - after) / max(before, 1e-9), 0.0, 1.0))
 
 
 def _at_bounds(causes: Sequence[Cause]) -> list[str]:
@@ -445,7 +439,6 @@ def _nearest(
 
 
 def _reasons(fit: Fit, chosen: Selection, fitted: FittedModel, *, fast: bool) -> list[str]:
-    """Why one effect is no answer."""
     validation = chosen.validation
     (effect,) = fitted.active
     reasons = [

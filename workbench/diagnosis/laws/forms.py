@@ -180,7 +180,6 @@ class ClosedForm:
         return self.scale if self.law.carrier.expression == "1.0" else 1.0
 
     def _reach(self) -> tuple[float, float]:
-        """Least and greatest size."""
         far = self.room * _REACH * max(self._unit, self.largest)
         if self.law.carrier.expression != self.law.place.nominal:
             return -far, far
@@ -211,7 +210,10 @@ class ClosedForm:
         powers = form.shape == "n"
         # A zone or a limit is the same to both sides.
         sizes = knots if knots.low >= 0.0 else Knots(0.0, max(abs(knots.low), abs(knots.high)))
-        values = form.values if powers else _rounded(sizes, form.values)
+        values = form.values
+        if not powers:
+            shares = sizes.low + np.array(values) * (sizes.high - sizes.low)
+            values = tuple(float(f"{value:.3g}") for value in shares)
         low, high = (0.1, 6.0) if powers else (min(values) / 20.0, 2.0 * sizes.high)
         unit = form.unit.format(unit="" if influence is None else influence.unit)
         known = _bounded(unit, low / self.room, high * self.room)
@@ -236,10 +238,4 @@ def candidates(
 
 
 def _bounded(unit: str, low: float, high: float) -> str:
-    """Modifiers of a parameter."""
     return ", ".join(filter(None, (unit_of(unit), f"min={number(low)}, max={number(high)}")))
-
-
-def _rounded(knots: Knots, shares: tuple[float, ...]) -> tuple[float, ...]:
-    values = knots.low + np.array(shares) * (knots.high - knots.low)
-    return tuple(float(f"{value:.3g}") for value in values)

@@ -103,7 +103,6 @@ class FittedLaw:
 
 
 def _written(name: str, prospect: LawScore) -> LawClass:
-    """The class of a free function."""
     law, knots = prospect.law, prospect.knots
     about = f"Free function: {law.text}"
     if law.influence is None or knots is None:

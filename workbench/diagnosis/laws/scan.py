@@ -254,7 +254,6 @@ class Scan:
         return columns
 
     def _largest(self, place: Place) -> float:
-        """Largest size of an output, without a law."""
         name = place.output.name
         return max(
             float(np.abs(place.at(recording, name)).max()) for _, recording in self._recordings

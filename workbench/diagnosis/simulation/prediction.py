@@ -339,7 +339,6 @@ class Predictor:
         return _Led(*self._leading, self._at(corrected), gain, self._at(restarted), seen)
 
     def _at(self, states: Sequence[str]) -> NDArray[np.intp]:
-        """Places of states in the model."""
         return np.array([self._fmu.states.index(name) for name in states], np.intp)
 
     def _steps(self) -> Steps:

@@ -116,7 +116,6 @@ class ResidualModel:
         return self._model.fmu.take_warning()
 
     def _tell(self, fmu: FMU) -> None:
-        """What the model says of its variables."""
         self.nominal = dict(fmu.defaults)
         self.units = dict(fmu.units)
         self.bounds = {
@@ -139,7 +138,6 @@ class ResidualModel:
             self.units[name], self.bounds[name] = error.unit, error.bounds
 
     def _prepared(self, *, restarting: bool) -> SimulatorSetup:
-        """Make all recordings ready."""
         self.recordings = [self._ready(case, restarting=restarting) for case in self.cases]
         recordings = tuple(self.recordings)
         return SimulatorSetup(self.source.path, self.system, recordings, free=self.free)
@@ -149,13 +147,11 @@ class ResidualModel:
         return Simulator(given, self._model.fmu)
 
     def _workers_with(self, given: SimulatorSetup) -> Pool[Simulator]:
-        """Simulators in processes, or the one of this process."""
         if self._alone:
             return Pool(1, lambda given: nullcontext(self._simulator(given)), given)
         return Pool(self._workers, simulating, given)
 
     def _ready(self, case: Case, *, restarting: bool) -> Samples:
-        """A recording made ready."""
         signals = compared(self.system, self.cases)
         return prepare(case, self.system, signals, self._model, self._sound, restarting=restarting)
 
@@ -290,7 +286,6 @@ class ResidualModel:
                 raise
 
     def _gathered(self, tasks: Mapping[Any, tuple[Any, ...]]) -> dict[Any, Any]:
-        """Results of tasks, by their names."""
         if self._interrupted.is_set():
             raise CancelledError
         counted = self._pace.part(len(tasks))

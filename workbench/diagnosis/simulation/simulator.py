@@ -20,12 +20,11 @@ from workbench.diagnosis.data.sensors import (
     sensed,
     sensed_changes,
     sensor_errors,
-    shifted,
     starts,
     step_of,
     straightened,
 )
-from workbench.diagnosis.effects.candidates import LAG, STEP
+from workbench.diagnosis.effects.candidates import LAG, LOSS, RECTIFIED, STEP
 from workbench.diagnosis.inference.thresholds import Thresholds
 from workbench.diagnosis.simulation.free import FreeDerivatives, FreePredictor
 from workbench.diagnosis.simulation.prediction import Predictor, Variation
@@ -37,6 +36,7 @@ from workbench.system.system import System
 _DELAY_STEP = 1e-3  # of the difference, over the delay's spread; errors are linear in the delay
 _DIFFERENCE = 1e-4  # step over a typical size: far above rounding, far below what bends
 _FINEST = 32  # steps of a sample time
+_CUT = 1e-12  # share, by which no reading differs
 _STRAIGHTENED = 2  # runs, of which each leads the next
 _DRAWS = 12  # of the noise of inputs: their variance is known to two fifths
 
@@ -265,7 +265,8 @@ class Simulator:
         now, columns = errors(values), []
         for column in varied:
             name, known = column.variables[0], {**values, **column.setting}
-            at, sensor = self._at(name, values), self._sensors.get(name)
+            at = values.get(name, self._fmu.defaults.get(name, 0.0))
+            sensor = self._sensors.get(name)
             if sensor is not None and sensor.parameter == STEP:
                 of = recording.read[:, recording.signals.index(sensor.signal)]
                 size = at or step_of(of) or sensor.typical
@@ -274,12 +275,11 @@ class Simulator:
                 continue
             timed = name not in self._typical or (sensor is not None and sensor.parameter == LAG)
             step = sample if timed else _DIFFERENCE * self._typical[name]
-            columns.append((errors({**known, name: at + step}) - now) / step)
+            before = now
+            if sensor is not None and sensor.parameter in (LOSS, RECTIFIED) and not at:
+                before = errors({**known, name: _CUT})  # nothing leads either run
+            columns.append((errors({**known, name: at + step}) - before) / step)
         return np.column_stack(columns)
-
-    def _at(self, name: str, values: Mapping[str, float]) -> float:
-        """Value of a parameter, or of the error of a clock or a sensor."""
-        return values.get(name, self._fmu.defaults.get(name, 0.0))
 
     def weighed(self, number: int, values: Mapping[str, float]) -> Samples:
         """A recording whose errors are weighed by how sharply they depend on what is not known.
@@ -365,22 +365,23 @@ class Simulator:
         by_one_clock = in_time(self._recordings[number], lateness(self._clocks, values))
         wrong = self._wrong(values)
         read_ = corrected(by_one_clock, wrong)
-        if not read_.corrected or not any(wrong[n].bends for n in read_.signals if n in wrong):
+        own = [wrong[name] for name in read_.signals if name in wrong]
+        if not read_.corrected or not any(reading.bends for reading in own):
             return read_
-        # What leads a run are outputs as they were, which what is bent says by the run alone.
-        seen, known = read_.y, self._known(values)
-        straight = read_
+        if any(reading.loss or reading.rectified for reading in own):
+            return read_.free  # what is cut off leads nothing
+        # What leads a run are outputs as they were, which what is bent says by the run alone: first
+        # by one that nothing leads.
+        straight, known = read_.free, self._known(values)
         for _ in range(_STRAIGHTENED):
             seen = straight.y - self._predictor.errors(straight, known)
             straight = straightened(read_, seen, wrong)
         return straight
 
     def _wrong(self, values: Mapping[str, float]) -> dict[str, SensorReading]:
-        """What sensors read, of those with an error."""
         return readings(self._sensors, values)
 
     def _known(self, values: Mapping[str, float]) -> dict[str, float]:
-        """Values of the FMU's variables."""
         others = {
             *(name for name, _ in self._delays.values()),
             *self._clocks,
@@ -393,8 +394,8 @@ class Simulator:
         """Errors of samples (n, c) with sensors behind structures, as late as `values` say."""
         recording, late = self._recordings[number], lateness(self._clocks, values)
         wrong = self._wrong(values)
-        seen = self._late(number, sensed(recording, recording.y - errors, wrong), values)
-        read_ = recording.y - shifted(recording, seen, wrong)
+        seen = sensed(recording, recording.y - errors, wrong)
+        read_ = recording.y - self._late(number, seen, values)
         return mirrored(recording, read_, late) if late else read_
 
     def _late(self, number: int, signals: Matrix, values: Mapping[str, float]) -> Matrix:
