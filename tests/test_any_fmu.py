@@ -375,11 +375,13 @@ def test_a_filter_that_does_not_know_when_a_thermostat_switches_says_so(name, bu
     folder = build("THERMOSTAT", saves=True).parent
     system = load_system(folder)
     (outside,), (inside,) = system.inputs, system.outputs
-    exact, poor = replace(outside, noise=0.0), replace(inside, noise=0.3)
+    exact, poor = replace(outside, noise=0.0, held=True), replace(inside, noise=0.3)
     system = replace(system, inputs=(exact,), outputs=(poor,))
     time = 10.0 * np.arange(361.0)
     noisy = along("THERMOSTAT", time, 60.0) + 0.3 * np.random.default_rng(1).standard_normal(361)
-    columns = {"time [s]": time, "Ta [K]": 280.0 + 0.0 * time, "T [K]": noisy}
+    # A command that jumps at each sample, and is no event of the model.
+    jumps = 280.0 + 1e-3 * (-1.0) ** np.arange(361)
+    columns = {"time [s]": time, "Ta [K]": jumps, "T [K]": noisy}
     result = prepare(system, choose(system, [name])).run(
         wb.case_from_frame(system, pd.DataFrame(columns))
     )

@@ -65,7 +65,7 @@ class HybridSimulation:
         self._signs = np.sign(fmu.event_indicators())
         self._step: float | None = None
         self._events, self._piled = 0, self._t  # in this interval, and when so many were over
-        self._beyond = False  # whether it began beyond an event
+        self.passed = 0  # events but for jumps of inputs, since `start_from`, one it was beyond too
         self._kept: _Kept | None = None
 
     def begin(self, u: Vector) -> None:
@@ -118,13 +118,8 @@ class HybridSimulation:
         self._before = np.concatenate([kept.before[: kept.before.size - held.size], held])
         self._after = self._before
         self._place(self._t, self._x)
-        self._beyond = bool((np.sign(self._fmu.event_indicators()) != self._signs).any())
+        self.passed = int((np.sign(self._fmu.event_indicators()) != self._signs).any())
         self._handle_event(self._before)
-
-    @property
-    def passed(self) -> int:
-        """Events since the point where it started from, with one that it was beyond."""
-        return self._events + self._beyond
 
     def release(self) -> None:
         """Free what was kept."""
@@ -259,6 +254,7 @@ class HybridSimulation:
     def _handle_event(self, u: Vector | None = None) -> None:
         """Go through Event Mode at the present point, where inputs may jump to u."""
         self._events += 1
+        self.passed += u is None
         if self._events % _PILED == 0:
             left, took = self._end - self._t, self._t - self._piled
             if left * _PILED > took * (_MOST_EVENTS - self._events) and self._events > _PILED:
