@@ -238,7 +238,6 @@ def _evaluate(pool: Workers, candidates: Sequence[Candidate]) -> list[float]:
 
 
 def _rates(pools: Sequence[Workers], candidates: Sequence[Candidate]) -> list[float]:
-    """Candidates per second of each pool."""
     calls = [functools.partial(_evaluate, pool, candidates) for pool in pools]
     return [len(candidates) / spent for spent in in_turns(calls, _REPEATS)]
 

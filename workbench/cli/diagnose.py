@@ -56,18 +56,14 @@ def add(commands: arguments.Commands, text: str) -> argparse.ArgumentParser:
         "--list", action="store_true", help="list the effects of the library, and end"
     )
     arguments.add_platforms(parser, "the extended FMU", "native")
-    parser.add_argument(
-        "--certainty",
-        action="store_true",
-        help="also fit profile intervals of the sizes, correlations of their errors, and a "
-        "multi-start",
-    )
-    parser.add_argument(
-        "--propose",
-        action="store_true",
-        help="if something is missing that no effect explains, infer a law for it: where it acts, "
-        "on what it depends, its form (into OUT/proposed)",
-    )
+    flags = {
+        "--certainty": "also fit profile intervals of the sizes, correlations of their errors, and "
+        "a multi-start",
+        "--propose": "if something is missing that no effect explains, infer a law for it: where "
+        "it acts, on what it depends, its form (into OUT/proposed)",
+    }
+    for option, text in flags.items():
+        parser.add_argument(option, action="store_true", help=text)
     arguments.add_run(parser)
     return parser
 

@@ -45,17 +45,14 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         help="take what is proposed by name without asking, but not what only a unit speaks for",
     )
     parts = parser.add_mutually_exclusive_group()
-    parts.add_argument(
-        "--together",
-        action="store_true",
-        help="the files, with all sheets and groups, are of one recording, by several loggers",
-    )
-    parts.add_argument(
-        "--apart",
-        action="store_true",
-        help="sheets or groups with the same channels are recordings of their own, even if their "
-        "times overlap",
-    )
+    flags = {
+        "--together": "the files, with all sheets and groups, are of one recording, by several "
+        "loggers",
+        "--apart": "sheets or groups with the same channels are recordings of their own, even if "
+        "their times overlap",
+    }
+    for option, text in flags.items():
+        parts.add_argument(option, action="store_true", help=text)
     parser.add_argument(
         "--whole", action="store_true", help="do not cut a long recording into several"
     )

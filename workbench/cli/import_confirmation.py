@@ -118,7 +118,6 @@ def _format(files: Sequence[RecordedFile], proposed: ProposedRecordings, system:
 
 
 def _clocks(held: Sequence[ProposedRecording]) -> Iterator[str]:
-    """Times of recordings; those that are alike are one line."""
     rows: list[_Row] = []
     for recording in held:
         for clock in recording.proposal.clocks.values():
@@ -133,7 +132,6 @@ def _clocks(held: Sequence[ProposedRecording]) -> Iterator[str]:
 
 
 def _channels(held: Sequence[ProposedRecording], system: System) -> Iterator[str]:
-    """Channels of signals, with the range over all recordings that have them alike."""
     for signal in system.signals.values():
         scale = si_factor(signal.shown, signal.unit, signal.name)
         rows: list[_Row] = []

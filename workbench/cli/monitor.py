@@ -52,18 +52,14 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         help="false alarms of a healthy machine per recording, all quantities together "
         "(default: %(default)s, one in a hundred recordings)",
     )
-    parser.add_argument(
-        "--diagnose",
-        action="store_true",
-        help="also diagnose the last recordings, with a machine calibrated on those before the "
-        "change (into OUT/cause). Takes minutes, needs the extra [compiler]",
-    )
-    parser.add_argument(
-        "--fleet",
-        action="store_true",
-        help="watch many machines, one task for each. HISTORY may be a URL that fsspec reads, "
-        "such as s3://bucket/fleet (extra [cluster])",
-    )
+    flags = {
+        "--diagnose": "also diagnose the last recordings, with a machine calibrated on those "
+        "before the change (into OUT/cause). Takes minutes, needs the extra [compiler]",
+        "--fleet": "watch many machines, one task for each. HISTORY may be a URL that fsspec "
+        "reads, such as s3://bucket/fleet (extra [cluster])",
+    }
+    for option, text in flags.items():
+        parser.add_argument(option, action="store_true", help=text)
     parser.add_argument(
         "--cluster",
         metavar="ADDRESS",

@@ -82,7 +82,6 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
 
 
 def _read_rivals(file: Path) -> tuple[str, Rivals]:
-    """Name of the system that was diagnosed, and the candidates that are left."""
     from workbench.diagnosis.inference.rivals import read_rivals
 
     remedy = "give the folder that 'workbench diagnose' wrote, as it wrote it"

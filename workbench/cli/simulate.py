@@ -242,7 +242,6 @@ def _run_live(
 
 
 def _models(simulation: Simulation) -> dict[str, Any]:
-    """Software and models that run, and always the observer's model."""
     from workbench.pages.provenance import models, software
     from workbench.system.system import OBSERVER
 

@@ -303,7 +303,6 @@ class _Run:
         return search(self.pool, self.problem.job, self.problem.space, on, self.plan, kept)
 
     def examine(self, tuned: TuningResult) -> TuningResult:
-        """Find out what gains are worth; Ctrl-C leaves out the rest."""
         pool, problem, folds = self.pool, self.problem, self.plan.folds
         job = problem.job
         try:

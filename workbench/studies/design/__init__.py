@@ -159,7 +159,6 @@ def _predict_all(
     *,
     in_full: bool = False,
 ) -> list[Prediction]:
-    """What experiments would tell, those that would count."""
     tasks = [
         pool.submit(ExperimentPredictor.predict_experiment, experiment, number, None, in_full)
         for number, experiment in enumerate(plan, 1)

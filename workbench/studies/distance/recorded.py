@@ -171,7 +171,6 @@ def _command(case: Case, rising: DrivenInput) -> float:
 
 
 def _at_rest(case: Case, speed: Vector, command: float, stopping: Stopping) -> int:
-    """First sample at rest after the command."""
     slow = (case.time > command) & (speed <= stopping.rest)
     if not slow.any():
         raise InputError(

@@ -125,7 +125,6 @@ class RecordingEstimator:
         )
 
     def _filter(self, parameters: Mapping[str, float]) -> ExtendedKalmanFilter:
-        """The filter on the model with the parameters of conditions."""
         key = tuple(sorted(parameters.items()))
         if key not in self._filters:
             model = self._model.variant(parameters)

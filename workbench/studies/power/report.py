@@ -416,7 +416,6 @@ def _curves(effects: Mapping[str, Any]) -> "Figure":
 
 
 def _confusion(confusion: Mapping[str, Mapping[str, int]], names: Sequence[str]) -> "Figure":
-    """Planted by named, each row in percent."""
     named = {name for row in confusion.values() for name in row}
     order = ["nothing", *names, "partly explained", "unexplained", "failed"]
     columns = [name for name in order if name in named or name in confusion]
@@ -436,7 +435,6 @@ def _confusion(confusion: Mapping[str, Mapping[str, int]], names: Sequence[str])
 
 
 def _coverage(summary: Mapping[str, Any]) -> "Figure":
-    """Share of the 95 % intervals that contain the truth, by effect."""
     rows = {name: effect["coverage"] for name, effect in summary["effects"].items()}
     rows = {name: row for name, row in rows.items() if row["of"]} | {"all": summary["coverage"]}
     with styled(7.5, 1.2 + 0.22 * len(rows), font_size=8) as sheet:
