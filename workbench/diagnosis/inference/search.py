@@ -204,7 +204,7 @@ def _simulated_start(fit: Fit, best: FittedModel, score: CandidateScore) -> Cand
         return None
     if fit.free:
         return _grown_start(fit, best, score)
-    if effect.size in (LOSS, RECTIFIED):
+    if effect.sensor and effect.size in (LOSS, RECTIFIED):
         return replace(score, size=1.0)  # other starts fit what is cut off: only a fit tells
     tried = [
         float(np.clip(way * effect.matters * step, low, high)) for way in ways for step in _SIZES

@@ -57,7 +57,7 @@ def by_themselves(
     base, best : the nominal model and the last one, with all derivatives.
     clean : whether the last one leaves nothing that lasts.
     """
-    if clean and all(effect.size == DELAY for effect in best.active):
+    if clean and all(effect.late and effect.size == DELAY for effect in best.active):
         return None  # of signals by themselves
     clocks = list(fit.own_clocks)
     other, least = fit.beside(clocks), fit.least_skew

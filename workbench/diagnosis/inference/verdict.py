@@ -570,10 +570,10 @@ def _apart_by_starts(fit: Fit, effect: Effect) -> list[str]:
     A linear model behind a lag is a lag behind that model. A recording that begins in motion does
     not say where either lag begins.
     """
-    if effect.size != LAG or len(fit.recorded) != 2:
+    if not effect.sensor or effect.size != LAG or len(fit.recorded) != 2:
         return []
     others = fit.unknowns.effects.values()
-    return [e.name for e in others if e.size == LAG and e.model != effect.model]
+    return [e.name for e in others if e.sensor and e.size == LAG and e.model != effect.model]
 
 
 def _cause(fit: Fit, chosen: Selection, effect: Effect, *, noise_alone: bool) -> Cause:
