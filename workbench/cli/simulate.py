@@ -27,6 +27,9 @@ WORKERS_NEED = ("workbench.observers.simulation", "workbench.observers.report")
 
 # That a run holds at its peak for each number of the recording: measured, EKF of the wheelset.
 _NUMBERS = 40
+# Numbers of all estimates that are written as CSV unasked: 20 MB, of ten characters each. What is
+# larger opens slowly in the programs that people read CSV with.
+_SMALL = 2_000_000
 
 
 def add(commands: arguments.Commands, text: str) -> argparse.ArgumentParser:
@@ -36,8 +39,8 @@ def add(commands: arguments.Commands, text: str) -> argparse.ArgumentParser:
         "simulate",
         help=text,
         description="Run all estimators on recordings. Write a page to read (index.html), and "
-        "beside it scores (summary.json) and data (NAME.npz). 'workbench results FOLDER --csv' "
-        "turns data into CSV.",
+        "beside it scores (summary.json) and data (NAME.npz, and NAME.csv if they are small). "
+        "'workbench results FOLDER --csv' turns data into CSV.",
         epilog="examples:\n"
         "  workbench simulate\n"
         f"  workbench simulate {own} --out /tmp/one\n"
@@ -75,7 +78,11 @@ def add(commands: arguments.Commands, text: str) -> argparse.ArgumentParser:
         action="store_true",
         help="show each run in a window as it goes, one after the other",
     )
-    parser.add_argument("--csv", action="store_true", help="write data as NAME.csv, too")
+    parser.add_argument(
+        "--csv",
+        action="store_true",
+        help="write data as NAME.csv, too, however large (otherwise up to about 20 MB in all)",
+    )
     parser.add_argument(
         "--figures", action="store_true", help="write figures of the page as NAME.png and NAME.svg"
     )
@@ -149,7 +156,11 @@ def _run(
         for name, meaning in simulation.meanings().items()
         if name in settings
     }
-    suffixes = ("npz", *["csv"] * options.csv, *["png", "svg"] * options.figures)
+    # Each estimate has a band.
+    width = len(cases[0].signals) + 2 * len(chosen) * len(system.columns)
+    small = width * sum(case.time.size for case in cases) <= _SMALL
+    with_csv = options.csv or small
+    suffixes = ("npz", *["csv"] * with_csv, *["png", "svg"] * options.figures)
     write = partial(_write, options.out, suffixes)
     if window is None:
         runs = simulate(simulation, cases, options.workers, write)
@@ -179,6 +190,8 @@ def _run(
         figures = [case_figure(result) for result in results]
         write_page(system, summary, figures, len(cases), page, suffixes)
         line = f"{len(results)} of {len(cases)} cases; to read: {page}, data beside it"
+        if not with_csv:
+            line += f" (as CSV: workbench results {arguments.nearby(options.out)} --csv)"
         output.result(line)
     if window is not None and not interrupted:
         window.wait()
