@@ -1,5 +1,6 @@
 """Models that are not smooth, autonomous and all Real: estimates are right, or refused in words."""
 
+import json
 import re
 import subprocess
 import zipfile
@@ -352,6 +353,15 @@ def test_kalman_filters_go_through_impacts_that_reverse_a_speed(name, tmp_path):
         assert not law.doubt
     assert square == pytest.approx(1.0, abs=5.0 * np.sqrt(2.0 / 1592.0))
     assert (inside > 0.93).all()
+
+
+@pytest.mark.parametrize("saves", [True, False])
+def test_the_check_says_that_kalman_filters_need_a_saved_state_for_events(saves, build, capsys):
+    path = build("THERMOSTAT", saves=saves)
+    assert main(["fmu", "check", str(path), "--instantiations", "3", "--json"]) == 1
+    possible = json.loads(capsys.readouterr().out)["result"]["uses"]
+    assert possible["ekf and ukf on recordings"] == ([] if saves else ["smoothness"])
+    assert possible["other observers on recordings"] == ["smoothness"]
 
 
 def bouncing(folder: Path) -> Path:

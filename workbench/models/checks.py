@@ -81,7 +81,7 @@ SAMPLE = 5000.0
 
 # The questions: findings without an answer. Bits are either the same or not, hence limits of 0.
 START = CheckResult("start", limit=1, unit="instances")
-# The step of an observer takes the model for smooth: it would pass over a jump.
+# The step of most observers takes the model for smooth: it would pass over a jump.
 EVENTS = CheckResult("smoothness", limit=0, unit="event indicators")
 RESET = CheckResult("reset and replay", limit=0.0)
 INJECTION = CheckResult("state injection", limit=0.0)
@@ -101,13 +101,15 @@ TIME_SET = CheckResult("time of inputs", limit=SAMPLE, unit="us")
 TIME_DERIVATIVES = CheckResult("time of states and derivatives", limit=SAMPLE, unit="us")
 TIME_STEP = CheckResult("time of states and step", limit=SAMPLE, unit="us")
 
-# Every estimator sets states and steps by the Jacobian; none rolls back, so far. What makes many
-# instances are tuning, fit and diagnosis, the last two of which simulate through events; what rolls
-# back are other tools.
+# Every estimator sets states and steps by the Jacobian. Kalman filters go through events where they
+# can roll back. What makes many instances are tuning, fit and diagnosis, the last two of which
+# simulate through events.
 _OBSERVING = (START, EVENTS, RESET, INJECTION, DERIVATIVES)
+_KALMAN = "ekf and ukf on recordings"
 _USES = {
     "open loop": (START, RESET),
-    "observers on recordings": _OBSERVING,
+    _KALMAN: _OBSERVING,
+    "other observers on recordings": _OBSERVING,
     "tuning": (*_OBSERVING, INSTANCES, LOADS, MEMORY),
     "fit and diagnosis": (START, RESET, INJECTION, DERIVATIVES, INSTANCES, LOADS, MEMORY),
     "observers beside a running rig": (
@@ -127,11 +129,15 @@ def uses(findings: Iterable[CheckResult]) -> dict[str, list[str]]:
 
     Exported observers are made of Modelica classes, not of FMUs.
     """
+    findings = list(findings)
     failed = {finding.name for finding in findings if finding.passed is False}
-    return {
+    possible = {
         use: [question.name for question in questions if question.name in failed]
         for use, questions in _USES.items()
     }
+    if any(finding.name == ROLLBACK.name and finding.passed for finding in findings):
+        possible[_KALMAN] = [name for name in possible[_KALMAN] if name != EVENTS.name]
+    return possible
 
 
 def _kept(sha256: str) -> Path:
