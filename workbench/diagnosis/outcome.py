@@ -233,6 +233,8 @@ class Outcome:
         hidden = {
             effect: f"the level {name} has the same signature; give its spread in "
             "[diagnosis.levels], or take it out there"
+            if name
+            else "the start of the one recording has the same signature; fit several recordings"
             for effect, name in levels.items()
         }
         return {**found.not_visible, **hidden}

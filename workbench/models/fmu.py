@@ -28,6 +28,7 @@ from workbench.models.archive import unpack
 from workbench.models.description import (
     CO_SIMULATION,
     MODEL_EXCHANGE,
+    OWN_TOOL,
     Description,
     Variable,
     read_description,
@@ -613,6 +614,18 @@ class FMU:
         )
         self._variants: list[FMU] = []
 
+    def states_derivatives(self, unknowns: NDArray[np.uint32]) -> bool:
+        """Whether the FMU states directional derivatives of these variables, by value reference.
+
+        FMI asks for those of outputs and rates only; some tools refuse all others (FMI 2.0.4,
+        section 2.1.9). FMUs that were built here have those of all variables.
+        """
+        if self.has_directional_derivatives and not self.description.tool.startswith(OWN_TOOL):
+            outputs = self.references(list(filter(self.is_real, self.outputs)))
+            asked = {*self.rate_references.tolist(), *outputs.tolist()}
+            return asked.issuperset(unknowns.tolist())
+        return self.has_directional_derivatives
+
     @cached_property
     def _state_variables(self) -> Variables:
         return self.variables(self.states)
@@ -903,14 +916,14 @@ class FMU:
     def jacobian(self, unknowns: NDArray[np.uint32], knowns: Variables) -> Matrix:
         """Derivatives d(unknowns)/d(knowns), (rows, columns).
 
-        Directional derivatives of the FMU; central differences where it offers none. Knowns are
+        Directional derivatives of the FMU; central differences where it states none. Knowns are
         states, inputs or tunable parameters; unknowns are value references.
         """
         columns = knowns.references.size
         result = np.zeros((columns, unknowns.size))
         if not result.size:
             return result.T
-        if not self.has_directional_derivatives:
+        if not self.states_derivatives(unknowns):
             return self._difference(unknowns, knowns)
         seed = np.ones(1)
         for j in range(columns):

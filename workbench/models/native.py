@@ -142,6 +142,7 @@ def instance(
     if not only_read:
         _refuse_discrete(fmu, [*inputs, *corrections])
         fmu.variables([*inputs, *outputs, *fmu.states])
+    unknowns = np.concatenate([fmu.rate_references, fmu.references(outputs)])
     return Instance(
         address=fmu.instance_address,
         set_states=fmu.function_address("set_states"),
@@ -152,7 +153,7 @@ def instance(
         set_time=fmu.function_address("time"),
         get_indicators=fmu.function_address("indicators"),
         complete_step=fmu.function_address("complete_step") if fmu.needs_completed_steps else 0,
-        fmi=int(fmu.version[0]) if fmu.has_directional_derivatives else 0,
+        fmi=int(fmu.version[0]) if fmu.states_derivatives(unknowns) else 0,
         measured=m,
         time=fmu.time,
         indicators=np.zeros(fmu.event_signs.size),
@@ -168,7 +169,7 @@ def instance(
         seed=np.ones(1),
         inputs=fmu.references([*inputs, *corrections]),
         outputs=fmu.references(outputs),
-        unknowns=np.concatenate([fmu.rate_references, fmu.references(outputs)]),
+        unknowns=unknowns,
         knowns=fmu.references([*fmu.states, *corrections]),
     )
 
