@@ -255,6 +255,11 @@ def swing(tmp_path_factory: pytest.TempPathFactory) -> System:
 
 def swung(law, start: float, time) -> np.ndarray:
     """Position of the swing with a law of friction, by a solver of its own, (n,)."""
+    return motion(law, start, time)[0]
+
+
+def motion(law, start: float, time) -> np.ndarray:
+    """Position and speed of the swing, (2, n)."""
     return solve_ivp(
         lambda _t, x: [x[1], -10.0 * x[0] - law(x[1])],
         (0.0, time[-1]),
@@ -263,7 +268,7 @@ def swung(law, start: float, time) -> np.ndarray:
         t_eval=time,
         rtol=1e-8,
         atol=1e-10,
-    ).y[0]
+    ).y
 
 
 @pytest.mark.parametrize(("form", "size"), [("Coulomb", 0.4), ("Viscous", 0.3), ("Quadratic", 0.5)])
@@ -338,13 +343,46 @@ def test_errors_far_above_noise_are_never_nothing(swing, tmp_path):
     assert outcome.diagnosis.verdict == "unexplained"
 
 
+@pytest.mark.long
+def test_friction_of_three_parts_is_named_with_each(swing, tmp_path):
+    """What fades with speed gains nothing beside dry friction, without what rises with speed."""
+
+    def law(v):
+        rubs = np.tanh(v / 1e-3)
+        return 0.25 * rubs + 0.5 * rubs * np.exp(-abs(v) / 0.5) + 0.05 * v
+
+    speed = 'unit = "m/s"\nnoise = "3 mm/s"\nscale = "2 m/s"\n'
+    text = (swing.source).read_text().replace("Swing.fmu", str(swing.source.parent / "Swing.fmu"))
+    (tmp_path / "system.toml").write_text(f"{text}\n[outputs.v]\n{speed}")
+    system = load_system(tmp_path)
+    rng, time = np.random.default_rng(3), np.arange(0.0, 6.005, 0.01)
+    for number, start in enumerate((1.5, 1.0, -1.2)):
+        s, v = motion(law, start, time)
+        columns = {
+            "time [s]": time,
+            "s [m]": s + 1e-3 * rng.standard_normal(time.size),
+            "v [m/s]": v + 3e-3 * rng.standard_normal(time.size),
+        }
+        write_case(tmp_path / f"recordings/{number}", columns, "Released")
+    cases = read_cases(tmp_path / "recordings", system)
+    outcome = diagnose(system, cases, out=tmp_path, workers=1, report=lambda line: None)
+    causes = {cause.effect.name: cause.parameters for cause in outcome.diagnosis.causes}
+    sizes = {"CoulombTerm[v]": 0.25, "StribeckTerm[v]": 0.5, "ViscousTerm[v]": 0.05}
+    assert causes.keys() == sizes.keys()
+    for name, size in sizes.items():
+        interval = causes[name]["coefficient"]
+        assert interval.low < size < interval.high
+    # A rest within a sample is simulated as one at its end: sizes are those to a fifth.
+    assert causes["StribeckTerm[v]"]["speed"].value == pytest.approx(0.5, rel=0.2)
+
+
 def test_an_fmu_around_another_has_its_rates_and_derivatives_with_terms(swing, tmp_path):
     inner = swing.source.parent / "Swing.fmu"
     with FMU(inner) as model:
-        terms = rate_terms(model)
+        terms = rate_terms(model, swing)
     # The rate of the position is the speed itself: what moves it acts on the speed.
     assert [term.name for term in terms] == [
-        f"added.{form}.v" for form in ("coulomb", "viscous", "quadratic", "constant")
+        f"added.{form}.v" for form in ("coulomb", "stribeck", "viscous", "quadratic", "constant")
     ]
     path = tmp_path / "Extended.fmu"
     write_extended(inner, path, terms, {"added.viscous.v": 0.3}, {"c": 20.0})
@@ -358,14 +396,23 @@ def test_an_fmu_around_another_has_its_rates_and_derivatives_with_terms(swing, t
         assert_allclose(model.derivatives()[at], [-0.7, acceleration], rtol=1e-14)
         jacobian = model.state_jacobian()[np.ix_(at, at)]
         assert_allclose(jacobian, [[0.0, 1.0], [-20.0, -0.3 - 2.0 * 0.5 * 0.7]], rtol=1e-12)
+        # (c, v_S) -> -c tanh(v/w) exp(-|v|/v_S), which rubs in full at 0.7 m/s
+        rubbing, speed = "added.stribeck.v", "added.stribeck.v.speed"
+        model.start({rubbing: 0.5, speed: 0.4, "added.viscous.v": 0.0})
+        model.set_states(x)
+        left = np.exp(-0.7 / 0.4)
+        assert_allclose(model.derivatives()[at[1]], -4.0 + 0.5 * left, rtol=1e-14)
+        by = model.jacobian(model.rate_references, model.variables([*model.states, rubbing, speed]))
+        slopes = [-20.0, 0.5 * left / 0.4, left, 0.5 * left * 0.7 / 0.4**2]
+        assert_allclose(by[at[1]], np.array(slopes)[[*at, 2, 3]], rtol=1e-12)
         model.start({})  # reset: what was set is gone, what was written stays
         model.set_states(x)
         assert_allclose(model.derivatives()[at], [-0.7, -4.0 + 0.3 * 0.7], rtol=1e-14)
 
 
-def test_no_fmu_is_built_around_one_of_fmi_3(tmp_path):
+def test_no_fmu_is_built_around_one_of_fmi_3(tank, tmp_path):
     path = build_text(tmp_path, SWING, fmi=3)
     with FMU(path) as model:
-        assert rate_terms(model) == ()
+        assert rate_terms(model, tank) == ()
     with pytest.raises(InputError, match=re.escape("expected Model Exchange of FMI 2.0")):
         write_extended(path, tmp_path / "Extended.fmu", [], {}, {})

@@ -163,7 +163,7 @@ def test_a_figure_that_cannot_be_written_costs_no_numbers(root, tmp_path, monkey
     assert printed.err.count("warning: ") == 2
     assert "open_loop" in printed.out
     written = sorted(path.name for path in tmp_path.iterdir() if path.is_file())
-    assert written == [f"{name}.npz", "index.html", "summary.json"]
+    assert written == [f"{name}.csv", f"{name}.npz", "index.html", "summary.json"]
 
 
 def test_what_fills_the_disk_leaves_no_half_of_a_file(tmp_path):

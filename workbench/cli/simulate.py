@@ -39,8 +39,8 @@ def add(commands: arguments.Commands, text: str) -> argparse.ArgumentParser:
         "simulate",
         help=text,
         description="Run all estimators on recordings. Write a page to read (index.html), and "
-        "beside it scores (summary.json) and data (NAME.npz, and NAME.csv if they are small). "
-        "'workbench results FOLDER --csv' turns data into CSV.",
+        "beside it scores (summary.json) and data (NAME.npz). Small data are written as NAME.csv, "
+        "too; of large data, the command 'workbench results FOLDER --csv' does that.",
         epilog="examples:\n"
         "  workbench simulate\n"
         f"  workbench simulate {own} --out /tmp/one\n"

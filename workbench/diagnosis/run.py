@@ -17,7 +17,12 @@ from workbench.diagnosis.data.sensors import (
 )
 from workbench.diagnosis.effects.candidates import COEFFICIENT, rate_terms, with_starts
 from workbench.diagnosis.effects.catalogue import Effect
-from workbench.diagnosis.effects.extension import ExtendedModel, build, parameter_of
+from workbench.diagnosis.effects.extension import (
+    ExtendedModel,
+    build,
+    parameter_of,
+    variables,
+)
 from workbench.diagnosis.inference.certainty import assess
 from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.residuals import dependences, residuals
@@ -157,7 +162,7 @@ def _with_model(
         with open_model(problem.system) as model:
             problem = replace(problem, system=with_starts(problem.system, model))
             asked = {effect.parameter for effect in problem.effects}
-            terms = [term for term in rate_terms(model) if term.name in asked]
+            terms = [term for term in rate_terms(model, problem.system) if term.name in asked]
         if terms:
             report(f"building an FMU around {model.path.name} with {len(terms)} terms")
             write_extended(model.path, everything, terms, {}, {})
@@ -257,7 +262,7 @@ class _Conclusion:
     def _extend_alone(self) -> Extension | None:
         """Write an FMU around the one that is diagnosed, if a parameter or a rate is wrong."""
         with open_model(self.problem.system) as model:
-            terms = {term.name: term for term in rate_terms(model)}
+            terms = {term.name: term for term in rate_terms(model, self.problem.system)}
             defaults, names, path = dict(model.defaults), model.names, model.path
             fit = MODEL_EXCHANGE in model.description.interfaces and model.version == "2.0"
         sizes = {
@@ -268,6 +273,13 @@ class _Conclusion:
         if not sizes or not fit:
             return None
         self.engine.report("building the extended model")
+        point = self.diagnosis.best.point
+        speeds = {
+            variables(effect, shape)[0]: float(point.sizes[effect.name, shape])
+            for effect in self.diagnosis.best.active
+            if effect.parameter in terms
+            for shape, _ in effect.shapes
+        }
         added = {name: float(size) for name, size in sizes.items() if name in terms}
         changed = {
             names.get(name, name): defaults[name] + float(size)
@@ -279,9 +291,9 @@ class _Conclusion:
         folder = self.engine.out / "model"
         folder.mkdir(parents=True, exist_ok=True)
         extended = folder / f"{EXTENDED}.fmu"
-        write_extended(path, extended, [terms[name] for name in added], added, changed)
+        write_extended(path, extended, [terms[name] for name in added], added | speeds, changed)
         # A start differs between recordings beside.
-        written = frozenset(sizes) - frozenset(self.fit.unknowns.local)
+        written = frozenset(sizes | speeds) - frozenset(self.fit.unknowns.local)
         return Extension(None, extended, self._difference(extended, written))
 
     def _difference(self, path: Path, own: Collection[str]) -> float:

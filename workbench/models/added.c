@@ -1,7 +1,8 @@
 /* A Model Exchange FMU (FMI 2.0) around another one, with terms beside the rates of its states.
 
    All calls go to the inner FMU, which lies unpacked below the resources. Variables from FIRST on are
-   the coefficients of the terms: rate[i] = inner rate[i] + sum of coefficient * form(state[i]).
+   the coefficients of the terms, then their speeds, of which a Stribeck term alone makes use:
+   rate[i] = inner rate[i] + sum of coefficient * form(state[i], speed).
    Parameters of the inner FMU that differ from its own are set as it is instantiated. */
 
 #include <dlfcn.h>
@@ -25,7 +26,7 @@
 typedef struct {
     void *library;
     fmi2Component inner;
-    double coefficient[TERMS];
+    double own[OWN_VARIABLES];
 #define POINTER(name) fmi2##name##TYPE *name;
     INNER(POINTER)
 #undef POINTER
@@ -33,16 +34,24 @@ typedef struct {
 
 typedef struct {
     fmi2FMUstate inner;
-    double coefficient[TERMS];
+    double own[OWN_VARIABLES];
 } Saved;
 
-/* Value of a form at x, and its derivative. A Coulomb term is smooth within `width` of rest. */
-static double form(const Term *term, double x, double *slope) {
+/* Value of a form at x, its derivatives by x and by the speed. Friction is smooth within `width` of
+   rest. A Stribeck term is -tanh(x / width) exp(-|x| / speed). */
+static double form(const Term *term, double x, double speed, double *slope, double *by_speed) {
+    *by_speed = 0.0;
     switch (term->form) {
         case COULOMB: {
             double t = tanh(x / term->width);
             *slope = -(1.0 - t * t) / term->width;
             return -t;
+        }
+        case STRIBECK: {
+            double t = tanh(x / term->width), left = exp(-fabs(x) / speed);
+            *slope = left * ((x < 0.0 ? -t : t) / speed - (1.0 - t * t) / term->width);
+            *by_speed = -t * left * fabs(x) / (speed * speed);
+            return -t * left;
         }
         case VISCOUS:
             *slope = -1.0;
@@ -61,16 +70,19 @@ static double sum(const Model *m, size_t state, double x, double *slope) {
     double total = 0.0;
     *slope = 0.0;
     for (size_t k = 0; k < TERMS; k++) {
-        if (terms[k].state != state || m->coefficient[k] == 0.0) continue;
-        double by_state;
-        total += m->coefficient[k] * form(&terms[k], x, &by_state);
-        *slope += m->coefficient[k] * by_state;
+        if (terms[k].state != state || m->own[k] == 0.0) continue;
+        double by_state, by_speed;
+        total += m->own[k] * form(&terms[k], x, m->own[TERMS + k], &by_state, &by_speed);
+        *slope += m->own[k] * by_state;
     }
     return total;
 }
 
 static fmi2Status change(Model *m) {
-    for (size_t k = 0; k < TERMS; k++) m->coefficient[k] = terms[k].start;
+    for (size_t k = 0; k < TERMS; k++) {
+        m->own[k] = terms[k].start;
+        m->own[TERMS + k] = terms[k].speed;
+    }
     return CHANGED ? m->SetReal(m->inner, changed, CHANGED, values) : fmi2OK;
 }
 
@@ -154,7 +166,7 @@ fmi2Status fmi2Reset(fmi2Component c) {
 }
 
 /* One call of the inner FMU for a run of variables that are its own. */
-#define OWN(vr) ((vr) >= FIRST && (vr) < FIRST + TERMS)
+#define OWN(vr) ((vr) >= FIRST && (vr) < FIRST + 2 * TERMS)
 
 static int rate_of(fmi2ValueReference vr, size_t *state) {
     for (size_t i = 0; i < STATES; i++)
@@ -168,7 +180,7 @@ fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n,
     for (size_t k = 0, end; k < n; k = end) {
         end = k + 1;
         if (OWN(vr[k])) {
-            m->coefficient[vr[k] - FIRST] = value[k];
+            m->own[vr[k] - FIRST] = value[k];
             continue;
         }
         while (end < n && !OWN(vr[end])) end++;
@@ -185,7 +197,7 @@ fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n,
     for (size_t k = 0, end; k < n; k = end) {
         end = k + 1;
         if (OWN(vr[k])) {
-            value[k] = m->coefficient[vr[k] - FIRST];
+            value[k] = m->own[vr[k] - FIRST];
             continue;
         }
         while (end < n && !OWN(vr[end])) end++;
@@ -217,7 +229,7 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReferenc
                                         const fmi2Real by[], fmi2Real result[]) {
     Model *m = c;
     fmi2ValueReference inner[KNOWNS];
-    double seed[KNOWNS], x[STATES + 1], slope, by_own;
+    double seed[KNOWNS], x[STATES + 1], slope, by_speed;
     size_t count = 0, i;
     if (nk > KNOWNS) return fmi2Error;
     for (size_t k = 0; k < nk; k++) {
@@ -234,9 +246,13 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReferenc
         if (!rate_of(unknown[j], &i)) continue;
         sum(m, i, x[i], &slope);
         for (size_t k = 0; k < nk; k++) {
+            double by_state;
             if (known[k] == states[i]) result[j] += slope * by[k];
-            if (OWN(known[k]) && terms[known[k] - FIRST].state == i)
-                result[j] += form(&terms[known[k] - FIRST], x[i], &by_own) * by[k];
+            if (!OWN(known[k])) continue;
+            size_t own = known[k] - FIRST, term = own % TERMS;
+            if (terms[term].state != i) continue;
+            double value = form(&terms[term], x[i], m->own[TERMS + term], &by_state, &by_speed);
+            result[j] += (own < TERMS ? value : m->own[term] * by_speed) * by[k];
         }
     }
     return status;
@@ -246,7 +262,7 @@ fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state) {
     Model *m = c;
     Saved *saved = *state ? *state : calloc(1, sizeof *saved);
     if (!saved) return fmi2Error;
-    memcpy(saved->coefficient, m->coefficient, sizeof saved->coefficient);
+    memcpy(saved->own, m->own, sizeof saved->own);
     *state = saved;
     return m->GetFMUstate(m->inner, &saved->inner);
 }
@@ -254,7 +270,7 @@ fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state) {
 fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state) {
     Model *m = c;
     Saved *saved = state;
-    memcpy(m->coefficient, saved->coefficient, sizeof saved->coefficient);
+    memcpy(m->own, saved->own, sizeof saved->own);
     return m->SetFMUstate(m->inner, saved->inner);
 }
 

@@ -20,26 +20,31 @@ from workbench.models.archive import DESCRIPTION
 from workbench.models.description import MODEL_EXCHANGE, Description, read_description
 from workbench.models.trial import derivatives_hold
 
-COULOMB, VISCOUS, QUADRATIC, CONSTANT = "coulomb", "viscous", "quadratic", "constant"
+COULOMB, STRIBECK, VISCOUS = "coulomb", "stribeck", "viscous"
+QUADRATIC, CONSTANT = "quadratic", "constant"
+SPEED = "speed"  # of a Stribeck term, at which 1/e is left
 _IDENTIFIER, _INNER = "Extended", "inner"
 _HEADERS = Path(fmpy.__file__).parent / "c-code"
 _MOST_KNOWNS = 4096  # of one directional derivative
+_SMOOTH = 1e-3  # of a state's size, within which friction is smooth
 
 
 @dataclass(frozen=True)
 class RateTerm:
     """A term beside the rate of a state.
 
-    The rate gains -tanh(x/width), -x, -x*abs(x) or 1, times a coefficient.
+    The rate gains -tanh(x/width), -tanh(x/width)*exp(-abs(x)/speed), -x, -x*abs(x) or 1, times a
+    coefficient. The exponent is that of A. Tustin (1947), J. IEE 94(IIA), 143-151.
 
     Attributes
     ----------
     name : of its coefficient, a parameter of the FMU.
     state : place in the FMU's continuous states.
-    form : COULOMB, VISCOUS, QUADRATIC or CONSTANT.
+    form : COULOMB, STRIBECK, VISCOUS, QUADRATIC or CONSTANT.
     typical : size of the coefficient, in its unit; bounds are 1000 times that.
     unit : of the coefficient, empty for none.
-    width : of the state within which a Coulomb term is smooth.
+    scale : typical size of the state; the speed of a Stribeck term begins at a third of it.
+    state_unit : of the state and of the speed, empty for none.
     text : what it is, for people.
     """
 
@@ -48,7 +53,8 @@ class RateTerm:
     form: str
     typical: float
     unit: str
-    width: float
+    scale: float
+    state_unit: str
     text: str
 
 
@@ -63,7 +69,7 @@ def write_extended(
 
     Parameters
     ----------
-    coefficients : start values of terms by name; others are 0.
+    coefficients : start values of terms by name, 0 for others; and of speeds, NAME.speed.
     parameters : values of the inner FMU's own, by its names.
 
     Raises
@@ -141,10 +147,10 @@ def _header(
     """What `added.c` must know."""
     references = {v.name: v.reference for v in description.variables}
     first = max(references.values()) + 1
-    forms = {COULOMB: "COULOMB", VISCOUS: "VISCOUS", QUADRATIC: "QUADRATIC", CONSTANT: "CONSTANT"}
     rows = [
-        f"{{{t.state}, {forms[t.form]}, {coefficients.get(t.name, 0.0)!r}, {t.width!r}}}"
-        for t in terms
+        f"{{{term.state}, {term.form.upper()}, {coefficients.get(term.name, 0.0)!r}, "
+        f"{_SMOOTH * term.scale!r}, {_speed(term, coefficients)!r}}}"
+        for term in terms
     ]
     values = [repr(float(value)) for value in parameters.values()]
     # C knows no empty arrays: one more entry than is used.
@@ -157,14 +163,19 @@ def _header(
 #define STATES {len(description.states)}u
 #define CHANGED {len(parameters)}u
 #define KNOWNS {_MOST_KNOWNS}
-enum {{ COULOMB, VISCOUS, QUADRATIC, CONSTANT }};
-typedef struct {{ size_t state; int form; double start, width; }} Term;
-static const Term terms[] = {{{", ".join([*rows, "{0, CONSTANT, 0.0, 1.0}"])}}};
+#define OWN_VARIABLES (2 * TERMS + 1)
+enum {{ COULOMB, STRIBECK, VISCOUS, QUADRATIC, CONSTANT }};
+typedef struct {{ size_t state; int form; double start, width, speed; }} Term;
+static const Term terms[] = {{{", ".join([*rows, "{0, CONSTANT, 0.0, 1.0, 1.0}"])}}};
 static const fmi2ValueReference states[] = {_array(references, description.states)};
 static const fmi2ValueReference rates[] = {_array(references, description.rates)};
 static const fmi2ValueReference changed[] = {_array(references, parameters)};
 static const fmi2Real values[] = {{{", ".join([*values, "0.0"])}}};
 """
+
+
+def _speed(term: RateTerm, coefficients: Mapping[str, float]) -> float:
+    return float(coefficients.get(f"{term.name}.{SPEED}", term.scale / 3.0))
 
 
 def _array(references: Mapping[str, int], names: Sequence[str] | Mapping[str, float]) -> str:
@@ -197,33 +208,43 @@ def _described(
         units = ElementTree.Element("UnitDefinitions")
         root.insert(list(root).index(exchange) + 1, units)
     known = {unit.get("name") for unit in units}
-    for unit in dict.fromkeys(term.unit for term in terms if term.unit not in {*known, ""}):
+    asked = [unit for term in terms for unit in (term.unit, term.state_unit)]
+    for unit in dict.fromkeys(unit for unit in asked if unit not in {*known, ""}):
         ElementTree.SubElement(units, "Unit", name=unit)
     for variable in variables:
         if (value := parameters.get(variable.get("name", ""))) is not None:
             next(iter(variable.iterfind("Real"))).set("start", repr(float(value)))
     first = max(v.reference for v in inner.variables) + 1
+
+    def add(name: str, reference: int, text: str, **real: str) -> None:
+        """Add a tunable parameter; an empty unit is none."""
+        of_all = {"causality": "parameter", "variability": "tunable", "description": text}
+        place = {"name": name, "valueReference": str(reference), **of_all}
+        entry = ElementTree.SubElement(variables, "ScalarVariable", place)
+        ElementTree.SubElement(entry, "Real", {key: value for key, value in real.items() if value})
+
     for k, term in enumerate(terms):
-        entry = ElementTree.SubElement(
-            variables,
-            "ScalarVariable",
-            name=term.name,
-            valueReference=str(first + k),
-            description=term.text,
-            causality="parameter",
-            variability="tunable",
-        )
-        least = -1e3 * term.typical if term.form == CONSTANT else 0.0
-        real = ElementTree.SubElement(
-            entry,
-            "Real",
+        add(
+            term.name,
+            first + k,
+            term.text,
             start=repr(coefficients.get(term.name, 0.0)),
             nominal=repr(term.typical),
-            min=repr(least),
+            min=repr(-1e3 * term.typical if term.form == CONSTANT else 0.0),
             max=repr(1e3 * term.typical),
+            unit=term.unit,
         )
-        if term.unit:
-            real.set("unit", term.unit)
+        if term.form == STRIBECK:
+            add(
+                f"{term.name}.{SPEED}",
+                first + len(terms) + k,
+                "at which 1/e of it is left",
+                start=repr(_speed(term, coefficients)),
+                nominal=repr(term.scale),
+                min=repr(_SMOOTH * term.scale),
+                max=repr(1e3 * term.scale),
+                unit=term.state_unit,
+            )
     # A rate depends on its own state now, which the inner FMU need not say.
     for unknown in structure.iterfind("Derivatives/Unknown") if structure is not None else ():
         for key in ("dependencies", "dependenciesKind"):

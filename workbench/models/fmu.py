@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path, PurePosixPath
 from typing import Any, NamedTuple, Self
+from weakref import WeakMethod
 
 import numpy as np
 from fmpy import fmi2, fmi3
@@ -131,6 +132,17 @@ class EventUpdate(NamedTuple):
     nominals_changed: bool
 
 
+def _weakly(method: Callable[..., None]) -> Callable[..., None]:
+    """Call a method while its object lives: a cycle would keep an FMU that nobody uses loaded."""
+    reference = WeakMethod(method)
+
+    def call(*arguments: Any) -> None:
+        if (living := reference()) is not None:
+            living(*arguments)
+
+    return call
+
+
 class FMUInstance:
     """An FMU that is unpacked and loaded, with one instance.
 
@@ -183,7 +195,7 @@ class FMUInstance:
                 modelIdentifier=identifier,
                 instanceName=identifier,
                 libraryPath=self._library,
-                fmiCallLogger=self._note_call,
+                fmiCallLogger=_weakly(self._note_call),
             )
         except Exception as error:  # FMPy raises bare Exception where a library cannot be loaded
             os.chdir(here)  # it looks for the library in its own folder, and stays there
@@ -216,10 +228,10 @@ class FMUInstance:
     def _instantiate(self) -> None:
         try:
             if self.version == "3.0":
-                self._instance.instantiate(logMessage=self._note)
+                self._instance.instantiate(logMessage=_weakly(self._note))
             else:
                 callbacks = fmi2.fmi2CallbackFunctions()
-                callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(self._note)
+                callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(_weakly(self._note))
                 callbacks.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(fmi2.calloc)
                 callbacks.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(fmi2.free)
                 self._instance.instantiate(callbacks=callbacks)

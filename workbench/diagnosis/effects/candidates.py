@@ -17,7 +17,15 @@ import numpy as np
 from workbench.arrays import Vector
 from workbench.diagnosis.effects.catalogue import Effect
 from workbench.errors import unknown_name
-from workbench.models.added import CONSTANT, COULOMB, QUADRATIC, VISCOUS, RateTerm
+from workbench.models.added import (
+    CONSTANT,
+    COULOMB,
+    QUADRATIC,
+    SPEED,
+    STRIBECK,
+    VISCOUS,
+    RateTerm,
+)
 from workbench.models.description import Variable
 from workbench.models.fmu import FMU, CoSimulation
 from workbench.observers.operating import start_spreads
@@ -66,11 +74,13 @@ _OUTPUT = (
 )
 _FORMS = {
     COULOMB: "a term of constant size against {state} in its rate, as of Coulomb friction",
+    STRIBECK: "a term against {state} in its rate that fades with speed, as of Stribeck friction",
     VISCOUS: "a term in proportion to {state} in its rate, as of viscous friction or a leak",
     QUADRATIC: "a quadratic term, as of drag, in the rate of {state}",
     CONSTANT: "a constant term in the rate of {state}",
 }
-_SMOOTH = 1e-3  # of a state's size, within which a Coulomb term is smooth
+# Of the speed of a Stribeck term, over the state's size: what is fitted goes by shares from these.
+_SPEEDS = (0.05, 0.2, 1.0)
 _CHANGEABLE = ("fixed", "tunable")
 # Of the least time that matters: a logger that scans five channels has neighbours as far apart.
 LEAST_SKEWS = 2.0
@@ -137,7 +147,7 @@ def own_bounds(nominal: float, declared: tuple[float, float]) -> tuple[float, fl
     return low - nominal, high - nominal
 
 
-def rate_terms(model: FMU) -> tuple[RateTerm, ...]:
+def rate_terms(model: FMU, system: System) -> tuple[RateTerm, ...]:
     """Terms that may be missing beside the rates of an FMU's states.
 
     A state that another state is the rate of, as a position is of a speed, has none: what moves it
@@ -146,7 +156,7 @@ def rate_terms(model: FMU) -> tuple[RateTerm, ...]:
     if model.version != "2.0" or sys.platform == "win32" or isinstance(model, CoSimulation):
         return ()
     model.start({})
-    x, scale = model.get_states(), _scales(model)
+    x, scale = model.get_states(), _scales(model, system)
     # The start, and each state moved by its scale to either side, (2s + 1, s); rates there.
     points = np.vstack([x, x + np.diag(scale), x - np.diag(scale)])
     rates = np.array([_rates(model, point) for point in points])
@@ -168,16 +178,18 @@ def rate_terms(model: FMU) -> tuple[RateTerm, ...]:
                     unit=("1/s" if power == 1 else f"({rate})/({own})2" if power else rate)
                     if own
                     else "",
-                    width=_SMOOTH * float(scale[i]),
+                    scale=float(scale[i]),
+                    state_unit=own,
                     text=text.format(state=state),
                 )
             )
     return tuple(terms)
 
 
-def _scales(model: FMU) -> Vector:
-    """Typical size of each state, (s,): its nominal value, or where it begins, or 1."""
+def _scales(model: FMU, system: System) -> Vector:
+    """Typical size of each state, (s,): of its signal, its nominal value, its start, or 1."""
     nominal = {v.name: v.nominal for v in model.description.variables}
+    nominal |= {name: signal.scale for name, signal in system.signals.items()}
     starts = zip(model.states, np.abs(model.get_states()), strict=True)
     return np.array([nominal.get(name) or start or 1.0 for name, start in starts])
 
@@ -242,7 +254,7 @@ def _parameters(model: FMU, system: System) -> Iterator[Effect]:
 
 
 def _terms(model: FMU, system: System) -> Iterator[Effect]:
-    for term in rate_terms(model):
+    for term in rate_terms(model, system):
         state = model.states[term.state]
         yield Effect(
             name=f"{term.form.capitalize()}Term[{state}]",
@@ -252,6 +264,9 @@ def _terms(model: FMU, system: System) -> Iterator[Effect]:
             matters=system.candidates.matters * term.typical,
             text=term.text,
             separation=f"recordings in which {state} moves otherwise",
+            shapes=((SPEED, tuple(term.scale * share for share in _SPEEDS)),)
+            if term.form == STRIBECK
+            else (),
             parameter=term.name,
         )
 

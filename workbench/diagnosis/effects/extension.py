@@ -34,7 +34,8 @@ def variables(effect: Effect, parameter: str) -> tuple[str, ...]:
     Of a clock or a sensor, which no FMU has, its own name.
     """
     if effect.parameter:
-        return (effect.parameter,)
+        own = effect.parameter
+        return (own if parameter in effect.sizes else f"{own}.{parameter}",)
     if not effect.of_library:
         return (f"{effect.name}.{parameter}",)
     element = f"[{effect.place}]" if effect.place else ""

@@ -3,13 +3,13 @@
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import pairwise
+from itertools import combinations, pairwise, product
 from typing import TypeVar
 
 import numpy as np
 
 from workbench.arrays import Matrix, Vector
-from workbench.diagnosis.effects.candidates import LOSS, RECTIFIED
+from workbench.diagnosis.effects.candidates import COEFFICIENT, LOSS, RECTIFIED
 from workbench.diagnosis.effects.catalogue import Effect, variant
 from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.linearized import LinearizedPoint, Point
@@ -95,10 +95,11 @@ def forward_selection(
         while True:
             best, trial = examine(fit, best, catalogue, report)
             step = _step(fit, sought, best, trial, report)
-            if step is None:
+            more = _terms_together(fit, sought, best, trial) if step is None else [step]
+            if not more:
                 return best, trial, False
-            steps.append(step)
-            best = step.rivals[0]
+            steps += more
+            best = more[-1].rivals[0]
     except KeyboardInterrupt:
         if not steps:
             raise
@@ -134,6 +135,57 @@ def _step(
     equals = [other for other in fits if beyond(other, fits[0]) < fit.decides.tied]
     first = min(equals, key=lambda equal: catalogue.index(equal.active[-1]))
     return Step(best, scores, (first, *(fit for fit in fits if fit is not first)))
+
+
+def _terms_together(
+    fit: Fit, catalogue: Sequence[Effect], best: FittedModel, trial: ScoreTest
+) -> list[Step]:
+    """One or two more terms beside the rate that lacks one, each set of them fitted in full.
+
+    Friction of several parts needs it: what fades with speed and what rises with it look like a
+    constant together, and either alone gains too little. Each term must pay for itself by what is
+    significant. Tried while errors are far above the noise; none if no set gains.
+    """
+    rates = {_rate(effect) for effect in best.active if effect.size == COEFFICIENT}
+    if best.linearised.variance_factors.max() <= fit.decides.wrong:
+        return []
+    scores = tuple(score for score in trial.scores() if score.effect in catalogue)
+    terms: dict[str, list[CandidateScore]] = {}
+    for score in scores:
+        if score.effect.size == COEFFICIENT and _rate(score.effect) in rates:
+            begin = replace(score, size=score.effect.matters)
+            terms.setdefault(score.effect.name, []).append(begin)
+    room = min(2, fit.decides.most - len(best.active))
+    sets = [
+        chosen
+        for count in range(1, room + 1)
+        for variants in combinations(terms.values(), count)
+        for chosen in product(*variants)
+    ]
+
+    def model(chosen: Sequence[CandidateScore]) -> FittedModel | None:
+        point = best.point
+        for score in chosen:
+            point = joined(point, score)
+        if (start := fit.tried(point)) is None:
+            return None
+        active = (*best.active, *(score.effect for score in chosen))
+        return differentiable(partial(fitted, fit, start, active, ROUNDS, best.linearised.spread))
+
+    models = [end for end in fit.together(model, sets) if end is not None]
+    gains = {
+        end: best.linearised.deviance
+        - end.linearised.deviance
+        - fit.decides.fall * (len(end.active) - len(best.active))
+        for end in models
+    }
+    first = max(models, key=gains.__getitem__, default=None)
+    return [Step(best, scores, (first,))] if first is not None and gains[first] > 0.0 else []
+
+
+def _rate(effect: Effect) -> str:
+    """State whose rate a term is added to."""
+    return effect.parameter.split(".", 2)[2]
 
 
 def _misjudged(
@@ -379,7 +431,10 @@ def pruned(
             key = (effect.name, effect.label)
             size = abs(best.point.sizes[key])
             clear = size / max(sigma[trial.joint.known.index(key)], 1e-300)
-            ratios[effect] = min(clear / fit.decides.significant, size / effect.matters)
+            material = size / effect.matters
+            if effect.size == COEFFICIENT:  # no sheet says what matters: what errors need does, too
+                material = max(material, beyond(less[effect], best) / fit.decides.needed)
+            ratios[effect] = min(clear / fit.decides.significant, material)
         if len(less) > 1 or fit.restarted:
             for effect, reduced in less.items():
                 ratios[effect] = min(ratios[effect], beyond(reduced, best) / fit.decides.needed)

@@ -175,7 +175,7 @@ class Unknowns:
         if effect.parameter in self._starts:
             middle = self._simulations.nominal.get(variable, 0.0)
             declared = declared[0] - middle, declared[1] - middle
-        elif effect.parameter:
+        elif effect.parameter and parameter in effect.sizes:
             declared = own_bounds(self._simulations.nominal[variable], declared)
         low, high = self.opened.get((effect.name, parameter), declared)
         # An amplitude has no sign: its phase has.
