@@ -173,10 +173,10 @@ def test_candidates_are_parameters_and_sensors_of_a_stated_size(tank):
     assert names[3:7] == [
         f"Sensor{size}[{signal}]" for signal in ("inflow", "level") for size in ("Gain", "Offset")
     ]
-    assert names[7:11] == [
-        f"{form}Term[x]" for form in ("Coulomb", "Viscous", "Quadratic", "Constant")
+    assert names[7:12] == [
+        f"{form}Term[x]" for form in ("Coulomb", "Stribeck", "Viscous", "Quadratic", "Constant")
     ]
-    assert names[11:] == [
+    assert names[12:] == [
         "Start[x]",
         "InputLag[inflow]",
         *(
