@@ -60,6 +60,14 @@ def test_a_claim_that_does_not_hold_is_named_with_its_text(library, capsys):
     assert any("the wall seeps by another law" in text for text in claim["failures"])
 
 
+def test_a_claim_that_does_not_compile_fails_and_effects_are_tried_all_the_same(library, capsys):
+    wrong = TRUE_CLAIM.replace("Seepage wall", "Sepage wall")
+    result = checked(library("end Tank;", f"{wrong}end Tank;"), capsys, 1)
+    (claim,) = result["claims"]
+    assert "Sepage" in claim["failures"][0]
+    assert [effect["name"] for effect in result["effects"]] == ["Seepage"]
+
+
 def test_an_effect_that_is_not_nominal_at_zero_is_refused_with_its_line(library, capsys):
     folder = library("actual = nominal + k*h", "actual = nominal + k*h + 1e-5")
     assert main(["check", str(folder)]) == 2

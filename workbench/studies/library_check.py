@@ -123,7 +123,11 @@ def check_library(
     claims = []
     for name in claim_models(library):
         report(f"claim {name}")
-        claims.append(ClaimResult(name, tuple(failures_of_claim(library.file, name))))
+        try:
+            failures = failures_of_claim(library.file, name)
+        except InputError as error:  # the other claims are of interest all the same
+            failures = [str(error)]
+        claims.append(ClaimResult(name, tuple(failures)))
     results = []
     with tempfile.TemporaryDirectory() as folder:
         report(f"compiling {len(effects)} effects")
