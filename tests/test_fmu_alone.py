@@ -4,6 +4,7 @@ Recordings are made by SciPy from equations of their own; the FMU is used as one
 """
 
 import re
+import zipfile
 from pathlib import Path
 
 import fmpy
@@ -21,6 +22,7 @@ from workbench.diagnosis.laws import propose
 from workbench.errors import InputError
 from workbench.models.added import write_extended
 from workbench.models.fmu import FMU
+from workbench.models.native import instance
 from workbench.runtime.engine import Engine
 from workbench.system.registry import load_system
 from workbench.system.system import System
@@ -408,6 +410,28 @@ def test_an_fmu_around_another_has_its_rates_and_derivatives_with_terms(swing, t
         model.start({})  # reset: what was set is gone, what was written stays
         model.set_states(x)
         assert_allclose(model.derivatives()[at], [-0.7, -4.0 + 0.3 * 0.7], rtol=1e-14)
+
+
+def test_another_tools_fmu_is_asked_for_derivatives_of_outputs_and_rates_alone(swing, tmp_path):
+    """FMI grants no others, and some tools end with an error; v is no output of the swing."""
+    with zipfile.ZipFile(swing.source.parent / "Swing.fmu") as archive:
+        files = {name: archive.read(name) for name in archive.namelist()}
+    described = re.sub(
+        rb'generationTool="[^"]*"', b'generationTool="Other"', files["modelDescription.xml"]
+    )
+    path = tmp_path / "Other.fmu"
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, content in (files | {"modelDescription.xml": described}).items():
+            archive.writestr(name, content)
+    with FMU(path) as model:
+        assert model.description.tool == "Other"
+        model.start({})
+        assert model.states_derivatives(np.append(model.rate_references, model.references(["s"])))
+        assert not model.states_derivatives(model.references(["v"]))
+        assert instance(model, [], [], ["s"]).fmi == 2
+        assert instance(model, [], [], ["s", "v"]).fmi == 0
+        by = model.jacobian(model.references(["v"]), model.variables(["s", "v"]))
+        assert_allclose(by, [[0.0, 1.0]], atol=1e-9)
 
 
 def test_no_fmu_is_built_around_one_of_fmi_3(tank, tmp_path):

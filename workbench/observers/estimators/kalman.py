@@ -613,9 +613,8 @@ class ExtendedKalmanFilter(Estimator):
         try:
             for h, sample, measured, row in zip(steps, samples, y, rows, strict=True):
                 self._step_through_events(float(h), sample, measured, row)
-        except (
-            FMUError
-        ):  # the instance may be replaced, and what it keeps is then none of the new one
+        except FMUError:
+            # The instance may be replaced, and what it keeps is then none of the new one.
             self._forget_events()
             raise
         return rows

@@ -60,11 +60,8 @@ class EventMap:
         FMUError
             If the FMU refuses a call, asks to end, or cannot be integrated.
         """
-        n, ends, seen = (
-            len(self._fmu.states),
-            points.copy(),
-            np.empty((len(points), len(self._seen))),
-        )
+        n, ends = len(self._fmu.states), points.copy()
+        seen = np.empty((len(points), len(self._seen)))
         passed = []
         for k in range(len(points) - 1, -1, -1):
             corrections = points[k, n:]
