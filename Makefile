@@ -9,7 +9,7 @@ COMPILER ?= workbench
 # prepares for itself takes longer. The slowest are listed.
 WORKERS := $(shell expr 1 + $$(getconf _NPROCESSORS_ONLN))
 PYTEST := $(RUN) -m pytest --numprocesses $(WORKERS) --maxprocesses 4 --dist worksteal --durations 10
-.PHONY: help simulate tune diagnose power cases fmus bench docs figures figures-long fuzz chaos test test-long clean
+.PHONY: help simulate tune diagnose power cases fmus bench docs notebooks figures figures-long fuzz chaos test test-long clean
 
 help:
 	@echo "make simulate   run all estimators on all cases, results in results/simulate"
@@ -24,6 +24,7 @@ help:
 	@echo "make figures    write the tables of docs/ from the commands that make them;"
 	@echo "                minutes. make figures-long: those of tuning, next, power and laws, too, hours; with"
 	@echo "                RECORDINGS=FOLDER also those of recordings outside of the repository"
+	@echo "make notebooks  the tutorials as notebooks, run on the recordings in RECORDINGS=FOLDER"
 	@echo "make docs       the documentation as a site for any static host, in build/site; no network"
 	@echo "make fuzz       read 100 000 damaged files of every kind, and report by class; minutes"
 	@echo "make chaos      kill, interrupt and starve long commands at random moments, resume and compare"
@@ -77,6 +78,10 @@ figures-long: $(VENV)/dev.stamp
 
 docs: $(VENV)/dev.stamp
 	$(RUN) -m mkdocs build --strict
+
+notebooks: $(VENV)/dev.stamp
+	$(INSTALL) ".[notebooks]"
+	$(RUN) docs/notebooks.py $(or $(RECORDINGS),$(error RECORDINGS is not set; pass the folder of the published recordings))
 
 bench: $(VENV)/dev.stamp
 	$(RUN) -m workbench bench --out results/bench

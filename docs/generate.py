@@ -17,6 +17,7 @@ from typing import Any
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 from mkdocs.structure.pages import Page
+from notebooks import cells
 
 import workbench
 from workbench.cli.parser import command_line, parsers
@@ -100,14 +101,13 @@ def _cell(text: str) -> str:
 
 
 def tutorial(path: Path) -> str:
-    """A script with cells as a page: comments at the head of a cell are its text."""
+    """A script with cells as a page."""
     parts = []
-    for cell in path.read_text(encoding="utf-8").split("# %%")[1:]:
-        lines = cell.removeprefix(" [markdown]").strip().splitlines()
-        code = next((i for i, line in enumerate(lines) if not line.startswith("#")), len(lines))
-        parts.append("\n".join(line.removeprefix("#").removeprefix(" ") for line in lines[:code]))
-        if rest := "\n".join(lines[code:]).strip():
-            parts.append(f"```python\n{rest}\n```")
+    for text, code in cells(path):
+        if text:
+            parts.append(text)
+        if code:
+            parts.append(f"```python\n{code}\n```")
     return "\n\n".join(parts) + "\n"
 
 

@@ -10,17 +10,13 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
+import nbformat
 import numpy as np
 import pytest
+from notebooks import DATA, notebook
 
 import workbench as wb
 
-DATA = {
-    "cascaded_tanks": "cascaded_tanks",
-    "servo_pendulum": "servo_pendulum",
-    "pneumatic_cylinder": "pneumatic_cylinder",
-    "air_supply": "metro_air_supply",
-}
 Names = dict[str, Any]
 
 
@@ -76,6 +72,16 @@ def own(outcome: wb.Outcome, case: wb.Case, measure: str = "rms") -> float:
 
 
 @pytest.mark.parametrize("tutorial", DATA)
+def test_a_notebook_is_its_script_with_results(tutorial, root):
+    kept = nbformat.read(root / "tutorials" / f"{tutorial}.ipynb", as_version=4)
+    parts = [(cell.cell_type, cell.source) for cell in kept.cells]
+    assert parts == [(cell.cell_type, cell.source) for cell in notebook(tutorial).cells]
+    results = [result for cell in kept.cells for result in cell.get("outputs", [])]
+    assert "error" not in {result.output_type for result in results}
+    assert sum("image/png" in result.get("data", {}) for result in results) >= 2
+
+
+@pytest.mark.parametrize("tutorial", DATA)
 def test_a_folder_without_the_recordings_is_refused(tutorial, run, tmp_path):
     with pytest.raises(wb.InputError, match="no such folder"):
         run(tutorial, tmp_path / "nowhere")
@@ -83,7 +89,7 @@ def test_a_folder_without_the_recordings_is_refused(tutorial, run, tmp_path):
 
 def test_both_tanks_overflow_and_the_pump_has_a_dead_zone(run):
     names = run("cascaded_tanks")
-    outcome = names["found"]
+    outcome = names["outcome"]
     groups = causes(outcome)
     for effect in ("UpperOverflow", "LowerOverflow", "SensorCurvature", "PumpDeadZone"):
         assert any(effect in group for group in groups)
@@ -106,7 +112,7 @@ def test_both_tanks_overflow_and_the_pump_has_a_dead_zone(run):
 @pytest.mark.long
 def test_servo_has_viscous_friction_and_more_under_load(run):
     names = run("servo_pendulum")
-    outcome = names["found"]
+    outcome = names["outcome"]
     named = [cause.effect.name for cause in outcome.diagnosis.causes]
     assert named[0] == "ViscousFriction"  # alone it explains most
     assert {"LoadStribeck", "SupplyResistance"} <= set(named)
@@ -134,29 +140,29 @@ def test_servo_has_viscous_friction_and_more_under_load(run):
 @pytest.mark.long
 def test_friction_of_both_seals_grows_with_pressure(run):
     names = run("pneumatic_cylinder")
-    outcome = names["found"]
+    outcomes = names["outcomes"]
     # What three parameters, fitted by hand, leave of the force at 1, 3 and 7 bar: of 5.9 N 1.0, of
     # 7.9 N 1.2.
     for seal, before, own_before, own_after in (
         ("O-ring", 6.6, 5.95, 1.0),
         ("NAPN", 9.0, 7.9, 1.2),
     ):
-        named = {cause.effect.name for cause in outcome[seal].diagnosis.causes}
+        named = {cause.effect.name for cause in outcomes[seal].diagnosis.causes}
         assert {"PressureFriction", "PreslidingFriction"} <= named
-        assert fitted(outcome[seal])[0] == pytest.approx(own_before, rel=0.02)
-        assert fitted(outcome[seal])[1] < own_after
-        assert held_out(outcome[seal]) == pytest.approx((before, 0.95), abs=0.05)
+        assert fitted(outcomes[seal])[0] == pytest.approx(own_before, rel=0.02)
+        assert fitted(outcomes[seal])[1] < own_after
+        assert held_out(outcomes[seal]) == pytest.approx((before, 0.95), abs=0.05)
         # The first second, in which the machine starts, is told by FMPy alone.
-        assert names["errors"][seal] == pytest.approx(held_out(outcome[seal])[1], rel=0.1)
-    assert {"LoadCellOffset", "PressureOffset"} in causes(outcome["NAPN"])
-    assert outcome["Ultimaker_020"].diagnosis.causes[0].effect.name == "LaminarLeak"
-    assert held_out(outcome["Ultimaker_020"]) == pytest.approx((6.16e5, 0.06e5), rel=0.05)
-    assert outcome["Aluminium"].diagnosis.verdict == "nothing"
+        assert names["errors"][seal] == pytest.approx(held_out(outcomes[seal])[1], rel=0.1)
+    assert {"LoadCellOffset", "PressureOffset"} in causes(outcomes["NAPN"])
+    assert outcomes["Ultimaker_020"].diagnosis.causes[0].effect.name == "LaminarLeak"
+    assert held_out(outcomes["Ultimaker_020"]) == pytest.approx((6.16e5, 0.06e5), rel=0.05)
+    assert outcomes["Aluminium"].diagnosis.verdict == "nothing"
 
 
 def test_train_loses_air_in_one_of_five_ways(run):
     names = run("air_supply")
-    outcome = names["found"]
+    outcome = names["outcome"]
     (group,) = causes(outcome)
     assert {"LaminarLeak", "OrificeLeak", "CheckValveLeak", "SteadyConsumption"} < group
     assert len(group) == 5

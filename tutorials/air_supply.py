@@ -26,12 +26,12 @@ DATA, OUT = Path(sys.argv[1]), Path((sys.argv[2:] or ["results/tutorials/air_sup
 # three are fitted, two are held out.
 system = wb.load_system("air_supply")
 fitted, held_out = wb.prepare_cases("air_supply", DATA, OUT / "cases")
-found = wb.diagnose(system, fitted, held_out=held_out, out=OUT)
+outcome = wb.diagnose(system, fitted, held_out=held_out, out=OUT)
 
 # %%
 # Where is the simulation wrong? The error of the nominal model (red) decreases while the
 # compressor rests. The measured pressure decreases, and nothing in the model takes air.
-found.plot().savefig(OUT / "errors.png")
+outcome.plot().savefig(OUT / "errors.png")
 
 # %%
 # The diagnosis finds a loss of air, whose size is known to about 13 %. These data cannot tell
@@ -40,19 +40,19 @@ found.plot().savefig(OUT / "errors.png")
 # summary says so, and what would discriminate between them. The remaining error is above the
 # noise. The flag is known to 10 s, and the compressor raises the pressure by 0.2 bar in that
 # time.
-print(found.summary())
+print(outcome.summary())
 
 # %%
 # The extended model is Modelica: the nominal model, with a class of the library in its slot.
-print(found.extension.modelica.read_text())
+print(outcome.extension.modelica.read_text())
 
 # %%
 # The gain on the held-out cycles: the error falls to a tenth or less. Only their initial pressure
 # was fitted.
-for one in found.errors:
-    before, after = (1e-2 * rms for rms in one.rms)  # from Pa
-    fate = "held out" if one.held_out else "fitted"
-    print(f"{one.recording}, {fate}: {before:.0f} mbar without the leak, {after:.0f} mbar with it")
+for error in outcome.errors:
+    before, after = (1e-2 * rms for rms in error.rms)  # from Pa
+    fate = "held out" if error.held_out else "fitted"
+    print(f"{error.recording}, {fate}: {before:.0f} mbar without leak, {after:.0f} mbar with it")
 
 # %%
 # The extended FMU runs in any tool, here in FMPy. It needs only the flag and the initial
@@ -60,9 +60,9 @@ for one in found.errors:
 # the steps are short.
 case = held_out[0]
 result = simulate_fmu(
-    str(found.extension.fmu),
+    str(outcome.extension.fmu),
     fmi_type="CoSimulation",
-    start_values=found.start_values(case.name),
+    start_values=outcome.start_values(case.name),
     input=np.rec.fromarrays([case.time, case["COMP"], 0 * case.time], names="time, COMP, dloss"),
     stop_time=case.time[-1],
     output_interval=0.5,

@@ -26,13 +26,13 @@ DATA, OUT = Path(sys.argv[1]), Path((sys.argv[2:] or ["results/tutorials/cascade
 # There are two recordings: one is fitted, one is held out.
 system = wb.load_system("cascaded_tanks")
 fitted, held_out = wb.prepare_cases("cascaded_tanks", DATA, OUT / "cases")
-found = wb.diagnose(system, fitted, held_out=held_out, out=OUT)
+outcome = wb.diagnose(system, fitted, held_out=held_out, out=OUT)
 
 # %%
 # Where is the simulation wrong? The error of the best nominal model (red) reaches 2 V, most of
 # all during and after high pump voltage. The grey band is the noise, and the error is far
 # outside.
-found.plot().savefig(OUT / "errors.png")
+outcome.plot().savefig(OUT / "errors.png")
 
 # %%
 # The diagnosis lists each effect, its size with a 95 % interval, and the indistinguishable
@@ -41,30 +41,29 @@ found.plot().savefig(OUT / "errors.png")
 # overflows too, the characteristic of the sensor is curved, and the pump needs a volt before it
 # delivers. The remaining error is far above the noise: the library has no effects for tubes,
 # waves and spray.
-print(found.summary())
+print(outcome.summary())
 
 # %%
 # The extended model is Modelica as one would write it: the nominal model with its coefficients,
 # and classes of the library in its slots.
-print(found.extension.modelica.read_text())
+print(outcome.extension.modelica.read_text())
 
 # %%
 # The gain on the held-out recording: less than a third of the error is left. Only its initial
 # levels were fitted.
-for one in found.errors:
-    fate = "held out" if one.held_out else "fitted"
-    print(
-        f"{one.recording}, {fate}: {one.rms[0]:.2f} V without, {one.rms[1]:.2f} V with the causes"
-    )
+for error in outcome.errors:
+    before, after = error.rms
+    fate = "held out" if error.held_out else "fitted"
+    print(f"{error.recording}, {fate}: {before:.2f} V without, {after:.2f} V with the causes")
 
 # %%
 # The extended FMU runs in any tool, here in FMPy. It needs only the pump voltage and the initial
 # levels. FMPy holds inputs over a step, as the converter of the pump does over a sample.
 case = held_out[0]
 result = simulate_fmu(
-    str(found.extension.fmu),
+    str(outcome.extension.fmu),
     fmi_type="CoSimulation",
-    start_values=found.start_values(case.name),
+    start_values=outcome.start_values(case.name),
     input=np.rec.fromarrays([case.time, case["pump"], 0 * case.time], names="time, pump, dk3"),
     stop_time=case.time[-1],
     output_interval=4.0,

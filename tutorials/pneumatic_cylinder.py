@@ -26,10 +26,10 @@ DATA, OUT = Path(sys.argv[1]), Path((sys.argv[2:] or ["results/tutorials/pneumat
 # recordings at 1, 3 and 7 bar are fitted, and that at 5 bar is held out.
 system = wb.load_system("seal_friction")
 fitted, held_out = wb.prepare_cases("seal_friction", DATA, OUT / "cases")
-found = {}
+outcomes = {}
 for seal in ("O-ring", "NAPN"):
     own, other = ([c for c in cases if c.name.startswith(seal)] for cases in (fitted, held_out))
-    found[seal] = wb.diagnose(system, own, held_out=other, out=OUT / seal)
+    outcomes[seal] = wb.diagnose(system, own, held_out=other, out=OUT / seal)
 
 # %%
 # Where is the simulation wrong? The error changes with the direction of the stroke. For both
@@ -38,13 +38,13 @@ for seal in ("O-ring", "NAPN"):
 # cell or the pressure sensor has a wrong zero; these data cannot tell which. The remaining error,
 # about a tenth of the friction, is above the noise. Grease and seals that are not round are not
 # modelled.
-for seal, one in found.items():
-    one.plot().savefig(OUT / f"errors_{seal}.png")
-    print(f"\n{seal}\n{one.summary()}")
+for seal, outcome in outcomes.items():
+    outcome.plot().savefig(OUT / f"errors_{seal}.png")
+    print(f"\n{seal}\n{outcome.summary()}")
 
 # %%
 # The extended model of the O-ring is Modelica. The forces of several effects add up in the slot.
-print(found["O-ring"].extension.modelica.read_text())
+print(outcomes["O-ring"].extension.modelica.read_text())
 
 # %%
 # The gain on the held-out recording at 5 bar: the error falls from 6.6 and 9.0 N to 0.9 N. The
@@ -53,12 +53,12 @@ print(found["O-ring"].extension.modelica.read_text())
 # the steps are short.
 figure, plots = plt.subplots(2, layout="constrained")
 errors = {}
-for axes, (seal, one) in zip(plots, found.items(), strict=True):
+for axes, (seal, outcome) in zip(plots, outcomes.items(), strict=True):
     (case,) = (case for case in held_out if case.name.startswith(seal))
     result = simulate_fmu(
-        str(one.extension.fmu),
+        str(outcome.extension.fmu),
         fmi_type="CoSimulation",
-        start_values=one.start_values(case.name),
+        start_values=outcome.start_values(case.name),
         input=np.rec.fromarrays(
             [case.time, *case.u.T, 0 * case.time], names=["time", *case.inputs, "dfriction"]
         ),
@@ -69,8 +69,8 @@ for axes, (seal, one) in zip(plots, found.items(), strict=True):
     )
     force = np.interp(case.time, result["time"], result["FReading"])
     errors[seal] = np.sqrt(np.mean((case["F"] - force) ** 2))
-    (told,) = (e.rms for e in one.errors if e.held_out)
-    print(f"{case.name}, held out: {told[0]:.1f} N without friction, {told[1]:.1f} N with it")
+    (rms,) = (e.rms for e in outcome.errors if e.held_out)
+    print(f"{case.name}, held out: {rms[0]:.1f} N without friction, {rms[1]:.1f} N with it")
     axes.plot(case.time, case["F"], "k", label="measured")
     axes.plot(case.time, force, label="extended model in FMPy")
     axes.set(
@@ -87,5 +87,5 @@ chamber = wb.load_system("leaking_chamber")
 fitted, held_out = wb.prepare_cases("leaking_chamber", DATA, OUT / "chambers")
 for name in ("Ultimaker_020", "Aluminium"):
     own, other = ([c for c in cases if c.name.startswith(name)] for cases in (fitted, held_out))
-    found[name] = wb.diagnose(chamber, own, held_out=other, out=OUT / name)
-    print(f"\n{name}\n{found[name].summary()}")
+    outcomes[name] = wb.diagnose(chamber, own, held_out=other, out=OUT / name)
+    print(f"\n{name}\n{outcomes[name].summary()}")

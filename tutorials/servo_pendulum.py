@@ -26,11 +26,11 @@ DATA, OUT = Path(sys.argv[1]), Path((sys.argv[2:] or ["results/tutorials/servo_p
 # are unknown and fitted. The recordings at a gain of 200 are held out.
 system = wb.load_system("servo_pendulum")
 fitted, held_out = wb.prepare_cases("servo_pendulum", DATA, OUT / "cases")
-found = wb.diagnose(system, fitted, held_out=held_out, out=OUT)
+outcome = wb.diagnose(system, fitted, held_out=held_out, out=OUT)
 
 # %%
 # Where is the simulation wrong? Without friction (red) the arm swings; the real one rests.
-found.plot().savefig(OUT / "errors.png")
+outcome.plot().savefig(OUT / "errors.png")
 
 # %%
 # The diagnosis names three effects: viscous friction; friction that grows with the load on the
@@ -38,20 +38,20 @@ found.plot().savefig(OUT / "errors.png")
 # with a 95 % interval, and the indistinguishable effects if there are any. A Stribeck curve
 # without the load is not named. The remaining error is far above the noise of the encoder, since
 # friction laws are approximations.
-print(found.summary())
+print(outcome.summary())
 
 # %%
 # The extended model is Modelica: the nominal model with the fitted parameters, and classes of the
 # library in its slots. Several friction torques add up.
-print(found.extension.modelica.read_text())
+print(outcome.extension.modelica.read_text())
 
 # %%
 # The gain on the recordings at the held-out gain: the mean absolute error falls from 125 to 29
 # mrad. The slow motion improves least, because it depends on friction alone.
-for one in found.errors:
-    before, after = (1e3 * mean for mean in one.mean_absolute)
-    fate = "held out" if one.held_out else "fitted"
-    print(f"{one.recording}, {fate}: {before:.0f} mrad without, {after:.0f} mrad with the causes")
+for error in outcome.errors:
+    before, after = (1e3 * mean for mean in error.mean_absolute)
+    fate = "held out" if error.held_out else "fitted"
+    print(f"{error.recording}, {fate}: {before:.0f} mrad without, {after:.0f} mrad with the causes")
 
 # %%
 # The extended FMU runs in any tool, here in FMPy. The start values include the gain of the
@@ -59,9 +59,9 @@ for one in found.errors:
 # steps are short.
 case = held_out[0]
 result = simulate_fmu(
-    str(found.extension.fmu),
+    str(outcome.extension.fmu),
     fmi_type="CoSimulation",
-    start_values=found.start_values(case.name),
+    start_values=outcome.start_values(case.name),
     input=np.rec.fromarrays(
         [case.time, *case.u.T, 0 * case.time], names=["time", *case.inputs, "dtauF"]
     ),

@@ -17,6 +17,7 @@ PURPOSES = {
     "cluster": "tune, monitor --fleet on a Dask cluster; recordings at URLs",
     "completion": "workbench completion",
     "docs": "make docs",
+    "notebooks": "make notebooks",
     "dev": "make test",
 }
 
