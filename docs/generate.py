@@ -10,6 +10,7 @@ import inspect
 import json
 import re
 import textwrap
+import typing
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -194,6 +195,8 @@ def python_api() -> str:
 def _signature(name: str, one: Callable[..., Any]) -> str:
     if inspect.isclass(one) and issubclass(one, Exception):
         return name
+    if typing.is_typeddict(one):
+        return f"**{name}: {', '.join(typing.get_type_hints(one))}"
     said = inspect.signature(one)
     whole = _short(f"{name}{said}")
     if len(whole) <= _WIDE:
@@ -209,7 +212,7 @@ def _signature(name: str, one: Callable[..., Any]) -> str:
 
 def _short(text: str) -> str:
     """Types without their modules."""
-    plain = text.replace("<factory>", "...")
+    plain = re.sub(r"\*<class '(?:\w+\.)*(\w+)'>", r"\1", text.replace("<factory>", "..."))
     return re.sub(r"\b[a-z_]+(?:\.[a-z_]+)*\.(?=[A-Z])", "", plain)
 
 

@@ -10,6 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:  # The public names. Each is imported from here when it is first used.
+    from workbench.api import TuningWork as TuningWork
+    from workbench.api import Work as Work
+    from workbench.api import WrittenWork as WrittenWork
     from workbench.api import case_from_frame as case_from_frame
     from workbench.api import diagnose as diagnose
     from workbench.api import distance as distance

@@ -11,8 +11,9 @@ import os
 import tempfile
 import warnings
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict, Unpack
 
 import pandas as pd
 
@@ -28,7 +29,7 @@ from workbench.recordings.channels import RecordingOptions, parse_named
 from workbench.recordings.csv import header
 from workbench.recordings.datasets import read_recorded, write_cases
 from workbench.recordings.plausibility import Origin
-from workbench.runtime.engine import Engine
+from workbench.runtime.engine import Engine, silent
 from workbench.runtime.files import locked_folder
 from workbench.studies import design, monitoring
 from workbench.studies.design import NextStop
@@ -44,6 +45,45 @@ from workbench.system.system import System
 from workbench.system.tables import Table
 from workbench.system.units import quantity, si_factor
 from workbench.tuning import Lines, Plan, TuningResult, evaluators, pose
+
+
+class Work(TypedDict, total=False):
+    """With what something is worked out.
+
+    Attributes
+    ----------
+    workers : processes, one per processor unless another number is given.
+    report : takes a line on what is being done; prints it unless given.
+    """
+
+    workers: int | None
+    report: Callable[[str], None]
+
+
+class WrittenWork(Work, total=False):
+    """Work that writes.
+
+    Attributes
+    ----------
+    out : folder of what is written, such as an extended model; a temporary one unless given.
+    """
+
+    out: str | Path | None
+
+
+class TuningWork(Work, total=False):
+    """Work of `tune`.
+
+    Attributes
+    ----------
+    generations : at most, 100.
+    population : candidates per gain, 15.
+    seed : of the search, 1.
+    """
+
+    generations: int
+    population: int
+    seed: int
 
 
 def read_cases(
@@ -186,33 +226,50 @@ def tune(
     estimator: str,
     cases: Sequence[Case],
     *,
-    generations: int = 100,
-    population: int = 15,
-    seed: int = 1,
     judge_by: str | None = None,
-    workers: int | None = None,
-    report: Callable[[str], None] = print,
+    **work: Unpack[TuningWork],
 ) -> TuningResult | None:
     """Find the gains whose worst case is best; see `workbench.tuning.tune`.
 
     Parameters
     ----------
-    population : candidates per gain.
     judge_by : estimator to score by if no sensor does, "smoother"; by measured signals if None.
-    workers : processes, one per processor unless another number is given.
-    report : takes a line on each generation.
+    work : generations, population, seed, workers, report; see `TuningWork`.
 
     Returns
     -------
     The result, or None if it was interrupted before there was anything to return.
     """
     problem = pose(system, estimator, cases, judge_by=judge_by)
-    plan = Plan(generations, population, seed)
+    plan, engine = _planned(**work)
     with (
         tempfile.TemporaryDirectory(prefix="tune-") as temporary,
-        evaluators(problem.job, _number(workers)) as pool,
+        evaluators(problem.job, engine.workers) as pool,
     ):
-        return tuning.tune(pool, problem, plan, Path(temporary), progress=Lines(plan, report))
+        progress = Lines(plan, engine.report)
+        return tuning.tune(pool, problem, plan, Path(temporary), progress=progress)
+
+
+def _planned(
+    *, generations: int = 100, population: int = 15, seed: int = 1, **work: Unpack[Work]
+) -> tuple[Plan, Engine]:
+    return Plan(generations, population, seed), _engine(**work)
+
+
+def _engine(
+    *,
+    workers: int | None = None,
+    report: Callable[[str], None] = print,
+    out: str | Path | None = None,
+) -> Engine:
+    return Engine(workers or os.cpu_count() or 1, report, Path(out or ""))
+
+
+def _writing(name: str, work: WrittenWork) -> Engine:
+    """As `_engine`; into a temporary folder of this name unless another one is given."""
+    engine = _engine(**work)
+    given = work.get("out") is not None
+    return engine if given else replace(engine, out=Path(tempfile.mkdtemp(prefix=f"{name}-")))
 
 
 def diagnose(
@@ -221,10 +278,8 @@ def diagnose(
     *,
     held_out: Sequence[Case] = (),
     effects: Sequence[str] = (),
-    out: str | Path | None = None,
     certainty: bool = False,
-    workers: int | None = None,
-    report: Callable[[str], None] = print,
+    **work: Unpack[WrittenWork],
 ) -> Outcome:
     """Find what the system's model lacks; see `workbench.diagnosis.diagnose`.
 
@@ -232,10 +287,8 @@ def diagnose(
     ----------
     held_out : recordings on which only the errors of both models are measured.
     effects : names of those to consider; all of the library, or of the FMU, unless some are given.
-    out : folder of the extended model; a temporary one unless another is given.
     certainty : whether it is asked how sure the sizes are, by fits of their own.
-    workers : processes, one per processor unless another number is given.
-    report : takes a line on what is being done.
+    work : workers, report, and out, the folder of the extended model; see `WrittenWork`.
 
     Raises
     ------
@@ -243,7 +296,7 @@ def diagnose(
         If recordings or library cannot be used.
     """
     problem = _problem(system, cases, effects, held_out)
-    engine = Engine(_number(workers), report, _folder(out, "diagnosis"))
+    engine = _writing("diagnosis", work)
     outcome = diagnosis.diagnose(problem, engine, certainty=certainty)
     return laws.compared_with_one_law(outcome, problem, engine)
 
@@ -256,22 +309,12 @@ def _problem(
     return Problem(system, cases, library, chosen, held_out)
 
 
-def _folder(out: str | Path | None, name: str) -> Path:
-    return Path(out) if out is not None else Path(tempfile.mkdtemp(prefix=f"{name}-"))
-
-
-def _number(workers: int | None) -> int:
-    return workers or os.cpu_count() or 1
-
-
 def propose(
     found: Outcome,
     *,
     held_out: Sequence[Case] = (),
     effects: Sequence[str] = (),
-    out: str | Path | None = None,
-    workers: int | None = None,
-    report: Callable[[str], None] = print,
+    **work: Unpack[WrittenWork],
 ) -> Proposal:
     """Infer a law for what no effect explains; see `workbench.diagnosis.laws.propose`.
 
@@ -279,7 +322,7 @@ def propose(
     ----------
     found : a diagnosis that left something unexplained, that needed several effects, or beside
         whose one cause errors last.
-    held_out, effects, out, workers, report : as of `diagnose`.
+    held_out, effects, work : as of `diagnose`.
 
     Raises
     ------
@@ -294,7 +337,7 @@ def propose(
             remedy="ask for no law: nothing is missing, or one effect explains it",
         )
     problem = _problem(found.system, found.cases, effects, held_out)
-    return laws.propose(found, problem, Engine(_number(workers), report, _folder(out, "proposal")))
+    return laws.propose(found, problem, _writing("proposal", work))
 
 
 def monitor(
@@ -326,7 +369,7 @@ def monitor(
             return monitoring.monitor(
                 system,
                 Path(history),
-                Engine(_number(workers), out=folder),
+                _engine(workers=workers, report=silent, out=folder),
                 rate=false_alarms,
                 read=read_recorded,
             )
@@ -339,8 +382,7 @@ def fit(
     *,
     held_out: Sequence[Case] = (),
     settings: FitSettings | None = None,
-    workers: int | None = None,
-    report: Callable[[str], None] = print,
+    **work: Unpack[Work],
 ) -> FitOutcome:
     """Fit parameters of the system's FMU to recordings; see `workbench.studies.fit.fit`.
 
@@ -350,22 +392,20 @@ def fit(
         `[fit]` of the system file unless some are given.
     held_out : recordings on which only errors are measured.
     settings : starts, loss, seed; the usual ones unless they are given.
-    workers : processes, one per processor unless another number is given.
-    report : takes a line on what is being done.
+    work : workers and report; see `Work`.
 
     Raises
     ------
     InputError
         If there is no such parameter, or the model cannot be simulated with its own values.
     """
-    engine = Engine(_number(workers), report)
     chosen = settings or FitSettings()
-    return fit_parameters(system, cases, parameters, engine, held_out=held_out, settings=chosen)
+    return fit_parameters(
+        system, cases, parameters, _engine(**work), held_out=held_out, settings=chosen
+    )
 
 
-def next_stop(
-    found: Outcome, *, workers: int | None = None, report: Callable[[str], None] = print
-) -> NextStop:
+def next_stop(found: Outcome, **work: Unpack[Work]) -> NextStop:
     """Find the recording that tells apart what a diagnosis could not.
 
     See `workbench.studies.design.next_stop`.
@@ -373,8 +413,7 @@ def next_stop(
     Parameters
     ----------
     found : a diagnosis that found a cause.
-    workers : processes, one per processor unless another number is given.
-    report : takes a line on what is being done.
+    work : workers and report; see `Work`.
 
     Raises
     ------
@@ -388,7 +427,7 @@ def next_stop(
             expected="a named effect, whose candidates or size need another recording",
             remedy="diagnose more recordings first",
         )
-    return design.next_stop(found.system, found.rivals, Engine(_number(workers), report))
+    return design.next_stop(found.system, found.rivals, _engine(**work))
 
 
 def distance(
@@ -397,8 +436,7 @@ def distance(
     asked: Mapping[str, Any] | None = None,
     *,
     effort: Effort | None = None,
-    workers: int | None = None,
-    report: Callable[[str], None] = print,
+    **work: Unpack[Work],
 ) -> Distance:
     """Predict the distance of a stop from past ones; see `workbench.studies.distance`.
 
@@ -407,13 +445,11 @@ def distance(
     stops : recordings of past stops of the same machine.
     asked : of the stop, by the names of the system file: {"speed": "160 km/h"}; the rest is usual.
     effort : how much is drawn, the usual unless it is given.
-    workers : processes, one per processor unless another number is given.
-    report : takes a line on what is being done.
+    work : workers and report; see `Work`.
 
     Raises
     ------
     InputError
         If the system does not say how it stops, or a recording holds no stop.
     """
-    engine = Engine(_number(workers), report)
-    return distance_of_stop(system, stops, asked or {}, effort or Effort(), engine)
+    return distance_of_stop(system, stops, asked or {}, effort or Effort(), _engine(**work))

@@ -346,17 +346,11 @@ def differentiate(model, row, count):  # type: ignore[no-untyped-def]
     """
     if model.fmi == 0:
         return _differences(model)
-    known = model.knowns[row:]
-    return direction(model, model.unknowns, count, known, 1, model.seed, model.jacobian[row])
-
-
-@inlined
-def direction(model, unknowns, count, knowns, number, seeds, out):  # type: ignore[no-untyped-def]
-    """Derivatives of the first `count` unknowns along `number` knowns into `out`; a status."""
+    known, along = model.knowns[row:], model.jacobian[row]
     if model.fmi == 2:
-        words = model.address, unknowns, count, knowns, number, seeds, out
+        words = model.address, model.unknowns, count, known, 1, model.seed, along
         return _call(model, model.directional, words)
-    more = model.address, unknowns, count, knowns, number, seeds, number, out, count
+    more = model.address, model.unknowns, count, known, 1, model.seed, 1, along, count
     return _call(model, model.directional, more)
 
 
