@@ -201,9 +201,10 @@ def test_a_full_horizon_solves_the_nonlinear_least_squares_problem(bent):
     estimator = horizon(*bent, 40, iterations=8)
     estimator.run(*samples)
     window = estimator._state.window
-    count = window.filled[0]
+    data = window.data
+    count = data.filled[0]
     # Differences of scipy's derivatives are good to 1e-8 of a term; a standard deviation is 1.
-    assert_allclose(window.nodes[:count] / SIZES, best.x.reshape(-1, 3) / SIZES, rtol=0, atol=2e-4)
+    assert_allclose(data.nodes[:count] / SIZES, best.x.reshape(-1, 3) / SIZES, rtol=0, atol=2e-4)
     assert cost(window) == pytest.approx(2.0 * best.cost, rel=1e-7)
     assert_allclose(
         estimator._state.filter.z[:2], residuals(best.x, "Bent", samples)[1][-1, :2], atol=2e-6
@@ -237,16 +238,17 @@ def test_with_active_bounds_it_is_the_bounded_least_squares_solution(folder):
         estimator = horizon(fmu, known, 50, rare=1e-300)
         estimator.run(*samples)
         window = estimator._state.window
-        solution = window.arrived[: window.filled[0]] / unit.reshape(-1, 3)
+        data, bounds = window.data, window.solution
+        solution = data.arrived[: data.filled[0]] / unit.reshape(-1, 3)
     # Rounding, grown by a condition number of about 1e5.
     assert_allclose(solution, best.x.reshape(-1, 3), rtol=0, atol=1e-6)
     gradient = matrix.T @ (matrix @ solution.ravel() + offset)
-    active = window.active[: window.filled[0]].ravel()
+    active = bounds.active[: data.filled[0]].ravel()
     np.testing.assert_array_equal(active, best.active_mask)
     size = np.abs(matrix).T @ np.abs(matrix @ solution.ravel() + offset)
     assert np.abs(gradient[active == 0] / size[active == 0]).max() < 1e-8
     assert (gradient[active == 1] <= 0.0).all()
-    assert (window.multiplier[: window.filled[0]].ravel()[active != 0] >= 0.0).all()
+    assert (bounds.multiplier[: data.filled[0]].ravel()[active != 0] >= 0.0).all()
 
 
 def test_a_sample_that_is_far_off_hardly_moves_it(linear):
@@ -342,7 +344,8 @@ def test_the_smoother_keeps_quantities_within_their_bounds(folder):
         estimator = horizon(fmu, known, 50, rare=1e-300)
         estimator.run(*samples)
         window = estimator._state.window
-        expected = window.arrived[: window.filled[0]]
+        data = window.data
+        expected = data.arrived[: data.filled[0]]
         estimate = smoother(fmu, known).run(*samples)
     assert (np.abs(estimate.values[1:, 2] - 0.5e-4) < 1e-15).sum() > 5
     assert_allclose(estimate.values[1:, 2], expected[:, 2], rtol=0, atol=1e-6 * 1e-5)

@@ -69,6 +69,7 @@ def time_horizon(case: Case, system: System) -> HorizonTimes:
             estimator.advance(steps[part], case.u[part], case.y[part])
             spent.append((time.perf_counter() - begin) / steps[part].size)
         window = _converged(fmu, system, case)
+        data = window.data
         ipopt, value = _solve(window, fmu, system)
         if not abs(value - cost(window)) <= _AGREEMENT * value:
             raise ArithmeticError(
@@ -76,7 +77,7 @@ def time_horizon(case: Case, system: System) -> HorizonTimes:
                 "times are not those of the same problem"
             )
     return HorizonTimes(
-        window.mean.size, int(window.filled[0]), statistics.median(spent), statistics.median(ipopt)
+        data.mean.size, int(data.filled[0]), statistics.median(spent), statistics.median(ipopt)
     )
 
 
@@ -129,27 +130,28 @@ def _ours(fmu: FMU, name: str) -> str:
 
 def _solve(window: Window, fmu: FMU, system: System) -> tuple[list[float], float]:
     """Times of IPOPT, from the solution on, and the cost that it finds."""
+    data = window.data
     model = system.model(OBSERVER)
     name = f"{system.library.parent.name}.{model.name}"
     step = _step(make_explicit(flatten(system.library, name)), fmu, system)
-    N, s = int(window.filled[0]), window.mean.size
+    N, s = int(data.filled[0]), data.mean.size
     nodes = ca.SX.sym("s", s, N)
-    spread = window.covariance + np.diag(window.noise[0] * window.wider[0])
+    spread = data.covariance + np.diag(data.noise[0] * data.wider[0])
     root = np.linalg.cholesky(np.linalg.inv(spread))
-    terms = [root.T @ (nodes[:, 0] - window.mean)]
+    terms = [root.T @ (nodes[:, 0] - data.mean)]
     for k in range(N):
-        before, after = window.inputs[k, :-1], window.reached[k, :-1]
-        end, seen = step(nodes[:, k], np.where(system.holds > 0.0, before, after), window.steps[k])
-        terms.append((window.samples[k] - seen) / np.sqrt(window.levels[k]))
+        before, after = data.inputs[k, :-1], data.reached[k, :-1]
+        end, seen = step(nodes[:, k], np.where(system.holds > 0.0, before, after), data.steps[k])
+        terms.append((data.samples[k] - seen) / np.sqrt(data.levels[k]))
         if k + 1 < N:
-            noise = np.sqrt(window.noise[k + 1] * window.wider[k + 1])
+            noise = np.sqrt(data.noise[k + 1] * data.wider[k + 1])
             terms.append((nodes[:, k + 1] - end) / noise)
     problem = {"x": ca.vec(nodes), "f": ca.sumsqr(ca.vertcat(*terms))}
     quiet = {"print_time": False, "ipopt.print_level": 0, "ipopt.sb": "yes"}
     solver = ca.nlpsol("solver", "ipopt", problem, quiet)
-    low, high = np.tile(window.low, N), np.tile(window.high, N)
+    low, high = np.tile(data.low, N), np.tile(data.high, N)
     spent: list[float] = []
-    start: Vector = window.nodes[:N].ravel()
+    start: Vector = data.nodes[:N].ravel()
     for _ in range(_REPEATS):
         begin = time.perf_counter()
         solution = solver(x0=start, lbx=low, ubx=high)

@@ -346,11 +346,18 @@ def differentiate(model, row, count):  # type: ignore[no-untyped-def]
     """
     if model.fmi == 0:
         return _differences(model)
-    known, along = model.knowns[row:], model.jacobian[row]
+    along = model.jacobian[row, :count]
+    return direction(model, model.unknowns, model.knowns[row:], model.seed, along)
+
+
+@inlined
+def direction(model, unknowns, knowns, seeds, out):  # type: ignore[no-untyped-def]
+    """Derivatives of as many unknowns as `out` has, along as many knowns as `seeds`; a status."""
+    count, number = out.size, seeds.size
     if model.fmi == 2:
-        words = model.address, model.unknowns, count, known, 1, model.seed, along
+        words = model.address, unknowns, count, knowns, number, seeds, out
         return _call(model, model.directional, words)
-    more = model.address, model.unknowns, count, known, 1, model.seed, 1, along, count
+    more = model.address, unknowns, count, knowns, number, seeds, number, out, count
     return _call(model, model.directional, more)
 
 

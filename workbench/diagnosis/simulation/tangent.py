@@ -148,13 +148,12 @@ def renew(model, tangent):  # type: ignore[no-untyped-def]
                     count += 1
     tangent.entries[now] = count
     for q in range(p):
-        first = tangent.edges[q]
-        knowns, seeds = tangent.knowns[first:], tangent.seeds[first:]
-        number = tangent.edges[q + 1] - first
-        if number == 0:
+        first, end = tangent.edges[q], tangent.edges[q + 1]
+        if first == end:
             continue
+        knowns, seeds, along = tangent.knowns[first:], tangent.seeds[first:end], tangent.along
         if not tangent.alike[q] and direction(
-            model, model.unknowns, unknowns, knowns, number, seeds, tangent.along
+            model, model.unknowns, knowns, seeds, along[:unknowns]
         ):
             return 1
         for i in range(unknowns):

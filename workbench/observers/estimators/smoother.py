@@ -18,7 +18,7 @@ from workbench.observers.estimators.moving_horizon.estimator import (
     move,
 )
 from workbench.observers.estimators.moving_horizon.window import (
-    Window,
+    Data,
     end,
     measurement_update,
     solve_damped,
@@ -55,7 +55,6 @@ def _keep(settings, whole, part, k):  # type: ignore[no-untyped-def]
     for i in range(settings.walk.size):
         least = _FAINTEST * part.steps[k] * settings.walk[i] ** 2
         whole.noise[at, i] = part.noise[k, i] if part.noise[k, i] > least else 0.0
-        whole.active[at, i] = 0
 
 
 @compiled
@@ -64,9 +63,9 @@ def _go_forward(model, settings, horizon, state, steps, u, y, estimates):  # typ
 
     Parameters
     ----------
-    memory : with the window of the whole recording, which is filled.
+    state : with the window of the whole recording, which is filled.
     """
-    whole, part = state.window, horizon.window
+    whole, part = state.window.data, horizon.window.data
     whole.filled[0] = 0
     for k in range(steps.size):
         if steps[k] > 0.0 and part.filled[0] == part.steps.size:
@@ -86,25 +85,31 @@ def _go_forward(model, settings, horizon, state, steps, u, y, estimates):  # typ
 def _filter_again(model, settings, state):  # type: ignore[no-untyped-def]
     """Lay the nodes along an extended Kalman filter with the noise of the window; a status."""
     window, seen, z, status = state.window, settings.layout.seen, state.filter.z, 0
-    P, error = window.P, window.error
-    assign(z, window.mean)
-    assign_rows(P, window.covariance)
-    for k in range(window.filled[0]):
+    data, solution, scratch = window.data, window.solution, window.scratch
+    P, error = solution.P, solution.error
+    assign(z, data.mean)
+    assign_rows(P, data.covariance)
+    for k in range(data.filled[0]):
         for i in range(z.size):
-            window.nodes[k, i] = z[i]
+            data.nodes[k, i] = z[i]
             error[i] = 0.0
         for i in range(z.size):
-            P[i, i] += window.noise[k, i] * window.wider[k, i]
+            P[i, i] += data.noise[k, i] * data.wider[k, i]
         status = status or expand(model, settings, state, k)
-        carry(window.F[k], P, window.product)
+        carry(data.F[k], P, scratch.product)
         for j in range(seen.size):
-            if not np.isnan(window.errors[k, j]):
+            if not np.isnan(data.errors[k, j]):
+                variance = data.levels[k, j] / data.weight[k, j]
                 measurement_update(
-                    *(P, error, window.gain[k, j], window.slopes[k, j], seen[j]),
-                    *(window.errors[k, j], window.levels[k, j] / window.weight[k, j]),
+                    solution,
+                    solution.gain[k, j],
+                    data.slopes[k, j],
+                    seen[j],
+                    data.errors[k, j],
+                    variance,
                 )
         for i in range(z.size):
-            z[i] = clip(window.arrived[k, i] + error[i], window.low[i], window.high[i])
+            z[i] = clip(data.arrived[k, i] + error[i], data.low[i], data.high[i])
     return status
 
 
@@ -116,25 +121,26 @@ def _solve(window, seen, damping):  # type: ignore[no-untyped-def]
     rounds: a recording has thousands of them. Source: M. Hintermüller, K. Ito, K. Kunisch (2003),
     SIAM J. Optim. 13, 865-888.
     """
+    data, solution = window.data, window.solution
     outputs = seen.size
     for _ in range(_ROUNDS):
         solve_damped(window, seen, damping)
         changed = False
-        for k in range(window.filled[0]):
-            for i in range(window.mean.size):
-                if window.low[i] == -np.inf and window.high[i] == np.inf:
+        for k in range(data.filled[0]):
+            for i in range(data.mean.size):
+                if data.low[i] == -np.inf and data.high[i] == np.inf:
                     continue
-                if window.active[k, i] != 0:
-                    window.multiplier[k, i] = push(window, outputs, k, i)
-                    if window.multiplier[k, i] < 0.0 or window.total[k, outputs + i] == 0.0:
-                        window.active[k, i], changed = 0, True
+                if solution.active[k, i] != 0:
+                    solution.multiplier[k, i] = push(window, outputs, k, i)
+                    if solution.multiplier[k, i] < 0.0 or solution.total[k, outputs + i] == 0.0:
+                        solution.active[k, i], changed = 0, True
                     continue
-                value, slack = end(window, k, i), _TOLERANCE * np.sqrt(window.scale[k, i])
-                if value > window.high[i] + slack:
-                    window.active[k, i], changed = 1, True
-                elif value < window.low[i] - slack:
-                    window.active[k, i], changed = -1, True
-                window.multiplier[k, i] = 0.0
+                value, slack = end(window, k, i), _TOLERANCE * np.sqrt(solution.scale[k, i])
+                if value > data.high[i] + slack:
+                    solution.active[k, i], changed = 1, True
+                elif value < data.low[i] - slack:
+                    solution.active[k, i], changed = -1, True
+                solution.multiplier[k, i] = 0.0
         if not changed:
             break
 
@@ -181,16 +187,17 @@ def _settle(model, settings, state):  # type: ignore[no-untyped-def]
 def _report(model, settings, state, known, u, estimates):  # type: ignore[no-untyped-def]
     """Write the smoothed estimates over those of the way forward; returns a status."""
     window, filter_ = state.window, state.filter
+    data, solution = window.data, window.solution
     z, seen = filter_.z, settings.layout.seen
     solve_free(window, seen)
     gather_spread(window, seen, known)
     for i in range(z.size):
-        z[i] = window.nodes[0, i]
-        z[i] += window.noise[0, i] * window.wider[0, i] * window.costates[0, i]
+        z[i] = data.nodes[0, i]
+        z[i] += data.noise[0, i] * data.wider[0, i] * solution.costates[0, i]
     assign_rows(filter_.P, known.first)
     status = measure(model, u[0]) or finish(model, settings, filter_, estimates[0])
-    for k in range(window.filled[0]):
-        assign(z, window.arrived[k])
+    for k in range(data.filled[0]):
+        assign(z, data.arrived[k])
         assign_rows(filter_.P, known.covariances[k])
         status = status or measure(model, u[k + 1])
         status = status or finish(model, settings, filter_, estimates[k + 1])
@@ -290,9 +297,9 @@ class Smoother(MovingHorizonEstimator):
         steps = np.diff(time, prepend=time[0])
         u, y = self._samples(steps, u, y)
         horizon, nodes, s = self._state, time.size - 1, self._settings.walk.size
-        limits = horizon.window.low, horizon.window.high
-        whole = window(nodes, len(self.fmu.states), u.shape[1], y.shape[1], *limits)
-        state = HorizonState(horizon.filter, horizon.held, whole)
+        limits = horizon.window.data.low, horizon.window.data.high
+        empty = window(nodes, len(self.fmu.states), u.shape[1], y.shape[1], *limits)
+        whole, state = empty.data, HorizonState(horizon.filter, horizon.held, empty)
         model, settings = self._model, self._settings
         raise_on_failure(
             _go_forward(model, settings, horizon, state, steps, u, y, estimates), self.fmu
@@ -310,7 +317,7 @@ class Smoother(MovingHorizonEstimator):
         return self._split(estimates)
 
     def _doubt(
-        self, whole: Window, start: Matrix, levels: Matrix, errors: Matrix, step: float
+        self, whole: Data, start: Matrix, levels: Matrix, errors: Matrix, step: float
     ) -> None:
         """Give outputs whose errors are not white the noise of their sum; see `excess`.
 

@@ -16,13 +16,13 @@ def slopes(model, parts, state):  # type: ignore[no-untyped-def]
         asked = parts.states[i] + parts.states[count]
         for k in range(parts.first[i], parts.first[i + 1]):
             known = model.knowns[parts.order[k] :]
-            out = state.slopes[k]
-            if direction(model, parts.rates[i], asked, known, 1, model.seed, out):
+            out = state.slopes[k, :asked]
+            if direction(model, parts.rates[i], known, model.seed, out):
                 return 1
     for a in range(parts.first[count + 1] - parts.first[count]):
         known = model.knowns[parts.order[parts.first[count] + a] :]
-        out = state.common[a]
-        if direction(model, model.unknowns, model.x.size, known, 1, model.seed, out):
+        out = state.common[a, : model.x.size]
+        if direction(model, model.unknowns, known, model.seed, out):
             return 1
     return 0
 
@@ -51,7 +51,7 @@ def slope(model, column, known, out):  # type: ignore[no-untyped-def]
         out[0] = model.jacobian[known, column]
         return 0
     own = model.unknowns[column:]
-    return direction(model, own, 1, model.knowns[known:], 1, model.seed, out)
+    return direction(model, own, model.knowns[known:], model.seed, out[:1])
 
 
 @compiled

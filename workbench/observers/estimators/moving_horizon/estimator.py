@@ -91,56 +91,58 @@ class HorizonState(NamedTuple):
 def _append(settings, state, h, u, y):  # type: ignore[no-untyped-def]
     """Add a node where the estimate stands, and the sample that its step leads to."""
     window, held, levels = state.window, state.held, state.filter.levels
-    if window.filled[0] == window.steps.size:
+    data, solution = window.data, window.solution
+    if data.filled[0] == data.steps.size:
         shift(window)
-    k = window.filled[0]
-    window.filled[0] = k + 1
+    k = data.filled[0]
+    data.filled[0] = k + 1
     for j in range(y.size):
         if not np.isnan(y[j]):
             held[j] = y[j]
     fade = fading(settings.layout, held)
-    window.steps[k] = h
-    assign(window.inputs[k], state.filter.step.inputs)
-    assign(window.reached[k], u)
-    assign(window.samples[k], y)
+    data.steps[k] = h
+    assign(data.inputs[k], state.filter.step.inputs)
+    assign(data.reached[k], u)
+    assign(data.samples[k], y)
     for j in range(y.size):
         levels.noise[j] = variance(settings, fade, held, j)
-        window.levels[k, j] = levels.sample[j] * levels.noise[j]
-        window.weight[k, j] = 1.0
+        data.levels[k, j] = levels.sample[j] * levels.noise[j]
+        data.weight[k, j] = 1.0
     for i in range(state.filter.z.size):
-        window.nodes[k, i] = state.filter.z[i]
-        window.noise[k, i] = h * (fade * settings.walk[i]) ** 2
-        window.active[k, i] = 0
-        before = window.wider[k - 1, i] if k > 0 else window.older[i]
+        data.nodes[k, i] = state.filter.z[i]
+        data.noise[k, i] = h * (fade * settings.walk[i]) ** 2
+        solution.active[k, i] = 0
+        before = data.wider[k - 1, i] if k > 0 else data.older[i]
         share = levels.walk[i] * room(settings, state.filter.P, i)
-        window.wider[k, i] = max(share, settings.fading * before)
+        data.wider[k, i] = max(share, settings.fading * before)
     for i in range(state.filter.least.size):
-        least = state.filter.least[i] / window.wider[k, i]
-        window.noise[k, i] = max(window.noise[k, i], least)
+        least = state.filter.least[i] / data.wider[k, i]
+        data.noise[k, i] = max(data.noise[k, i], least)
 
 
 @inlined
 def expand(model, settings, state, k):  # type: ignore[no-untyped-def]
     """Take and linearise the step from a node, and the outputs there; returns a status."""
     window, layout, n = state.window, settings.layout, model.x.size
-    arrived, step = window.arrived[k], state.filter.step
+    data = window.data
+    arrived, step = data.arrived[k], state.filter.step
     for i in range(arrived.size):
-        arrived[i] = window.nodes[k, i]
-    interval(layout, step, window.inputs[k], window.reached[k])
+        arrived[i] = data.nodes[k, i]
+    interval(layout, step, data.inputs[k], data.reached[k])
     status = measure(model, step.end)
-    status = status or advance(model, layout, step, arrived, window.steps[k], True)
-    assign_rows(window.F[k], step.F)
+    status = status or advance(model, layout, step, arrived, data.steps[k], True)
+    assign_rows(data.F[k], step.F)
     if layout.columns > n:
-        status = status or measure(model, window.reached[k])
+        status = status or measure(model, data.reached[k])
         status = status or put(model, arrived) or read(model) or linearise(model, layout.columns)
     for j in range(layout.seen.size):
         at = layout.seen[j]
         if at >= 0:
-            window.errors[k, j] = window.samples[k, j] - arrived[at]
+            data.errors[k, j] = data.samples[k, j] - arrived[at]
         else:
-            window.errors[k, j] = window.samples[k, j] - model.y[-1 - at]
+            data.errors[k, j] = data.samples[k, j] - model.y[-1 - at]
             for i in range(arrived.size):
-                window.slopes[k, j, i] = model.jacobian[i, n - 1 - at]
+                data.slopes[k, j, i] = model.jacobian[i, n - 1 - at]
     return status
 
 
@@ -148,16 +150,17 @@ def expand(model, settings, state, k):  # type: ignore[no-untyped-def]
 def _learn(settings, state):  # type: ignore[no-untyped-def]
     """Let noise levels follow the last sample, as those of a filter without a window."""
     window, levels = state.window, state.filter.levels
-    last = window.filled[0] - 1
+    data, solution = window.data, window.solution
+    last = data.filled[0] - 1
     for j in range(levels.sample.size):
         levels.scatter[j] = levels.sample[j]  # as thought, of a sample that is missing
-        if window.total[last, j] > 0.0:
-            explained = window.total[last, j] - window.levels[last, j]
-            note(levels, j, window.surprise[last, j], explained, levels.noise[j])
-    assign_rows(levels.before, window.before)
-    assign_rows(state.filter.P, window.P)
-    assign(state.filter.change, window.moved)
-    learn(settings, state.filter, fading(settings.layout, state.held), window.steps[last])
+        if solution.total[last, j] > 0.0:
+            explained = solution.total[last, j] - data.levels[last, j]
+            note(levels, j, solution.surprise[last, j], explained, levels.noise[j])
+    assign_rows(levels.before, solution.before)
+    assign_rows(state.filter.P, solution.P)
+    assign(state.filter.change, solution.moved)
+    learn(settings, state.filter, fading(settings.layout, state.held), data.steps[last])
 
 
 @compiled
@@ -165,7 +168,7 @@ def _fill_in(model, settings, state, k, y):  # type: ignore[no-untyped-def]
     """Put samples that were missing to node k; returns a status."""
     for j in range(y.size):
         if not np.isnan(y[j]):
-            state.window.samples[k, j] = y[j]
+            state.window.data.samples[k, j] = y[j]
     return expand(model, settings, state, k)
 
 
@@ -178,24 +181,25 @@ def _solve(settings, state, new, estimate):  # type: ignore[no-untyped-def]
     new : whether it is the first time that the last sample is met.
     """
     window, seen = state.window, settings.layout.seen
-    last = window.filled[0] - 1
+    data, solution = window.data, window.solution
+    last = data.filled[0] - 1
     solve_free(window, seen)
     nis = 0.0
     for j in range(seen.size):
-        if window.total[last, j] > 0.0:
-            nis += window.surprise[last, j] ** 2 / window.total[last, j]
+        if solution.total[last, j] > 0.0:
+            nis += solution.surprise[last, j] ** 2 / solution.total[last, j]
     estimate[estimate.size - 1] = nis
     learns, age = settings.learning.within < np.inf, state.filter.levels.age[0]
     if nis > settings.largest_nis and not (learns and age < settings.learning.within):
-        window.alert[0] = 1
+        data.alert[0] = 1
         trust(state.filter.levels)
-    if new and learns and window.alert[0] == 0:
+    if new and learns and data.alert[0] == 0:
         _learn(settings, state)
     for _ in range(_ROUNDS):
         if not reweigh(window, settings.limit, settings.fading):
             break
         solve_free(window, seen)
-    assign_rows(state.filter.P, window.P)
+    assign_rows(state.filter.P, solution.P)
     bound(window, seen)
     for i in range(state.filter.z.size):
         state.filter.z[i] = end(window, last, i)
@@ -205,20 +209,21 @@ def _solve(settings, state, new, estimate):  # type: ignore[no-untyped-def]
 def _follow_sample(settings, state, nis):  # type: ignore[no-untyped-def]
     """Carry the error of steps on by the last sample, as its gain does with every innovation."""
     window, step, seen = state.window, state.filter.step, settings.layout.seen
-    k, shown, count = window.filled[0] - 1, 0.0, 0.0
+    data, solution = window.data, window.solution
+    k, shown, count = data.filled[0] - 1, 0.0, 0.0
     if step.accurate[0] > 0.0:
         return
     for j in range(seen.size):
-        total, off = window.total[k, j], 0.0
+        total, off = solution.total[k, j], 0.0
         if total == 0.0:
             continue
         if seen[j] >= 0:
             off = step.error[seen[j]]
         else:
             for i in range(step.error.size):
-                off += window.slopes[k, j, i] * step.error[i]
+                off += data.slopes[k, j, i] * step.error[i]
         for i in range(step.error.size):
-            step.error[i] -= window.gain[k, j, i] / total * off
+            step.error[i] -= solution.gain[k, j, i] / total * off
         shown += off * off / total
         count += 1.0
     judge_sample(step, state.filter.P, fading(settings.layout, state.held), shown, count, nis)
@@ -228,9 +233,10 @@ def _follow_sample(settings, state, nis):  # type: ignore[no-untyped-def]
 def move(model, settings, state, share):  # type: ignore[no-untyped-def]
     """Move the nodes by a share of their change and take the steps from there; a status."""
     window, status = state.window, 0
-    for k in range(window.filled[0]):
+    data, solution = window.data, window.solution
+    for k in range(data.filled[0]):
         for i in range(state.filter.z.size):
-            window.nodes[k, i] += share * window.change[k, i]
+            data.nodes[k, i] += share * solution.change[k, i]
         status = status or expand(model, settings, state, k)
     return status
 
@@ -256,22 +262,23 @@ def _relinearise(model, settings, state):  # type: ignore[no-untyped-def]
 def horizon_step(model, settings, state, h, u, y, estimate):  # type: ignore[no-untyped-def]
     """Estimate the last samples anew, with one that is added; returns a status."""
     window = state.window
+    data = window.data
     if h == 0.0:
         status = begin(model, settings, state.filter, u, y)
         reset(state.filter.levels)
-        window.filled[0] = 0
-        window.alert[0] = 0
+        data.filled[0] = 0
+        data.alert[0] = 0
         for i in range(state.filter.z.size):
-            window.older[i] = 1.0
+            data.older[i] = 1.0
         assign(state.held, y)
-        assign(window.mean, state.filter.z)
-        assign_rows(window.covariance, state.filter.P)
+        assign(data.mean, state.filter.z)
+        assign_rows(data.covariance, state.filter.P)
         return status or finish(model, settings, state.filter, estimate)
     step, z = state.filter.step, state.filter.z
     status = put(model, z) or begin_interval(model, settings.layout, step, z, u, h)
     status = status or drive(model, settings, state.filter, z, step.end, h)
     _append(settings, state, h, u, y)
-    status = status or expand(model, settings, state, window.filled[0] - 1)
+    status = status or expand(model, settings, state, data.filled[0] - 1)
     follow_error(step)
     for iteration in range(settings.iterations):
         _solve(settings, state, iteration == 0, estimate)
@@ -368,12 +375,12 @@ class MovingHorizonEstimator(ExtendedKalmanFilter):
         InputError
             If they are older than the horizon, or than the first step.
         """
-        k = int(self.window.filled[0]) - 1 - age
+        k = int(self.window.data.filled[0]) - 1 - age
         if age < 0 or k < 0:
             raise InputError(
                 where=f"estimator {self.name}",
                 found=f"samples that are {age} steps old",
-                expected=f"0 to {self.window.filled[0] - 1}, as many as the horizon has",
+                expected=f"0 to {self.window.data.filled[0] - 1}, as many as the horizon has",
                 remedy="give a longer horizon in [design] of the gains",
             )
         raise_on_failure(

@@ -27,11 +27,10 @@ Tensor = NDArray[np.float64]
 DETERMINED = 1e-12
 
 
-class Window(NamedTuple):
-    """Nodes of the last N steps, oldest first, what was measured, and work space.
+class Data(NamedTuple):
+    """What was measured along the last N steps, oldest first, and how the model moves there.
 
-    s unknowns at a node (n states), m inputs, l outputs; rows of samples: l of outputs, then s of
-    bounds.
+    s unknowns at a node (n states), m inputs, l outputs.
 
     Attributes
     ----------
@@ -46,16 +45,6 @@ class Window(NamedTuple):
     weight : (N, l) share of a sample's information that counts; wider : (N, s) variance of the
         model's noise over what is declared, less where levels are learnt; older : (s,) of the node
         before; alert : (1,) whether it may be wider.
-    active : (N, s) 1 at the upper bound, -1 at the lower one; multiplier : (N, s) of it.
-    scale : (N, s) variances without bounds.
-    offset : (N, s) filtered less node; spread : (N, s, s) covariance of it.
-    gain : (N, l + s, s), total, surprise, force : (N, l + s) of samples and bounds, see
-        `measurement_update`.
-    change : (N, s) best node less node.
-    next_mean, next_covariance : as mean and covariance, of the second node.
-    before : (s, s) covariance of the last arrival before its sample; moved : (s,) by the sample.
-    costates : (N, s) of the nodes: what noise does to the cost.
-    costate, error, work : (s,); product : (n, s); P : (s, s).
     """
 
     filled: NDArray[np.intp]
@@ -78,6 +67,25 @@ class Window(NamedTuple):
     wider: Matrix
     older: Vector
     alert: NDArray[np.intp]
+
+
+class Solution(NamedTuple):
+    """The best change of the nodes, and how it was found; rows are l outputs, then s bounds.
+
+    Attributes
+    ----------
+    active : (N, s) 1 at the upper bound, -1 at the lower one; multiplier : (N, s) of it.
+    scale : (N, s) variances without bounds.
+    offset : (N, s) filtered less node; spread : (N, s, s) covariance of it.
+    gain : (N, l + s, s), total, surprise, force : (N, l + s) of samples and bounds, see
+        `measurement_update`.
+    change : (N, s) best node less node.
+    next_mean, next_covariance : as mean and covariance of the data, of the second node.
+    before : (s, s) covariance of the last arrival before its sample; moved : (s,) by the sample.
+    costates : (N, s) of the nodes: what noise does to the cost.
+    error, P : (s,) and (s, s) of the arrival that the filter is at.
+    """
+
     active: NDArray[np.intp]
     multiplier: Matrix
     scale: Matrix
@@ -93,18 +101,31 @@ class Window(NamedTuple):
     before: Matrix
     moved: Vector
     costates: Matrix
-    costate: Vector
     error: Vector
+    P: Matrix
+
+
+class Scratch(NamedTuple):
+    """Work space: costate, work : (s,); product : (n, s)."""
+
+    costate: Vector
     work: Vector
     product: Matrix
-    P: Matrix
+
+
+class Window(NamedTuple):
+    """A least-squares problem, its solution, and room to work in."""
+
+    data: Data
+    solution: Solution
+    scratch: Scratch
 
 
 def window(N: int, n: int, m: int, outputs: int, low: Vector, high: Vector) -> Window:
     """An empty window of N nodes of a model with so many states, inputs and outputs."""
     s = low.size
     rows = outputs + s
-    return Window(
+    data = Data(
         filled=np.zeros(1, np.intp),
         mean=np.zeros(s),
         covariance=np.zeros((s, s)),
@@ -125,6 +146,8 @@ def window(N: int, n: int, m: int, outputs: int, low: Vector, high: Vector) -> W
         wider=np.ones((N, s)),
         older=np.ones(s),
         alert=np.zeros(1, np.intp),
+    )
+    solution = Solution(
         active=np.zeros((N, s), np.intp),
         multiplier=np.zeros((N, s)),
         scale=np.zeros((N, s)),
@@ -140,45 +163,45 @@ def window(N: int, n: int, m: int, outputs: int, low: Vector, high: Vector) -> W
         before=np.zeros((s, s)),
         moved=np.zeros(s),
         costates=np.zeros((N, s)),
-        costate=np.zeros(s),
         error=np.zeros(s),
-        work=np.zeros(s),
-        product=np.zeros((n, s)),
         P=np.zeros((s, s)),
     )
+    return Window(data, solution, Scratch(np.zeros(s), np.zeros(s), np.zeros((n, s))))
 
 
 @compiled
 def shift(window):  # type: ignore[no-untyped-def]
     """Forget the oldest node: what it tells becomes the mean and covariance of the next one."""
-    last = window.filled[0] - 1
-    assign(window.mean, window.next_mean)
-    assign(window.older, window.wider[0])
-    assign_rows(window.covariance, window.next_covariance)
-    assign(window.steps[:last], window.steps[1:])
-    assign_rows(window.inputs[:last], window.inputs[1:])
-    assign_rows(window.reached[:last], window.reached[1:])
-    assign_rows(window.nodes[:last], window.nodes[1:])
-    assign_rows(window.noise[:last], window.noise[1:])
-    assign_rows(window.arrived[:last], window.arrived[1:])
-    assign_rows(window.errors[:last], window.errors[1:])
+    data, solution = window.data, window.solution
+    last = data.filled[0] - 1
+    assign(data.mean, solution.next_mean)
+    assign(data.older, data.wider[0])
+    assign_rows(data.covariance, solution.next_covariance)
+    assign(data.steps[:last], data.steps[1:])
+    assign_rows(data.inputs[:last], data.inputs[1:])
+    assign_rows(data.reached[:last], data.reached[1:])
+    assign_rows(data.nodes[:last], data.nodes[1:])
+    assign_rows(data.noise[:last], data.noise[1:])
+    assign_rows(data.arrived[:last], data.arrived[1:])
+    assign_rows(data.errors[:last], data.errors[1:])
     for k in range(last):
-        assign_rows(window.F[k], window.F[k + 1])
-        assign_rows(window.slopes[k], window.slopes[k + 1])
-    assign_rows(window.active[:last], window.active[1:])
-    assign_rows(window.samples[:last], window.samples[1:])
-    assign_rows(window.levels[:last], window.levels[1:])
-    assign_rows(window.weight[:last], window.weight[1:])
-    assign_rows(window.wider[:last], window.wider[1:])
-    window.filled[0] = last
+        assign_rows(data.F[k], data.F[k + 1])
+        assign_rows(data.slopes[k], data.slopes[k + 1])
+    assign_rows(solution.active[:last], solution.active[1:])
+    assign_rows(data.samples[:last], data.samples[1:])
+    assign_rows(data.levels[:last], data.levels[1:])
+    assign_rows(data.weight[:last], data.weight[1:])
+    assign_rows(data.wider[:last], data.wider[1:])
+    data.filled[0] = last
 
 
 @compiled
-def measurement_update(P, error, v, c, at, residual, variance):  # type: ignore[no-untyped-def]
+def measurement_update(solution, v, c, at, residual, variance):  # type: ignore[no-untyped-def]
     """Correct error and P by a sample of unknown `at`, or of an output with slopes c, `at` < 0.
 
     Returns what the way back needs beside v = P c: c'P c + variance, and residual - c'error.
     """
+    P, error = solution.P, solution.error
     s = error.size
     if at >= 0:
         for i in range(s):
@@ -205,59 +228,68 @@ def measurement_update(P, error, v, c, at, residual, variance):  # type: ignore[
 @compiled
 def _filter(window, seen, bounded, damping):  # type: ignore[no-untyped-def]
     """Filter along the nodes; error and P are then those of the last arrival."""
-    P, error, outputs = window.P, window.error, seen.size
-    s, n = error.size, window.F.shape[1]
-    for k in range(window.filled[0]):
-        d, F = window.offset[k], window.F[k]
+    data, solution, scratch = window.data, window.solution, window.scratch
+    P, error, outputs = solution.P, solution.error, seen.size
+    s, n = error.size, data.F.shape[1]
+    for k in range(data.filled[0]):
+        d, F = solution.offset[k], data.F[k]
         for i in range(s):
-            before = window.mean[i] if k == 0 else window.arrived[k - 1, i] + error[i]
-            d[i] = before - window.nodes[k, i]
+            before = data.mean[i] if k == 0 else data.arrived[k - 1, i] + error[i]
+            d[i] = before - data.nodes[k, i]
             for j in range(s):
                 if k == 0:
-                    P[i, j] = window.covariance[i, j]
+                    P[i, j] = data.covariance[i, j]
                 if i == j:
-                    P[i, i] += window.noise[k, i] * window.wider[k, i]
-                window.spread[k, i, j] = P[i, j]
-        carry(F, P, window.product)
+                    P[i, i] += data.noise[k, i] * data.wider[k, i]
+                solution.spread[k, i, j] = P[i, j]
+        carry(F, P, scratch.product)
         for i in range(n):
             error[i] = 0.0
             for j in range(s):
                 error[i] += F[i, j] * d[j]
         for i in range(n, s):
             error[i] = d[i]
-        if k == window.filled[0] - 1:
-            assign_rows(window.before, P)
-            assign(window.moved, error)
+        if k == data.filled[0] - 1:
+            assign_rows(solution.before, P)
+            assign(solution.moved, error)
         for j in range(outputs):
-            window.total[k, j] = 0.0
-            if not np.isnan(window.errors[k, j]):
-                variance = window.levels[k, j] / window.weight[k, j]
-                window.total[k, j], window.surprise[k, j] = measurement_update(
-                    *(P, error, window.gain[k, j], window.slopes[k, j]),
-                    *(seen[j], window.errors[k, j], variance),
+            solution.total[k, j] = 0.0
+            if not np.isnan(data.errors[k, j]):
+                variance = data.levels[k, j] / data.weight[k, j]
+                solution.total[k, j], solution.surprise[k, j] = measurement_update(
+                    solution,
+                    solution.gain[k, j],
+                    data.slopes[k, j],
+                    seen[j],
+                    data.errors[k, j],
+                    variance,
                 )
-        if k == window.filled[0] - 1:
+        if k == data.filled[0] - 1:
             for i in range(s):
-                window.moved[i] = error[i] - window.moved[i]
+                solution.moved[i] = error[i] - solution.moved[i]
         if k == 0:
-            assign_rows(window.next_covariance, P)
+            assign_rows(solution.next_covariance, P)
             for i in range(s):
-                window.next_mean[i] = window.arrived[0, i] + error[i]
+                solution.next_mean[i] = data.arrived[0, i] + error[i]
         for i in range(s):
-            window.total[k, outputs + i] = 0.0
+            solution.total[k, outputs + i] = 0.0
             if not bounded:
-                window.scale[k, i] = P[i, i]
-            elif abs(window.active[k, i]) == 1 and P[i, i] > DETERMINED * window.scale[k, i]:
-                limit = window.high[i] if window.active[k, i] > 0 else window.low[i]
-                row, missing = outputs + i, limit - window.arrived[k, i]
-                window.total[k, row], window.surprise[k, row] = measurement_update(
-                    P, error, window.gain[k, row], window.work, i, missing, 0.0
+                solution.scale[k, i] = P[i, i]
+            elif abs(solution.active[k, i]) == 1 and P[i, i] > DETERMINED * solution.scale[k, i]:
+                limit = data.high[i] if solution.active[k, i] > 0 else data.low[i]
+                row, missing = outputs + i, limit - data.arrived[k, i]
+                solution.total[k, row], solution.surprise[k, row] = measurement_update(
+                    solution, solution.gain[k, row], scratch.work, i, missing, 0.0
                 )
-            elif damping > 0.0 and window.scale[k, i] > 0.0:
+            elif damping > 0.0 and solution.scale[k, i] > 0.0:
                 row = outputs + i
-                window.total[k, row], window.surprise[k, row] = measurement_update(
-                    *(P, error, window.gain[k, row], window.work, i, 0.0),
-                    window.scale[k, i] / damping,
+                solution.total[k, row], solution.surprise[k, row] = measurement_update(
+                    solution,
+                    solution.gain[k, row],
+                    scratch.work,
+                    i,
+                    0.0,
+                    solution.scale[k, i] / damping,
                 )
 
 
@@ -281,33 +313,34 @@ def _react(costate, v, c, at, total, surprise):  # type: ignore[no-untyped-def]
 @compiled
 def _smooth(window, seen):  # type: ignore[no-untyped-def]
     """Forces of samples and bounds, and the best change of each node, from the last one back."""
-    costate, work, outputs = window.costate, window.work, seen.size
-    s, n = costate.size, window.F.shape[1]
+    data, solution, scratch = window.data, window.solution, window.scratch
+    costate, work, outputs = scratch.costate, scratch.work, seen.size
+    s, n = costate.size, data.F.shape[1]
     for i in range(s):
         costate[i] = 0.0
-    for k in range(window.filled[0] - 1, -1, -1):
-        F = window.F[k]
+    for k in range(data.filled[0] - 1, -1, -1):
+        F = data.F[k]
         for i in range(s - 1, -1, -1):
             row = outputs + i
-            window.force[k, row] = _react(
-                *(costate, window.gain[k, row], work, i),
-                *(window.total[k, row], window.surprise[k, row]),
+            solution.force[k, row] = _react(
+                *(costate, solution.gain[k, row], work, i),
+                *(solution.total[k, row], solution.surprise[k, row]),
             )
         for j in range(outputs - 1, -1, -1):
-            window.force[k, j] = _react(
-                *(costate, window.gain[k, j], window.slopes[k, j], seen[j]),
-                *(window.total[k, j], window.surprise[k, j]),
+            solution.force[k, j] = _react(
+                *(costate, solution.gain[k, j], data.slopes[k, j], seen[j]),
+                *(solution.total[k, j], solution.surprise[k, j]),
             )
         for j in range(s):
             work[j] = costate[j] if j >= n else 0.0
             for i in range(n):
                 work[j] += F[i, j] * costate[i]
         for i in range(s):
-            costate[i] = window.costates[k, i] = work[i]
+            costate[i] = solution.costates[k, i] = work[i]
         for i in range(s):
-            window.change[k, i] = window.offset[k, i]
+            solution.change[k, i] = solution.offset[k, i]
             for j in range(s):
-                window.change[k, i] -= window.spread[k, i, j] * costate[j]
+                solution.change[k, i] -= solution.spread[k, i, j] * costate[j]
 
 
 @inlined
@@ -339,10 +372,11 @@ def solve_bounded(window, seen):  # type: ignore[no-untyped-def]
 @inlined
 def end(window, k, i):  # type: ignore[no-untyped-def]
     """Unknown i where the best step from node k leads."""
-    n = window.F.shape[1]
+    data, solution = window.data, window.solution
+    n = data.F.shape[1]
     if i >= n:
-        return window.arrived[k, i] + window.change[k, i]
-    total = window.arrived[k, i]
-    for j in range(window.mean.size):
-        total += window.F[k, i, j] * window.change[k, j]
+        return data.arrived[k, i] + solution.change[k, i]
+    total = data.arrived[k, i]
+    for j in range(data.mean.size):
+        total += data.F[k, i, j] * solution.change[k, j]
     return total

@@ -24,21 +24,23 @@ _MOST = 20  # recursions for each node: more would be a circle of rounding
 @inlined
 def push(window, outputs, k, i):  # type: ignore[no-untyped-def]
     """What an active bound pushes with, inwards; negative if it pulls."""
-    return -window.active[k, i] * window.force[k, outputs + i]
+    solution = window.solution
+    return -solution.active[k, i] * solution.force[k, outputs + i]
 
 
 @compiled
 def _most_missed(window):  # type: ignore[no-untyped-def]
     """The worst miss of a bound that is not active: node, unknown and side, 0 if there is none."""
+    data, solution = window.data, window.solution
     worst, node, which, side = _TOLERANCE, 0, 0, 0
-    for i in range(window.mean.size):
-        if window.low[i] == -np.inf and window.high[i] == np.inf:
+    for i in range(data.mean.size):
+        if data.low[i] == -np.inf and data.high[i] == np.inf:
             continue
-        for k in range(window.filled[0]):
-            if window.active[k, i] != 0:
+        for k in range(data.filled[0]):
+            if solution.active[k, i] != 0:
                 continue
-            value, deviation = end(window, k, i), np.sqrt(window.scale[k, i])
-            above, below = value - window.high[i], window.low[i] - value
+            value, deviation = end(window, k, i), np.sqrt(solution.scale[k, i])
+            above, below = value - data.high[i], data.low[i] - value
             if max(above, below) > worst * deviation:
                 worst, node, which = max(above, below) / deviation, k, i
                 side = 1 if above > below else -1
@@ -48,25 +50,26 @@ def _most_missed(window):  # type: ignore[no-untyped-def]
 @compiled
 def _resume(window, seen):  # type: ignore[no-untyped-def]
     """Start from the bounds of the sample before, without those that would pull; see `bound`."""
+    data, solution = window.data, window.solution
     outputs, recursions = seen.size, 0
     while True:
         any_active, dropped = False, False
-        for k in range(window.filled[0]):
-            for i in range(window.mean.size):
-                any_active = any_active or window.active[k, i] != 0
+        for k in range(data.filled[0]):
+            for i in range(data.mean.size):
+                any_active = any_active or solution.active[k, i] != 0
         if not any_active:
             if recursions > 0:
                 solve_free(window, seen)
             return recursions
         solve_bounded(window, seen)
         recursions += 1
-        for k in range(window.filled[0]):
-            for i in range(window.mean.size):
-                if window.active[k, i] == 0:
+        for k in range(data.filled[0]):
+            for i in range(data.mean.size):
+                if solution.active[k, i] == 0:
                     continue
-                window.multiplier[k, i] = push(window, outputs, k, i)
-                if window.multiplier[k, i] < 0.0 or window.total[k, outputs + i] == 0.0:
-                    window.active[k, i], dropped = 0, True
+                solution.multiplier[k, i] = push(window, outputs, k, i)
+                if solution.multiplier[k, i] < 0.0 or solution.total[k, outputs + i] == 0.0:
+                    solution.active[k, i], dropped = 0, True
         if not dropped:
             return recursions
 
@@ -77,21 +80,22 @@ def _advance(window, outputs, node, which):  # type: ignore[no-untyped-def]
 
     That bound is let go. Returns whether none was.
     """
+    data, solution = window.data, window.solution
     share, at, of = 1.0, -1, -1
-    for k in range(window.filled[0]):
-        for i in range(window.mean.size):
-            if abs(window.active[k, i]) != 1 or (k == node and i == which):
+    for k in range(data.filled[0]):
+        for i in range(data.mean.size):
+            if abs(solution.active[k, i]) != 1 or (k == node and i == which):
                 continue
-            new, old = push(window, outputs, k, i), window.multiplier[k, i]
+            new, old = push(window, outputs, k, i), solution.multiplier[k, i]
             if new < 0.0 and old < share * (old - new):
                 share, at, of = old / (old - new), k, i
-    for k in range(window.filled[0]):
-        for i in range(window.mean.size):
-            if abs(window.active[k, i]) == 1:
-                new, old = push(window, outputs, k, i), window.multiplier[k, i]
-                window.multiplier[k, i] = old + share * (new - old)
+    for k in range(data.filled[0]):
+        for i in range(data.mean.size):
+            if abs(solution.active[k, i]) == 1:
+                new, old = push(window, outputs, k, i), solution.multiplier[k, i]
+                solution.multiplier[k, i] = old + share * (new - old)
     if at >= 0:
-        window.active[at, of] = 0
+        solution.active[at, of] = 0
     return at < 0
 
 
@@ -102,30 +106,31 @@ def bound(window, seen):  # type: ignore[no-untyped-def]
     A bound that no noise of the model can reach, such as that of a quantity which others
     determine, is left missed.
     """
+    data, solution = window.data, window.solution
     outputs, recursions = seen.size, _resume(window, seen)
     ruled_out = False
-    while recursions < _MOST * window.filled[0]:
+    while recursions < _MOST * data.filled[0]:
         node, which, side = _most_missed(window)
         if side == 0:
             break
-        window.active[node, which], window.multiplier[node, which] = side, 0.0
+        solution.active[node, which], solution.multiplier[node, which] = side, 0.0
         done = False
         while not done:
             solve_bounded(window, seen)
             recursions += 1
-            if window.total[node, outputs + which] == 0.0:
-                window.active[node, which], done, ruled_out = _RULED_OUT, True, True
+            if solution.total[node, outputs + which] == 0.0:
+                solution.active[node, which], done, ruled_out = _RULED_OUT, True, True
             else:
                 done = _advance(window, outputs, node, which)
-    for i in range(window.mean.size):
+    for i in range(data.mean.size):
         # What the first bounds push with stays, so that the next window meets the same balance.
-        if abs(window.active[0, i]) == 1:
-            for j in range(window.mean.size):
-                push = window.next_covariance[j, i] * window.force[0, outputs + i]
-                window.next_mean[j] += push
+        if abs(solution.active[0, i]) == 1:
+            for j in range(data.mean.size):
+                push = solution.next_covariance[j, i] * solution.force[0, outputs + i]
+                solution.next_mean[j] += push
     if ruled_out:
-        for k in range(window.filled[0]):
-            for i in range(window.mean.size):
-                if window.active[k, i] == _RULED_OUT:
-                    window.active[k, i] = 0
+        for k in range(data.filled[0]):
+            for i in range(data.mean.size):
+                if solution.active[k, i] == _RULED_OUT:
+                    solution.active[k, i] = 0
     return recursions

@@ -24,28 +24,29 @@ def reweigh(window, limit, fading):  # type: ignore[no-untyped-def]
     -------
     Whether any of it changed by more than a tenth.
     """
+    data, solution = window.data, window.solution
     changed, calm = False, True
-    for k in range(window.filled[0]):
-        for j in range(window.weight.shape[1]):
-            if window.total[k, j] == 0.0:
+    for k in range(data.filled[0]):
+        for j in range(data.weight.shape[1]):
+            if solution.total[k, j] == 0.0:
                 continue
-            old = window.weight[k, j]
-            size = np.sqrt(window.levels[k, j]) * abs(window.force[k, j]) / old
+            old = data.weight[k, j]
+            size = np.sqrt(data.levels[k, j]) * abs(solution.force[k, j]) / old
             new = limit / size if size > limit else 1.0
-            window.weight[k, j] = new
+            data.weight[k, j] = new
             changed = changed or abs(new - old) > 0.1 * old
-        if window.alert[0] == 0:
+        if data.alert[0] == 0:
             continue
-        for i in range(window.F.shape[1], window.mean.size):
-            old = window.wider[k, i]
-            square = window.noise[k, i] * (window.costates[k, i] * old) ** 2
-            before = window.wider[k - 1, i] if k > 0 else window.older[i]
+        for i in range(data.F.shape[1], data.mean.size):
+            old = data.wider[k, i]
+            square = data.noise[k, i] * (solution.costates[k, i] * old) ** 2
+            before = data.wider[k - 1, i] if k > 0 else data.older[i]
             new = max(1.0, square, fading * before)
-            window.wider[k, i] = new
+            data.wider[k, i] = new
             changed = changed or abs(new - old) > 0.1 * old
             calm = calm and new == 1.0
     if calm:
-        window.alert[0] = 0
+        data.alert[0] = 0
     return changed
 
 
@@ -55,15 +56,16 @@ def cost(window):  # type: ignore[no-untyped-def]
 
     A bound that is missed costs what it pushes with, so that the solution with bounds is a minimum.
     """
-    s, outputs, P, work = window.mean.size, window.weight.shape[1], window.P, window.work
+    data, solution, scratch = window.data, window.solution, window.scratch
+    s, outputs, P, work = data.mean.size, data.weight.shape[1], solution.P, scratch.work
     total = 0.0
     # Cholesky's factor of the first covariance; directions without variance do not move.
     for i in range(s):
-        work[i] = window.nodes[0, i] - window.mean[i]
+        work[i] = data.nodes[0, i] - data.mean[i]
         for j in range(i + 1):
-            P[i, j] = window.covariance[i, j]
+            P[i, j] = data.covariance[i, j]
             if i == j:
-                P[i, i] += window.noise[0, i] * window.wider[0, i]
+                P[i, i] += data.noise[0, i] * data.wider[0, i]
             least = DETERMINED * P[i, i]
             for k in range(j):
                 P[i, j] -= P[i, k] * P[j, k]
@@ -75,16 +77,16 @@ def cost(window):  # type: ignore[no-untyped-def]
             work[i] -= P[i, j] * work[j]
         work[i] = work[i] / P[i, i] if P[i, i] > 0.0 else 0.0
         total += work[i] ** 2
-    for k in range(window.filled[0]):
+    for k in range(data.filled[0]):
         for i in range(s):
-            variance = window.noise[k, i] * window.wider[k, i]
+            variance = data.noise[k, i] * data.wider[k, i]
             if k > 0 and variance > 0.0:
-                total += (window.nodes[k, i] - window.arrived[k - 1, i]) ** 2 / variance
-            if window.active[k, i] != 0:
-                above = window.arrived[k, i] - window.high[i]
-                below = window.low[i] - window.arrived[k, i]
-                total += 2.0 * window.multiplier[k, i] * max(above, below, 0.0)
+                total += (data.nodes[k, i] - data.arrived[k - 1, i]) ** 2 / variance
+            if solution.active[k, i] != 0:
+                above = data.arrived[k, i] - data.high[i]
+                below = data.low[i] - data.arrived[k, i]
+                total += 2.0 * solution.multiplier[k, i] * max(above, below, 0.0)
         for j in range(outputs):
-            if not np.isnan(window.errors[k, j]):
-                total += window.errors[k, j] ** 2 * window.weight[k, j] / window.levels[k, j]
+            if not np.isnan(data.errors[k, j]):
+                total += data.errors[k, j] ** 2 * data.weight[k, j] / data.levels[k, j]
     return total

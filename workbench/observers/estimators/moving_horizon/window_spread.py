@@ -96,18 +96,19 @@ def _reduce(P, information, product, smoothed):  # type: ignore[no-untyped-def]
 @compiled
 def gather_spread(window, seen, spread):  # type: ignore[no-untyped-def]
     """Covariances without bounds, from the last node back, after `solve_free`."""
+    data, solution, scratch = window.data, window.solution, window.scratch
     information, product = spread.information, spread.product
     for i in range(information.shape[0]):
         for j in range(information.shape[0]):
             information[i, j] = 0.0
-    for k in range(window.filled[0] - 1, -1, -1):
+    for k in range(data.filled[0] - 1, -1, -1):
         for j in range(seen.size - 1, -1, -1):
-            if window.total[k, j] > 0.0:
+            if solution.total[k, j] > 0.0:
                 _gather(
-                    *(information, window.gain[k, j], window.slopes[k, j], seen[j]),
-                    *(window.total[k, j], window.work),
+                    *(information, solution.gain[k, j], data.slopes[k, j], seen[j]),
+                    *(solution.total[k, j], scratch.work),
                 )
-        _back(window.F[k], information, product)
-        _reduce(window.spread[k], information, product, spread.covariances[k])
-        carry(window.F[k], spread.covariances[k], window.product)
-    _reduce(window.covariance, information, product, spread.first)
+        _back(data.F[k], information, product)
+        _reduce(solution.spread[k], information, product, spread.covariances[k])
+        carry(data.F[k], spread.covariances[k], scratch.product)
+    _reduce(data.covariance, information, product, spread.first)
