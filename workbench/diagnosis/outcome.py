@@ -124,7 +124,7 @@ class Outcome:
     @property
     def sentence(self) -> str:
         """The verdict in one sentence."""
-        found = self.diagnosis
+        diagnosis = self.diagnosis
         cost = "".join(
             f" Without a measured {signal.label}, fewer effects can be discriminated."
             for signal in self.missing
@@ -133,27 +133,28 @@ class Outcome:
             alone = not self.system.library.is_file()
             cost += " All figures are of free simulations of the FMU, which nothing corrects"
             cost += f"{'; terms beside its rates are no candidates' * alone}."
-        if found.verdict == "nothing":
+        if diagnosis.verdict == "nothing":
             return f"Nothing significant is missing: what remains is noise and tolerance.{cost}"
-        if found.verdict == "unexplained":
+        if diagnosis.verdict == "unexplained":
             return f"{self._unexplained()}{cost}"
-        part = found.verdict == "partly explained"
+        part = diagnosis.verdict == "partly explained"
         names = []
-        for cause in found.causes:
+        for cause in diagnosis.causes:
             label, size = next(iter(cause.parameters.items()))
             twins = f" (or {', '.join(cause.confusable_with)})" if cause.confusable_with else ""
             names.append(f"{cause.effect.text}: {cause.effect.name}{twins}, {label} {size.text}")
-        assert found.gain is not None
-        more = " The search was interrupted: more may be missing." if found.interrupted else ""
+        assert diagnosis.gain is not None
+        more = " The search was interrupted: more may be missing." if diagnosis.interrupted else ""
         if part:
-            sizes = [size for cause in found.causes for size in cause.parameters.values()]
+            sizes = [size for cause in diagnosis.causes for size in cause.parameters.values()]
             rest = f"no effect of the catalogue explains the rest{self._goes}"
             if any(np.isfinite(size.beyond) for size in sizes):
                 rest = "a size beyond its bound explains more"
             more = f" This is a part: {rest}."
         return (
             f"The model lacks {'; and '.join(names)}; in cross-validation its error falls from "
-            f"{found.gain.before:.1f} to {found.gain.after:.1f} times the noise{self._held_out}."
+            f"{diagnosis.gain.before:.1f} to {diagnosis.gain.after:.1f} times the noise"
+            f"{self._held_out}."
             f"{more}{cost}"
         )
 
@@ -188,26 +189,26 @@ class Outcome:
     @property
     def warnings(self) -> list[str]:
         """What makes the answer doubtful, and what to do."""
-        found = self.diagnosis
+        diagnosis = self.diagnosis
         limits = [
             f"{cause.effect.name}: {name} {size.text}."
             + f" If physics allows it, widen the bounds of {name} in {cause.effect.model}."
             * size.open
-            for cause in found.causes
+            for cause in diagnosis.causes
             for name, size in cause.parameters.items()
             if size.limit
         ]
         if self.one_law:
-            names = " and ".join(cause.effect.name for cause in found.causes)
+            names = " and ".join(cause.effect.name for cause in diagnosis.causes)
             limits.insert(
                 0,
                 f"One law explains as much as {names} with less: {self.one_law}. Ask for its form "
                 "with --propose before you trust several causes.",
             )
-        named = {name for cause in found.causes for name in variables(cause.effect, "")}
+        named = {name for cause in diagnosis.causes for name in variables(cause.effect, "")}
         limits = [f"{self.warned}."] * bool(self.warned) + limits
         shifted = [
-            *(level.text for level in found.shifted),
+            *(level.text for level in diagnosis.shifted),
             *(
                 f"Derivatives by {name} differ by {share:.0%} between steps of their difference, "
                 "as events or the FMU's own solver make them rough: its interval may be wrong by "
@@ -216,20 +217,20 @@ class Outcome:
                 if name in named
             ),
         ]
-        if found.noise_alone or found.gain is None:
+        if diagnosis.noise_alone or diagnosis.gain is None:
             return [*limits, *shifted]
         return [
             *limits,
             *shifted,
-            f"What remains in cross-validation, {found.gain.after:.1f} times the noise, widens "
+            f"What remains in cross-validation, {diagnosis.gain.after:.1f} times the noise, widens "
             "the intervals: a law may be wrong in form.",
         ]
 
     @property
     def not_visible(self) -> dict[str, str]:
         """Why these recordings cannot show an effect, and what would, by its name."""
-        found = self.diagnosis
-        levels = {effect: name for name, effects in found.hidden.items() for effect in effects}
+        diagnosis = self.diagnosis
+        levels = {effect: name for name, effects in diagnosis.hidden.items() for effect in effects}
         hidden = {
             effect: f"the level {name} has the same signature; give its spread in "
             "[diagnosis.levels], or take it out there"
@@ -237,7 +238,7 @@ class Outcome:
             else "the start of the one recording has the same signature; fit several recordings"
             for effect, name in levels.items()
         }
-        return {**found.not_visible, **hidden}
+        return {**diagnosis.not_visible, **hidden}
 
     @property
     def next_steps(self) -> list[str]:
@@ -246,7 +247,9 @@ class Outcome:
             return []
         if self.diagnosis.late is not None:
             return []
-        bound = any("at its bound" in why for one in self.diagnosis.nearest for why in one.reasons)
+        bound = any(
+            "at its bound" in why for nearest in self.diagnosis.nearest for why in nearest.reasons
+        )
         widen = ["widen the bounds of a parameter at its bound, if physics allows it"] * bound
         if not self.system.library.is_file():
             return [
@@ -355,28 +358,31 @@ class Outcome:
 
     def to_dict(self) -> dict[str, Any]:
         """All of it as plain numbers and texts; the keys of the first level are a contract."""
-        found = self.diagnosis
+        diagnosis = self.diagnosis
         return {
-            "verdict": found.verdict,
+            "verdict": diagnosis.verdict,
             "sentence": self.sentence,
-            "interrupted": found.interrupted,
+            "interrupted": diagnosis.interrupted,
             "warnings": self.warnings,
             "doubts": {case.name: list(case.doubts) for case in self.cases if case.doubts},
-            "causes": [_cause(cause) for cause in found.causes],
-            "gain": None if found.gain is None else self._gain(found.gain),
-            "model": _model(self.extension, partial=found.verdict == "partly explained"),
-            "partial": list(found.partial),
-            "noise_alone": found.noise_alone,
-            "nearest": [asdict(candidate) for candidate in found.nearest],
+            "causes": [_cause(cause) for cause in diagnosis.causes],
+            "gain": None if diagnosis.gain is None else self._gain(diagnosis.gain),
+            "model": _model(self.extension, partial=diagnosis.verdict == "partly explained"),
+            "partial": list(diagnosis.partial),
+            "noise_alone": diagnosis.noise_alone,
+            "nearest": [asdict(candidate) for candidate in diagnosis.nearest],
             "next_steps": self.next_steps,
-            "late": None if found.late is None else asdict(found.late),
+            "late": None if diagnosis.late is None else asdict(diagnosis.late),
             "lasting_errors": self._lasting_errors(),
             "dependences": [asdict(dependence) for dependence in self.dependences],
-            "confusability": {"effects": list(found.names), "cosines": found.cosines.tolist()},
-            "candidates": [_candidate(score) for score in found.scores],
-            "steps": [_step(step) for step in found.steps],
+            "confusability": {
+                "effects": list(diagnosis.names),
+                "cosines": diagnosis.cosines.tolist(),
+            },
+            "candidates": [_candidate(score) for score in diagnosis.scores],
+            "steps": [_step(step) for step in diagnosis.steps],
             "not_visible": self.not_visible,
-            "shifted_levels": [asdict(level) for level in found.shifted],
+            "shifted_levels": [asdict(level) for level in diagnosis.shifted],
             "levels": {
                 f"{name} {choice}": {"value": value, "unit": unit}
                 for (name, choice), (value, unit) in self.levels.items()
@@ -620,23 +626,23 @@ def lasting(residuals: Residuals, span: int) -> LastingErrors:
 
 def at_blocks(residuals: Residuals) -> dict[str, Vector]:
     """Balances at the middle of each block, (b,), SI; they are smooth over more than a block."""
-    found = {}
+    balances = {}
     for balance in residuals.balances:
         known = np.isfinite(balance.values)
-        found[balance.name] = np.interp(
+        balances[balance.name] = np.interp(
             residuals.block_time, residuals.time[known], balance.values[known]
         )
-    return found
+    return balances
 
 
 def recording_figures(outcome: Outcome) -> list[CaseFigure]:
     """Figures of all recordings, the one that shows best what was found first."""
-    system, found = outcome.system, outcome.diagnosis
-    added = [cause.effect.name for cause in found.causes] or found.partial
+    system, diagnosis = outcome.system, outcome.diagnosis
+    added = [cause.effect.name for cause in diagnosis.causes] or diagnosis.partial
     extension = f"with {', '.join(added)}" if added else ""
     span = FAST if outcome.turns else lasting_blocks(system)
     pairs = list(zip(outcome.residuals, outcome.cases, strict=True))
-    pairs.sort(key=lambda pair: -_clearness(pair[0], span, bool(found.causes)))
+    pairs.sort(key=lambda pair: -_clearness(pair[0], span, bool(diagnosis.causes)))
     return [recording_figure(recording, case, system, extension, span) for recording, case in pairs]
 
 

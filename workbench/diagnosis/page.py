@@ -79,8 +79,8 @@ def write_diagnosis_page(
         [figures[0], *more, *figures[1:]], summary, folder, files=("csv", "png", "svg")
     )
     estimate = replace(others.pop(0), files=(), headed=False) if more else None
-    found = bool(summary["causes"])
-    title = "recording that shows it best" if found else "recording with the largest errors"
+    explained = bool(summary["causes"])
+    title = "recording that shows it best" if explained else "recording with the largest errors"
     parts = [
         Part("shown", f"The {title}", [*_shown(system, summary, figures, others, first)]),
         Part("dependences", "What the errors go with", _dependences(summary)),
@@ -355,8 +355,8 @@ def _cause(
             f"recording alone: {phases}."
         )
     if twins := ", ".join(cause["confusable_with"]):
-        told = Markup("These data cannot tell it from <strong>{}</strong>. What would: {}.")
-        blocks.append(Text(told.format(twins, cause["separation"]), warning=True))
+        text = Markup("These data cannot tell it from <strong>{}</strong>. What would: {}.")
+        blocks.append(Text(text.format(twins, cause["separation"]), warning=True))
     else:
         blocks.append(
             "No other effect of the catalogue explains these data as well. To confirm it by "
@@ -382,13 +382,13 @@ def _traded(certainty: Mapping[str, Any], effect: str, name: str) -> str:
         "of the errors that noise makes, -1 to 1; by recording is what differs between recordings "
         "within its tolerance, in the mean",
     )
-    told = [
+    correlations = [
         Markup("{} ({}{:+.2f})").format(other, "" if k else correlation + " ", value)
         for k, (other, value) in enumerate(others)
     ]
     return Markup(
         "Others compensate for an error of {}, which is correlated with that of {}."
-    ).format(name, joined(", ", told))
+    ).format(name, joined(", ", correlations))
 
 
 def _starts(starts: Mapping[str, Any]) -> Text:
@@ -404,8 +404,8 @@ def _starts(starts: Mapping[str, Any]) -> Text:
 
 def _step(place: int, step: Mapping[str, Any]) -> Markup:
     misfit = term("chi-squared", "sum of squared errors in units of their standard deviation")
-    told = Markup("{} ({} {:.0f})").format
-    rivals = [told(rival["effect"], misfit, rival["misfit"]) for rival in step["rivals"]]
+    rival_text = Markup("{} ({} {:.0f})").format
+    rivals = [rival_text(rival["effect"], misfit, rival["misfit"]) for rival in step["rivals"]]
     return Markup("Step {} of the search fitted {}; without, it was {:.0f}.").format(
         place, joined(", ", rivals), step["before"]
     )
@@ -414,11 +414,11 @@ def _step(place: int, step: Mapping[str, Any]) -> Markup:
 def _candidates(summary: Mapping[str, Any]) -> Table:
     """The best variant of each effect, best first, and what became of it."""
     twins = {twin for cause in summary["causes"] for twin in cause["confusable_with"]}
-    found = [cause["effect"] for cause in summary["causes"]]
+    causes = [cause["effect"] for cause in summary["causes"]]
     outcomes = {
         **dict.fromkeys(twins, "as good as the cause"),
         **dict.fromkeys(summary["partial"], "explains a part"),
-        **dict.fromkeys(found, "cause"),
+        **dict.fromkeys(causes, "cause"),
     }
     best: dict[str, Mapping[str, Any]] = {}
     for candidate in summary["candidates"]:
@@ -467,14 +467,14 @@ def _candidates(summary: Mapping[str, Any]) -> Table:
         "weighed by all that the nominal model leaves; chi-squared falls on recordings that the "
         "effect was fitted to, and in cross-validation."
     )
-    return Table("candidate-table", caption, columns, rows, marked=found)
+    return Table("candidate-table", caption, columns, rows, marked=causes)
 
 
 def _confusable(summary: Mapping[str, Any]) -> list[Block]:
     names, cosines = summary["confusability"]["effects"], summary["confusability"]["cosines"]
     if not names:
         return ["No effect of the catalogue was compared."]
-    found = [cause["effect"] for cause in summary["causes"]]
+    causes = [cause["effect"] for cause in summary["causes"]]
     pairs = [
         (names[i], names[j], 100 * cosines[i][j])
         for i in range(len(names))
@@ -487,23 +487,23 @@ def _confusable(summary: Mapping[str, Any]) -> list[Block]:
     caption = (
         "Cosine of the angle between what two effects leave in the errors, levels and tolerances "
         "apart, in percent; 100 is indistinguishable, numbers are given from 70 on"
-        f"{', the effect that was found is framed' if found else ''}. Data and figure"
+        f"{', the effect that was found is framed' if causes else ''}. Data and figure"
     )
-    told = "No two effects of the catalogue leave similar traces in these recordings and signals."
+    text = "No two effects of the catalogue leave similar traces in these recordings and signals."
     if pairs:
-        told = (
+        text = (
             f"In these recordings and signals, the most alike are {alike}. Effects at nearly 100 "
             "are named together."
         )
     return [
-        told,
+        text,
         Matrix(
             finding=f"Similarity of the signatures of {len(names)} effects, 0 to 100. "
             f"{read or 'None are alike.'}",
             names=names,
             shares=cosines,
             least=_SIMILAR,
-            marked=found,
+            marked=causes,
             caption=_files("confusability", caption),
         ),
     ]
@@ -514,13 +514,13 @@ def _gain(system: System, summary: Mapping[str, Any]) -> list[Block]:
     if (gain := summary["gain"]) is None:
         blocks.append("Nothing was extended, so that there is no gain to measure.")
     else:
-        told = Markup(
+        text = Markup(
             "Cross-validation: each recording was predicted from a fit to the others. Its error "
             "falls from <strong>{:.2f}</strong> to <strong>{:.2f}</strong> (95 %: {:.2f} to "
             "{:.2f}). Measured is the {}."
         )
         ends = (gain[key] for key in ("before", "after", "low", "high"))
-        blocks += [told.format(*ends, gain["measure"]), _dots(gain)]
+        blocks += [text.format(*ends, gain["measure"]), _dots(gain)]
     blocks.append(_errors(system, summary))
     if observers := summary.get("observers"):
         blocks.append(_observers(system, summary["cases"], observers))
@@ -532,7 +532,7 @@ def _dots(gain: Mapping[str, Any]) -> Dots:
     ranked = sorted(gain["recordings"].items(), key=lambda item: -item[1]["before"])
     values = [1.0, *(gain[key] for key in ("low", "high", "before", "after"))]
     values += [error[key] for _, error in ranked for key in ("before", "after")]
-    told = (f"{name} {e['before']:.1f} to {e['after']:.1f}, " for name, e in ranked)
+    errors = (f"{name} {e['before']:.1f} to {e['after']:.1f}, " for name, e in ranked)
     rows = [
         (name, (Dot(e["before"], NOMINAL), Dot(e["after"], EXTENDED, diamond=True)))
         for name, e in ranked
@@ -540,7 +540,7 @@ def _dots(gain: Mapping[str, Any]) -> Dots:
     total = "all recordings"
     after = Dot(gain["after"], EXTENDED, gain["low"], gain["high"], diamond=True)
     return Dots(
-        finding=f"Error in units of the noise, nominal to extended: {''.join(told)}{total} "
+        finding=f"Error in units of the noise, nominal to extended: {''.join(errors)}{total} "
         f"{gain['before']:.1f} to {gain['after']:.1f}.",
         axis="error in units of the noise, logarithmic",
         rows=[*rows, (total, (Dot(gain["before"], NOMINAL), after))],
@@ -660,14 +660,14 @@ def _model(model: Mapping[str, Any], folder: Path) -> list[Block]:
     # What is written into the folder is linked from there.
     source, fmu = (Path(model[key]).relative_to(folder).as_posix() for key in ("modelica", "fmu"))
     part = "It explains a part of what is missing. " * model["partial"]
-    told = Markup(part) + Markup(
+    text = Markup(part) + Markup(
         'Modelica source <a href="{}">{}</a> and FMU <a href="{}">{}</a>, beside this page. '
         "Compiled, it predicts as the fit does: the largest difference on these recordings is "
         "{:.1e} standard deviations of the noise."
     ).format(quote(source), source, quote(fmu), fmu, model["difference_from_fit"])
     again = f"workbench diagnose NEW_RECORDINGS --model {model['fmu']} --out results/next"
     return [
-        told,
+        text,
         Source(Path(model["modelica"]).read_text(), "Modelica source"),
         "Next, to see on new recordings whether anything is still missing:",
         Source(again),

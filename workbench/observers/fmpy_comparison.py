@@ -133,8 +133,10 @@ class _Problem:
             if v.causality == "output" and v.holds_number and not v.array
         ]
         self.outputs = outputs or list(description.states)
-        found = {v.name: v for v in description.variables}
-        self._places = {name: (found[name].of, found[name].element) for name in self.outputs}
+        variables = {v.name: v for v in description.variables}
+        self._places = {
+            name: (variables[name].of, variables[name].element) for name in self.outputs
+        }
         if not self.outputs:
             raise InputError(
                 where=str(description.path),

@@ -208,7 +208,7 @@ def residual_tests(
     residuals : (n,) by output, measured less estimated; NaN where not measured.
     deviations : (n,) by output, standard deviations of the estimate.
     """
-    found: list[Contradiction] = []
+    contradictions: list[Contradiction] = []
     chance = _CHANCE / max(2 * len(residuals), 1)  # of one of so many tests
     for name, values in residuals.items():
         known = np.isfinite(values) & np.isfinite(deviations[name])
@@ -221,7 +221,7 @@ def residual_tests(
             continue  # taken as measured
         off = float(r.sum()) / count / np.sqrt(variance)
         if abs(off) > _OFF and 2.0 * norm.sf(abs(r.sum()) / np.sqrt(scatter)) < chance:
-            found.append(Contradiction("mean", name, off, True))
+            contradictions.append(Contradiction("mean", name, off, True))
         r = np.where(known, r - r.sum() / count, 0.0)
         lags = range(1, _LAGS + 1)
         products = [r[lag:] * r[:-lag] for lag in lags]
@@ -232,8 +232,10 @@ def residual_tests(
         shared = (sums / pairs / variance)[np.argmax(np.abs(sums) / pairs)]
         large = shared > NARROW - 1.0 or shared < WIDE - 1.0
         if large and chi2.sf(statistic, _LAGS) < chance:
-            found.append(Contradiction("whiteness", name, float(shared), bool(shared > 0.0)))
-    return found
+            contradictions.append(
+                Contradiction("whiteness", name, float(shared), bool(shared > 0.0))
+            )
+    return contradictions
 
 
 def contradiction_lines(tested: Mapping[str, Mapping[str, Iterable[Contradiction]]]) -> list[str]:

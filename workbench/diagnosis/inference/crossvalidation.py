@@ -62,7 +62,9 @@ class CrossValidation:
         """Number of means of which `squares` are, of each recording or part."""
         span = 1 if fast else fitted.linearised.lasting
         told, parts = self._told(fitted), self._fit.parts if self._fit.unknowns.count == 1 else 1
-        blocks = [len(one.errors) for one in fitted.linearised.residuals for _ in range(parts)]
+        blocks = [
+            len(recording.errors) for recording in fitted.linearised.residuals for _ in range(parts)
+        ]
         return [
             max(1, n // parts // span) * int(own.sum()) for n, own in zip(blocks, told, strict=True)
         ]
@@ -76,7 +78,7 @@ class CrossValidation:
             return []
         was, now = self.squares(before, fast=fast), self.squares(after, fast=fast)
         worse = now > np.maximum(was, self.chance(after, fast=fast))
-        return [name for name, one in zip(self._fit.tests, worse, strict=True) if one]
+        return [name for name, rises in zip(self._fit.tests, worse, strict=True) if rises]
 
     def explained(self, less: FittedModel, best: FittedModel, *, fast: bool) -> tuple[float, float]:
         """Share of the explainable by which two fits differ; mean square error of the first."""

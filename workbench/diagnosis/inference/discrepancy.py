@@ -67,8 +67,8 @@ def autocovariance(recordings: Sequence[Vector]) -> Vector:
     >>> autocovariance([np.array([1.0, -1.0, 1.0])]).round(3).tolist()
     [1.0, -0.667, 0.333]
     """
-    found = np.zeros(max(map(len, recordings)))
+    sums = np.zeros(max(map(len, recordings)))
     for errors in recordings:
-        found[: len(errors)] += np.correlate(errors, errors, "full")[len(errors) - 1 :]
-    covariances: Vector = found / sum(map(len, recordings))
+        sums[: len(errors)] += np.correlate(errors, errors, "full")[len(errors) - 1 :]
+    covariances: Vector = sums / sum(map(len, recordings))
     return covariances

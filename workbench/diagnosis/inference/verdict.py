@@ -355,8 +355,8 @@ def _fewest(
                 continue
             alone, trial = examine(fit, fitted(fit, start, (effect,)), catalogue, report)
             steps = list(chosen.steps)
-            found = ForwardSelection(alone, steps, trial, interrupted=True, begun=None)
-            return replace(select(fit, catalogue, found, report), interrupted=False)
+            selection = ForwardSelection(alone, steps, trial, interrupted=True, begun=None)
+            return replace(select(fit, catalogue, selection, report), interrupted=False)
     return chosen
 
 
@@ -511,7 +511,8 @@ def _share(before: FittedModel, after: FittedModel) -> float:
 def _gain(fit: Fit, chosen: Selection) -> Gain:
     fast = any(effect.order_locked for effect in chosen.best.active)
     before, after = (
-        chosen.validation.squares(one, fast=fast) for one in (chosen.base, chosen.best)
+        chosen.validation.squares(fitted_model, fast=fast)
+        for fitted_model in (chosen.base, chosen.best)
     )
     low, high = bootstrap(
         (after,),

@@ -48,17 +48,17 @@ _TRIED = 6  # laws that are fitted in full, of the likeliest: it costs time only
 
 def needs_law(before: Outcome) -> bool:
     """Whether a diagnosis leaves a law to propose: something unexplained, or several causes."""
-    found = before.diagnosis
-    left = found.verdict == "unexplained" or len(found.causes) > 1 or _more(found)
-    return found.late is None and left
+    diagnosis = before.diagnosis
+    left = diagnosis.verdict == "unexplained" or len(diagnosis.causes) > 1 or _more(diagnosis)
+    return diagnosis.late is None and left
 
 
-def _more(found: Diagnosis) -> bool:
+def _more(diagnosis: Diagnosis) -> bool:
     """Whether errors last beside what was found: it explains most, and not all."""
-    if found.verdict == "partly explained":
+    if diagnosis.verdict == "partly explained":
         return True
-    lasting = float(found.best.linearised.variance_factors.max())
-    return len(found.causes) == 1 and lasting >= Thresholds.wrong
+    lasting = float(diagnosis.best.linearised.variance_factors.max())
+    return len(diagnosis.causes) == 1 and lasting >= Thresholds.wrong
 
 
 def compared_with_one_law(outcome: Outcome, problem: Problem, engine: Engine) -> Outcome:
@@ -67,13 +67,13 @@ def compared_with_one_law(outcome: Outcome, problem: Problem, engine: Engine) ->
     By the description length of the causes, and the marginal likelihood of the law. Returns the
     outcome with the law's text, or as it was.
     """
-    found = outcome.diagnosis
-    if len(found.causes) < 2 or found.interrupted or problem.library is None:
+    diagnosis = outcome.diagnosis
+    if len(diagnosis.causes) < 2 or diagnosis.interrupted or problem.library is None:
         return outcome
-    slots = {slot for cause in found.causes for slot in cause.effect.slots}
-    able = _likeliest(Scan(problem, found.base, engine, slots).prospects)[:_BESIDE]
-    laws = estimated(problem, able, found.base, engine) if able else []
-    less = description_length(found.base) - description_length(found.best)
+    slots = {slot for cause in diagnosis.causes for slot in cause.effect.slots}
+    able = _likeliest(Scan(problem, diagnosis.base, engine, slots).prospects)[:_BESIDE]
+    laws = estimated(problem, able, diagnosis.base, engine) if able else []
+    less = description_length(diagnosis.base) - description_length(diagnosis.best)
     if not laws or laws[0].evidence < less:
         return outcome
     return replace(outcome, one_law=laws[0].law.text)
@@ -118,8 +118,8 @@ def propose(before: Outcome, problem: Problem, engine: Engine) -> Proposal:
         for form in candidates(prospect.law, prospect.knots, known, largest):
             forms[form.name] = form
     forms = _surviving(problem, forms, about, engine)
-    found = (tuple(scan.prospects), tuple(estimates), tuple(tied))
-    proposal = Proposal(before, *found, forms, None)
+    estimated_laws = (tuple(scan.prospects), tuple(estimates), tuple(tied))
+    proposal = Proposal(before, *estimated_laws, forms, None)
     # Beside what bends to the rest, a law may not be seen; alone it may explain a part.
     tolerant = replace(problem.system, comparison=replace(problem.system.comparison, left=1.0))
     ways = [problem, replace(problem, system=tolerant, effects=())]
@@ -127,7 +127,7 @@ def propose(before: Outcome, problem: Problem, engine: Engine) -> Proposal:
         for name in list(forms)[:_OF_FORMS]:
             own = {name: forms[name], **forms}
             outcome = _diagnosed(way, own, engine)
-            proposal = Proposal(before, *found, own, outcome)
+            proposal = Proposal(before, *estimated_laws, own, outcome)
             if proposal.laws:
                 return proposal
     return proposal

@@ -277,8 +277,8 @@ class Predictor:
         """What is watched, at each sample of a recording, (n, w); see `errors`."""
         count = len(self._model.y) - samples.y.shape[1]
         y = np.hstack([samples.y, np.zeros((samples.time.size, count))])
-        found: Matrix = -self.errors(replace(samples, y=y), values)[:, samples.y.shape[1] :]
-        return found
+        watched: Matrix = -self.errors(replace(samples, y=y), values)[:, samples.y.shape[1] :]
+        return watched
 
     def derivatives(
         self,

@@ -258,17 +258,17 @@ class ResidualModel:
 
     def free_runs(self, points: Sequence[Mapping[str, float]]) -> list[Matrix]:
         """Errors of samples of every recording that nothing corrects, each (2, c); see `at`."""
-        found = self._gathered(
+        results = self._gathered(
             {k: (Simulator.free_run, self._at[k], points[k]) for k in self._order}
         )
-        return [found[k] for k in range(len(self.recordings))]
+        return [results[k] for k in range(len(self.recordings))]
 
     def predicted(self, points: Sequence[Mapping[str, float]]) -> list[Matrix]:
         """Signals of every recording as the model has them, each (n, c); see `at`."""
-        found = self._gathered(
+        results = self._gathered(
             {k: (Simulator.predicted, self._at[k], points[k]) for k in self._order}
         )
-        return [found[k] for k in range(len(self.recordings))]
+        return [results[k] for k in range(len(self.recordings))]
 
     def together(self, job: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
         """Results of a job that asks for evidence, by item; no processor waits for one of them."""
