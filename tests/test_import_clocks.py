@@ -6,6 +6,7 @@ from pathlib import Path
 from zoneinfo import ZoneInfo
 
 import numpy as np
+import openpyxl
 import pytest
 from numpy.testing import assert_allclose
 
@@ -58,6 +59,7 @@ def local(begin: datetime, count: int, form: str, step: float = QUARTER) -> list
     return [moment.astimezone(begin.tzinfo).strftime(form) for moment in moments]
 
 
+BERLIN_NIGHT = datetime(2024, 3, 1, 23, tzinfo=ZoneInfo("Europe/Berlin"))
 BERLIN, NEW_YORK = ZoneInfo("Europe/Berlin"), ZoneInfo("America/New_York")
 SYDNEY = ZoneInfo("Australia/Sydney")
 
@@ -121,6 +123,8 @@ def test_a_zone_that_is_said_tells_the_hours_of_a_changing_clock(tmp_path, tank)
         ("%d-%b-%y %H:%M:%S", "2024-03-01"),
         ("%Y%m%dT%H%M%S", "2024-03-01"),
         ("%Y%m%d%H%M%S", "2024-03-01"),
+        ("%Y%m%d%H%M%S000", "2024-03-01"),
+        ("%a %b %d %H:%M:%S UTC %Y", "2024-03-01"),
         ("%y%m%d %H%M%S", "2024-03-01"),
         ("%Y %m %d %H:%M:%S", "2024-03-01"),
         ("%Y:%m:%d %H:%M:%S", "2024-03-01"),
@@ -262,6 +266,7 @@ def test_a_format_that_is_said_reads_what_is_no_date_elsewhere(tmp_path, tank):
             "",
         ),
         ("t [s]", [f"{(80000 + 900 * k) % 86400}" for k in range(300)], ""),
+        ("elapsed_ms", [f"{900000 * k}" for k in range(300)], ""),
         ("t [h]", [f"{(80000 + 900 * k) % 86400 / 3600}" for k in range(300)], ""),
         ("t [min]", [f"{900 * k % 3600 / 60}" for k in range(300)], ""),
         ("tick [ms]", [f"{(900000 * k) % 2**24}" for k in range(300)], ""),
@@ -355,16 +360,79 @@ def test_a_preamble_tells_the_date_of_a_recording(tmp_path, tank, head, name, st
     assert merge([recorded], propose([recorded], tank, {}), tank).date(0)[:19] == date
 
 
-def test_parts_of_a_second_beside_a_date_are_of_its_time(tmp_path, tank):
+@pytest.mark.parametrize(
+    ("names", "form", "part"),
+    [
+        ("Date&Time;ms", "%Y/%m/%d %H:%M:%S", 1e3),
+        ("Date;Time;ms", "%d.%m.%Y;%H:%M:%S", 1e3),
+        ("Time;Time ms", "%m/%d/%Y %I:%M:%S %p", 1e3),
+        ("Time;[ms]", "%Y-%m-%d %H:%M:%S", 1e3),
+        ("Timestamp;Time [ms]", "%Y-%m-%d %H:%M:%S", 1e3),
+        ("Time;fraction [s]", "%Y-%m-%d %H:%M:%S", 1.0),
+        ("sec;nanosec", "%s", 1e9),
+        ("header.stamp.secs;header.stamp.nsecs", "%s", 1e9),
+        ("tv_sec;tv_usec", "%s", 1e6),
+    ],
+)
+def test_parts_of_a_second_beside_a_time_are_of_it(tmp_path, tank, names, form, part):
     """Every 2.5 s: in whole seconds, steps were 2 s and 3 s."""
     moments = [datetime(2024, 3, 1) + timedelta(seconds=2.5 * k) for k in range(60)]
-    rows = [
-        f"{k};{m:%Y/%m/%d %H:%M:%S};{m.microsecond // 1000};1.{k % 7};2{k % 9}"
+    stamps = [
+        f"{m.strftime(form.replace('%s', str(1709251200 + 5 * k // 2)))}"
+        f";{m.microsecond * 1e-6 * part:.10g}"
         for k, m in enumerate(moments)
     ]
-    path = tmp_path / "a.csv"
-    path.write_text("\n".join(["Number;Date&Time;ms;inflow;h", "NO.;Time;ms;l/s;mm", *rows]))
-    assert_allclose(clock(path, tank).times, 2.5 * np.arange(60), atol=1e-9)
+    read = clock(table(tmp_path / "a.csv", stamps, names), tank)
+    assert_allclose(read.times, 2.5 * np.arange(60), atol=1e-6)
+
+
+def test_a_fraction_of_something_else_is_none_of_a_second(tmp_path, tank):
+    stamps = [f"2024-03-01 10:00:{k:02d};0.{k % 9}" for k in range(60)]
+    recorded = read_recorded_file(table(tmp_path / "a.csv", stamps, "Time;fraction"))
+    assert "fraction" in [channel.name for channel in recorded.groups[0].channels]
+
+
+def test_a_date_at_midnight_goes_with_the_time_beside_it(tmp_path, tank):
+    """As databases and workbooks keep days; a gap of three days is one."""
+    moments = [datetime(2024, 3, 1) + timedelta(seconds=QUARTER * k) for k in range(60)]
+    moments[30:] = [moment + timedelta(days=3) for moment in moments[30:]]
+    stamps = [f"{m:%d.%m.%Y} 00:00:00;{m:%H:%M:%S}" for m in moments]
+    read = clock(table(tmp_path / "a.csv", stamps, "Date;Time"), tank)
+    assert read.times[-1] == 59 * QUARTER + 3 * 86400
+    book = openpyxl.Workbook()
+    book.active.append(["Date", "Time", "inflow [l/s]", "h [mm]"])
+    for k, moment in enumerate(moments):
+        book.active.append([moment.date(), moment.time(), 1.5, 20 + k])
+    book.save(tmp_path / "a.xlsx")
+    read = clock(tmp_path / "a.xlsx", tank)
+    assert read.times[-1] == 59 * QUARTER + 3 * 86400
+    assert iso(read.start)[:19] == "2024-03-01T00:00:00"
+
+
+def test_a_recording_has_the_date_of_a_column_that_is_not_its_time(tmp_path, tank):
+    stamps = [
+        f"{QUARTER * k:.0f};{local(BERLIN_NIGHT, 60, '%d %b %Y %H:%M')[k]}" for k in range(60)
+    ]
+    recorded = read_recorded_file(table(tmp_path / "a.csv", stamps, "Elapsed [s];Date"))
+    proposal = propose([recorded], tank, {})
+    assert merge([recorded], proposal, tank).date(0)[:19] == "2024-03-01T23:00:00"
+
+
+def test_a_clock_that_was_set_is_refused_or_told(tmp_path, tank):
+    """Recorders begin in 1970 until they know the time."""
+    rows = [*local(datetime(1970, 1, 1, tzinfo=UTC), 4, "%Y-%m-%d %H:%M:%S")]
+    for days, refused in ((365, False), (19000, True)):
+        later = datetime(1970, 1, 1, tzinfo=UTC) + timedelta(days=days)
+        path = table(tmp_path / "a.csv", [*rows, *local(later, 60, "%Y-%m-%d %H:%M:%S")])
+        recorded = read_recorded_file(path)
+        proposal = propose([recorded], tank, {})
+        recording = ProposedRecording("", (recorded,), proposal)
+        if refused:
+            with pytest.raises(InputError, match="more than 100 times all other steps"):
+                import_recording("a", recording, tank, {})
+        else:
+            (piece,) = import_recording("a", recording, tank, {}).pieces
+            assert "more than 100 times all other steps together" in " ".join(piece.doubts)
 
 
 def test_nothing_goes_across_a_censored_sample(tmp_path, tank):

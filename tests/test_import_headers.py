@@ -109,6 +109,9 @@ def test_a_row_for_each_value_is_read_by_tags(tmp_path):
         (b"<html><table></table></html>", "text of HTML or XML"),
         (b"\x93NUMPY\x01\0v\0", r"an array of NumPy \(.npy\)"),
         (b"SQLite format 3\0", "a database of SQLite"),
+        (b'<?xml version="1.0"?><usi:tdm version="1.0"/>', r"a header of DIAdem \(.tdm\)"),
+        (b"DIAEXTENDED  {@:ENGLISH\n1,WINDOWS 32Bit\n", r"a header of DIAdem \(.dat\)"),
+        (b"date Tue Mar 5\nbase hex\ninternal events logged\n", "a trace of bus messages"),
         (b"", "an archive"),
     ],
 )
@@ -188,6 +191,14 @@ def test_numbers_are_read_as_people_and_programs_write_them(tmp_path, form):
     (group,) = read_recorded_file(table(tmp_path / "a.csv", ["time [s];h [mm]", *rows])).groups
     assert_allclose(group.channels[1].values, 10.0 * np.arange(10, 70) + 5.0)
     assert group.channels[1].unit == "mm"
+
+
+@pytest.mark.parametrize("form", ["({0}5)", "{0}5-", "\u2212{0}5"])
+def test_negative_numbers_are_read_as_bookkeepers_write_them(tmp_path, form):
+    rows = [f"{k};{form.format(k) if k % 2 else k}" for k in range(10, 70)]
+    (group,) = read_recorded_file(table(tmp_path / "a.csv", ["time [s];h [mm]", *rows])).groups
+    numbers = np.arange(10.0, 70.0)
+    assert_allclose(group.channels[1].values, np.where(numbers % 2, -10 * numbers - 5, numbers))
 
 
 def test_on_and_off_are_1_and_0_of_what_has_no_unit(tmp_path):

@@ -379,6 +379,27 @@ def test_samples_that_go_out_and_back_at_once_are_asked_about(tmp_path, tank, va
     assert np.isnan(proposal.assigned["h"].values).sum() == 3
 
 
+def test_one_value_that_comes_again_and_again_is_asked_about(tmp_path, tank):
+    """Nearer than three widths of all others: a sensor that fails for a sample shows zero."""
+    level = 950.0 + 200.0 * np.sin(np.arange(200.0) / 31.0)
+    path = write(tmp_path / "a.csv", np.where(np.arange(200) % 60 == 20, 0.0, level))
+    (doubt,) = proposed(path, tank).doubts
+    assert "'h' is 0 in 3 samples, far outside of all others" in doubt
+    path = write(tmp_path / "b.csv", np.where(np.arange(200) == 20, 0.0, level))
+    assert not proposed(path, tank).doubts
+
+
+@pytest.mark.parametrize("cell", ["950m", "9.5.0"])
+def test_cells_that_look_like_numbers_are_asked_about(tmp_path, tank, cell):
+    path = write(tmp_path / "a.csv", LEVEL)
+    path.write_text(path.read_text().replace(f"{LEVEL[50]:.3f}", cell, 1))
+    (doubt,) = proposed(path, tank).doubts
+    assert f"'h' has 1 cells such as '{cell}', which are no numbers" in doubt
+    left_out = proposed(path, tank, "h=h missing none")
+    assert not left_out.doubts
+    assert np.isnan(left_out.assigned["h"].values).sum() == 1
+
+
 def test_two_markers_beside_each_other_are_no_samples(tmp_path, tank):
     counts = np.arange(200) % 50
     path = write(

@@ -27,6 +27,8 @@ _JUDGED = 50  # samples that say how a signal moves
 # Standard deviations that no noise reaches out and back, see `Soundness.spike` of a diagnosis.
 _BEYOND = 8.0
 _CONTRADICTS = 300.0  # times the usual step: the unit of the time is another one
+_SET_ANEW = 100  # times all other steps together: the clock was set, or it is another recording
+_TEN_YEARS = 3.15e8  # s, over which nobody records without a sample
 _OTHER_UNITS = 60.0, 3600.0  # minutes and hours that are taken for seconds
 _CELSIUS = 273.15  # K
 _ALIKE = 0.05  # share by which a machine at its usual start is off that of its model
@@ -315,6 +317,15 @@ def _sampling(time: Vector, system: System, origin: Origin) -> Iterator[_Finding
             f"a gap of {steps[longest]:.6g} s after {time[longest]:.9g} s",
             f"samples of one recording, no more than {limits.gap:g} s apart",
             "write a case folder for each recording, if several stand in one file",
+        )
+    elif steps[longest] > _SET_ANEW * (time[-1] - time[0] - steps[longest]):
+        yield _Finding(
+            bool(steps[longest] > _TEN_YEARS),
+            where,
+            f"a gap of {steps[longest]:.6g} s after {time[longest]:.9g} s, more than {_SET_ANEW} "
+            "times all other steps together",
+            "samples of one clock, which was not set in between",
+            "remove the samples before it, or give each part as a file of its own",
         )
     ratio = usual / system.sample_time
     if ratio > _CONTRADICTS or any(abs(ratio * 1e3**k - 1.0) < 0.2 for k in (1, 2, 3)):

@@ -13,7 +13,7 @@ from workbench.arrays import Vector
 from workbench.errors import InputError
 from workbench.recordings.channels.names import TIME, NamedChannel, is_time, listed, words
 from workbench.recordings.formats import FileChannel, Group
-from workbench.recordings.formats.spelling import conversion
+from workbench.recordings.formats.spelling import conversion, spell_unit
 from workbench.recordings.formats.stamps import MINUTES, is_said, read_stamps
 from workbench.system.system import System
 
@@ -101,7 +101,12 @@ def read_clock(
         If there is no time, none that goes on, or two that contradict each other.
     """
     clock = _read_clock(group, named, step, system, where)
-    if not math.isfinite(group.begun) or math.isfinite(clock.start):
+    if math.isfinite(clock.start):
+        return clock
+    beside = [c.start for c in group.channels if c.stamp and not c.doubt and math.isfinite(c.start)]
+    if beside:
+        return replace(clock, dated=beside[0])
+    if not math.isfinite(group.begun):
         return clock
     shown = next((c.shown for c in group.channels if c.name == clock.channel), math.nan)
     day = group.begun - group.begun % _DAY
@@ -279,6 +284,10 @@ def _candidate(channel: FileChannel, group: Group, system: System) -> Clock | No
     if scale is not None and (is_time(channel.name) or channel is group.channels[0]):
         return _count_clock(channel, channel.unit, scale.factor, "name and unit")
     if not channel.unit and is_time(channel.name):
+        last = spell_unit(words(channel.name)[-1])  # elapsed_ms
+        scale = conversion(last, "s") if len(words(channel.name)) > 1 else None
+        if scale is not None:
+            return _count_clock(channel, last, scale.factor, "name and unit")
         if (since := _since(channel, system)) is not None:
             return since
         if (packed := _packed_clock(channel)) is not None:

@@ -104,10 +104,15 @@ def missing_of(
     column : how the user names the channel, SIGNAL=CHANNEL.
     """
     if declared is not None:
-        return declared, "", ""
+        return declared, f"; {channel.unread} are no samples" if channel.unread else "", ""
     known, others = markers(channel.values)
     said = "".join(f"; {value:g}, {count} times, is no sample" for value, count in known.items())
     doubt = ""
+    if channel.unread:
+        doubt = (
+            f"'{channel.name}' has {channel.unread}, which are no numbers; correct them, or "
+            f"--column '{column} missing none' takes them for no samples"
+        )
     if others:
         counted = " and ".join(
             f"{value:.15g} in {count} samples" for value, count in others.items()

@@ -54,7 +54,12 @@ _UNREAD = {  # how files begin that are told, and not read
     b"BZh": "a file packed by bzip2",
     b"7z\xbc\xaf": "an archive (.7z)",
     b"%PDF": "a PDF",
+    b"DIAEXTENDED": "a header of DIAdem (.dat), whose samples are in another file",
     b"<": "text of HTML or XML",
+}
+_UNREAD_WITHIN = {  # what stands near the begin of others
+    b"usi:tdm": "a header of DIAdem (.tdm), whose samples are in another file",
+    b"internal events logged": "a trace of bus messages (.asc), whose signals are not decoded",
 }
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 _BEGINS = {  # how files begin, whatever their ending
@@ -162,6 +167,8 @@ def _refuse_unread(path: Path, raw: bytes, *, is_workbook: bool) -> None:
     format_name = next(
         (format_name for start, format_name in _UNREAD.items() if begin.startswith(start)), ""
     )
+    within = (words for text, words in _UNREAD_WITHIN.items() if text in begin)
+    format_name = next(within, format_name)
     if is_workbook and b"[Content_Types].xml" not in raw and zipfile.is_zipfile(io.BytesIO(raw)):
         format_name = "an archive (.zip)"
         format_name = "arrays of NumPy (.npz)" if b".npy" in begin else format_name

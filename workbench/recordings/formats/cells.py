@@ -15,6 +15,7 @@ from workbench.recordings.formats.contents import FileChannel, Group
 from workbench.recordings.formats.numbers import (
     all_plain,
     is_censored,
+    is_like_number,
     is_missing,
     is_number,
     plain,
@@ -65,10 +66,12 @@ _NAME_ROW = re.compile(
     re.IGNORECASE,
 )
 _UNIT_ROW = re.compile(r"(y[ _]|v)?(units?|unit[ _]label|einheit(en)?)\W*", re.IGNORECASE)
+_TIME_NAME = re.compile(r"(time|zeit|date|datum)", re.IGNORECASE)
 _REMARK = re.compile(r"comments?|remarks?|notes?|kommentar|bemerkung", re.IGNORECASE)
 _WITH_UNIT = re.compile(
     r"\s*(?P<number>[+-]?\s?[\d.,]*\d([eE][+-]?\d+)?)\s*(?P<unit>[^\W\d][^\s;,|]{0,9}|%|°\S)\s*"
 )
+_QUOTIENT = re.compile(r"\s*(?P<name>[^/\s][^/]*?)\s*/\s*(?P<unit>[^\s/].*?)\s*")
 _FORTRAN = re.compile(r"(\d\.?)[dD]([+-]?\d+)")
 _STATES = {"true": "1", "false": "0", "on": "1", "off": "0"}
 # What recorders write into a row of units above record numbers, dates and times.
@@ -88,7 +91,8 @@ _PARTS_OF_TAGS = {
 _PARTS = {
     **dict.fromkeys(("ms", "msec", "millisecond", "milliseconds", "millisekunden", "millis"), 3),
     **dict.fromkeys(("us", "\u00b5s", "usec", "microseconds", "mikrosekunden", "micros"), 6),
-    **dict.fromkeys(("ns", "nsec", "nanoseconds"), 9),
+    **dict.fromkeys(("ns", "nsec", "nsecs", "nanosec", "nanoseconds"), 9),
+    **dict.fromkeys(("fraction", "frac", "subsec", "subseconds"), 0),
 }
 # Columns that hold parts of a date, by their names in small letters.
 _PARTS_OF_TIME = {
@@ -108,7 +112,11 @@ _DATE_IN_FIGURES = re.compile(r"(19|20)\d\d(0[1-9]|1[0-2])(0[1-9]|[12]\d|3[01])"
 _BEGAN = re.compile(r"start|beg[iu]n|trigger|^\W*(date|datum|t0)\b", re.IGNORECASE)
 _NOT_BEGAN = re.compile(r"end|stop|export|print|druck|[ck]alib|version|software", re.IGNORECASE)
 _WORD = re.compile(r"[\d./:-][\d./:T\s-]{6,}[\d](\.\d+)?(\s*[AP]M\b)?|[\d./:-]{8,}", re.IGNORECASE)
-_WHOLE_SECONDS = re.compile(r".*\d:\d\d:\d\d")
+_AT_MIDNIGHT = re.compile(r"[T\s]+(0?0:00(:00([.,]0+)?)?|12:00(:00)?\s*AM)$", re.IGNORECASE)
+_WHOLE_SECONDS = re.compile(
+    r"(?P<whole>.*\d:\d\d:\d\d|\d+)(?P<half>(\s*[AP]\.?M\.?)?)", re.IGNORECASE
+)
+_LAST_WORD = re.compile(r"(.*?)([^\W_]*)$")  # header.stamp.nsec, tv_usec
 
 
 @dataclass(frozen=True)
@@ -170,11 +178,24 @@ def find_table(rows: Sequence[Sequence[str]], lines: Sequence[int], where: str) 
         _refuse_narrow(names, units, body, f"{where}, above line {lines[first]}")
     else:
         names = [f"column {i + 1}" for i in range(width)]
+    names = names if units else _with_slashes(names)
     own_names, own_units = (tuple((row + [""] * width)[:width]) for row in (names, units))
     # Recorders of portable kind name channels CH1 above samples, and say further up what they are.
     listed = {row[0].strip(): row[1].strip() for row in rows[:first] if len(row) > 2}
     about = tuple(said if (said := listed.get(name, "")) not in names else "" for name in names)
     return Cells(body, [lines[i] for i in kept], head, own_names, own_units, about)
+
+
+def _with_slashes(names: list[str]) -> list[str]:
+    """Names with units in brackets, where most are written as quotients: t/s, U/V, Ewe/V."""
+    matches = [_QUOTIENT.fullmatch(name) for name in names]
+    units = [match["unit"] if match and is_unit(match["unit"]) else "" for match in matches]
+    if sum(map(bool, units)) < max(2, len(names) / 3):
+        return names
+    return [
+        f"{match['name']} [{unit}]" if match and unit else name
+        for name, match, unit in zip(names, matches, units, strict=True)
+    ]
 
 
 def _samples(
@@ -231,7 +252,10 @@ def _with_whole_stamps(rows: list[list[str]]) -> list[list[str]]:
     for i, (days, clocks) in enumerate(pairwise(columns)):
         dated = _mostly(days, is_stamp) and has_day_alone(days)
         if dated and _mostly(clocks, is_stamp) and not has_day(clocks):
-            return [[*row[:i], f"{row[i]} {row[i + 1]}", *row[i + 2 :]] for row in rows]
+            return [
+                [*row[:i], f"{_AT_MIDNIGHT.sub('', row[i])} {row[i + 1]}", *row[i + 2 :]]
+                for row in rows
+            ]
     return rows
 
 
@@ -292,6 +316,8 @@ def _header(above: Sequence[Sequence[str]], width: int) -> tuple[list[str], list
     if at is None and len(rows) > 1 and _are_units(rows[0]):
         rows = [*rows[1:2], rows[0], *rows[2:]]
         at = 1
+    if at is not None and (names_and_units := _header_below(rows[at], rows[at + 1 :], width)):
+        return names_and_units
     # Below units stand kinds, such as Avg; channel numbers are no names.
     named = [row for row in rows[:at] if not all(is_number(cell) for cell in row if cell)]
     labelled = _labelled_row(above, _UNIT_ROW, width) if at is None else []
@@ -305,7 +331,27 @@ def _header(above: Sequence[Sequence[str]], width: int) -> tuple[list[str], list
             return with_units, []
         return _whole_names(named), [spell_unit(cell) for cell in labelled]
     units = [cell if is_unit(cell) or not _says_nothing(cell) else "" for cell in rows[at]]
-    return _whole_names(named), [spell_unit(cell) for cell in units]
+    names = _whole_names(named)
+    for below in rows[at + 1 :]:  # dates and times may have their names there
+        for i, cell in enumerate(below[: len(names)]):
+            if not any(units[i : i + 1]) and cell.casefold() in {*_PARTS, *_PARTS_OF_TIME}:
+                names[i] = cell
+    return names, [spell_unit(cell) for cell in units]
+
+
+def _header_below(
+    units: list[str], below: Sequence[list[str]], width: int
+) -> tuple[list[str], list[str]] | None:
+    """Names and units, where settings with a row of units stand above the header; else None."""
+    if not below or len(_trim(below[-1])) != width or len(set(below[-1])) != width:
+        return None
+    names = below[-1]
+    if all(names) and 2 * _units_within(names) > width:
+        return names, []
+    labelled = _UNIT_ROW.fullmatch(units[0]) and not _UNIT_ROW.fullmatch(names[0])
+    if labelled and _TIME_NAME.match(names[0]):
+        return names, [spell_unit(cell) if is_unit(cell) else "" for cell in units]
+    return None
 
 
 def _units_within(row: Sequence[str]) -> int:
@@ -441,7 +487,10 @@ def read_group(
                 f"{columns[i][bad[0]]!r} in line {table.lines[bad[0]]}"
             )
         said = about.get(labels[i][0], "")
-        channels.append(FileChannel(*labels[i], values, said, censored=tuple(beyond)))
+        like = [k for k in bad if is_like_number(cells[k])]
+        unread = f"{len(like)} cells such as {columns[i][like[0]]!r}" if like else ""
+        channel = FileChannel(*labels[i], values, said, censored=tuple(beyond), unread=unread)
+        channels.append(channel)
     step, doubt = stated_step(table.head)
     within = (name,) if name else ()
     group = Group(
@@ -566,7 +615,8 @@ def _join_day_and_clock(
     if not any(kinds) or not any(clocks):
         return labels, columns
     day, clock = kinds.index(True), clocks.index(True)
-    joined = [f"{date} {other}" for date, other in zip(columns[day], columns[clock], strict=True)]
+    pairs = zip(columns[day], columns[clock], strict=True)
+    joined = [f"{_AT_MIDNIGHT.sub('', date)} {other}" for date, other in pairs]
     left = [i for i in range(len(columns)) if i not in (day, clock)]
     name = f"{labels[day][0]} {labels[clock][0]}", ""
     return [name, *(labels[i] for i in left)], [joined, *(columns[i] for i in left)]
@@ -575,29 +625,59 @@ def _join_day_and_clock(
 def _with_parts(
     labels: list[tuple[str, str]], columns: list[list[str]]
 ) -> tuple[list[tuple[str, str]], list[list[str]]]:
-    """The same columns, with time stamps of whole seconds and their parts of a second as one."""
+    """The same columns, with times of whole seconds and their parts of a second as one.
+
+    The times are time stamps, or seconds of a counter whose name differs by `sec` for `nsec` alone.
+    """
     stamps = [i for i, cells in enumerate(columns) if _mostly(cells, is_stamp)]
-    if len(stamps) != 1 or has_fraction(columns[stamps[0]]):
-        return labels, columns
-    at = stamps[0]
+    stamped = len(stamps) == 1 and not has_fraction(columns[stamps[0]])
     for i, (name, unit) in enumerate(labels):
-        digits = _PARTS.get(name.casefold(), 0)
-        if i == at or not digits or (unit and _PARTS.get(unit.casefold()) != digits):
+        begin, last = _LAST_WORD.findall(name.casefold().strip("[]()"))[0]
+        if f"{begin}{last}" in ("time", "zeit"):  # Time [ms]
+            last = unit.casefold()
+        begin = "" if begin.strip(" _") in ("time", "zeit") else begin
+        digits = _PARTS.get(last)
+        if digits is None or (unit and _PARTS.get(unit.casefold(), 0) != digits):
             continue
-        parts, moments = columns[i], columns[at]
-        held = [cell for cell in parts if cell]
-        if not all(cell.isdecimal() and len(cell.lstrip("0")) <= digits for cell in held):
-            continue
-        if not all(_WHOLE_SECONDS.fullmatch(cell) for cell in moments if cell):
-            continue
-        joined = [
-            f"{moment}.{part.lstrip('0').rjust(digits, '0')}" if moment and part else ""
-            for moment, part in zip(moments, parts, strict=True)
+        if not digits and not (unit or (stamped and _repeats(columns[stamps[0]]))):
+            continue  # a fraction of something else: stamps tell samples apart without it
+        counters = [
+            k for k, other in enumerate(labels) if other[0].casefold() in _seconds_beside(begin)
         ]
+        at = stamps[0] if stamped and not begin else next(iter(counters), i)
+        if at == i or (joined := _join_parts(columns[at], columns[i], digits)) is None:
+            continue
         left = [k for k in range(len(columns)) if k not in (at, i)]
         label = f"{labels[at][0]} {name}", ""
+        if at not in stamps:
+            label = f"time {labels[at][0]} {name}", "s"
         return [label, *(labels[k] for k in left)], [joined, *(columns[k] for k in left)]
     return labels, columns
+
+
+def _repeats(cells: Sequence[str]) -> bool:
+    """Whether cells beside each other are alike."""
+    return any(a == b for a, b in pairwise(cells))
+
+
+def _seconds_beside(begin: str) -> list[str]:
+    """Names of a counter of seconds, beside one of parts of a second whose name begins so."""
+    return [f"{begin}{word}" for word in ("sec", "secs", "seconds", "s")]
+
+
+def _join_parts(moments: list[str], parts: list[str], digits: int) -> list[str] | None:
+    """Times with their parts of a second behind them; None where they are not such."""
+    joined = []
+    for moment, part in zip(moments, parts, strict=True):
+        if not moment or not part:
+            joined.append("")
+            continue
+        match = _WHOLE_SECONDS.fullmatch(moment)
+        seconds = float(part) * 0.1**digits if _FIGURES.fullmatch(part) else 1.0
+        if match is None or not 0.0 <= seconds < 1.0:
+            return None
+        joined.append(f"{match['whole']}.{round(seconds * 1e9):09d}{match['half']}")
+    return joined
 
 
 def _label(table: Cells, i: int) -> tuple[str, str]:

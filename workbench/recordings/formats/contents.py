@@ -26,6 +26,8 @@ class FileChannel:
     corrections : how time stamps were made to go on, in words.
     doubt : why time stamps cannot be read before somebody says how, in words; empty: they can.
     censored : samples of which the file says only that they are below or above another value.
+    unread : a cell that looks like a number and is not read as one, and how many there are, in
+        words; empty: there is none.
     texts : (n,) cells of time stamps, or of texts that nobody knows; empty for numbers.
     """
 
@@ -40,6 +42,7 @@ class FileChannel:
     corrections: tuple[str, ...] = ()
     doubt: str = ""
     censored: tuple[int, ...] = ()
+    unread: str = ""
     texts: tuple[str, ...] = ()
 
 

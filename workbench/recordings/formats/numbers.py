@@ -14,15 +14,19 @@ from workbench.errors import InputError
 _MISSING = re.compile(
     r"|nan|na|n/a|n\.a\.|n\.d\.|<na>|#n/a|#nv|#value!|#div/0!|#bezug!|#ref!|null|none|[+-]?inf(inity)?"
     r"|-?1\.#(inf|qnan|ind)\w*|[+-]?(ol|ovl|over|overload|overrange|overflow|underrange)|burnout"
-    r"|no ?data|invalid|bad|err|error|fault|open|-+|\*+|#+|\?+|_+",
+    r"|0\.?l|no ?data|invalid|bad|err|error|fault|open|-+|\*+|#+|\?+|_+",
     re.IGNORECASE,
 )
 _CENSORED = re.compile(r"[<>\u2264\u2265]=?\s*[+-]?[\d.,]+([eE][+-]?\d+)?")
+# A negative number of bookkeeping, in brackets or with its sign behind it; and what looks like one
+# number, whatever it means: figures with no more than one letter.
+_NEGATIVE = re.compile(r"\(([\d.,]*\d[\d.,]*)\)|(\d[\d.,]*)-")
+_LIKE_NUMBER = re.compile(r"[^A-Za-z]*\d[^A-Za-z]*[A-Za-z]?[^A-Za-z]*")
 _SIGN_APART = re.compile(r"([+-])[ \u00a0]+(?=[\d.,])")
 _NUMBER = re.compile(r"[+-]?[0-9.,]*[0-9][0-9.,]*([eE][+-]?[0-9]+)?")
 _GROUPED = re.compile(r"[+-]?\d{1,3}([ \u00a0\u202f'\u2019]\d{3})+([.,]\d+)?")
 _SPACES = re.compile(r"[ \u00a0\u202f'\u2019]")
-_SET = re.compile("[ \u00a0\u202f'\u2019\u2212]")
+_SET = re.compile("[ \u00a0\u202f'\u2019\u2212(]")
 _EXPONENT = r"([eE][+-]?\d+)?"
 _POINT, _COMMA = "decimal points", "decimal commas"
 _THOUSANDS_POINT = "decimal commas, points between thousands"
@@ -50,6 +54,7 @@ _MARKERS = frozenset(
 _LARGE = 1e30, 3.5e38  # from which on single precision holds no samples, to its largest number
 _MAYBE = frozenset((99.0, 99.9, 99.99, 888.0, 888.8, 8888.0, 999.0, 999.9, 999.99, 327.67, 1e10))
 _FEWEST, _RARE, _FAR, _FARTHER = 5, 0.02, 3.0, 100.0
+_AGAIN = 3
 _LARGEST = 1e100  # no measurement comes near
 
 
@@ -57,7 +62,8 @@ def markers(values: Vector) -> tuple[dict[float, int], dict[float, int]]:
     """Values that stand alone far outside of all others, and how often: known markers, and others.
 
     Known are those that recorders write where they have no sample; others are rare, and come more
-    than once, one or two samples at a time, or stand a hundred widths of all others apart.
+    than once, one or two samples at a time, or stand a hundred widths of all others apart. Of those
+    that come three times and more, one width is far: noise does not hit one number again.
     """
     known: dict[float, int] = {}
     others: dict[float, int] = {}
@@ -80,7 +86,8 @@ def markers(values: Vector) -> tuple[dict[float, int], dict[float, int]]:
             # Far outside of all others, or out and back at once, as no machine moves.
             rare = count <= max(1.0, _RARE * left.size)
             alone = distance > _FARTHER or not (at[1:-1] & at[2:] & at[:-2]).any()
-            if distance > _FAR and (
+            again = rare and count >= _AGAIN and not (at[1:] & at[:-1]).any()
+            if distance > (1.0 if again else _FAR) and (
                 abs(extreme) in _MAYBE
                 or (rare and alone and count > 1)
                 or (rare and distance > _FARTHER)
@@ -118,14 +125,22 @@ def is_censored(cell: str) -> bool:
     return _CENSORED.fullmatch(cell.strip()) is not None
 
 
+def is_like_number(cell: str) -> bool:
+    """Whether a cell that is no number looks like one: 1500m, 1.2.3."""
+    return _LIKE_NUMBER.fullmatch(cell.strip()) is not None
+
+
 def all_plain(cells: list[str]) -> list[str]:
     """Cells without signs of type setting, which most columns have none of."""
-    return [plain(cell) for cell in cells] if _SET.search("".join(cells)) else cells
+    is_set = _SET.search("".join(cells)) or any(cell[-1:] == "-" for cell in cells)
+    return [plain(cell) for cell in cells] if is_set else cells
 
 
 def plain(cell: str) -> str:
     """A cell without signs of type setting."""
     text = cell.replace("\u2212", "-") if "\u2212" in cell else cell
+    if text[-1:] in ("-", ")"):
+        text = _NEGATIVE.sub(r"-\1\2", text) if _NEGATIVE.fullmatch(text) else text
     text = _SIGN_APART.sub(r"\1", text, count=1) if text[:1] in "+-" else text
     return _SPACES.sub("", text) if _GROUPED.fullmatch(text) else text
 

@@ -54,13 +54,13 @@ _DAY = re.compile(
     re.IGNORECASE,
 )
 _CALLED_FIRST = re.compile(  # Mar 5, 2024 10:00; Tue Mar  5 10:00:00 2024
-    rf"([A-Za-z]{{3,9}},?\s+)?{_CALLED}\.?\s+(?P<of>\d{{1,2}})(,?\s+(?P<in>\d{{4}}),?\s+{_CLOCK}{_ZONE}"
-    rf"|\s+{_CLOCK.replace('(?P<', '(?P<c')}\s+(?P<cin>\d{{4}}))",
+    rf"([A-Za-z]{{3,9}},?\s+)?{_CALLED}\.?\s+(?P<of>\d{{1,2}})(,?\s+(?P<in>\d{{4}}),?\s+{_CLOCK}"
+    rf"|\s+{_CLOCK.replace('(?P<', '(?P<c')}\s+(?P<cin>\d{{4}})){_ZONE}",
     re.IGNORECASE,
 )
 _COMPACT = re.compile(  # 20240305T101500.25
     r"(?P<year>(19|20)\d\d)(?P<month>0[1-9]|1[0-2])(?P<day>0[1-9]|[12]\d|3[01])[T_\s-]?"
-    rf"(?P<h>[01]\d|2[0-3])(?P<m>[0-5]\d)(?P<s>[0-5]\d)([.,](?P<f>\d{{1,12}}))?{_ZONE}"
+    rf"(?P<h>[01]\d|2[0-3])(?P<m>[0-5]\d)(?P<s>[0-5]\d)((?:[.,]|(?=\d{{3}}(?!\d)))(?P<f>\d{{1,12}}))?{_ZONE}"
 )
 _COMPACT_SHORT = re.compile(  # 240305 101500
     r"(?P<one>\d\d)(?P<mark>)(?P<two>\d\d)(?P<last>\d\d)[T_\s-]"
@@ -78,6 +78,7 @@ _DURATION = re.compile(  # PT1H15M, 1h 15m 0s
     re.IGNORECASE,
 )
 _OF_CONTROLLERS = re.compile(r"^(DATE_AND_TIME|DT|TIME_OF_DAY|TOD|TIME|T)#", re.IGNORECASE)
+_ZONE_WITHIN = re.compile(r"(?<=:\d\d )([A-Z]{3,4}) ((?:19|20)\d\d)$")  # 10:00:00 CEST 2024
 _TIMES_ALONE = (_OF_DAY, _OF_HOUR, _OF_MINUTES, _DURATION)
 _EPOCH = date(1970, 1, 1).toordinal()
 _START = datetime(1970, 1, 1)
@@ -108,15 +109,16 @@ def is_stamp(cell: str) -> bool:
 
 
 def _match(text: str) -> re.Match[str] | None:
-    text = _plc(text)
+    text = _spelled(text)
     patterns = (_DAY, _OF_DAY, _OF_HOUR, _COMPACT, _COMPACT_SHORT, _CALLED_FIRST, _DURATION)
     match = next((match for pattern in patterns if (match := pattern.fullmatch(text))), None)
     return match if match is None or _zone_known(match.groupdict().get("zone")) else None
 
 
-def _plc(text: str) -> str:
-    """A time without what controllers write before it: DT#2024-03-30-22:00:00, T#1m30s."""
-    return _OF_CONTROLLERS.sub("", text) if "#" in text else text
+def _spelled(text: str) -> str:
+    """A time as others write it: without DT# of controllers, its zone behind its year."""
+    text = _OF_CONTROLLERS.sub("", text) if "#" in text else text
+    return _ZONE_WITHIN.sub(r"\2 \1", text)
 
 
 def _zone_known(zone: str | None) -> bool:
@@ -145,7 +147,7 @@ def read_stamps(name: str, cells: Sequence[str], how: str = "") -> FileChannel |
         %d/%m/%y %H:%M; and a zone such as Europe/Berlin; "min:s" of what is no time of day. Empty:
         nothing.
     """
-    texts = [_plc(cell.strip()) for cell in cells]
+    texts = [_spelled(cell.strip()) for cell in cells]
     order, stated, zone = _read_statement(how)
     if stated in (MINUTES, HOURS):
         pattern = _OF_MINUTES if stated == MINUTES else _OF_DAY
@@ -188,9 +190,12 @@ def has_day(cells: Sequence[str]) -> bool:
 
 
 def has_day_alone(cells: Sequence[str]) -> bool:
-    """Whether a column holds dates without a time of day."""
-    first = _first_day(cells)
-    return first is not None and first.re is _DAY and first["h"] is None
+    """Whether a column holds dates without a time of day, or all at midnight."""
+    matches = (match for cell in cells if cell and (match := _match(cell.strip())))
+    first = next(matches, None)
+    if first is None or first.re is not _DAY or _clock(first):
+        return False
+    return first["h"] is None or not any(map(_clock, matches))
 
 
 def has_fraction(cells: Sequence[str]) -> bool:
