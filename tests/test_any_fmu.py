@@ -423,8 +423,11 @@ def test_a_tuning_names_the_events_that_it_does_not_go_through(build, tmp_path, 
     (folder / "day").mkdir()
     time = 10.0 * np.arange(91.0)
     columns = {"time [s]": time, "Ta [K]": 280.0 + 0.0 * time, "T [K]": along("TIMETABLE", time)}
+    columns["G [W/K]"] = 50.0 + 0.0 * time
     pd.DataFrame(columns).to_csv(folder / "day" / "measured.csv", index=False)
     (folder / "day" / "case.toml").write_text('title = "day"\nmeasurement.file = "measured.csv"\n')
+    file, line = folder / "system.toml", 'G = { unit = "W/K", noise = "1 W/K", scale = "50 W/K" }'
+    file.write_text(file.read_text().replace("[est", f"reference_signals.{line}\n[est"))
     options = ["--system", folder, "--cases", folder / "day", "--workers", "1", "--quiet"]
     out = ["--out", tmp_path / "tuned"]
     assert main(["tune", "disturbance_observer", *map(str, [*options, *out])]) == 1

@@ -27,6 +27,7 @@ from workbench.observers.trust import likely_reason, residual_tests
 from workbench.recordings.case import Case
 from workbench.system.registry import open_model
 from workbench.system.system import System
+from workbench.tuning.recipe import pose
 
 from .built import declare, machine
 
@@ -57,14 +58,31 @@ def test_innovations_do_not_contradict_bands_of_a_model_and_noise_that_are_right
     # The test has something to go by, though the first sample has no innovation.
     # Walks are declared, of which the vessel has none: somewhat less than 1.
     assert all(0.7 < result.surprise("ekf") < 1.17 for result in results)
-    assert format_table(vessel, results[:1]).splitlines()[1].startswith("case")
+    assert format_table(vessel, results[:1]).splitlines()[2].startswith("case")
+
+
+def test_a_score_by_what_corrects_an_estimator_says_so_and_no_gains_are_tuned_by_it(vessel):
+    """V follows its sensor as closely as gains let it: the best of them would repeat its noise."""
+    result = result_of(vessel, 1.0, 0)
+    (said,) = [text for text in result.warnings() if text.startswith("V corrects the estimators")]
+    assert said in format_table(vessel, [result]).splitlines()[1]
+    assert said in result.summary()
+    with pytest.raises(InputError, match="which ekf is fed: the gains that score best would repe"):
+        pose(vessel, "ekf", [result.case])
+    # A gauge of the outflow is fed to none.
+    (meter,) = [output for output in vessel.outputs if output.name == "through"]
+    gauge = replace(meter, name="gauge")
+    objective = replace(vessel.objective, signal="gauge", weights={"gauge": 1.0})
+    validated = replace(vessel, reference_signals=(gauge,), objective=objective)
+    assert "corrects the estimators" not in " ".join(replace(result, system=validated).warnings())
+    assert validated.validated
 
 
 def test_bands_that_innovations_contradict_are_told_at_the_top_of_all_that_is_read(vessel):
     result = result_of(vessel, 3.0, 0)
     assert list(result.contradicted) == ["ekf", "mhe"]
     said = "Bands of ekf are too narrow in filled: innovations have "
-    assert format_table(vessel, [result]).splitlines()[1].startswith(said)
+    assert format_table(vessel, [result]).splitlines()[2].startswith(said)
     assert said in result.summary()
     summary = summarise_runs(vessel, [result], {"run": {}})
     assert said in summary["answer"]["sentence"]

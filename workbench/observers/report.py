@@ -271,7 +271,7 @@ def write_page(
         title=f"{capital(quantity)} estimated on {recordings(len(order))}",
         parts=parts,
         warnings=[incomplete] * (missing > 0)
-        + [Markup.escape(line) for line in warning_lines(warnings) + _contradictions(summary)],
+        + [Markup.escape(line) for line in warning_lines(warnings)],
         run=_run(system, summary),
     )
     page.write(summary, path)

@@ -176,8 +176,14 @@ class CaseResult:
         return [q.name for q in self.system.estimated if q.name in {*together, *self.untold}]
 
     def warnings(self) -> list[str]:
-        """What is said first of the recording: guesses, and doubts by the model."""
-        return [*self.guesses(), *self.doubts]
+        """What is said first of the recording: guesses, doubts by the model, what scores it."""
+        scored = self.system.objective.signal
+        followed = (
+            f"{scored} corrects the estimators that it scores: its errors say how closely each "
+            "follows the sensor, not how right it is. A validation sensor would score them"
+        )
+        fed = scored in (output.name for output in self.system.outputs)
+        return [*self.guesses(), *self.doubts, *[followed] * fed]
 
     def to_frame(self) -> pd.DataFrame:
         """All that the figure of the case shows: time, then `source.signal [unit]`.

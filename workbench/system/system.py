@@ -326,6 +326,11 @@ class System:
         }
 
     @property
+    def validated(self) -> bool:
+        """Whether the objective weighs a signal that no estimator is fed."""
+        return not self.objective.weights.keys() <= {output.name for output in self.outputs}
+
+    @property
     def holds(self) -> Vector:
         """When samples of each input act, (m,); see `Signal.hold`."""
         return np.array([signal.hold for signal in self.inputs])
