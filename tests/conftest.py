@@ -277,6 +277,19 @@ def everything(system, once) -> Path:
 # --- results of a command ---
 
 
+@pytest.fixture(scope="session")
+def of_a_stop(once) -> Path:
+    """One estimator on one recorded stop, through the command line."""
+
+    def simulate(folder: Path) -> Path:
+        case = str(ROOT / "cases" / "01_dry_80_1.5")
+        out = folder / "out"
+        assert program.main(["simulate", case, "--estimator", "ekf", "--out", str(out)]) == 0
+        return out
+
+    return once("results of a stop", simulate)
+
+
 @pytest.fixture(scope="module")
 def summary(results) -> dict[str, Any]:
     """Of the `results` that a file has."""

@@ -70,22 +70,27 @@ def test_a_place_that_takes_no_results_is_refused_before_the_work(
 ):
     monkeypatch.chdir(root)
     (tmp_path / "file").write_text("mine")
+    message = refused(command, tmp_path / "file", capsys)
+    assert "a file, and no folder" in message
+    assert message.count("\n") == 1
+    assert (tmp_path / "file").read_text() == "mine"
+
+
+def test_a_folder_that_takes_no_results_is_refused_whatever_it_lacks(tmp_path):
+    (tmp_path / "file").write_text("mine")
     for out, match in (
-        (tmp_path / "file", "a file, and no folder"),
         (tmp_path / "file" / "below", "Not a directory"),
         (tmp_path / ("long" * 100), "File name too long"),
         (Path("/proc/results"), "No such file or directory"),
     ):
-        message = refused(command, out, capsys)
-        assert match in message
-        assert message.count("\n") == 1
-    with at_most(4_900_000):  # less than is asked for, more than any part of an FMU has
-        message = refused(command, tmp_path / "full", capsys)
-    assert "File too large" in message
-    with locked_folder(tmp_path / "taken"):
-        message = refused(command, tmp_path / "taken", capsys)
-    assert "another run that writes there" in message
-    assert (tmp_path / "file").read_text() == "mine"
+        with pytest.raises(InputError, match=match), locked_folder(out):
+            pass
+    full, taken = tmp_path / "full", tmp_path / "taken"
+    with at_most(4_900_000), pytest.raises(InputError, match="File too large"), locked_folder(full):
+        pass  # less than is asked for
+    another = pytest.raises(InputError, match="another run that writes there")
+    with locked_folder(taken), another, locked_folder(taken):
+        pass
 
 
 def test_a_run_lets_go_of_its_folder_after_any_end(tmp_path):

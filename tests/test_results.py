@@ -22,12 +22,8 @@ NAME = "worst error of Fx, ekf"
 
 
 @pytest.fixture(scope="module")
-def results(tmp_path_factory, root) -> Path:
-    """One estimator on one recorded stop, through the command line."""
-    out = tmp_path_factory.mktemp("results") / "before"
-    case = root / "cases" / CASE
-    assert main(["simulate", str(case), "--estimator", "ekf", "--out", str(out)]) == 0
-    return out
+def results(of_a_stop) -> Path:
+    return of_a_stop
 
 
 def other(results: Path, to: Path, **headline: dict[str, Any]) -> Path:

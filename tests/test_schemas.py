@@ -1,7 +1,6 @@
 """Published schemas take what is there and refuse what the readers refuse."""
 
 import copy
-import json
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
@@ -10,7 +9,6 @@ from typing import Any
 import pytest
 
 import workbench.system.template
-from workbench.__main__ import main
 from workbench.cli.schemas import gains_schema, summaries, system_schema
 from workbench.system.installed import system_files
 from workbench.system.registry import load_system
@@ -81,13 +79,8 @@ def test_tuned_gains_that_come_along_are_as_the_schema_says_and_others_are_not()
 
 
 @pytest.fixture(scope="module")
-def summary(tmp_path_factory, root) -> dict[str, Any]:
-    """Of one estimator on one recorded stop, through the command line."""
-    out = tmp_path_factory.mktemp("schemas")
-    case = root / "cases" / "01_dry_80_1.5"
-    assert main(["simulate", str(case), "--estimator", "ekf", "--out", str(out)]) == 0
-    read: dict[str, Any] = json.loads((out / "summary.json").read_text())
-    return read
+def results(of_a_stop) -> Path:
+    return of_a_stop
 
 
 def test_a_summary_is_as_its_schema_says_and_of_no_other_command(summary):

@@ -78,8 +78,15 @@ LATE = {
 }
 
 
+# Of each kind of end one is quick.
+FURTHER = ("split", "eat", "scribble_and_leave", "hang_at_exit", "wait")
+
+
 @needs_compiler
-@pytest.mark.parametrize(("attack", "how"), LATE.items())
+@pytest.mark.parametrize(
+    ("attack", "how"),
+    [pytest.param(*late, marks=[pytest.mark.long] * (late[0] in FURTHER)) for late in LATE.items()],
+)
 def test_a_model_that_ends_its_process_late_is_told_by_the_process_beside(
     attack, how, hostile_path, home
 ):
