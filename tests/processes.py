@@ -65,11 +65,13 @@ def comes_true(condition: Callable[[], bool]) -> bool:
 def living(session: int) -> list[int]:
     """Processes of a session that are not zombies."""
     alive = []
-    for entry in Path("/proc").glob("[0-9]*"):
+    for number in map(int, filter(str.isdigit, os.listdir("/proc"))):
         try:
-            state = (entry / "stat").read_text().rpartition(")")[2].split()
+            if os.getsid(number) != session:
+                continue
+            state = Path(f"/proc/{number}/stat").read_text().rpartition(")")[2].split()
         except OSError:
             continue  # it ended meanwhile
-        if int(state[3]) == session and state[0] != "Z":
-            alive.append(int(entry.name))
+        if state[0] != "Z":
+            alive.append(number)
     return alive
