@@ -13,6 +13,7 @@ from scipy.stats import binom
 from workbench.__main__ import main
 from workbench.diagnosis.data.clocks import late_signals
 from workbench.diagnosis.effects.extension import variables
+from workbench.diagnosis.inference.quadratic import beside
 from workbench.diagnosis.inference.thresholds import thresholds
 from workbench.errors import InputError
 from workbench.machines.wheelset.planting import PLANTABLE, SHEET_ERRORS
@@ -24,6 +25,7 @@ from workbench.machines.wheelset.rig import (
 )
 from workbench.models.fmu import FMU
 from workbench.pages.provenance import run_of
+from workbench.recordings.case import Case
 from workbench.studies.power import (
     Journal,
     NamedCause,
@@ -35,7 +37,11 @@ from workbench.studies.power import (
     summarise,
 )
 from workbench.studies.power.campaign import SURE, clear, limits_of_effects, predict_campaign
-from workbench.studies.power.diagnosing import build_everything, library_effects
+from workbench.studies.power.diagnosing import (
+    build_everything,
+    information_of_set,
+    library_effects,
+)
 from workbench.studies.power.following import SHARES, summarise_following
 from workbench.studies.power.planting import Group, Kind
 from workbench.studies.power.report import (
@@ -46,6 +52,7 @@ from workbench.studies.power.report import (
     oracle_check,
     write_power,
 )
+from workbench.studies.power.run import Setup
 from workbench.studies.power.statistics import intervals_cover, named_all, named_right
 from workbench.system.registry import load_system
 from workbench.system.template import write_system
@@ -383,9 +390,15 @@ def test_a_plan_foresees_what_its_recordings_show(tmp_path):
 
     # What an oracle knows, the diagnosis does not: that nothing else is missing, and that all that
     # the model leaves is noise. It linearises about the nominal model, which moves 5 % at most.
-    limits = limits_of_effects(study, PLANTABLE, 1)
+    lacking = ("friction_step", "drive_beat")
+    wanted = [p for p in PLANTABLE if p.effect or p.name in lacking]
+    limits = limits_of_effects(study, wanted, 1)
     shown = {row.effect: row for row in limits if row.sigma is not None}
-    assert all(row.sigma < 1.05 * by_name[name].sigma for name, row in shown.items() if row.sigma)
+    known = [(row, by_name[name]) for name, row in shown.items() if name in by_name]
+    assert all(row.sigma < 1.05 * other.sigma for row, other in known if row.sigma)
+    # Of what no catalogue has, by recordings with it: 1 % of friction is plain, as of its gain.
+    assert {*shown} >= {*lacking}
+    assert 0.0 < shown["friction_step"].sigma < 1e-3
     assert "FallingFriction" not in shown
     # A gain of 8 kN that are read with noise of 80 N, a hundredth, in 1000 samples: 3e-4.
     assert 0.0 < shown["FxGain"].sigma < 1e-3
@@ -407,18 +420,41 @@ def test_what_is_clear_is_found_in_19_of_20(unknowns):
     assert power == pytest.approx(SURE, abs=3.0 * np.sqrt(SURE * (1.0 - SURE) / 4000))
 
 
-def test_a_system_without_a_plugin_is_planted_in_its_own_model(tmp_path):
-    """Its own four recordings drive it; seepage of 2 l/s per metre is far above noise."""
+def test_a_signature_by_recordings_is_that_by_derivatives(all_effects):
+    """An effect that is taken for one that the catalogue lacks: the same information on it."""
+    study = sets.study()
+    setup = Setup(SYSTEM, study.rig, all_effects, REPERTOIRE.effects)
+    gain = 0.016
+
+    def made(gains: dict[str, float]) -> list[Case]:
+        planting = Planting("single", 1, 1.0, gains, ("FxGain",))
+        return setup.record(planting, study.rig.simulate(1, gains))
+
+    lacking, known = ("fx_gain", "lacking"), ("FxGain", "gain")
+    given = SYSTEM, REPERTOIRE.effects, all_effects, made({})
+    joint = information_of_set(*given, {lacking: (gain, made({"fx_gain": gain}))})
+    at = [joint.shared.index(lacking), joint.shared.index(known)]
+    left = beside(joint.total().N, range(len(joint.known)))[np.ix_(at, at)]
+    # A gain of 1.6 % bends the whitening of relative noise by as much.
+    assert left[0, 0] == pytest.approx(left[1, 1], rel=0.05)
+    assert left[0, 1] == pytest.approx(left[1, 1], rel=0.05)
+
+
+def test_a_system_without_a_plugin_is_planted_in_its_own_model(tmp_path, capsys):
+    """Its own four recordings drive it; an oracle finds 20 standard deviations without fail."""
     pytest.importorskip("casadi", reason="needs the extra [compiler]")
     pytest.importorskip("rumoca", reason="needs the extra [compiler]")
     write_system(tmp_path / "tank")
-    sets = ["--clean", "2", "--sizes", "200", "--repeats", "2", "--pairs", "0", "--workers", "1"]
+    sets = ["--clean", "2", "--sigmas", "20", "--repeats", "2", "--pairs", "0", "--workers", "1"]
     options = ["--system", str(tmp_path / "tank"), "--out", str(tmp_path / "out")]
     assert main(["power", *options, *sets]) == 0
     power = json.loads((tmp_path / "out" / "power.json").read_text())
     assert "own model" in power["provenance"]["machine"]
     assert (power["false_alarms"]["hits"], power["false_alarms"]["of"]) == (0, 2)
     assert (power["right_first"]["hits"], power["right_first"]["of"]) == (2, 2)
+    assert power["scale"]["chances"] == {"20": pytest.approx(1.0)}
+    check("power", power)
+    assert "an oracle, by chance" in capsys.readouterr().out
 
 
 def test_one_effect_at_one_size_is_one_set():
@@ -437,6 +473,7 @@ def test_one_effect_at_one_size_is_one_set():
         ["--sizes", "0"],
         ["--clean", "-1"],
         ["--case", "16_nowhere"],
+        ["--sigmas", "--oracle"],
         ["--effects", "BrakeFadee"],
         ["--clean", "0", "--pairs", "0", "--repeats", "0"],
     ],

@@ -18,11 +18,12 @@ from workbench.runtime.files import locked_folder
 
 if TYPE_CHECKING:
     from workbench.diagnosis import Effect
-    from workbench.studies.power import Plantable, PowerStudy, VirtualRig
+    from workbench.studies.power import Plantable, PowerStudy, Repertoire, VirtualRig
     from workbench.studies.power.planting import Group
     from workbench.studies.power.report import Check
     from workbench.system.system import System
 
+_SIGMAS = [2.0, 4.0, 6.0, 10.0, 20.0]  # from what nobody finds to what nobody may miss
 WORKERS_NEED = ("workbench.studies.power", "workbench.studies.power.report")
 
 
@@ -45,6 +46,7 @@ def add(commands: arguments.Commands, text: str) -> argparse.ArgumentParser:
         "  workbench power --thresholds --sets 8\n"
         "  workbench power --plan --case 01_dry_80_1.5 --case 04_dry_160_4.2\n"
         "  workbench power --oracle --system train\n"
+        "  workbench power --sigmas --system train --repeats 1\n"
         "  workbench power --follow --case 24_alike_80_2.7 --case 25_alike_80_2.7\n"
         "  workbench power --leave-out-effect --sizes 8 --repeats 1 --clean 0\n"
         "  workbench power --sheet-error --repeats 2\n"
@@ -77,13 +79,22 @@ def _add_sets(parser: argparse.ArgumentParser) -> None:
             metavar="N",
             help=f"{text} (default: %(default)s)",
         )
-    parser.add_argument(
+    sizes = parser.add_mutually_exclusive_group()
+    sizes.add_argument(
         "--sizes",
         type=arguments.above_zero,
         nargs="+",
         default=[0.5, 1.0, 2.0, 4.0],
         metavar="X",
         help="multiples of the least size that is worth a finding (default: 0.5 1 2 4)",
+    )
+    sizes.add_argument(
+        "--sigmas",
+        type=arguments.above_zero,
+        nargs="*",
+        metavar="X",
+        help="in place of --sizes: multiples of an oracle's standard deviation, see --oracle "
+        "(without a number: 2 4 6 10 20)",
     )
     arguments.add_seed(parser, "all sets")
     parser.add_argument(
@@ -139,6 +150,14 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
     from workbench.system.system import REFERENCE
 
     require_compiler()
+    if options.sigmas is not None and (options.check or options.recorded):
+        other = options.check.replace("_", "-") if options.check else "recorded"
+        raise InputError(
+            where="command line, --sigmas",
+            found=f"--{other} beside it",
+            expected="sets of the simulated rig, which are diagnosed as they are",
+            remedy="leave one of them out",
+        )
     system = load_system(options.system)
     if options.library:
         system = replace(system, library=options.library)
@@ -147,7 +166,8 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
         sets = read_recorded_sets(system, options.recorded)
         with locked_folder(options.out):
             output.progress(f"{len(sets.recordings)} recorded sets")
-            return _usual(options, output, PowerStudy(system, sets, effects), sets.groups)
+            study = PowerStudy(system, sets, effects)
+            return _usual(options, output, study, sets.groups, _repertoire(options, study))
     known = model_path(system, REFERENCE) if REFERENCE in system.models else None
     with locked_folder(options.out):
         output.progress(f"{len(effects)} effects in the library")
@@ -162,7 +182,9 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
         if about := study.rig.identity.get("machine"):
             output.result(f"Recordings are made by {about}.")
         if options.check is None:
-            return _usual(options, output, study, _plan_sets(options, study))
+            repertoire = _repertoire(options, study)
+            groups = _plan_sets(options, study, repertoire)
+            return _usual(options, output, study, groups, repertoire)
         engine = Engine(options.workers, output.stage)
         check, interrupted = _CHECKS[options.check](options, study, engine)
         provenance = _provenance(options, study, interrupted)
@@ -217,12 +239,28 @@ def _provenance(
     }
 
 
-def _plan_sets(options: argparse.Namespace, study: PowerStudy) -> list[Group]:
+def _repertoire(options: argparse.Namespace, study: PowerStudy) -> Repertoire:
+    """All that the rig can plant, or what --effects names in sizes by an oracle."""
+    from workbench.studies.power import Repertoire
+    from workbench.studies.power.campaign import by_oracle
+
+    if options.sigmas is None:
+        return Repertoire(study.rig.plantables, tuple(study.effects))
+    sigmas = sorted({*(options.sigmas or _SIGMAS)})
+    return by_oracle(study, _select(options.effects, study.rig), sigmas, options.seed)
+
+
+def _plan_sets(
+    options: argparse.Namespace, study: PowerStudy, repertoire: Repertoire | None = None
+) -> list[Group]:
     from workbench.studies.power import Repertoire, plan
 
-    repertoire = Repertoire(_select(options.effects, study.rig), tuple(study.effects))
-    sizes = sorted(set(options.sizes))
-    groups = plan(repertoire, options.clean, sizes, options.repeats, options.pairs, options.seed)
+    if repertoire is None or not repertoire.scale.chances:
+        sizes = sorted({*options.sizes})
+        wanted = Repertoire(_select(options.effects, study.rig), tuple(study.effects))
+    else:
+        sizes, wanted = [float(size) for size in repertoire.scale.chances], repertoire
+    groups = plan(wanted, options.clean, sizes, options.repeats, options.pairs, options.seed)
     if not groups:
         raise InputError(
             where="command line, --clean, --repeats and --pairs",
@@ -234,16 +272,20 @@ def _plan_sets(options: argparse.Namespace, study: PowerStudy) -> list[Group]:
 
 
 def _usual(
-    options: argparse.Namespace, output: Output, study: PowerStudy, groups: Sequence[Group]
+    options: argparse.Namespace,
+    output: Output,
+    study: PowerStudy,
+    groups: Sequence[Group],
+    repertoire: Repertoire,
 ) -> CommandResult:
-    from workbench.studies.power import Repertoire, diagnose_sets, summarise
+    from workbench.studies.power import diagnose_sets, summarise
     from workbench.studies.power.report import format_power, write_power
 
     engine = Engine(options.workers, output.stage, options.out)
     results, interrupted = diagnose_sets(
         groups, study, engine, seed=options.seed, resume=options.resume
     )
-    summary = summarise(results, Repertoire(study.rig.plantables, tuple(study.effects)))
+    summary = summarise(results, repertoire)
     write_power(summary, study.effects, _provenance(options, study, interrupted), options.out)
     output.result(format_power(summary))
     page = options.out / "index.html"

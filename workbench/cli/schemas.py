@@ -22,7 +22,7 @@ from workbench.recordings.case import UNKNOWN
 from workbench.studies.distance.outcome import SafetyLevel
 from workbench.studies.distance.rare_events import PlainLevel
 from workbench.studies.fit.outcome import LOSSES, FittedValue
-from workbench.studies.power import following, left_out
+from workbench.studies.power import Scale, following, left_out
 from workbench.studies.power.campaign import EffectChance, EffectLimit
 from workbench.studies.power.sensitivity import VerdictChange
 from workbench.system.installed import installed_plugins
@@ -227,6 +227,7 @@ def power_summaries() -> dict[str, Schema]:
     outside = {"size": NUMBER, "unit": TEXT, "verdicts": by_name(by_name(WHOLE))}
     power = {
         "sets": WHOLE,
+        "scale": declared(Scale),
         "failed": listed(closed({"rig error": TEXT})),
         "false_alarms right_first right_first_above_noise right_alone unexplained coverage": SHARE,
         "pairs": closed({"both both_seen_alone": SHARE}),

@@ -295,6 +295,16 @@ class Joint:
             prior=Quadratic(N, g, c, 0),
         )
 
+    def joined(self, key: Key, columns: Sequence[Vector]) -> "Joint":
+        """The same with a further unknown, by its derivatives in each recording, (n,) each."""
+        systems = tuple(
+            replace(system, J=np.column_stack([system.J, column]))
+            for system, column in zip(self.systems, columns, strict=True)
+        )
+        N, g = np.pad(self.prior.N, (0, 1)), np.pad(self.prior.g, (0, 1))
+        prior = replace(self.prior, N=N, g=g)
+        return replace(self, shared=(*self.shared, key), systems=systems, prior=prior)
+
     @property
     def chi_squared(self) -> float:
         """At the point itself, tolerances and the prior included."""

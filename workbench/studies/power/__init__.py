@@ -10,11 +10,11 @@ from workbench.studies.power.planting import Findable as Findable
 from workbench.studies.power.planting import Plantable as Plantable
 from workbench.studies.power.planting import Planting as Planting
 from workbench.studies.power.planting import Repertoire as Repertoire
+from workbench.studies.power.planting import Scale as Scale
 from workbench.studies.power.planting import plan as plan
 from workbench.studies.power.run import PowerStudy as PowerStudy
 from workbench.studies.power.run import diagnose_sets as diagnose_sets
 from workbench.studies.power.statistics import CLEAR as CLEAR
-from workbench.studies.power.statistics import VISIBLE as VISIBLE
 from workbench.studies.power.statistics import share as share
 from workbench.studies.power.statistics import summarise as summarise
 from workbench.studies.power.virtual_rig import RecordedSets as RecordedSets

@@ -1,7 +1,7 @@
 """Chances that a campaign of recordings shows effects, before a recording is made."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import chndtrinc
@@ -13,12 +13,15 @@ from workbench.diagnosis.effects.catalogue import variant
 from workbench.diagnosis.inference.quadratic import Joint, beside
 from workbench.diagnosis.inference.score_test import shapes
 from workbench.diagnosis.inference.thresholds import Thresholds, of_system
+from workbench.errors import InputError
+from workbench.recordings.case import Case
 from workbench.studies.power.diagnosing import diagnose_set, information_of_set
-from workbench.studies.power.planting import Plantable, Planting
-from workbench.studies.power.run import PowerStudy
+from workbench.studies.power.planting import Plantable, Planting, Repertoire, Scale
+from workbench.studies.power.run import PowerStudy, Setup
 
 SURE = 0.95  # chance from which on a size is called found
 _ALIKE = 1e-9  # share of a signature that is rounding: the other has the same
+_LACKING = "lacking"  # in place of a parameter, of an effect that the catalogue lacks
 
 
 @dataclass(frozen=True)
@@ -78,7 +81,7 @@ class EffectLimit:
 
     Attributes
     ----------
-    effect, unit : of the library, and of its sizes, SI.
+    effect, unit : of the library, or of the rig where the library lacks it; of its sizes, SI.
     sigma : standard deviation of its size by the exact model, which knows that nothing else is
         missing [unit]; None where recordings cannot show it.
     found : size from which on it is significant with the chance `SURE` [unit]; None as `sigma`.
@@ -114,38 +117,94 @@ def limits_of_effects(
     InputError
         If a model or the library is not what it should be.
     """
+    names = {effect.name for effect in study.effects}
+    repertoire = Repertoire(study.rig.plantables, tuple(study.effects))
     with study.setup() as setup:
         clean = Planting("clean", seed, 0.0, {}, ())
         cases = setup.record(clean, study.rig.simulate(seed, {}))
-        joint = information_of_set(setup.system, setup.effects, setup.everything, cases)
-    at = _columns_of_effects(study.effects, joint)
-    left = beside(joint.total().N, range(len(joint.known)))
-    decides = of_system(study.system.comparison, len(study.effects))
-    multiple = clear(1, decides)
-    limits = []
-    for plantable in wanted:
-        if plantable.effect not in at:
-            if any(effect.name == plantable.effect for effect in study.effects):
-                limits.append(EffectLimit(plantable.effect, plantable.unit, None, None, "", None))
-            continue
-        own = _of_shape(at[plantable.effect], plantable, study.effects)
-        sigma = len(own) / float(np.trace(left[np.ix_(own, own)]))
-        sigma = float(np.sqrt(sigma))
-        differences = {
-            name: min(_unlike(left, own, other) for other in variants)
-            for name, variants in at.items()
-            if name != plantable.effect
+        others = {
+            (plantable.name, _LACKING): _changed(setup, plantable.name, size, seed)
+            for plantable in wanted
+            if plantable.effect not in names and np.isfinite(size := repertoire.size(plantable))
         }
-        like = min(differences, key=lambda name: differences[name], default="")
-        least = (
-            multiple * sigma / np.sqrt(differences[like])
-            if like and differences[like] > _ALIKE
-            else None
+        joint = information_of_set(setup.system, setup.effects, setup.everything, cases, others)
+    at = _columns_of_effects(study.effects, joint)
+    at |= {name: [[joint.shared.index((name, _LACKING))]] for name, _ in others}
+    left = beside(joint.total().N, range(len(joint.known)))
+    multiple = clear(1, of_system(study.system.comparison, len(study.effects)))
+    return [_limit(plantable, at, left, study.effects, multiple) for plantable in wanted]
+
+
+def _changed(setup: Setup, name: str, size: float, seed: int) -> tuple[float, list[Case]]:
+    """Size of one effect of the rig, and recordings with it."""
+    planting = Planting("outside", seed, 1.0, {name: size}, ("",))
+    return size, setup.record(planting, setup.rig.simulate(seed, planting.gains))
+
+
+def _limit(
+    plantable: Plantable,
+    at: Mapping[str, list[list[int]]],
+    left: Matrix,
+    effects: Sequence[Effect],
+    multiple: float,
+) -> EffectLimit:
+    name = plantable.effect if plantable.effect in at else plantable.name
+    if name not in at:
+        return EffectLimit(plantable.effect or name, plantable.unit, None, None, "", None)
+    own = _of_shape(at[name], plantable, effects)
+    information = float(np.trace(left[np.ix_(own, own)]))
+    if not information > 0.0:
+        return EffectLimit(name, plantable.unit, None, None, "", None)
+    sigma = float(np.sqrt(len(own) / information))
+    differences = {
+        other: min(_unlike(left, own, columns) for columns in variants)
+        for other, variants in at.items()
+        if other != name
+    }
+    like = min(differences, key=lambda other: differences[other], default="")
+    told = None
+    if like and differences[like] > _ALIKE:
+        told = multiple * sigma / float(np.sqrt(differences[like]))
+    return EffectLimit(name, plantable.unit, sigma, multiple * sigma, like, told)
+
+
+ORACLE = "an oracle's standard deviation"
+
+
+def by_oracle(
+    study: PowerStudy, wanted: Sequence[Plantable], sizes: Sequence[float], seed: int
+) -> Repertoire:
+    """What can be planted, with sizes in standard deviations of what an oracle knows of them.
+
+    What recordings cannot show is left out. A finding is expected from the size on that an oracle
+    finds with the chance `SURE`.
+
+    Parameters
+    ----------
+    sizes : that will be planted [standard deviations].
+
+    Raises
+    ------
+    InputError
+        If a model or the library is not what it should be, or recordings show none of it.
+    """
+    limits = limits_of_effects(study, wanted, seed)
+    planted = tuple(
+        replace(plantable, unit_size=limit.sigma)
+        for plantable, limit in zip(wanted, limits, strict=True)
+        if limit.sigma is not None
+    )
+    if not planted:
+        raise InputError(
+            where="command line, --sigmas",
+            found="recordings that can show none of these effects",
+            expected="one effect or more with a finite standard deviation",
+            remedy="name others by --effects, or other recordings by --case",
         )
-        limits.append(
-            EffectLimit(plantable.effect, plantable.unit, sigma, multiple * sigma, like, least)
-        )
-    return limits
+    decides = of_system(study.system.comparison, len(study.effects))
+    chances = {f"{size:g}": chance(size, 1, decides) for size in sizes}
+    scale = Scale(ORACLE, clear(1, decides), chances)
+    return Repertoire(planted, tuple(study.effects), scale)
 
 
 def _columns_of_effects(effects: Sequence[Effect], joint: Joint) -> dict[str, list[list[int]]]:
@@ -164,6 +223,8 @@ def _of_shape(
     variants: Sequence[list[int]], planted: Plantable, effects: Sequence[Effect]
 ) -> list[int]:
     """Columns of an effect in the shape that the rig has, or else in its middle one."""
+    if len(variants) == 1:
+        return variants[0]
     effect = next(effect for effect in effects if effect.name == planted.effect)
     forms = shapes(effect)
     index = forms.index(dict(planted.shapes)) if dict(planted.shapes) in forms else len(forms) // 2

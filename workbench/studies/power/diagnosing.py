@@ -1,6 +1,6 @@
 """The diagnosis as its power is measured: all effects of the library in one FMU, set by set."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -8,19 +8,23 @@ from pathlib import Path
 import numpy as np
 
 from workbench import diagnosis
+from workbench.arrays import Vector
 from workbench.diagnosis import Diagnosis, Effect, catalogue
 from workbench.diagnosis.data.motion import ModelSource
 from workbench.diagnosis.inference.fit import Fit
-from workbench.diagnosis.inference.quadratic import Joint
+from workbench.diagnosis.inference.quadratic import Joint, Key
 from workbench.diagnosis.inference.rivals import Rivals, gathered
 from workbench.diagnosis.inference.score_test import shapes, signatures
 from workbench.diagnosis.inference.search import FittedModel, examine, extended
 from workbench.diagnosis.inference.verdict import conclude
 from workbench.diagnosis.simulation.residual_model import ResidualModel
+from workbench.diagnosis.simulation.simulator import WhitenedResiduals
 from workbench.models.modelica import read_library
 from workbench.recordings.case import Case
 from workbench.runtime.engine import silent
 from workbench.system.system import System
+
+_NONE: Mapping[Key, tuple[float, Sequence[Case]]] = {}
 
 
 def library_effects(system: System) -> tuple[Effect, ...]:
@@ -54,12 +58,21 @@ def diagnose_set(
 
 
 def information_of_set(
-    system: System, effects: Sequence[Effect], everything: Path, cases: Sequence[Case]
+    system: System,
+    effects: Sequence[Effect],
+    everything: Path,
+    cases: Sequence[Case],
+    others: Mapping[Key, tuple[float, Sequence[Case]]] = _NONE,
 ) -> Joint:
     """Linearise one set about the nominal model: what it says of each effect and each level.
 
     Errors have the variance of the sensors' noise; levels and what differs between recordings have
     the tolerances of the system file.
+
+    Parameters
+    ----------
+    others : by the name of an effect that the catalogue lacks, its size and the same recordings
+        with it; its signature is the difference of their errors, over that size.
     """
     with _fit(system, effects, everything, cases) as (_, fit):
         candidates = [
@@ -70,7 +83,21 @@ def information_of_set(
         ]
         lin = fit.linearise(fit.at(fit.unknowns.start()), (), candidates)
         lin = replace(lin, variance_factors=np.ones(lin.variance_factors.size))
-        return fit.apart(lin, signatures(candidates))
+        joint = fit.quadratics(lin, signatures(candidates))
+        for key, (size, changed) in others.items():
+            with _fit(system, effects, everything, changed) as (_, other):
+                errors = other.at(other.unknowns.start()).residuals
+            moved = map(_difference, errors, lin.residuals)
+            joint = joint.joined(key, [column / size for column in moved])
+        return joint
+
+
+def _difference(changed: WhitenedResiduals, usual: WhitenedResiduals) -> Vector:
+    """By how much errors and rest of a recording differ, (b*c + q,), as long as both last."""
+    blocks = min(len(changed.errors), len(usual.errors))
+    errors = np.zeros_like(usual.errors)
+    errors[:blocks] = changed.errors[:blocks] - usual.errors[:blocks]
+    return np.append(errors.ravel(), changed.rest - usual.rest)
 
 
 def rivals_of_set(

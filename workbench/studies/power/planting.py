@@ -119,6 +119,22 @@ class SheetError:
 
 
 @dataclass(frozen=True)
+class Scale:
+    """In what sizes are measured.
+
+    Attributes
+    ----------
+    unit : in words.
+    visible : size from which on a finding is expected [unit].
+    chances : by size [unit], the chance that an oracle finds it; empty where nobody asked one.
+    """
+
+    unit: str = "the least size that is worth a finding"
+    visible: float = 2.0  # beyond what tolerances may hide
+    chances: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
 class Repertoire:
     """What can be planted, and what can be found.
 
@@ -126,10 +142,12 @@ class Repertoire:
     ----------
     plantables : of the virtual rig.
     effects : of the library.
+    scale : of all sizes.
     """
 
     plantables: tuple[Plantable, ...]
     effects: tuple[Findable, ...]
+    scale: Scale = Scale()
 
     def plantable(self, name: str) -> Plantable:
         """By the rig's name."""

@@ -25,7 +25,7 @@ from workbench.pages.parts import (
 )
 from workbench.pages.views import capital
 from workbench.runtime.files import write_json
-from workbench.studies.power import CLEAR, VISIBLE, Findable, following, left_out
+from workbench.studies.power import CLEAR, Findable, following, left_out
 from workbench.studies.power.campaign import SURE, EffectChance, EffectLimit
 from workbench.studies.power.sensitivity import FACTORS, ThresholdSensitivity
 from workbench.system.units import with_unit
@@ -302,13 +302,13 @@ def _share_dots(answer: Mapping[str, Any]) -> Dots:
 
 
 def _effects(summary: Mapping[str, Any]) -> Table:
-    effects = summary["effects"]
+    effects, scale = summary["effects"], summary["scale"]
     sizes = sorted(
         {size for effect in effects.values() for size in effect["right_first"]}, key=float
     )
     columns = [
         "effect",
-        term("1 is", "least size that is worth a finding"),
+        term("1 is", scale["unit"]),
         *(Numbers(f"x {size} [%]") for size in sizes),
         Numbers("intervals hold [%]"),
         "remark",
@@ -323,10 +323,13 @@ def _effects(summary: Mapping[str, Any]) -> Table:
         )
         for name, effect in effects.items()
     ]
+    if scale["chances"]:
+        chances = (scale["chances"][size] for size in sizes)
+        cells = (number(100.0 * chance, ".0f", chance) for chance in chances)
+        rows.append(("an oracle", Cell(""), *cells, Cell(""), "by chance"))
     caption = (
         "Fraction of sets in which the injected effect, or a group that it is in, is named first, "
-        "by "
-        "its size over the least that is worth a finding; hits and sets in brackets."
+        f"by its size over {scale['unit']}; hits and sets in brackets."
     )
     return Table("effect-table", caption, columns, rows)
 
@@ -346,7 +349,8 @@ def _confusion_rows(summary: Mapping[str, Any]) -> Table:
         counts = (row.get(name, 0) for name in names)
         cells = (number(float(count), ".0f", count / of if of else 0.0) for count in counts)
         rows.append((planted, *cells))
-    caption = f"Sets by injected effect (rows, from size {VISIBLE:g} on) and what was named first."
+    visible = summary["scale"]["visible"]
+    caption = f"Sets by injected effect (rows, from size {visible:g} on) and what was named first."
     columns = ("planted", *(Numbers(name) for name in names))
     return Table("confusion-table", caption, columns, rows)
 
@@ -381,16 +385,16 @@ def write_power(
     write_power_page(content, out)
     names = [effect.name for effect in effects]
     measured = summary["effects"]
-    figures = {"confusion": _confusion(summary["confusion"], names)} if summary["sets"] else {}
+    figures = {"confusion": _confusion(summary, names)} if summary["sets"] else {}
     if measured:
-        figures |= {"power": _curves(measured), "coverage": _coverage(summary)}
+        figures |= {"power": _curves(measured, summary["scale"]), "coverage": _coverage(summary)}
     with in_style(font_size=8):
         for name, figure in figures.items():
             save_figure(figure, [out / f"{name}.png", out / f"{name}.svg"])
 
 
-def _curves(effects: Mapping[str, Any]) -> "Figure":
-    """Share named right against size, one panel for each effect."""
+def _curves(effects: Mapping[str, Any], scale: Mapping[str, Any]) -> "Figure":
+    """Share named right against size, one panel for each effect, beside an oracle's chance."""
     columns = min(_COLUMNS, len(effects))
     rows = -(-len(effects) // columns)
     with styled(0.6 + 2.1 * columns, 1.0 + 1.4 * rows, font_size=8) as sheet:
@@ -402,6 +406,9 @@ def _curves(effects: Mapping[str, Any]) -> "Figure":
             places = range(len(shares))
             low, high = ([100.0 * entry[key] for entry in shares] for key in ("low", "high"))
             axes.vlines(places, low, high, color=LIGHT["raw"], linewidth=2.0)
+            if scale["chances"]:
+                chances = [100.0 * scale["chances"][size] for size in effect["right_first"]]
+                axes.plot(places, chances, "--", color=_MARK, linewidth=0.8)
             axes.plot(places, [100.0 * entry["share"] for entry in shares], "o-", color=_LINE)
             hidden = ", hidden" if effect["hidden"] else ""
             axes.set_title(
@@ -411,11 +418,13 @@ def _curves(effects: Mapping[str, Any]) -> "Figure":
             axes.set_ylim(-5.0, 105.0)
         for row in panels:
             row[0].set_ylabel("[%]")
-        sheet.suptitle("Named right, with 95 % interval, against size over the least that matters")
+        oracle = "; dashed: an oracle" * bool(scale["chances"])
+        sheet.suptitle(f"Named right, with 95 % interval{oracle}. Sizes over {scale['unit']}")
     return sheet
 
 
-def _confusion(confusion: Mapping[str, Mapping[str, int]], names: Sequence[str]) -> "Figure":
+def _confusion(summary: Mapping[str, Any], names: Sequence[str]) -> "Figure":
+    confusion: Mapping[str, Mapping[str, int]] = summary["confusion"]
     named = {name for row in confusion.values() for name in row}
     order = ["nothing", *names, "partly explained", "unexplained", "failed"]
     columns = [name for name in order if name in named or name in confusion]
@@ -430,7 +439,7 @@ def _confusion(confusion: Mapping[str, Mapping[str, int]], names: Sequence[str])
         axes = _heat(sheet, table, columns, labels, turned=90.0)
         axes.set_xlabel("named first; indistinguishable effects under their own name")
         axes.set_ylabel("injected (sets)")
-        sheet.suptitle(f"Named first [%], from size {VISIBLE:g} on")
+        sheet.suptitle(f"Named first [%], from size {summary['scale']['visible']:g} on")
     return sheet
 
 
@@ -454,14 +463,14 @@ def _coverage(summary: Mapping[str, Any]) -> "Figure":
 
 def format_power(summary: Mapping[str, Any]) -> str:
     """Table for the terminal."""
-    effects, outside = summary["effects"], summary["outside"]
+    effects, outside, scale = summary["effects"], summary["outside"], summary["scale"]
     sizes = sorted({float(s) for effect in effects.values() for s in effect["right_first"]})
     header = f"{'effect':<30}{'1 is':>18}" + "".join(f"{f'x {s:g}':>8}" for s in sizes)
     lines = [
         f"{summary['sets']} sets of recordings, {len(summary['failed'])} failed",
         f"false alarms on clean sets          {_text(summary['false_alarms'])}",
-        f"right cause or its group first      {_text(summary['right_first'])}   from {VISIBLE:g} "
-        "times the size that matters",
+        f"right cause or its group first      {_text(summary['right_first'])}   from "
+        f"{scale['visible']:.2g} times {scale['unit']}",
         f"... where it is above noise         {_text(summary['right_first_above_noise'])}   from "
         f"{CLEAR:g} standard deviations on",
         f"... and no other cause              {_text(summary['right_alone'])}",
@@ -477,6 +486,9 @@ def format_power(summary: Mapping[str, Any]) -> str:
         row = f"{name:<30}{with_unit(effect['size'], effect['unit']):>18}"
         row += "".join(f"{_count(effect['right_first'].get(f'{size:g}')):>8}" for size in sizes)
         lines.append(row + f"{_count(effect['coverage']):>11}" + "  hidden" * effect["hidden"])
+    if scale["chances"]:
+        row = "".join(f"{scale['chances'][f'{size:g}']:>8.0%}" for size in sizes)
+        lines.append(f"{'an oracle, by chance':<48}{row}")
     for name, unknown in outside.items():
         verdicts = (
             f"x {size}: " + ", ".join(f"{n} {verdict}" for verdict, n in counts.items())
@@ -484,6 +496,8 @@ def format_power(summary: Mapping[str, Any]) -> str:
         )
         size = with_unit(unknown["size"], unknown["unit"])
         lines.append(f"{name:<30}{size:>18}  {'; '.join(verdicts)}")
+    lines += ["", f"sets with a wrong name: {len(summary['wrong'])}"]
+    lines += [f"  {' and '.join(row['said'])} ({row['rig']})" for row in summary["wrong"]]
     return "\n".join(lines)
 
 

@@ -2,6 +2,8 @@
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
+from dataclasses import asdict
+from functools import partial
 from itertools import permutations
 from typing import Any
 
@@ -10,7 +12,6 @@ from scipy.stats import binomtest
 from workbench.studies.power.journal import SetVerdict
 from workbench.studies.power.planting import Repertoire
 
-VISIBLE = 2.0  # times the size that matters: beyond what tolerances may hide
 CLEAR = 4.0  # standard deviations that a size must have to be more than noise
 
 
@@ -76,8 +77,10 @@ def summarise(results: Sequence[SetVerdict], repertoire: Repertoire) -> dict[str
     """All statistics of a run, as they are written to power.json.
 
     A share has `hits`, `of`, `share` and the 95 % interval `low` to `high`. Sizes are multiples of
-    the size that matters. A diagnosis that failed counts as neither right nor "nothing".
+    the unit of `scale`. A diagnosis that failed counts as neither right nor "nothing".
     """
+    scale = repertoire.scale
+    large = partial(_large, visible=scale.visible)
     kinds: dict[str, list[SetVerdict]] = {"clean": [], "single": [], "pair": [], "outside": []}
     for result in results:
         kinds[result.planting.kind].append(result)
@@ -88,15 +91,16 @@ def summarise(results: Sequence[SetVerdict], repertoire: Repertoire) -> dict[str
         result
         for plantable in repertoire.plantables
         if plantable.effect and plantable.effect not in repertoire.hidden
-        for result in _large(by_name.get(plantable.name, []))
+        for result in large(by_name.get(plantable.name, []))
     ]
     confusion = {"none": kinds["clean"]} | {
-        plantable.effect or plantable.name: _large(by_name[plantable.name])
+        plantable.effect or plantable.name: large(by_name[plantable.name])
         for plantable in repertoire.plantables
         if plantable.name in by_name
     }
     return {
         "sets": len(results),
+        "scale": asdict(scale),
         "failed": [
             {"rig": result.planting.options, "error": result.error}
             for result in results
@@ -107,9 +111,7 @@ def summarise(results: Sequence[SetVerdict], repertoire: Repertoire) -> dict[str
         "right_first_above_noise": share(map(named_right, filter(above_noise, visible))),
         "right_alone": share(named_right(result) and len(result.causes) == 1 for result in visible),
         "pairs": _pairs(kinds["pair"], by_name),
-        "unexplained": share(
-            result.verdict == "unexplained" for result in _large(kinds["outside"])
-        ),
+        "unexplained": share(result.verdict == "unexplained" for result in large(kinds["outside"])),
         "coverage": _coverage(kinds["single"], repertoire),
         "effects": _by_effect(by_name, repertoire),
         "outside": _outside(by_name, repertoire),
@@ -178,8 +180,8 @@ def _pairs(pairs: Sequence[SetVerdict], by_name: dict[str, list[SetVerdict]]) ->
     }
 
 
-def _large(results: Sequence[SetVerdict]) -> list[SetVerdict]:
-    return [result for result in results if result.planting.multiple >= VISIBLE]
+def _large(results: Sequence[SetVerdict], visible: float) -> list[SetVerdict]:
+    return [result for result in results if result.planting.multiple >= visible]
 
 
 def _by_size(results: Sequence[SetVerdict]) -> dict[str, list[SetVerdict]]:
