@@ -25,6 +25,7 @@ title = "80 km/h"
 
 [conditions]
 rail = "dry"
+pressure_full_load = "2.7 bar"
 mass1 = "45 t"
 mass2 = "50 t"
 
@@ -74,6 +75,7 @@ def test_gradients_and_curves_are_those_under_the_vehicles(tmp_path, train):
     weight = 45.0 * (position >= 1210.75) + 50.0 * (position >= 1237.15)
     assert_allclose(case["curve"], 1e-3 * weight / 95.0, atol=1e-15)
     assert set(case["mass1"]) == {45e3}
+    assert case.conditions == {"rail": "dry", "pressure_full_load": 2.7e5}
 
 
 @pytest.mark.parametrize(
@@ -82,6 +84,7 @@ def test_gradients_and_curves_are_those_under_the_vehicles(tmp_path, train):
         ('mass2 = "50 t"', "", "mass2"),
         ('mass2 = "50 t"', 'mass2 = "50 m"', "a unit of another dimension"),
         ('rail = "dry"', "", "rail"),
+        ('"2.7 bar"', '"2.7 m"', "a unit of another dimension"),
         ('"track.csv"', '"way.csv"', r"way\.csv"),
     ],
 )

@@ -283,6 +283,7 @@ def test_water_and_a_wrong_track_file_are_named(
         (5102, "late[3]", 0.002, "LateSpeed[3]"),
         (5103, "drag[5]", 400.0, "DraggingBrake[5]"),
         (5108, "zero[2]", 2000.0, "PressureSensorOffset[2]"),  # it shows while the train coasts
+        (9607, "reading[2]", 0.0528, "PressureSensorGain[2]"),  # beside what the brake asks for
         pytest.param(5109, "accelerometer_bias", 0.12, "AccelerometerBias", marks=pytest.mark.long),
         pytest.param(5110, "accelerometer_gain", 0.03, "AccelerometerGain", marks=pytest.mark.long),
         pytest.param(5111, "glazing", 0.03, "Glazing", marks=pytest.mark.long),
@@ -297,7 +298,7 @@ def test_faults_of_some_deviations_of_the_sheet_are_named_alone(
     assert (cause.effect.name, cause.confusable_with) == (right, ())
 
 
-def test_only_a_recording_that_begins_unbraked_tells_what_a_sensor_reads_at_rest(tmp_path):
+def test_a_sensor_is_read_at_rest_and_held_where_a_recording_shows_it(tmp_path):
     whole = stop(tmp_path, {"tolerances": -1.0, "zero[2]": 2000.0})
     braked = whole.time > whole.time[np.argmax(whole["pB1"] > 2e5)]
     (name,) = (path.parent for path in tmp_path.glob("*/measured.csv"))
@@ -305,9 +306,19 @@ def test_only_a_recording_that_begins_unbraked_tells_what_a_sensor_reads_at_rest
     kept = [row for row, wanted in zip(rows, braked, strict=True) if wanted]
     (name / "measured.csv").write_text("\n".join([header, *kept]))
     begun = read_case(name, SYSTEM)
+    unasked = replace(whole, conditions={"rail": "dry"})
+    late = whole.time > 0.8 * whole.time[-1]
+    moved = whole.with_signals({"pB1": whole["pB1"] * np.where(late, 1.05, 1.0)})
     source = ModelSource(model_path(SYSTEM, OBSERVER), SYSTEM, SYSTEM.given)
-    with ResidualModel(source, [whole, begun]) as simulations:
-        coasted, late = simulations.recordings
+    with ResidualModel(source, [whole, begun, unasked, moved]) as simulations:
+        coasted, begins, untold, steps = simulations.recordings
     # Means of 200 samples of 2.3 mbar; the sheet's own zero is left out.
-    assert_allclose(coasted.rest, [0.0, 2000.0, 0.0, 0.0], atol=100.0)
-    assert np.isinf(late.rest_noise).all()
+    assert_allclose(coasted.rest[:4], [0.0, 2000.0, 0.0, 0.0], atol=100.0)
+    # Of a full vehicle of 56 t 2.7 bar are asked for, beside the springs that hold pads off.
+    asked = [25e3 + (2.7e5 - 25e3) * whole[mass][0] / 56e3 for mass in ("mass1", "mass2")]
+    held = np.add(np.repeat(asked, 2), [0.0, 2000.0, 0.0, 0.0])
+    assert_allclose(coasted.rest[4:], held, atol=200.0)  # 0.6 mbar of means, and the step of 2.4
+    assert coasted.rest_noise.max() < 200.0
+    assert np.isinf(begins.rest_noise).all()
+    assert np.isinf(untold.rest_noise).tolist() == [False] * 4 + [True] * 4
+    assert steps.rest_noise[4] > 10.0 * coasted.rest_noise[4]  # moved by 5 %: not held

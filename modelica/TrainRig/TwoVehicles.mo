@@ -3,6 +3,10 @@ model TwoVehicles "Two vehicles with four axles each"
   extends Train(final vehicles=2);
   parameter Real zero[bogies](each unit="Pa", each min=-1e5, each max=1e5) = zeros(bogies)
     "Readings of the pressure sensors of empty cylinders";
+  parameter Real pressureAsked(unit="Pa", min=0.0) = 2.7e5 "Pressure that the brake asks of a full vehicle";
+  parameter Real massFull(unit="kg", min=1.0) = 56000.0 "Mass of a full vehicle";
+  parameter Real regulation[bogies](each unit="1", each min=0.5, each max=2.0) = fill(1.0, bogies)
+    "Pressure of a bogie, of the one that its load asks for";
   input Real pB1(unit="Pa") "Pressure of bogie 1";
   input Real pB2(unit="Pa") "Pressure of bogie 2";
   input Real pB3(unit="Pa") "Pressure of bogie 3";
@@ -45,14 +49,17 @@ model TwoVehicles "Two vehicles with four axles each"
   output Real omega8(unit="rad/s", start=0.0, fixed=true, nominal=50.0) "Of axle 8";
   output Real omegaReading[8](each unit="rad/s") = speedSensor.y "Readings of the speed sensors";
   output Real pBRest[bogies](each unit="Pa") = cylinder.rest "Readings of empty cylinders";
+  output Real pBHeld[bogies](each unit="Pa") = cylinder.held "Readings while the brake is applied";
   output Real slip(unit="m/s") = v - rA[1]*omega1 "Slip velocity of axle 1";
   output Real vGNSS(unit="m/s") = v "Speed that satellites tell";
   output Real force(unit="N") = sum(Fx) "Braking force of all axles";
   output Real a(unit="m/s2", start=0.0, fixed=true, nominal=1.0) "Of the accelerometer";
   output Real vTrain(unit="m/s", start=0.0, fixed=true, nominal=20.0) "Speed of the train";
 
-  replaceable Slots.UnchangedBogies cylinder(u={pB1, pB2, pB3, pB4} - zero, restBefore=zero)
-    constrainedby Slots.PartialBogies(u={pB1, pB2, pB3, pB4} - zero, restBefore=zero)
+  replaceable Slots.UnchangedBogies cylinder(u={pB1, pB2, pB3, pB4} - zero, restBefore=zero,
+      heldBefore=asked)
+    constrainedby Slots.PartialBogies(
+      u={pB1, pB2, pB3, pB4} - zero, restBefore=zero, heldBefore=asked)
     "From the reading of a bogie's sensor to its cylinders";
   replaceable Slots.UnchangedPads padFriction(u=ordinary, T=T, power=frictionPower)
     constrainedby Slots.PartialPads(u=ordinary, T=T, power=frictionPower) "Pads";
@@ -76,7 +83,13 @@ model TwoVehicles "Two vehicles with four axles each"
     constrainedby Slots.PartialAxles(u=omega) "Speed sensors";
   replaceable Common.Signals.Unchanged accelerometer(u=felt)
     constrainedby Common.Interfaces.Signal(u=felt) "Accelerometer";
+protected
+  Real asked[bogies](each unit="Pa") "Readings of right sensors while the brake is applied";
 equation
+  for j in 1:2 loop
+    asked[j] = zero[j] + regulation[j]*(pRelease + (pressureAsked - pRelease)*mass1/massFull);
+    asked[j + 2] = zero[j + 2] + regulation[j + 2]*(pRelease + (pressureAsked - pRelease)*mass2/massFull);
+  end for;
   // Of the pads alone, in place of forces that follow from loads themselves.
   braking = sum(tauB[i]/rA[i] for i in 1:n)/weight;
   pC = cylinder.y;

@@ -79,11 +79,25 @@ class LeadingOutput:
 
 @declared
 class Rest:
-    """An input that is measured at rest, before it is applied, against what the model says."""
+    """An input that is measured while it is steady, against what the model says.
+
+    At rest, before it is applied, or held, some time after.
+    """
 
     signal: str = key("the input", of=SIGNAL)
-    output: str = key("of the model: its reading at rest", of=VARIABLE)
-    zero: float = key("standard deviation of a good sensor's zero", unit=unit_of_signal)
+    output: str = key("of the model: its reading then", of=VARIABLE)
+    zero: float = key("standard deviation of the mean of a good sensor", unit=unit_of_signal)
+    held_from: float = key(
+        "time after it is applied from which it is held until it falls; then the mean is taken",
+        "s",
+        0.0,
+        otherwise="it is at rest, before it is applied",
+    )
+    by: str = key(
+        "condition that the reading depends on: without it, a recording does not count here",
+        of=CONDITION,
+        absent="",
+    )
 
 
 @declared
@@ -223,7 +237,9 @@ class Comparison:
     begins: Threshold | None = key(
         "input whose application starts the test, and how far above its rest", absent=None
     )
-    rests: tuple[Rest, ...] = key("zero readings before that", name="rest", absent=())
+    rests: tuple[Rest, ...] = key(
+        "readings of inputs while they are steady", name="rest", absent=()
+    )
     leading: LeadingOutput | None = key(
         "output that corrects a slow motion, which integrates the noise of inputs",
         name="leads",

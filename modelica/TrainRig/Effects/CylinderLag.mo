@@ -13,6 +13,7 @@ equation
     y[i] = u[i] - lag[i]/tau[i]*(u[i] - past[i]);
   end for;
   rest = restBefore;
+  held = heldBefore;
   annotation (
     __Workbench(effect(
       size="lag", matters=0.012,

@@ -6,6 +6,7 @@ equation
   for i in 1:n loop
     y[i] = u[i] - offset[i];
     rest[i] = restBefore[i] + offset[i];
+    held[i] = heldBefore[i] + offset[i];
   end for;
   annotation (
     __Workbench(effect(

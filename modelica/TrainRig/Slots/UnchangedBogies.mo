@@ -4,4 +4,5 @@ model UnchangedBogies "Null version: nothing changes"
 equation
   y = u;
   rest = restBefore;
+  held = heldBefore;
 end UnchangedBogies;

@@ -10,9 +10,9 @@ model EffectsActInTheirPlace "An effect changes the axle, bogie or vehicle that 
     power={0.0, 1.35e6, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0});
   Effects.IsolatedUnit unit(u=fill(3.0, 8), lost={0, 0, 0, 0, 0, 1.0, 0, 0});
   Effects.DraggingBrake drag(omega=fill(50.0, 8), torque={0, 0, 0, 0, 0, 0, 0, 900.0});
-  Effects.CylinderLag lag(u=fill(2e5, 4), restBefore=zeros(4), lag={0, 0.5, 0, 0});
-  Effects.PressureSensorGain gauge(u=fill(2.2e5, 4), restBefore=zeros(4), gain={0, 0, 0.1, 0});
-  Effects.PressureSensorOffset zero(u=fill(2e5, 4), restBefore=fill(100.0, 4), offset={0, 2e3, 0, 0});
+  Effects.CylinderLag lag(u=fill(2e5, 4), restBefore=zeros(4), heldBefore=fill(2e5, 4), lag={0, 0.5, 0, 0});
+  Effects.PressureSensorGain gauge(u=fill(2.2e5, 4), restBefore=zeros(4), heldBefore=fill(2e5, 4), gain={0, 0, 0.1, 0});
+  Effects.PressureSensorOffset zero(u=fill(2e5, 4), restBefore=fill(100.0, 4), heldBefore=fill(2e5, 4), offset={0, 2e3, 0, 0});
   Effects.WheelRadius radius(u=fill(0.46, 8), deviation={0, -0.002, 0, 0, 0, 0, 0, 0});
   Effects.PoleCount poles(u=fill(50.0, 8), gain={0.01, 0, 0, 0, 0, 0, 0, 0});
   Effects.LateSpeed late(u=fill(50.0 - 2.0*time, 8), lag={0, 0, 0, 0.05, 0, 0, 0, 0});
@@ -38,6 +38,9 @@ equation
   assert(abs(zero.y[2] - 1.98e5) < 1e-6 and abs(zero.y[1] - 2e5) < 1e-6, "Zero of bogie 2");
   assert(abs(zero.rest[2] - 2.1e3) < 1e-9 and abs(zero.rest[1] - 100.0) < 1e-9,
     "An empty cylinder reads the offset, beside what reads before");
+  assert(abs(zero.held[2] - 2.02e5) < 1e-6 and abs(gauge.held[3] - 2.2e5) < 1e-6
+      and abs(lag.held[2] - 2e5) < 1e-6,
+    "A sensor is off by its offset or gain while the brake is applied; a lag is over by then");
   assert(abs(tilted.y + 0.95) < 1e-12 and abs(scaled.y + 1.02) < 1e-12, "Accelerometer");
   assert(abs(radius.y[2] - 0.458) < 1e-12 and abs(sum(radius.y) - 3.678) < 1e-12, "Wheel 2");
   assert(abs(poles.y[1] - 50.5) < 1e-12 and abs(sum(poles.y) - 400.5) < 1e-12, "Poles of axle 1");

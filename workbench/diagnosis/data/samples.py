@@ -61,8 +61,8 @@ class Samples:
     restarts : where states are set as measured, or None if nowhere.
     holds : (m,) when samples of inputs act, see `Signal.hold`.
     begin : outputs, what rolls along, and states that outputs show under other names, at the start.
-    rest : (q,) means of inputs at rest, before they are applied; rest_noise : (q,) standard
-        deviations, infinite of one that is never at rest before it is applied.
+    rest : (q,) means of inputs at rest, before they are applied, or held; rest_noise : (q,)
+        standard deviations, infinite of one that is never so.
     blocks : (b, 2) first sample and end of each block that counts.
     slopes : (c, c) of the channels by the signals.
     whitening : (b, c, c) makes the errors of a block, by channel, white with variance one.
@@ -256,7 +256,7 @@ def prepare(
     driving = [
         smooth(time, clean[signal.name], signal.smoothed, h, sound.held) for signal in system.inputs
     ]
-    rest, rest_noise = _at_rest(system.comparison, clean, counted.applied)
+    rest, rest_noise = _at_rest(system.comparison, case, clean, counted.applied)
     start = slice(0, max(1, round(_STARTING * system.sample_time / h)))
     first = {n: first_value(time[start], clean[n][start], deviation[n]) for n in case.outputs}
     begin = _begin(system, first, model.motion)
@@ -333,20 +333,40 @@ def _led(
 
 
 def _at_rest(
-    compare: Comparison, clean: Mapping[str, Vector], applied: int
+    compare: Comparison, case: Case, clean: Mapping[str, Vector], applied: int
 ) -> tuple[Vector, Vector]:
-    """Means of inputs before they are applied, (q,), and their standard deviations, (q,).
+    """Means of inputs while they are steady, (q,), and their standard deviations, (q,).
 
-    A recording that begins while an input acts does not tell what its sensor reads at rest.
+    A recording that begins while an input acts does not tell what its sensor reads at rest; one in
+    which it is released early, or of which nobody says what was asked for, not what it reads held.
     """
-    means, deviations = np.zeros((2, len(compare.rests)))
+    means, deviations = np.zeros(len(compare.rests)), np.full(len(compare.rests), np.inf)
     for q, rest in enumerate(compare.rests):
         values = clean[rest.signal]
-        before = values[:applied]
-        means[q] = np.mean(before)
-        spread = float(np.std(before)) / np.sqrt(before.size)
-        deviations[q] = np.hypot(spread, rest.zero) if applied < values.size else np.inf
+        steady = values[:applied]
+        if rest.held_from:
+            steady = _held(case.time[applied:], values[applied:], rest.held_from)
+        known = not rest.by or isinstance(case.conditions.get(rest.by), float)
+        if not (known and steady.size > 1 and applied < values.size):
+            continue
+        means[q] = np.mean(steady)
+        spread = float(np.std(steady)) / np.sqrt(steady.size)
+        halves = np.array_split(steady, 2) if rest.held_from else [steady]
+        drift = np.mean(halves[-1]) - np.mean(halves[0])  # a pressure that is moved is not held
+        deviations[q] = np.hypot(np.hypot(spread, rest.zero), drift)
     return means, deviations
+
+
+def _held(time: Vector, values: Vector, after: float) -> Vector:
+    """Values from some time after they rise to half of their greatest one on, until they fall."""
+    if not time.size:
+        return values
+    greatest = values.max()
+    fallen = np.maximum.accumulate(values) - values > _RELEASED * greatest
+    end = int(np.argmax(fallen)) if fallen.any() else values.size
+    applied = time[np.argmax(values > 0.5 * greatest)]
+    held: Vector = values[:end][time[:end] >= applied + after]
+    return held
 
 
 def _begin(system: System, measured: dict[str, float], motion: Motion | None) -> dict[str, float]:

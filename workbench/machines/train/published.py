@@ -13,7 +13,7 @@ from workbench.arrays import Matrix, Vector
 from workbench.errors import InputError
 from workbench.recordings.csv import read_columns
 from workbench.recordings.datasets import FolderLayout, PublishedRecording, PublishedSet
-from workbench.system.tables import read_table
+from workbench.system.tables import Table, read_table
 from workbench.system.units import si_factor
 
 _CASE = "case.toml"
@@ -21,6 +21,7 @@ _STEP = 0.1  # of a case [s]
 _PRESSURES = ("pB1", "pB2", "pB3", "pB4")
 _SPEEDS = tuple(f"omega{axle}" for axle in range(1, 9))
 _INTERMITTENT = "vGNSS"  # new at 10 Hz, then held
+_ASKED = "pressure_full_load"  # of the brake; a recording need not say so
 _NONE: Mapping[str, str] = {}
 _MIDDLES = (10.75, 37.15)  # of the vehicles, behind the first axle [m]
 _CURVE = 0.6  # resistance over weight, times the radius [m]
@@ -77,9 +78,15 @@ def _recording(folder: Path) -> PublishedRecording:
             "gradients and curves from the track file, at the middles of the vehicles",
             "satellite speed in lines between its samples, empty where it has none",
         ),
-        {"rail": conditions.take("rail", str)},
+        {"rail": conditions.take("rail", str)} | _asked(conditions),
         date=conditions.text("date", ""),
     )
+
+
+def _asked(conditions: Table) -> dict[str, str]:
+    if _ASKED not in conditions:
+        return {}
+    return {_ASKED: f"{conditions.number(_ASKED, 'Pa'):.9g} Pa"}
 
 
 def _columns(

@@ -87,17 +87,17 @@ def information_of_set(
         for key, (size, changed) in others.items():
             with _fit(system, effects, everything, changed) as (_, other):
                 errors = other.at(other.unknowns.start()).residuals
-            moved = map(_difference, errors, lin.residuals)
+            moved = map(_accounted, errors, lin.residuals)
             joint = joint.joined(key, [column / size for column in moved])
         return joint
 
 
-def _difference(changed: WhitenedResiduals, usual: WhitenedResiduals) -> Vector:
-    """By how much errors and rest of a recording differ, (b*c + q,), as long as both last."""
+def _accounted(changed: WhitenedResiduals, usual: WhitenedResiduals) -> Vector:
+    """What a model with the effect takes from errors and rest, (b*c + q,), as long as both last."""
     blocks = min(len(changed.errors), len(usual.errors))
     errors = np.zeros_like(usual.errors)
-    errors[:blocks] = changed.errors[:blocks] - usual.errors[:blocks]
-    return np.append(errors.ravel(), changed.rest - usual.rest)
+    errors[:blocks] = usual.errors[:blocks] - changed.errors[:blocks]
+    return np.append(errors.ravel(), usual.rest - changed.rest)
 
 
 def rivals_of_set(
