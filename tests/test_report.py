@@ -313,6 +313,19 @@ def test_figures_fit_a_narrow_screen_with_letters_as_large_as_ever(browser):
     assert browser["wide"] == [988, narrow["captions"]]
 
 
+def test_only_the_best_two_estimators_and_the_open_loop_are_shown_at_first(
+    browser, summary, system
+):
+    best = best_estimator(summary)
+    cases = [summary["cases"][name]["estimators"] for name in CASES]
+    first = max(cases, key=lambda scores: scores[best]["Fx_nrmse"])
+    errors = {name: score["Fx_nrmse"] for name, score in first.items()}
+    shown = {label(n, system) for n in (*sorted(errors, key=errors.__getitem__)[:2], "open_loop")}
+    pressed = {text.split(" (")[0]: state for text, state in browser["pressed"]}
+    for name in errors:
+        assert pressed[label(name, system)] == str(label(name, system) in shown).lower()
+
+
 def test_legend_hides_an_estimator_everywhere(browser):
     pressed, displays = browser["hidden"]
     assert pressed == "false"

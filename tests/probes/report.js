@@ -33,6 +33,8 @@ told.wheeled = view();
 for (let k = 0; k < 20; k += 1) zoomIn.click();
 told.closest = view();
 whole.click();
+told.pressed = [...place.parentElement.querySelectorAll(".legend button")].map((button) =>
+  [button.textContent, button.getAttribute("aria-pressed")]);
 const entry = place.parentElement.querySelector(".legend [data-style='0'] button");
 entry.click();
 told.hidden = [entry.getAttribute("aria-pressed"),

@@ -31,7 +31,16 @@ from workbench.pages.parts import (
     zoomable,
 )
 from workbench.pages.templates import anchor
-from workbench.pages.views import below, called, capital, inverse, percent, rounded, window
+from workbench.pages.views import (
+    below,
+    called,
+    capital,
+    errs_least,
+    inverse,
+    percent,
+    rounded,
+    window,
+)
 from workbench.recordings.csv import csv_text
 from workbench.runtime.files import replacing
 from workbench.system.system import System
@@ -182,7 +191,6 @@ def simulation_answer(system: System, summary: Mapping[str, Any]) -> Answer:
     """The answer of `simulate`."""
     reference = system.objective.signal
     ranking = standings(summary, reference)
-    best = ranking[0]
     headline = {}
     for standing in ranking:
         headline[f"worst error of {reference}, {standing.name}"] = percentage(standing.worst)
@@ -196,22 +204,26 @@ def simulation_answer(system: System, summary: Mapping[str, Any]) -> Answer:
         for case, values in summary["cases"].items()
         for name, score in values["estimators"].items()
     }
-    count = len(summary["cases"])
     trust = "".join(f" {line}" for line in _contradictions(summary))
-    if best.worst is None:
-        sentence = f"{len(ranking)} estimators ran on {recordings(count)}; none could be scored."
-        return Answer(sentence + trust, headline, details)
-    share, signal = percent(best.worst), called(system, reference)
-    first = f"The {label(best.name, system)} errs least: {share} of the mean {signal} in"
+    return Answer(_ranked(system, summary, ranking) + trust, headline, details)
+
+
+def _ranked(system: System, summary: Mapping[str, Any], ranking: Sequence[Standing]) -> str:
+    """Who errs least, in a sentence."""
+    best, count = ranking[0], len(summary["cases"])
+    errors = [(s.worst, label(s.name, system)) for s in ranking if s.worst is not None]
+    if not errors:
+        return f"{len(ranking)} estimators ran on {recordings(count)}; none could be scored."
+    signal = called(system, system.objective.signal)
+    first = f"{errs_least(errors)}: {percent(errors[0][0])} of the mean {signal} in"
     if best.judged == 1:
-        only = f"{best.case}, the only scored recording; one cannot say how others differ."
-        return Answer(f"{first} {only}{trust}", headline, details)
+        return f"{first} {best.case}, the only scored recording; one cannot say how others differ."
     sentence = f"{first} the worst of {recordings(best.judged)}, {best.case}"
     if None not in best.usual:
         middle, low, high = (percent(end or 0.0) for end in best.usual)
         ends = f"{low.removesuffix(' %')} to {high.removesuffix(' %')}"
         sentence += f", {middle} (95 %: {ends}) in a usual one"
-    return Answer(f"{sentence}.{trust}", headline, details)
+    return f"{sentence}."
 
 
 def write_page(
@@ -248,7 +260,8 @@ def write_page(
         "and estimated, its error, and the quantities behind it. Estimators are scored in the "
         "shaded time. Bands, where an estimator knows its uncertainty, hold 95 %. If a recording "
         "has no validation sensor, the grey band is the reference. Curves that leave a "
-        "panel are cut, most often of the open loop."
+        "panel are cut, most often of the open loop. The best two estimators and the open loop "
+        "are shown; the legend shows the others."
     )
     title = "The worst recording" if best.worst is not None else "A recording"
     table = _cases(system, summary, ranking, order)
@@ -269,9 +282,10 @@ def write_page(
     warnings = {name: case["warnings"] for name, case in summary["cases"].items()}
     page = Page(
         title=f"{capital(quantity)} estimated on {recordings(len(order))}",
+        headline=_ranked(system, summary, ranking),
         parts=parts,
         warnings=[incomplete] * (missing > 0)
-        + [Markup.escape(line) for line in warning_lines(warnings)],
+        + [Markup.escape(line) for line in _contradictions(summary) + warning_lines(warnings)],
         run=_run(system, summary),
     )
     page.write(summary, path)

@@ -52,6 +52,7 @@ from workbench.pages.figures import ESTIMATORS, CaseFigure, Curve, Panel
 from workbench.pages.views import (
     below,
     called,
+    errs_least,
     per_shown,
     percent,
     rounded,
@@ -490,6 +491,7 @@ def _models(
 
 
 _REFERENCE = "raw"  # style
+_SHOWN = 3  # estimators whose curves can be told apart: best, runner-up and baseline
 
 
 def case_figure(result: CaseResult, styles: Sequence[str] = ESTIMATORS) -> CaseFigure:
@@ -517,6 +519,7 @@ def case_figure(result: CaseResult, styles: Sequence[str] = ESTIMATORS) -> CaseF
         time=case.time,
         window=(float(counted[0]), float(counted[-1])) if counted.size else None,
         legend=tuple(_legend(result, chosen)),
+        hidden=_on_demand(result, chosen),
         panels=tuple(panel for panel in panels if panel.curves),
     )
 
@@ -620,6 +623,15 @@ def _legend(result: CaseResult, styles: dict[str, str]) -> list[tuple[str, str]]
     return entries
 
 
+def _on_demand(result: CaseResult, styles: Mapping[str, str]) -> frozenset[str]:
+    """Styles of all estimators but the best, the runner-up and the open loop, whose curves hide."""
+    errors = {n: s.nrmse for n, s in result.scores.items() if s.nrmse is not None}
+    shown = {*sorted(errors, key=errors.__getitem__)[:2], "open_loop"}
+    if len(shown & styles.keys()) < _SHOWN:
+        return frozenset()
+    return frozenset(styles.values()) - {styles[name] for name in shown}
+
+
 def _finding(result: CaseResult) -> str:
     """Errors of the estimators, the least first."""
     system, signal = result.system, result.system.objective.signal
@@ -631,12 +643,13 @@ def _finding(result: CaseResult) -> str:
     if not shares:
         reasons = sorted({score.reason for score in result.scores.values()})
         return f"Estimated, not scored: {'; '.join(reasons)}."
-    share, first, rms = shares[0]
+    share, _, rms = shares[0]
+    first = errs_least([(value, name) for value, name, _ in shares])
     others = ", ".join(f"{name} {percent(value)}" for value, name, _ in shares[1:])
     trust = "".join(
         f" {line}" for line in contradiction_lines({result.case.name: result.contradictions})
     )
     return (
-        f"The {first} errs least: {percent(share)} of the mean {called(system, signal)}, "
+        f"{first}: {percent(share)} of the mean {called(system, signal)}, "
         f"{rounded(rms)} {system.unit(signal)} rms" + (f"; {others}." if others else ".") + trust
     )

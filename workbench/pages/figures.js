@@ -390,14 +390,16 @@ function zoomable(figure) {
     const button = document.createElement("button");
     button.type = "button";
     button.append(...entry.childNodes);
-    button.setAttribute("aria-pressed", "true");
     entry.append(button);
-    button.addEventListener("click", () => {
-      const shown = button.getAttribute("aria-pressed") === "false";
+    const reveal = (shown) => {
       button.setAttribute("aria-pressed", String(shown));
       for (const path of plot.querySelectorAll(`path[data-style="${entry.dataset.style}"]`)) {
         path.style.display = shown ? "" : "none";
       }
+    };
+    reveal(entry.dataset.hidden === undefined);
+    button.addEventListener("click", () => {
+      reveal(button.getAttribute("aria-pressed") === "false");
       draw();
     });
   }

@@ -98,6 +98,7 @@ class CaseFigure:
     window : begin and end [s] of the time in which estimators are judged; None without.
     legend : (style, text) of each entry; from the ninth estimator on, styles repeat.
     panels : from top to bottom.
+    hidden : styles whose curves a page shows on demand, at a press of their entry of the legend.
     axis : what is at the bottom, and its unit; empty where it is a count.
     """
 
@@ -108,6 +109,7 @@ class CaseFigure:
     window: tuple[float, float] | None
     legend: tuple[tuple[str, str], ...]
     panels: tuple[Panel, ...]
+    hidden: frozenset[str] = frozenset()
     axis: tuple[str, str] = ("time", "s")
 
 

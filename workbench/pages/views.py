@@ -127,3 +127,21 @@ def percent(share: float) -> str:
     '1.12 %'
     """
     return f"{100 * share:.2f} %"
+
+
+def errs_least(errors: Sequence[tuple[float, str]]) -> str:
+    """Say who errs least, or who tie: those whose errors are the same as they are shown.
+
+    Parameters
+    ----------
+    errors : share and name of each, the least first.
+
+    >>> errs_least([(0.0043, "UKF"), (0.0051, "EKF")])
+    'The UKF errs least'
+    >>> errs_least([(0.00431, "UKF"), (0.00432, "EKF"), (0.62, "open loop")])
+    'The UKF and the EKF tie'
+    """
+    names = [name for share, name in errors if percent(share) == percent(errors[0][0])]
+    if len(names) == 1:
+        return f"The {names[0]} errs least"
+    return f"The {', the '.join(names[:-1])} and the {names[-1]} tie"
