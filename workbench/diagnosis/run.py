@@ -93,8 +93,8 @@ def _diagnosed(
 ) -> Outcome:
     """A diagnosis with an FMU that has all effects; `free` if nothing corrects simulations."""
     system, effects, report = problem.system, problem.effects, engine.report
-    source = ModelSource(everything, system, given_values(everything, system))
-    with ResidualModel(source, problem.cases, engine, free=free) as simulations:
+    source = ModelSource(everything, system, given_values(everything, system), free)
+    with ResidualModel(source, problem.cases, engine) as simulations:
         if simulations.free and problem.library is None:
             # Terms of several forms explain a run that nothing corrects as one parameter does.
             effects = [effect for effect in effects if effect.size != COEFFICIENT]

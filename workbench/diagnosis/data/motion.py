@@ -58,11 +58,13 @@ class ModelSource(NamedTuple):
     ----------
     path : of its FMU.
     given : values of its variables instead of the defaults.
+    free : whether nothing is to correct its simulations.
     """
 
     path: Path
     system: System
     given: Mapping[str, float]
+    free: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,8 +73,9 @@ class OpenModel:
 
     Attributes
     ----------
-    motion : of the model at its design point; None of an FMU that can only be simulated as a
-        whole: Co-Simulation alone, other types than Real, events where it should be linearised.
+    motion : of the model at its design point; None of an FMU that is to be simulated as a whole, or
+        can only be: Co-Simulation alone, other types than Real, events where it should be
+        linearised.
     """
 
     fmu: FMU
@@ -88,7 +91,7 @@ def opened(source: ModelSource) -> Iterator[OpenModel]:
         readings = [signal.reading for signal in system.signals.values()]
         seen = [name for name in readings if name in fmu.outputs]
         along = None
-        if not needs_simulation(fmu, inputs, seen):
+        if not source.free and not needs_simulation(fmu, inputs, seen):
             try:
                 along = motion(fmu, system)
             except (InputError, FMUError):

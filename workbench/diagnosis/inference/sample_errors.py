@@ -103,9 +103,8 @@ def held_out_errors(
     errors : of both models.
     starts : of the last model, by recording, see `Unknowns.starts`.
     """
-    with ResidualModel(
-        fitted.source, cases, Engine(workers), restarting=False, free=fitted.free
-    ) as simulations:
+    source = fitted.source._replace(free=fitted.free)
+    with ResidualModel(source, cases, Engine(workers), restarting=False) as simulations:
         fit = Fit(simulations, effects, beside=fitted.cases)
 
         def apart(model: FittedModel) -> LinearizedPoint:

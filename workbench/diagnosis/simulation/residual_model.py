@@ -47,7 +47,6 @@ class ResidualModel:
     engine : is told now and then how many simulations were made.
     sound : which samples count.
     restarting : whether samples count where states can be restarted.
-    free : whether nothing is to correct the simulations.
     model : the same, where it is open already; it must outlive the simulations.
 
     Attributes
@@ -70,7 +69,6 @@ class ResidualModel:
         sound: Soundness = SOUND,
         *,
         restarting: bool = True,
-        free: bool = False,
         model: OpenModel | None = None,
     ) -> None:
         self._pace = ProgressReporter(engine.report, "simulations")
@@ -86,8 +84,6 @@ class ResidualModel:
         with ExitStack() as stack:
             self._model = model or stack.enter_context(opened(source))
             self._tell(self._model.fmu)
-            if free:
-                self._model = replace(self._model, motion=None)
             self.free = self._model.motion is None
             self.simulated = self._prepared(restarting=restarting and not self.free)
             if not self.free:
