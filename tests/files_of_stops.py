@@ -36,18 +36,22 @@ def workbook(path: Path, stops: Stops) -> None:
     book.save(path)
 
 
-def workbook_of_stamps(path: Path, stops: Stops) -> None:
-    """A sheet for each stop, with dates, one after the other."""
+def workbook_of_stamps(
+    path: Path, stops: Stops, pause: float = PAUSE, *, of_day: bool = False
+) -> None:
+    """A sheet for each stop, with dates a pause after each other [s], or with times of day."""
     book = openpyxl.Workbook()
     book.remove(book.active)
     for number, (title, columns) in enumerate(stops.items()):
-        begin = BEGAN.replace(tzinfo=None) + datetime.timedelta(seconds=PAUSE * number)
+        begin = BEGAN.replace(tzinfo=None) + datetime.timedelta(seconds=pause * number)
         sheet = book.create_sheet(title)
         others = {name: column for name, column in columns.items() if name != "Zeit"}
-        sheet.append(["Zeitstempel", *(f"{name} [{unit}]" for name, (unit, _) in others.items())])
+        names = (f"{name} [{unit}]" for name, (unit, _) in others.items())
+        sheet.append(["Uhrzeit" if of_day else "Zeitstempel", *names])
         for k, t in enumerate(columns["Zeit"][1]):
             moment = begin + datetime.timedelta(seconds=round(float(t), 3))
-            sheet.append([moment, *(float(values[k]) for _, values in others.values())])
+            stamp = moment.time() if of_day else moment
+            sheet.append([stamp, *(float(values[k]) for _, values in others.values())])
     book.save(path)
 
 

@@ -1,7 +1,6 @@
 """Files of recorders are opened as they are: no number is wrong, nothing is invented."""
 
 import builtins
-import datetime
 import json
 import struct
 import sys
@@ -28,7 +27,6 @@ from workbench.system.system import System
 
 from .files_of_stops import FORMATS_OF_STOPS, Stops, add_sheet, workbook, workbook_of_stamps
 from .recorder_files import (
-    BEGAN,
     DIGITS,
     FORMATS,
     Columns,
@@ -143,24 +141,22 @@ def test_what_a_library_warns_of_is_noted(tmp_path, stop, system):
 
 
 @pytest.mark.parametrize(
-    "package",
-    ["openpyxl", "xlrd", "pyarrow", "h5py", "asammdf", "nptdms", "python_calamine"],
+    ("package", "begins"),
+    [
+        ("openpyxl", b"PK\x03\x04"),
+        ("xlrd", b"\xd0\xcf\x11\xe0"),
+        ("pyarrow", b"PAR1"),
+        ("h5py", b"MATLAB 7.3 MAT-file"),
+        ("asammdf", b"MDF     "),
+        ("nptdms", b"TDSm"),
+        ("python_calamine", b"PK\x03\x04mimetypeapplication/vnd.oasis.opendocument.spreadsheet"),
+    ],
 )
-def test_a_missing_reader_names_the_extra(tmp_path, monkeypatch, package):
-    begins = {
-        "openpyxl": b"PK\x03\x04",
-        "xlrd": b"\xd0\xcf\x11\xe0",
-        "pyarrow": b"PAR1",
-        "h5py": b"MATLAB 7.3 MAT-file",
-        "asammdf": b"MDF     ",
-        "nptdms": b"TDSm",
-        "python_calamine": b"PK\x03\x04mimetypeapplication/vnd.oasis.opendocument.spreadsheet",
-    }
-    (tmp_path / "a").write_bytes(begins[package])
+def test_a_missing_reader_names_the_extra(tmp_path, monkeypatch, package, begins):
+    (tmp_path / "a").write_bytes(begins)
     monkeypatch.setitem(sys.modules, package, None)
-    with pytest.raises(
-        InputError, match=rf"package '{package}' reads.*extra \[files\].*pip install"
-    ):
+    match = rf"package '{package}' reads.*extra \[files\].*pip install"
+    with pytest.raises(InputError, match=match):
         read_recorded_file(tmp_path / "a")
 
 
@@ -600,30 +596,12 @@ def test_names_of_sheets_become_names_that_differ(tmp_path, take, stops, system,
 
 def at_once(path: Path, stops: Stops) -> None:
     """Sheets with dates of one time."""
-    workbook_of_stamps(path, {"one": next(iter(stops.values()))})
-    book = openpyxl.load_workbook(path)
-    second = book.create_sheet("two")
-    columns = list(stops.values())[1]
-    others = {name: column for name, column in columns.items() if name != "Zeit"}
-    second.append(["Zeitstempel", *(f"{name} [{unit}]" for name, (unit, _) in others.items())])
-    for k, t in enumerate(columns["Zeit"][1]):
-        moment = BEGAN.replace(tzinfo=None) + datetime.timedelta(seconds=round(float(t), 3))
-        second.append([moment, *(float(values[k]) for _, values in others.values())])
-    book.save(path)
+    workbook_of_stamps(path, dict(zip(("one", "two"), stops.values(), strict=True)), 0.0)
 
 
 def clocks_of_day(path: Path, stops: Stops) -> None:
     """Sheets with times of day and no date, of one time."""
-    book = openpyxl.Workbook()
-    book.remove(book.active)
-    for title, columns in stops.items():
-        sheet = book.create_sheet(title)
-        others = {name: column for name, column in columns.items() if name != "Zeit"}
-        sheet.append(["Uhrzeit", *(f"{name} [{unit}]" for name, (unit, _) in others.items())])
-        for k, t in enumerate(columns["Zeit"][1]):
-            moment = BEGAN.replace(tzinfo=None) + datetime.timedelta(seconds=round(float(t), 3))
-            sheet.append([moment.time(), *(float(values[k]) for _, values in others.values())])
-    book.save(path)
+    workbook_of_stamps(path, stops, 0.0, of_day=True)
 
 
 def running_clock(path: Path, stops: Stops) -> None:

@@ -38,15 +38,14 @@ def group(path: Path, content: Mapping[str, Any], form: Literal["4", "5"] = "5")
     return held
 
 
+T, U, Y = column(TIME), column(FLOW), column(LEVEL)
+
+
 @pytest.mark.parametrize(
     ("content", "names", "form"),
     [
-        (
-            {"data": {"t": column(TIME), "u": column(FLOW), "y": column(LEVEL)}},
-            ["t", "u", "y"],
-            "5",
-        ),
-        ({"est": {"u": column(FLOW), "y": column(LEVEL), "Ts": 0.5}}, ["u", "y"], "5"),
+        ({"data": {"t": T, "u": U, "y": Y}}, ["t", "u", "y"], "5"),
+        ({"est": {"u": U, "y": Y, "Ts": 0.5}}, ["u", "y"], "5"),
         ({"time": TIME, "u": FLOW, "y": LEVEL}, ["time", "u", "y"], "4"),
         (simulink(("u", "y")), ["time", "u", "y"], "5"),
         (simulink(("", "")), ["time", "(1)", "(2)"], "5"),
@@ -75,13 +74,14 @@ def array(*entries: Mapping[str, Any]) -> np.ndarray:
     return held
 
 
+NAMES = struct(InputName="inflow", OutputName="h", InputUnit="l/s", OutputUnit="mm")
+
+
 @pytest.mark.parametrize(
     "content",
     [
-        struct(u=column(FLOW), y=column(LEVEL), InputName="inflow", OutputName="h", InputUnit="l/s")
-        | struct(OutputUnit="mm", Ts=500.0, TimeUnit="ms"),
-        struct(InputData=column(FLOW), OutputData=column(LEVEL), InputName="inflow", OutputName="h")
-        | struct(InputUnit="l/s", OutputUnit="mm", Ts=0.5),
+        NAMES | struct(u=U, y=Y, Ts=500.0, TimeUnit="ms"),
+        NAMES | struct(InputData=U, OutputData=Y, Ts=0.5),
     ],
 )
 def test_data_of_system_identification_has_its_names_units_and_steps(tmp_path, content):
@@ -90,19 +90,15 @@ def test_data_of_system_identification_has_its_names_units_and_steps(tmp_path, c
     assert recorded.step == 0.5
 
 
+INFLOW = struct(Name="inflow", Values=struct(Time=TIME, Data=U, Units="l/s"))
+H = struct(Name="h", Values=struct(Time=TIME, Data=Y, Units="mm"))
+
+
 @pytest.mark.parametrize(
     "logged",
     [
-        {
-            "element1": struct(
-                Name="inflow", Values=struct(Time=TIME, Data=column(FLOW), Units="l/s")
-            ),
-            "element2": struct(Name="h", Values=struct(Time=TIME, Data=column(LEVEL), Units="mm")),
-        },
-        array(
-            struct(Name="inflow", Values=struct(Time=TIME, Data=column(FLOW), Units="l/s")),
-            struct(Name="h", Values=struct(Time=TIME, Data=column(LEVEL), Units="mm")),
-        ),
+        {"element1": INFLOW, "element2": H},
+        array(INFLOW, H),
         {
             "inflow": struct(Time=TIME, Data=FLOW.reshape(1, 1, -1), DataInfo=struct(Units="l/s")),
             "h": struct(Time=TIME, Data=LEVEL.reshape(1, 1, -1), DataInfo=struct(Units="mm")),
@@ -161,52 +157,30 @@ def test_a_signal_without_a_label_has_the_name_of_its_structure(tmp_path):
 STAMPS = [f"2024-03-05T10:00:{t:06.3f}Z" for t in TIME]
 
 
-@pytest.mark.parametrize(
-    "document",
-    [
-        [{"time": s, "h [mm]": h} for s, h in zip(STAMPS, LEVEL, strict=True)],
-        {"values": [{"time": s, "h": h} for s, h in zip(STAMPS, LEVEL, strict=True)]}
-        | {"units": {"h": "mm"}},
-        [{"time": s, "h": {"value": h, "unit": "mm"}} for s, h in zip(STAMPS, LEVEL, strict=True)],
-        {"time": STAMPS, "h": LEVEL.tolist(), "units": {"h": "mm"}},
-        {"columns": ["h [mm]"], "index": STAMPS, "data": LEVEL.reshape(-1, 1).tolist()},
-        {"h [mm]": dict(zip(STAMPS, LEVEL, strict=True)), "b": dict.fromkeys(STAMPS, 1.0)},
-        {s: {"h [mm]": h, "b": 1.0} for s, h in zip(STAMPS, LEVEL, strict=True)},
-        {
-            "result": {
-                "rig": "A",
-                "series": [{"t": s, "h [mm]": h} for s, h in zip(STAMPS, LEVEL, strict=True)],
-            }
-        },
-        {
-            "signals": {
-                "h": {"unit": "mm", "gain": 1, "zero": 0},
-                "b": {"unit": "", "gain": 1, "zero": 0},
-            }
-        }
-        | {"time": STAMPS, "h": LEVEL.tolist(), "units": {"h": "mm"}},
-        {"channels": [{"name": "h", "unit": "mm", "time": STAMPS, "values": LEVEL.tolist()}]},
-    ],
-    ids=[
-        "records",
-        "nested",
-        "values with units",
-        "columns",
-        "split",
-        "by column",
-        "by row",
-        "deep",
-        "described",
-        "x, y",
-    ],
-)
+LEVELS = LEVEL.tolist()
+SAMPLES = list(zip(STAMPS, LEVELS, strict=True))
+BY_UNIT = {"time": STAMPS, "h": LEVELS, "units": {"h": "mm"}}
+CHANNELS = ("h", "mm"), ("b", "")
+DOCUMENTS: dict[str, Any] = {
+    "records": [{"time": s, "h [mm]": h} for s, h in SAMPLES],
+    "nested": {"values": [{"time": s, "h": h} for s, h in SAMPLES], "units": {"h": "mm"}},
+    "values with units": [{"time": s, "h": {"value": h, "unit": "mm"}} for s, h in SAMPLES],
+    "columns": BY_UNIT,
+    "split": {"columns": ["h [mm]"], "index": STAMPS, "data": [[h] for h in LEVELS]},
+    "by column": {"h [mm]": dict(SAMPLES), "b": dict.fromkeys(STAMPS, 1.0)},
+    "by row": {s: {"h [mm]": h, "b": 1.0} for s, h in SAMPLES},
+    "deep": {"result": {"rig": "A", "series": [{"t": s, "h [mm]": h} for s, h in SAMPLES]}},
+    "described": {"signals": {n: {"unit": u, "gain": 1, "zero": 0} for n, u in CHANNELS}} | BY_UNIT,
+    "x, y": {"channels": [{"name": "h", "unit": "mm", "time": STAMPS, "values": LEVELS}]},
+}
+
+
+@pytest.mark.parametrize("document", DOCUMENTS.values(), ids=DOCUMENTS)
 def test_json_has_channels_units_and_dates(tmp_path, document):
     (tmp_path / "a.json").write_text(json.dumps(document))
     (held,) = read_recorded_file(tmp_path / "a.json").groups
-    clock, level = (
-        next(c for c in held.channels if c.stamp),
-        next(c for c in held.channels if c.name == "h"),
-    )
+    clock = next(channel for channel in held.channels if channel.stamp)
+    level = next(channel for channel in held.channels if channel.name == "h")
     assert (level.unit, iso(clock.start)) == ("mm", "2024-03-05T10:00:00.000000")
     assert_allclose(level.values, LEVEL)
     assert_allclose(clock.values, TIME)
