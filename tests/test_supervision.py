@@ -49,7 +49,10 @@ def left(folder: Path) -> list[Path]:
     [
         ("simulate", CASE, "--out", "out", "--fmu"),
         pytest.param(("observability", CASE, "--out", "out", "--fmu"), marks=pytest.mark.long),
-        ("diagnose", CASE, ROOT / "cases" / "02_dry_100_2.7", "--out", "out", "--model"),
+        pytest.param(
+            ("diagnose", CASE, ROOT / "cases" / "02_dry_100_2.7", "--out", "out", "--model"),
+            marks=pytest.mark.long,
+        ),
     ],
 )
 def test_a_model_that_ends_its_process_does_not_end_a_command_in_silence(
@@ -104,7 +107,9 @@ def test_a_model_that_ends_its_process_late_is_told_by_the_process_beside(
 
 
 @needs_compiler
-@pytest.mark.parametrize("attack", ["scribble", "scribble_and_leave"])
+@pytest.mark.parametrize(
+    "attack", ["scribble", pytest.param("scribble_and_leave", marks=pytest.mark.long)]
+)
 def test_what_a_model_writes_to_all_open_files_is_no_answer_of_a_worker(attack, hostile_path, home):
     cases = (CASE, ROOT / "cases" / "02_dry_100_2.7")
     command = ("simulate", *cases, "--estimator", "open_loop", "--workers", "2", "--out", "out")
