@@ -7,7 +7,9 @@ import struct
 import tempfile
 import zipfile
 from collections.abc import Callable
+from copy import copy
 from pathlib import Path
+from random import Random
 
 import pytest
 
@@ -117,6 +119,21 @@ def test_many_files_that_unpack_to_much_more_together_are_refused(count, size, t
         for number in range(count):
             archive.writestr(f"resources/{number}", bytes(size))
     with pytest.raises(InputError, match=r"an archive with \d+ MB, which is \d+ times its size"):
+        FMU(path)
+
+
+def test_entries_that_share_their_bytes_are_judged_by_what_the_file_has(tmp_path):
+    """Each unpacks to little of its own size, and a small file to a lot."""
+    path = tmp_path / "bomb.fmu"
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr(
+            "resources/0", Random(1).randbytes(1 << 14) * (1 << 9)
+        )  # 8 MB, packed 20:1
+        for number in range(1, 100):
+            other = copy(archive.infolist()[0])
+            other.filename = other.orig_filename = f"resources/{number}"
+            archive.filelist.append(other)
+    with pytest.raises(InputError, match=r"an archive with 800 MB, which is \d+ times its size"):
         FMU(path)
 
 
@@ -244,6 +261,22 @@ DAMAGES: dict[str, tuple[Callable[[Path], None], str]] = {
     "an output that is a parameter": (
         edited('causality="output"', 'causality="parameter"'),
         "a parameter '.*' among the outputs",
+    ),
+    "range from high to low": (
+        edited('min="0.0" max="1.0" start="0.4"', 'min="2.0" max="1.0" start="0.4"'),
+        r"the range of 'polach.A', from 2 to 1",
+    ),
+    "derivative of a parameter": (
+        edited('unit="rad/s2" derivative="1"', 'unit="rad/s2" derivative="12"'),
+        r"a derivative 'der\(omegaW\)' of 'rR', which is no state",
+    ),
+    "two derivatives of a state": (
+        edited('unit="rad/s2" derivative="2"', 'unit="rad/s2" derivative="1"'),
+        "two derivatives of 'omegaW'",
+    ),
+    "experiment without length": (
+        edited('startTime="0" stopTime="40.0"', 'startTime="-1e308" stopTime="1e308"'),
+        "an experiment from -1e.308 s to 1e.308 s, which has no length",
     ),
     "no name": (edited('name="tauR"', 'name=""'), "a variable without a name"),
 }

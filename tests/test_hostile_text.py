@@ -1,5 +1,6 @@
 """Files that no person writes: each is refused in a few lines that name it, and none hangs."""
 
+import json
 import os
 import zipfile
 from collections.abc import Callable
@@ -8,6 +9,13 @@ from pathlib import Path
 import pytest
 
 from workbench.__main__ import main
+from workbench.errors import InputError
+from workbench.machines.train.recorded import _planting
+from workbench.machines.wheelset.rig.proposed import proposed_stop
+from workbench.pages.runs import read_runs
+from workbench.recordings.datasets import _hashes_before
+from workbench.recordings.importing import imported
+from workbench.system.registry import load_system
 
 from .case_folders import LINES, TOML, write
 
@@ -209,3 +217,29 @@ def test_a_folder_without_permission_is_refused(tmp_path, capsys):
     finally:
         os.seteuid(0)
     assert "Permission denied" in message
+
+
+DEEP_LIST = "[" * 100_000
+LEFT = {
+    "import.json": (lambda folder, _: imported(folder), "no list of imports"),
+    "prepared.json": (lambda folder, _: _hashes_before(folder), "no list of files"),
+    "next.json": (proposed_stop, "no experiment that says"),
+    "truth.json": (lambda folder, _: _planting(1, folder), "a truth that is not understood"),
+    "summary.json": (lambda folder, _: read_runs(folder), "a summary that does not say"),
+}
+
+
+@pytest.mark.parametrize("name", LEFT)
+def test_what_another_run_left_and_no_run_writes_is_refused(name, tmp_path):
+    read, found = LEFT[name]
+    large = {
+        "tried": [{"conditions": {}, "inputs": {"pB": {"levels": [10**400]}}}],
+        "effects": {"pads_axle": {"size": 10**400, "at": 1}},
+        "imports": [1],
+        "written": {"../above": ""},
+    }
+    half = {**large, "answer": {"sentence": "\ud800"}}
+    for content in ("[]", "{", DEEP_LIST, json.dumps(large), json.dumps(half)):
+        (tmp_path / name).write_text(content)
+        with pytest.raises(InputError, match=f"{name}: found {found}"):
+            read(tmp_path, load_system("wheelset"))

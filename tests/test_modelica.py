@@ -250,6 +250,11 @@ def test_a_file_must_stand_where_its_class_belongs(tmp_path):
             "model A extends C; end A; model C extends D; end C; model D extends C; end D;",
             "P.C extends itself, by P.D",
         ),
+        (
+            "model A extends A0; end A;"
+            + "".join(f"model A{k} extends A{k + 1}; end A{k};" for k in range(999)),
+            "which 101 classes extend one after the other",
+        ),
         ("type A = B; type B = A;", "P.A extends itself, by P.B"),
         ("package Q end Q; model A extends Q.X; end A;", "P.Q has no class 'X'"),
     ],

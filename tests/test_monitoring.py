@@ -288,7 +288,9 @@ def test_a_state_of_another_model_or_a_damaged_one_is_refused(history, train, tm
     connection.close()
     with pytest.raises(InputError, match="another model, system file or version"):
         wb.monitor(train, tmp_path / "in", out=tmp_path / "out", workers=1)
-    for content in (whole[:3000], b"no state" * 1000):
+    other = whole.replace(b"number INTEGER", b"number\x85INTEGER")  # of its tables, no UTF-8
+    assert other != whole
+    for content in (whole[:3000], b"no state" * 1000, other):
         state.write_bytes(content)
         with pytest.raises(InputError, match=r"state\.sqlite: found a state that cannot be read"):
             wb.monitor(train, tmp_path / "in", out=tmp_path / "out", workers=1)
@@ -309,6 +311,8 @@ def _change(result: str, **changes: object) -> str:
         lambda text: "[]",
         lambda text: b"\xff\xfe",
         lambda text: _change(text, covariance=[[-1.0]]),
+        lambda text: _change(text, covariance=[[1.0, 2.0], [2.0, 1.0]]),
+        lambda text: _change(text, values=[0.3], covariance=[[1e-4]]),
         lambda text: _change(text, counted=float("inf")),
         lambda text: _change(text, values=["nan"]),
         lambda text: _change(text, date="yesterday"),

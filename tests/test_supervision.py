@@ -78,6 +78,8 @@ LATE = {
     "spin": "a call did not return for 3 s",
     "wait": "a call did not return for 3 s",
     "go": "a model's own code went to another folder, /",
+    "close_streams": "error: .*Bad file descriptor",
+    "close_files": "before it was done|Bad file descriptor",
 }
 
 
@@ -108,14 +110,25 @@ def test_a_model_that_ends_its_process_late_is_told_by_the_process_beside(
 
 @needs_compiler
 @pytest.mark.parametrize(
-    "attack", ["scribble", pytest.param("scribble_and_leave", marks=pytest.mark.long)]
+    ("attack", "said"),
+    [
+        ("scribble", "a model's own code wrote into files that are not its own"),
+        pytest.param(
+            "scribble_and_leave",
+            "a model's own code wrote into files that are not its own",
+            marks=pytest.mark.long,
+        ),
+        ("close_files", "a task ended its worker, twice"),
+    ],
 )
-def test_what_a_model_writes_to_all_open_files_is_no_answer_of_a_worker(attack, hostile_path, home):
+def test_what_a_model_does_to_all_open_files_is_no_answer_of_a_worker(
+    attack, said, hostile_path, home
+):
     cases = (CASE, ROOT / "cases" / "02_dry_100_2.7")
     command = ("simulate", *cases, "--estimator", "open_loop", "--workers", "2", "--out", "out")
     run = workbench(home, *command, "--fmu", hostile_path, HOSTILE=f"{attack} fmi2SetReal 1000")
     assert run.returncode == 1
-    assert "a model's own code wrote into files that are not its own" in run.stderr
+    assert said in run.stderr
     assert "Traceback" not in run.stderr
     assert left(home) == []
 
@@ -142,6 +155,17 @@ def test_the_document_of_a_command_that_a_model_ends_says_so(hostile_path, home)
     document = json.loads(run.stdout)
     assert (document["command"], document["status"]) == ("simulate", 1)
     assert "before it was done" in document["error"]["message"]
+
+
+@needs_compiler
+def test_of_a_process_that_a_model_has_doubled_one_tells_the_results(hostile_path, home):
+    command = ("simulate", CASE, "--estimator", "open_loop", "--workers", "1", "--json")
+    command += ("--out", "out", "--fmu", hostile_path)
+    run = workbench(home, *command, HOSTILE="twice fmi2SetReal 1000")
+    assert run.returncode == 0
+    assert json.loads(run.stdout)["status"] == 0
+    assert "error" not in run.stderr
+    assert left(home) == []
 
 
 @linux_only

@@ -58,8 +58,9 @@ def main(arguments: Sequence[str] | None = None, *, confined: bool = False) -> i
     parser = command_line(version("wheelset-workbench"), command)
     options = parser.parse_args(given)
     output = Output(getattr(options, "json", False), getattr(options, "quiet", False))
+    isolated = getattr(options, "isolated", False) and not confined
     try:
-        if getattr(options, "isolated", False) and not confined:
+        if isolated:
             folders = json.dumps([str(folder) for folder in _written(options)])
             return run_program([sys.executable, "-c", _CONFINED, folders, *given])
         printing = getattr(options, "pdf", False)
@@ -93,6 +94,10 @@ def main(arguments: Sequence[str] | None = None, *, confined: bool = False) -> i
         )
     except KeyboardInterrupt:
         return output.fail(command, 130, "interrupted")
+    except SystemExit as asked:  # by SIGTERM or SIGHUP; an isolated command says so itself
+        if isolated or not isinstance(asked.code, int):
+            raise
+        return output.fail(command, asked.code, "terminated")
 
 
 def _written(options: argparse.Namespace) -> list[Path]:

@@ -224,12 +224,12 @@ def _state(path: Path) -> Target:
         RecordingResult(name, f"hash of {name}", "2024-03-01T10:00:00", estimate, "")
         for name in ("01", "02", "03")
     ]
-    with open_state(path, {"model": "one"}) as state:
+    with open_state(path, {"model": "one"}, (2, 1)) as state:
         for result in written:
             state.add(result)
 
     def read(folder: Path) -> list[RecordingResult]:
-        with open_state(folder / "state.sqlite", {"model": "one"}) as state:
+        with open_state(folder / "state.sqlite", {"model": "one"}, (2, 1)) as state:
             return state.all()
 
     def impossible(results: list[RecordingResult]) -> str:

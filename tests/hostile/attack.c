@@ -89,6 +89,16 @@ static void beg(void) {
 
 static void refuse(void) { refused = 1; }
 
+static void twice(void) { fork(); }
+
+static void close_streams(void) {
+    for (int file = 0; file < 3; file++) close(file);
+}
+
+static void close_files(void) {
+    for (int file = 3; file < 1024; file++) close(file);
+}
+
 static void kill_itself(void) { raise(SIGKILL); }
 
 static void stay_behind(void) {
@@ -136,6 +146,7 @@ static const struct {
     {"ask", ask},          {"flood", flood},    {"kill", kill_itself}, {"daemon", stay_behind},
     {"touch", touch},      {"scribble", scribble}, {"scribble_and_leave", scribble_and_leave},
     {"hang_at_exit", hang_at_exit}, {"spin_at_exit", spin_at_exit}, {"split", split}, {"hide", hide}, {"go", go}, {"say", say},
+    {"twice", twice},      {"close_streams", close_streams}, {"close_files", close_files},
     {"meddle", meddle},    {"beg", beg},          {"refuse", refuse},
 };
 

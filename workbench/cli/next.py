@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,7 +12,7 @@ from workbench.cli.extras import require_compiler
 from workbench.cli.output import CommandResult, Output, read_result
 from workbench.errors import InputError
 from workbench.runtime.engine import Engine
-from workbench.runtime.files import locked_folder, read_text
+from workbench.runtime.files import locked_folder, parse_table, read_text
 
 if TYPE_CHECKING:
     from workbench.diagnosis.inference.rivals import Rivals
@@ -87,7 +86,7 @@ def _read_rivals(file: Path) -> tuple[str, Rivals]:
     remedy = "give the folder that 'workbench diagnose' wrote, as it wrote it"
     text = read_text(file, remedy)
     try:
-        summary = json.loads(text)
+        summary = parse_table(text)
         verdict, system = summary["verdict"], summary["provenance"]["system"]
         if not isinstance(system, str) or not isinstance(verdict, str):
             raise KeyError("provenance")

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from workbench.errors import InputError
+from workbench.runtime.files import end_copy
 
 
 @dataclass(frozen=True)
@@ -54,6 +55,7 @@ class Output:
 
     def progress(self, line: str) -> None:
         """Print a line of progress."""
+        end_copy()
         if not self.quiet:
             print(line, file=sys.stderr, flush=True)
 
@@ -76,6 +78,7 @@ class Output:
 
     def fail(self, command: str, status: int, error: Exception | str) -> int:
         """Print an error to standard error and into the document; returns the status."""
+        end_copy()
         with suppress(OSError, ValueError):  # which is full, or closed
             print(error if isinstance(error, str) else f"error: {error}", file=sys.stderr)
         if self.json:
@@ -99,6 +102,7 @@ def _document(command: str, status: int, content: Mapping[str, Any]) -> str:
 
 def _print(text: str) -> None:
     """Print to whoever reads; one that has gone, as `head` does, costs nothing but the text."""
+    end_copy()
     if sys.stdout is None:
         raise OSError("standard output is closed, so that no result can be printed")
     try:

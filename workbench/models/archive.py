@@ -89,7 +89,8 @@ def _check(path: Path, entries: list[zipfile.ZipInfo]) -> None:
         if name == DESCRIPTION and entry.file_size > _MOST_OF_DESCRIPTION:
             found = f"a model description of {entry.file_size >> 20} MB"
             raise _refusal(path, found, f"{_MOST_OF_DESCRIPTION >> 20} MB at most")
-    size, packed = (sum(getattr(e, key) for e in entries) for key in ("file_size", "compress_size"))
+    # Entries that share their bytes say more, all together, than the file has.
+    size, packed = sum(entry.file_size for entry in entries), path.stat().st_size
     if size > max(_LITTLE, _HIGHEST_RATIO * packed):
         found = f"{size >> 20} MB, which is {size // max(packed, 1)} times its size"
         raise _refusal(path, found, f"{_HIGHEST_RATIO} times at most")

@@ -8,7 +8,6 @@ tried, so that a fault is named once, where it is.
 
 import functools
 import gc
-import json
 import multiprocessing
 import os
 import pickle
@@ -39,7 +38,7 @@ from workbench.models.fmu import FMU, CoSimulation, Variables, central_differenc
 from workbench.models.fmu_cache import cache_folder
 from workbench.models.trial import ContainedError, NoAnswerError, describe_end, run_trial, unpacked
 from workbench.models.trial_calls import limit_processor, limit_sizes
-from workbench.runtime.files import temporary_folder, write_json
+from workbench.runtime.files import parse_table, temporary_folder, write_json
 from workbench.runtime.pool import (
     ForeignDataError,
     close_servers,
@@ -158,11 +157,11 @@ def remember_findings(sha256: str, failed: Iterable[CheckResult]) -> None:
 def remembered_findings(sha256: str) -> Mapping[str, str]:
     """What failed in the last check of an FMU that observers rest on, with reasons."""
     try:
-        reasons: dict[str, str] = json.loads(_kept(sha256).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        reasons = parse_table(_kept(sha256).read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
         return {}
     needed = {question.name for question in _OBSERVING}
-    return {name: reason for name, reason in reasons.items() if name in needed}
+    return {name: str(reason) for name, reason in reasons.items() if name in needed}
 
 
 # A check yields findings, and numbers that say how far it is.

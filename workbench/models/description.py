@@ -22,6 +22,7 @@ OWN_TOOL = "Wheelset observer workbench"  # that FMUs say they were made by, wit
 MODEL_EXCHANGE = "Model Exchange"
 CO_SIMULATION = "Co-Simulation"
 REAL_TYPES = ("Real", "Float64")  # of FMI 2.0 and 3.0
+_FLOATS = (*REAL_TYPES, "Float32")  # of states
 
 
 @dataclass(frozen=True)
@@ -321,8 +322,7 @@ def _description(
 
     if twice := [n for n, count in Counter(v.name for v in variables).items() if count > 1]:
         raise _WrongError(f"two variables '{twice[0]}'")
-    if any(unknown.variable.derivative is None for unknown in description.derivatives):
-        raise _WrongError("a derivative in the model structure that is the derivative of nothing")
+    _refuse_wrong_states(description)
     return Description(
         path=path,
         sha256=hashlib.sha256(path.read_bytes()).hexdigest(),
@@ -355,6 +355,21 @@ def _description(
     )
 
 
+def _refuse_wrong_states(description: "fmpy.model_description.ModelDescription") -> None:
+    """Refuse derivatives of nothing, of what is no state, and two of the same."""
+    states = [unknown.variable.derivative for unknown in description.derivatives]
+    for unknown, state in zip(description.derivatives, states, strict=True):
+        name = unknown.variable.name
+        if state is None:
+            raise _WrongError(
+                f"a derivative '{name}' in the model structure, which is the derivative of nothing"
+            )
+        if (state.variability or "continuous") != "continuous" or state.type not in _FLOATS:
+            raise _WrongError(f"a derivative '{name}' of '{state.name}', which is no state")
+        if sum(other is state for other in states) > 1:
+            raise _WrongError(f"two derivatives of '{state.name}' in the model structure")
+
+
 def _refuse_impossible(
     description: "fmpy.model_description.ModelDescription", root: ElementTree.Element
 ) -> None:
@@ -373,7 +388,8 @@ def _refuse_impossible(
         if v.dimensions
     )
     if count > _MOST_ELEMENTS:
-        raise _WrongError(f"arrays with {count} elements, where {_MOST_ELEMENTS} can be read,")
+        elements = str(count) if count < 10**18 else "more than 10^18"
+        raise _WrongError(f"arrays with {elements} elements, where {_MOST_ELEMENTS} can be read,")
     for variable in description.modelVariables:
         if any(length < 1 for length in variable.shape or ()):
             raise _WrongError(f"an array '{variable.name}' of the shape {variable.shape}")
@@ -392,6 +408,8 @@ def _refuse_impossible(
             raise _WrongError(f"the step size {step:g} s")
         if stop is not None and stop < start:
             raise _WrongError(f"the stop time {stop:g} s before the start time {start:g} s")
+        if stop is not None and math.isinf(stop - start):
+            raise _WrongError(f"an experiment from {start:g} s to {stop:g} s, which has no length")
 
 
 def _interface(element: ElementTree.Element, version: str) -> Interface:
@@ -434,6 +452,9 @@ def _variable(variable: "fmpy.model_description.ModelVariable") -> Variable:
         text = getattr(variable, key) or (getattr(declared, key) if declared else None)
         return _number(text, f"{key} of '{name}'", endless=key != "nominal") if real else None
 
+    minimum, maximum = limit("min"), limit("max")
+    if minimum is not None and maximum is not None and minimum > maximum:
+        raise _WrongError(f"the range of '{name}', from {minimum:g} to {maximum:g}")
     return Variable(
         name=name,
         reference=variable.valueReference,
@@ -444,8 +465,8 @@ def _variable(variable: "fmpy.model_description.ModelVariable") -> Variable:
         unit=variable.unit or (declared.unit if declared else None),
         start=None if variable.start is None else str(variable.start),
         nominal=limit("nominal"),
-        minimum=limit("min"),
-        maximum=limit("max"),
+        minimum=minimum,
+        maximum=maximum,
         text=variable.description or "",
         array=bool(variable.dimensions),
         initial=variable.initial,

@@ -1,6 +1,5 @@
 """Runs in a folder, by what they say of themselves, and two of them side by side."""
 
-import json
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,7 +8,7 @@ from typing import Any, Literal
 from workbench.errors import InputError
 from workbench.pages.answer import SUMMARIES, Measure
 from workbench.recordings.channels import listed
-from workbench.runtime.files import read_text
+from workbench.runtime.files import parse_table, read_text
 
 Verdict = Literal["better", "worse", "changed", "unclear", "unchanged", "gone", "new"]
 _ANEW = "make the results anew with this version"
@@ -127,7 +126,7 @@ def read_runs(folder: Path, warn: Callable[[InputError], None] | None = None) ->
 
 def _read(path: Path, folder: Path) -> RunRecord:
     try:
-        content = json.loads(read_text(path, _ANEW))
+        content = parse_table(read_text(path, _ANEW))
         run, answer = content["provenance"]["run"], content["answer"]
         headline, details = (
             {name: Measure(**measure) for name, measure in answer[key].items()}
@@ -158,10 +157,11 @@ def _read(path: Path, folder: Path) -> RunRecord:
 
 def _check(run: Mapping[str, Any], measures: list[Measure]) -> None:
     texts = [run[key] for key in ("command", "date", "workbench", "system")]
-    commit, data = run["commit"] or "", dict(run["data"])
+    texts += [] if run["commit"] is None else [run["commit"]]
+    data = dict(run["data"])
     numbers = [end for measure in measures for end in (measure.value, measure.low, measure.high)]
     if (
-        not all(isinstance(text, str) for text in (*texts, commit, *data))
+        not all(isinstance(text, str) for text in (*texts, *data))
         or not all(end is None or isinstance(end, int | float) for end in numbers)
         or not all(isinstance(measure.unit, str) for measure in measures)
     ):

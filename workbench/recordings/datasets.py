@@ -5,7 +5,6 @@ plugin has as `published`.
 """
 
 import hashlib
-import json
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -18,7 +17,13 @@ from workbench.arrays import Vector
 from workbench.errors import InputError
 from workbench.recordings.case import KEYS, Case, read_case
 from workbench.recordings.csv import table_text
-from workbench.runtime.files import locked_folder, write_json, write_whole
+from workbench.runtime.files import (
+    locked_folder,
+    parse_table,
+    read_text,
+    write_json,
+    write_whole,
+)
 from workbench.runtime.resources import commit
 from workbench.system.installed import system_path
 from workbench.system.plugins import find_plugin, load, plugin_of
@@ -286,8 +291,21 @@ def _hashes_before(out: Path) -> dict[str, str]:
     path = out / PREPARED
     if not path.is_file():
         return {}
-    written: dict[str, str] = json.loads(path.read_text()).get("written", {})
-    return written
+    remedy = f"prepare into another folder, or restore {PREPARED}"
+    text = read_text(path, remedy)
+    try:
+        written: dict[str, str] = parse_table(text).get("written", {})
+        inside = [Path(name).parts for name in written]
+        if not any(".." in parts or Path(*parts).is_absolute() for parts in inside):
+            return {name: str(sha256) for name, sha256 in written.items()}
+    except (ValueError, TypeError, AttributeError, RecursionError):
+        pass
+    raise InputError(
+        where=str(path),
+        found="no list of files in this folder",
+        expected="what 'workbench prepare' writes",
+        remedy=remedy,
+    )
 
 
 def _remove(out: Path, files: Mapping[str, str]) -> None:

@@ -4,7 +4,6 @@ A file is read (`formats`), its channels are proposed for the signals of a syste
 (`channels`), and it is cut where it holds several recordings. Originals are only read.
 """
 
-import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -27,7 +26,7 @@ from workbench.recordings.channels import (
 )
 from workbench.recordings.csv import table_text
 from workbench.recordings.plausibility import Origin, doubts
-from workbench.runtime.files import write_json, write_whole
+from workbench.runtime.files import parse_table, read_text, write_json, write_whole
 from workbench.runtime.resources import commit
 from workbench.system.parts import RecordingSplit
 from workbench.system.system import System
@@ -402,8 +401,20 @@ def imported(out: Path) -> list[dict[str, Any]]:
     """
     path = out / IMPORTED
     if path.is_file():
-        imports: list[dict[str, Any]] = json.loads(path.read_text())["imports"]
-        return imports
+        remedy = f"import into another folder, or restore {IMPORTED}"
+        text = read_text(path, remedy)
+        try:
+            imports: list[dict[str, Any]] = parse_table(text)["imports"]
+            if all(isinstance(entry, dict) for entry in imports):
+                return imports
+        except (ValueError, KeyError, TypeError, RecursionError):
+            pass
+        raise InputError(
+            where=str(path),
+            found="no list of imports",
+            expected="what 'workbench import' writes",
+            remedy=remedy,
+        )
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise InputError(
             where=str(out),

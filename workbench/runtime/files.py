@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import math
 import os
 import re
 import shutil
@@ -128,6 +129,7 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
     InputError
         If the file cannot be written there.
     """
+    end_copy()
     # Named after the process: two that write the same file do not write into each other's. Names
     # may have 255 bytes, and a character up to four.
     part = path.with_name(f"{path.name[:60]}.{os.getpid()}.part")
@@ -193,6 +195,28 @@ def warning_if_unwritable() -> Iterator[None]:
         print(f"warning: {error}", file=sys.stderr, flush=True)
 
 
+@cache
+def _own_process() -> int:
+    """Number of this process; one that foreign code makes of it, by C's fork, has another."""
+    return os.getpid()
+
+
+def _count_as_own() -> None:
+    _own_process.cache_clear()
+    _own_process()
+
+
+if hasattr(os, "fork"):  # Python's own forks are processes of ours
+    os.register_at_fork(after_in_child=_count_as_own)
+_count_as_own()
+
+
+def end_copy() -> None:
+    """End this process if foreign code made it of another, which tells the same results."""
+    if os.getpid() != _own_process():
+        os._exit(1)
+
+
 def write_whole(path: Path, content: str | bytes) -> None:
     """Write a file, text as UTF-8; see `replacing`."""
     with replacing(path) as stream:
@@ -212,9 +236,7 @@ def check_checksum(text: str) -> dict[str, Any]:
     ValueError
         If it says anything else than what was written.
     """
-    content = json.loads(text)
-    if not isinstance(content, dict):
-        raise ValueError("no table")
+    content = parse_table(text)
     if content.pop(_SEAL, None) != _checksum(content):
         raise ValueError("its checksum is another one")
     return content
@@ -228,6 +250,27 @@ def _checksum(content: Mapping[str, Any]) -> str:
 def previous_path(path: Path) -> Path:
     """Where the file before the last of this name is kept."""
     return path.with_name(f"{path.stem}.before{path.suffix}")
+
+
+def parse_table(text: str) -> dict[str, Any]:
+    """Parse a table of JSON that a program has left.
+
+    Raises
+    ------
+    ValueError, RecursionError
+        If it is none, or holds a text that no file can hold or an integer beyond all numbers.
+    """
+
+    def number(digits: str) -> int:
+        if not math.isfinite(float(digits)):
+            raise ValueError("an integer beyond all numbers")
+        return int(digits)
+
+    content = json.loads(text, parse_int=number)
+    if not isinstance(content, dict):
+        raise ValueError("no table")
+    json.dumps(content, ensure_ascii=False).encode()  # halves of characters have no UTF-8
+    return content
 
 
 def write_json(path: Path, content: Mapping[str, Any]) -> None:

@@ -33,7 +33,7 @@ from typing import Any, Generic, Self, TypeVar, TypeVarTuple
 from threadpoolctl import threadpool_limits
 
 from workbench.errors import WorkerError
-from workbench.runtime.files import temporary_folder
+from workbench.runtime.files import end_copy, temporary_folder
 from workbench.runtime.supervision import Watch, beat, usual_limits
 
 Given = TypeVar("Given")
@@ -342,7 +342,6 @@ class _Worker:
 
 def _serve(connection: "Connection[bytes, bytes]", folder: str, secret: bytes, heart: Path) -> None:
     """Work on tasks, in a process of its own."""
-    own = os.getpid()
     close_servers()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_master, daemon=True).start()
@@ -360,15 +359,20 @@ def _serve(connection: "Connection[bytes, bytes]", folder: str, secret: bytes, h
             return
         send_marked(connection, secret, b"")
         while True:
-            message = connection.recv_bytes()
+            try:
+                message = connection.recv_bytes()
+            except (EOFError, OSError):  # the pool has ended, or foreign code closed its pipe
+                os._exit(1)
             try:
                 function, arguments = pickle.loads(message)
                 answer = _packed(function(state, *arguments), None)
             except Exception as error:
                 answer = _packed(None, error)
-            if os.getpid() != own:  # another that a model made of this process
+            end_copy()
+            try:
+                send_marked(connection, secret, answer)
+            except OSError:
                 os._exit(1)
-            send_marked(connection, secret, answer)
 
 
 def close_servers() -> None:

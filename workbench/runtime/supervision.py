@@ -24,7 +24,7 @@ from types import FrameType
 from typing import Any
 
 from workbench.errors import InputError
-from workbench.runtime.files import own_temporary_files
+from workbench.runtime.files import end_copy, own_temporary_files
 
 try:
     import resource
@@ -360,26 +360,30 @@ def _begin(parent: int) -> None:
 
 
 def _set_results_apart() -> None:
-    """Lead what foreign code prints to standard error, and what Python prints where it went."""
+    """Lead what foreign code prints to standard error, and what Python prints where it went.
+
+    Python's own descriptors serve where a model closes those of its standard streams.
+    """
     if sys.stdout is None or sys.stderr is None:
         return
-    shown = os.dup(1)
+    shown, told = os.dup(1), os.dup(2)
     os.dup2(2, 1)
     buffering = 1 if os.isatty(shown) else -1
     sys.stdout = open(  # noqa: SIM115  # for as long as the process runs
         shown, "w", buffering, encoding=sys.stdout.encoding, errors=sys.stdout.errors
     )
+    sys.stderr = open(  # noqa: SIM115
+        told, "w", 1, encoding=sys.stderr.encoding, errors=sys.stderr.errors
+    )
 
 
 def _worked(work: Callable[[], int], status_pipe: int, secret: bytes) -> int:
     """Status of the work, told to the parent, too."""
-    own = os.getpid()
     try:
         status = work()
     except BaseException as error:
         status = _status(error)
-    if os.getpid() != own:  # another that a model made of this process
-        os._exit(1)
+    end_copy()
     with suppress(AttributeError, OSError, ValueError):  # it is closed, or its reader has gone
         sys.stdout.flush()
     with suppress(OSError):  # a model has filled it; the parent says that no status came

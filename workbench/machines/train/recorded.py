@@ -1,7 +1,6 @@
 """Sets of recorded stops with known faults, diagnosed as those of the virtual train."""
 
 import hashlib
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,7 +9,7 @@ from typing import Any, ClassVar
 from workbench.errors import InputError
 from workbench.machines.train.planting import PLANTABLE
 from workbench.recordings.datasets import write_cases
-from workbench.runtime.files import read_text
+from workbench.runtime.files import parse_table, read_text
 from workbench.studies.power.planting import Group, Kind, Planting, SheetError
 
 _TRUTH = "truth.json"
@@ -97,14 +96,21 @@ def recorded_sets(folders: Sequence[Path]) -> RecordedTrain:
 def _planting(number: int, folder: Path) -> Planting:
     path, known = folder / _TRUTH, {plantable.name: plantable for plantable in PLANTABLE}
     try:
-        effects = json.loads(read_text(path, "name another folder"))["effects"]
+        effects = parse_table(read_text(path, "name another folder"))["effects"]
         gains = {}
         for name, fault in effects.items():
             own, unit = _KNOWN[name]
             place = f"[{int(fault['at'])}]" if "at" in fault else ""
             gains[own + place] = unit * float(fault["size"])
         planted = [known[name] for name in gains]
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+    except (
+        ValueError,
+        ArithmeticError,
+        KeyError,
+        TypeError,
+        AttributeError,
+        RecursionError,
+    ) as error:
         raise InputError(
             where=str(path),
             found=f"a truth that is not understood ({type(error).__name__}: {error})",

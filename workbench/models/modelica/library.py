@@ -11,7 +11,7 @@ from typing import Any
 from workbench.errors import InputError, unknown_name
 from workbench.models.modelica.classes import Class, Component, Modifier
 from workbench.models.modelica.files import PACKAGE, is_installed, packages, read
-from workbench.models.modelica.source import Reader
+from workbench.models.modelica.source import DEEPEST, Reader
 
 
 class _Classes(dict[str, Class]):
@@ -175,6 +175,13 @@ class Library:
                     found=f"{base} extends itself{by}",
                     expected="a class that ends in one without 'extends'",
                     remedy="correct what it extends",
+                )
+            if len(below) > DEEPEST:
+                raise InputError(
+                    where=self.classes[base].where,
+                    found=f"{base}, which {len(below)} classes extend one after the other",
+                    expected=f"{DEEPEST} at most",
+                    remedy="extend fewer in a line",
                 )
             if base in self.classes:
                 yield base

@@ -76,7 +76,8 @@ def monitor(
             "system": hashlib.sha256(system.source.read_bytes()).hexdigest(),
             "model": model.sha256,
         }
-    with open_state(engine.out / STATE, identity) as state:
+    sizes = len(watched(system)), len(system.work)
+    with open_state(engine.out / STATE, identity, sizes) as state:
         new = state.missing(recording_folders(folder))
         interrupted = _estimate(system, new, state, engine, read)
         results = state.all()

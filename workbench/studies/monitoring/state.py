@@ -82,6 +82,10 @@ CREATE TABLE IF NOT EXISTS results (
 """
 
 
+# Of correlations: a filter loses half of the sixteen digits at most, and estimates show three.
+_ROUNDING = 1e-4
+
+
 @dataclass(frozen=True, eq=False)
 class RecordingResult:
     """What came of one recording: an estimate, or why there is none."""
@@ -96,8 +100,8 @@ class RecordingResult:
 class State:
     """The file of one machine; see `open_state`."""
 
-    def __init__(self, connection: sqlite3.Connection) -> None:
-        self._connection = connection
+    def __init__(self, connection: sqlite3.Connection, sizes: tuple[int, int]) -> None:
+        self._connection, self._sizes = connection, sizes
 
     def missing(self, folders: list[RecordingFolder]) -> list[RecordingFolder]:
         """Those whose result is not known by name and content, or damaged."""
@@ -120,7 +124,7 @@ class State:
         results = []
         for name, content, text in rows:
             try:
-                result = _read_result(str(text))
+                result = _read_result(str(text), self._sizes)
                 if (result.name, result.content) != (name, content):
                     raise ValueError("the result of another recording")
             except (AttributeError, LookupError, OverflowError, TypeError, ValueError) as error:
@@ -133,7 +137,7 @@ class State:
         return results
 
 
-def _read_result(text: str) -> RecordingResult:
+def _read_result(text: str, sizes: tuple[int, int]) -> RecordingResult:
     content = check_checksum(text)
     entries = content.pop("estimate")
     if not all(isinstance(value, str) for value in content.values()):
@@ -150,27 +154,37 @@ def _read_result(text: str) -> RecordingResult:
         work=np.array(entries["work"], float).reshape(-1),
         counted=float(entries["counted"]),
     )
-    q = estimate.values.size
+    q, w = sizes
     finite = all(np.isfinite(value).all() for value in vars(estimate).values())
-    if not finite or estimate.covariance.shape != (q, q) or estimate.values.shape != (q,):
+    shapes = estimate.values.shape, estimate.covariance.shape, estimate.work.shape
+    if not finite or shapes != ((q,), (q, q), (w,)):
         raise ValueError("estimates that are not finite, or of another shape")
-    # Rounding leaves a covariance some digits less than symmetric.
+    # Rounding leaves a covariance some digits less than symmetric and positive.
     variances = np.diag(estimate.covariance)
-    scale = np.sqrt(np.outer(variances, variances)) if (variances > 0.0).all() else None
-    if scale is None or (np.abs(estimate.covariance) > scale * (1.0 + 1e-6)).any():
+    if not (variances > 0.0).all():
         raise ValueError("variances that cannot be")
+    deviations = np.sqrt(variances)
+    with np.errstate(over="ignore"):
+        correlations = estimate.covariance / deviations / deviations[:, None]
+    if (
+        (np.abs(correlations) > 1.0 + _ROUNDING).any()
+        or not np.allclose(correlations, correlations.T, atol=_ROUNDING)
+        or np.linalg.eigvalsh(correlations).min() < -_ROUNDING
+    ):
+        raise ValueError("covariances that cannot be")
     if estimate.counted <= 0.0:
         raise ValueError("a time that cannot be")
     return RecordingResult(estimate=estimate, **content)
 
 
 @contextmanager
-def open_state(path: Path, identity: Mapping[str, Any]) -> Iterator[State]:
+def open_state(path: Path, identity: Mapping[str, Any], sizes: tuple[int, int]) -> Iterator[State]:
     """Open the file of a machine, or make it.
 
     Parameters
     ----------
     identity : what estimates depend on beside the recordings; others do not stand beside them.
+    sizes : numbers of values, and of works, that an estimate has.
 
     Raises
     ------
@@ -194,8 +208,8 @@ def open_state(path: Path, identity: Mapping[str, Any]) -> Iterator[State]:
                     expected="those of this one, because levels are compared",
                     remedy="give another --out, into which all recordings are estimated anew",
                 )
-            yield State(connection)
-    except sqlite3.Error as error:
+            yield State(connection, sizes)
+    except (sqlite3.Error, UnicodeDecodeError) as error:
         raise InputError(
             where=str(path),
             found=f"a state that cannot be read or written ({error})",

@@ -1,6 +1,5 @@
 """The stop that `workbench next` proposes, as the rig makes it."""
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal
@@ -18,7 +17,7 @@ from workbench.machines.wheelset.rig.scenarios import (
     Surface,
 )
 from workbench.machines.wheelset.rig.sensors import FURTHER
-from workbench.runtime.files import read_text
+from workbench.runtime.files import parse_table, read_text
 from workbench.studies.design.candidates import Profile
 from workbench.system.system import System
 
@@ -43,8 +42,8 @@ def proposed_stop(result: Path, system: System) -> Scenario:
     remedy = "give the folder that 'workbench next' wrote for this rig"
     text = read_text(file, remedy)
     try:
-        return stop_of(json.loads(text)["tried"][0], system)
-    except (ValueError, KeyError, IndexError, TypeError, AttributeError):
+        return stop_of(parse_table(text)["tried"][0], system)
+    except (ValueError, LookupError, TypeError, AttributeError, RecursionError):
         raise InputError(
             where=str(file),
             found="no experiment that says speed, direction, surfaces and pressure of a stop",
