@@ -78,9 +78,14 @@ def tank(tmp_path_factory) -> System:
     return load_system(folder)
 
 
+def quietly(system: System, recordings: Path, *effects: str) -> Outcome:
+    """A diagnosis of recordings, which writes beside them."""
+    cases, out = read_cases(recordings, system), recordings.parent / "out"
+    return diagnose(system, cases, effects=effects, out=out, workers=1, report=lambda line: None)
+
+
 def diagnosed(system: System, folder: Path, **truth: float) -> Outcome:
-    cases = read_cases(record(folder / "recordings", **truth), system)
-    return diagnose(system, cases, out=folder / "out", workers=1, report=lambda line: None)
+    return quietly(system, record(folder / "recordings", **truth))
 
 
 def test_nothing_is_missing_where_only_unknown_starts_differ(tank, tmp_path):
@@ -104,25 +109,21 @@ def test_what_is_wrong_is_named_with_its_size(tank, tmp_path, truth, effect, siz
     assert (outcome.extension is None) == (effect != "A")  # a sensor is no matter of the model
 
 
-def test_a_late_sensor_and_an_input_that_acts_late_are_one_cause(tank, tmp_path):
-    """Of one input and one output nothing says which is late."""
-    outcome = diagnosed(tank, tmp_path, seed=2, late=3.0)
+@pytest.mark.parametrize(
+    ("truth", "form", "size"),
+    [({"seed": 2, "late": 3.0}, "Delay", "delay"), ({"seed": 3, "lag": 6.0}, "Lag", "lag")],
+)
+def test_a_late_or_lagging_sensor_and_such_an_input_are_one_cause(
+    tank, tmp_path, truth, form, size
+):
+    """Of one input and one output, in motion from the first sample, nothing says which is late."""
+    outcome = diagnosed(tank, tmp_path, **truth)
     (cause,) = outcome.diagnosis.causes
     names = {cause.effect.name, *cause.confusable_with}
-    assert names == {"InputDelay[inflow]", "SensorDelay[level]"}
-    delay = cause.parameters["delay"]
-    assert delay.low < 3.0 < delay.high
+    assert names == {f"Input{form}[inflow]", f"Sensor{form}[level]"}
+    interval, (_, late) = cause.parameters[size], truth.values()
+    assert interval.low < late < interval.high
     assert outcome.extension is None
-
-
-def test_a_sensor_that_lags_is_never_named_as_an_input_alone(tank, tmp_path):
-    """A recording begins in motion: nothing says where the lag of a sensor begins."""
-    outcome = diagnosed(tank, tmp_path, seed=3, lag=6.0)
-    (cause,) = outcome.diagnosis.causes
-    names = {cause.effect.name, *cause.confusable_with}
-    assert names == {"InputLag[inflow]", "SensorLag[level]"}
-    lag = cause.parameters["lag"]
-    assert lag.low < 6.0 < lag.high
 
 
 def test_parameters_that_act_alike_are_named_together(tank, tmp_path):
@@ -178,16 +179,10 @@ def test_candidates_are_parameters_and_sensors_of_a_stated_size(tank):
     assert names[7:12] == [
         f"{form}Term[x]" for form in ("Coulomb", "Stribeck", "Viscous", "Quadratic", "Constant")
     ]
-    assert names[12:] == [
-        "Start[x]",
-        "InputLag[inflow]",
-        *(
-            f"Sensor{form}[level]"
-            for form in ("Lag", "Saturation", "Rectification", "DeadZone", "Quantisation")
-        ),
-        "InputDelay[inflow]",
-        "SensorDelay[level]",
-    ]
+    forms = ("Lag", "Saturation", "Rectification", "DeadZone", "Quantisation")
+    late = ("InputDelay[inflow]", "SensorDelay[level]")
+    bent = (f"Sensor{form}[level]" for form in forms)
+    assert names[12:] == ["Start[x]", "InputLag[inflow]", *bent, *late]
 
 
 def test_candidates_are_chosen_in_the_system_file(tank, tmp_path, capsys):
@@ -195,11 +190,8 @@ def test_candidates_are_chosen_in_the_system_file(tank, tmp_path, capsys):
     chosen = '[candidates]\nonly = ["c", "Sensor*"]\nwithout = ["*[level]"]\nmatters = 0.05\n'
     (tmp_path / "system.toml").write_text(text + chosen)
     effects = catalogue(load_system(tmp_path), None)
-    assert [effect.name for effect in effects] == [
-        "c",
-        "SensorGain[inflow]",
-        "SensorOffset[inflow]",
-    ]
+    names = [effect.name for effect in effects]
+    assert names == ["c", "SensorGain[inflow]", "SensorOffset[inflow]"]
     assert effects[0].matters == pytest.approx(5e-5)
     (tmp_path / "system.toml").write_text(text + '[candidates]\nonly = ["cc"]\n')
     assert main(["diagnose", "--system", str(tmp_path), "--list"]) == 2
@@ -212,25 +204,16 @@ def test_a_stated_range_bounds_the_change(tank, tmp_path):
     text = SYSTEM.replace("Tank.fmu", str(tank.source.parent / "Tank.fmu"))
     (tmp_path / "system.toml").write_text(f'{text}[fit.A]\nrange = ["0.4 m2", "0.52 m2"]\n')
     system = load_system(tmp_path)
-    cases = read_cases(record(tmp_path / "recordings", seed=2, area=0.55), system)
-    outcome = diagnose(
-        system, cases, effects=["A"], out=tmp_path, workers=1, report=lambda line: None
-    )
+    outcome = quietly(system, record(tmp_path / "recordings", seed=2, area=0.55), "A")
     nearest = [candidate.text for candidate in outcome.diagnosis.nearest]
     assert [text for text in [*outcome.warnings, *nearest] if "0.02 m2" in text], outcome.summary()
 
 
 def test_what_needs_the_equations_says_so(tank, tmp_path):
-    cases = read_cases(record(tmp_path / "recordings", seed=6, area=0.55), tank)
-    problem = Problem(tank, cases, None, choose(["SensorOffset[level]"], catalogue(tank, None)))
-    outcome = diagnose(
-        tank,
-        cases,
-        effects=["SensorOffset[level]"],
-        out=tmp_path,
-        workers=1,
-        report=lambda line: None,
-    )
+    effects = choose(["SensorOffset[level]"], catalogue(tank, None))
+    recordings = record(tmp_path / "recordings", seed=6, area=0.55)
+    outcome = quietly(tank, recordings, "SensorOffset[level]")
+    problem = Problem(tank, outcome.cases, None, effects)
     assert outcome.diagnosis.verdict != "found"
     assert "put the Modelica library" in outcome.next_steps[-1]
     with pytest.raises(InputError, match=re.escape("no Modelica library package.mo")):
@@ -282,8 +265,7 @@ def test_a_missing_friction_is_named_with_its_size(swing, tmp_path, form, size):
         write_case(
             tmp_path / f"recordings/{number}", {"time [s]": time, "s [m]": position}, "Released"
         )
-    cases = read_cases(tmp_path / "recordings", swing)
-    outcome = diagnose(swing, cases, out=tmp_path, workers=1, report=lambda line: None)
+    outcome = quietly(swing, tmp_path / "recordings")
     (cause,) = outcome.diagnosis.causes
     assert cause.effect.name == f"{form}Term[v]"
     assert cause.parameters["coefficient"].low < size < cause.parameters["coefficient"].high
@@ -322,8 +304,7 @@ def test_a_sensor_that_bends_its_signal_is_named_with_its_size(swing, tmp_path, 
             read = np.clip(read, -size, size)
         columns = {"time [s]": fine[::10], "s [m]": read}
         write_case(tmp_path / f"recordings/{number}", columns, "Released")
-    cases = read_cases(tmp_path / "recordings", swing)
-    outcome = diagnose(swing, cases, out=tmp_path, workers=1, report=lambda line: None)
+    outcome = quietly(swing, tmp_path / "recordings")
     (cause,) = outcome.diagnosis.causes
     assert (cause.effect.name, cause.confusable_with) == (name, ())
     assert cause.parameters[parameter].low < size < cause.parameters[parameter].high
@@ -338,11 +319,7 @@ def test_errors_far_above_noise_are_never_nothing(swing, tmp_path):
         position += 1e-3 * rng.standard_normal(time.size)
         columns = {"time [s]": time, "s [m]": position}
         write_case(tmp_path / f"recordings/{number}", columns, "Released")
-    cases = read_cases(tmp_path / "recordings", swing)
-    outcome = diagnose(
-        swing, cases, effects=["m"], out=tmp_path, workers=1, report=lambda line: None
-    )
-    assert outcome.diagnosis.verdict == "unexplained"
+    assert quietly(swing, tmp_path / "recordings", "m").diagnosis.verdict == "unexplained"
 
 
 @pytest.mark.long
@@ -366,8 +343,7 @@ def test_friction_of_three_parts_is_named_with_each(swing, tmp_path):
             "v [m/s]": v + 3e-3 * rng.standard_normal(time.size),
         }
         write_case(tmp_path / f"recordings/{number}", columns, "Released")
-    cases = read_cases(tmp_path / "recordings", system)
-    outcome = diagnose(system, cases, out=tmp_path, workers=1, report=lambda line: None)
+    outcome = quietly(system, tmp_path / "recordings")
     causes = {cause.effect.name: cause.parameters for cause in outcome.diagnosis.causes}
     sizes = {"CoulombTerm[v]": 0.25, "StribeckTerm[v]": 0.5, "ViscousTerm[v]": 0.05}
     assert causes.keys() == sizes.keys()

@@ -12,6 +12,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
+from workbench.diagnosis import Outcome
 from workbench.diagnosis.data.cleaning import outliers
 from workbench.diagnosis.data.counting import BEYOND
 from workbench.diagnosis.inference.thresholds import SOUND
@@ -97,11 +98,16 @@ def test_a_state_that_nobody_measured_starts_where_the_recording_says(heater, tm
     assert fitted == pytest.approx(starts, abs=0.5)
 
 
-def test_errors_are_told_on_recordings_that_were_held_out(heater, tmp_path):
-    recordings = cases(heater, [simulated(k, LOSS, 3.0 * k) for k in range(4)])
-    outcome = diagnosed(heater, recordings[:2], tmp_path, recordings[2:])
-    assert [error.recording for error in outcome.errors if error.held_out] == ["02", "03"]
-    for error in outcome.errors:
+@pytest.fixture(scope="module")
+def half(heater, tmp_path_factory) -> Outcome:
+    """Of four recordings from unlike starts, two of them held out."""
+    recordings = cases(heater, [simulated(k, LOSS, 10.0 * k) for k in range(4)])
+    return diagnosed(heater, recordings[:2], tmp_path_factory.mktemp("half"), recordings[2:])
+
+
+def test_errors_are_told_on_recordings_that_were_held_out(half):
+    assert [error.recording for error in half.errors if error.held_out] == ["02", "03"]
+    for error in half.errors:
         assert error.rms[0] > 10.0 * NOISE
         # Sampling scatter of a standard deviation over a thousand samples is 2 %.
         assert error.rms[1] == pytest.approx(NOISE, rel=0.1)
@@ -109,21 +115,19 @@ def test_errors_are_told_on_recordings_that_were_held_out(heater, tmp_path):
         assert error.mean_absolute[1] == pytest.approx(
             error.rms[1] * np.sqrt(2.0 / np.pi), rel=0.05
         )
-    assert "2 recordings held out" in outcome.summary()
+    assert "2 recordings held out" in half.summary()
     # Cross-validation inside the fitted ones is never called so.
-    assert "in cross-validation its error falls from" in outcome.sentence
-    assert "and on 2 held-out recordings that of" in outcome.sentence
-    assert outcome.sentence.count("held-out") == 1
+    assert "in cross-validation its error falls from" in half.sentence
+    assert "and on 2 held-out recordings that of" in half.sentence
+    assert half.sentence.count("held-out") == 1
 
 
-def test_another_tool_starts_the_extended_model_as_a_recording_does(heater, tmp_path):
-    recordings = cases(heater, [simulated(k, LOSS, 10.0 * k) for k in range(3)])
-    outcome = diagnosed(heater, recordings[:2], tmp_path, recordings[2:])
-    for case in recordings:
-        start = outcome.start_values(case.name)
+def test_another_tool_starts_the_extended_model_as_a_recording_does(heater, half):
+    for case in cases(heater, [simulated(k, LOSS, 10.0 * k) for k in range(4)]):
+        start = half.start_values(case.name)
         assert start.keys() == {"T", "Tc"}
         result = fmpy.simulate_fmu(
-            str(outcome.extension.fmu),
+            str(half.extension.fmu),
             fmi_type="CoSimulation",
             start_values=start,
             input=np.rec.fromarrays([case.time, case["P"], 0.0 * case.time], names="time, P, dGc"),
@@ -133,8 +137,8 @@ def test_another_tool_starts_the_extended_model_as_a_recording_does(heater, tmp_
         )
         # The model has what was planted: noise is left, of which a thousand samples are within 2 %.
         assert np.std(case["T"] - result["T"]) == pytest.approx(NOISE, rel=0.1)
-    with pytest.raises(InputError, match=r"'03': found no recording of this name"):
-        outcome.start_values("03")
+    with pytest.raises(InputError, match=r"'04': found no recording of this name"):
+        half.start_values("04")
 
 
 def in_steps(values: NDArray[np.float64], step: float) -> NDArray[np.float64]:
@@ -181,15 +185,13 @@ def test_mistakes_in_what_a_sensor_reads_are_refused(sensor, match, tmp_path):
         system(tmp_path / "wrong", sensor)
 
 
-def test_page_tells_errors_of_fitted_and_of_held_out_recordings(heater, tmp_path):
-    recordings = cases(heater, [simulated(k, LOSS, 0.0) for k in range(3)])
-    outcome = diagnosed(heater, recordings[:2], tmp_path, recordings[2:])
-    provenance = {"run": run_of("diagnose", outcome.system, {})}
-    page = lxml.html.fromstring(write_diagnosis(outcome, provenance, tmp_path, 1).read_bytes())
+def test_page_tells_errors_of_fitted_and_of_held_out_recordings(half):
+    provenance, folder = {"run": run_of("diagnose", half.system, {})}, half.extension.fmu.parents[1]
+    page = lxml.html.fromstring(write_diagnosis(half, provenance, folder, 1).read_bytes())
     rows = page.xpath("//table[@id='error-table']/tbody/tr")
-    assert [row.xpath("string(td[1])") for row in rows] == ["yes", "yes", "held out"]
-    table = pd.read_csv(tmp_path / "errors.csv", dtype={"recording": str})
-    assert list(table["recording"]) == ["00", "01", "02"]
+    assert [row.xpath("string(td[1])") for row in rows] == ["yes", "yes", "held out", "held out"]
+    table = pd.read_csv(folder / "errors.csv", dtype={"recording": str})
+    assert list(table["recording"]) == ["00", "01", "02", "03"]
     shown = [float(cell) for cell in rows[2].xpath("td[@class='number']/@data-value")]
     names = ["rms_before", "mean_absolute_before", "rms_after", "mean_absolute_after"]
     names += ["free_run_before", "free_run_after"]
