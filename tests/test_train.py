@@ -79,6 +79,20 @@ def test_gradients_and_curves_are_those_under_the_vehicles(tmp_path, train):
 
 
 @pytest.mark.parametrize(
+    ("said", "doubted"), [('"2.3 bar"', False), ('"2.5 bar"', True), ('"4.2 bar"', None)]
+)
+def test_a_pressure_that_the_brake_never_reached_is_doubted(said, doubted, tmp_path, train):
+    """Readings rise to 2 bar in vehicles of 45 t and 50 t: that is 2.3 bar in full ones of 56 t."""
+    write_cases("train", stop(tmp_path, ('"2.7 bar"', said)), tmp_path / "cases")
+    if doubted is None:
+        with pytest.raises(InputError, match="pressure_full_load: found 420000 Pa"):
+            read_cases([tmp_path / "cases"], train)
+        return
+    (case,) = read_cases([tmp_path / "cases"], train)
+    assert any("pressure_full_load" in doubt for doubt in case.doubts) == doubted
+
+
+@pytest.mark.parametrize(
     ("old", "new", "message"),
     [
         ('mass2 = "50 t"', "", "mass2"),

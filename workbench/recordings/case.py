@@ -113,7 +113,10 @@ def conditions_shown(signals: Mapping[str, Vector], system: System) -> dict[str,
     signals : (n,) each, SI.
     """
     texts: dict[str, Any] = {}
+    compared = {rest.by for rest in system.comparison.rests}
     for condition in system.conditions:
+        if condition.name in compared:
+            continue  # readings are compared with it: it must be told, not read off them
         value = shown_by(condition, signals, system)
         if value is None or not np.isfinite(value):
             continue
