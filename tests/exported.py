@@ -13,7 +13,7 @@ from fmpy.fmi3 import FMU3Slave
 
 from workbench.models import fmu_cache
 from workbench.models.compiler import native
-from workbench.observers import Estimator
+from workbench.observers import Estimator, Gains
 from workbench.observers.export import build_observer, model_name
 
 PACKAGE = Path(__file__).parents[1] / "workbench"
@@ -25,6 +25,19 @@ class Exported:
 
     path: Path
     python: Estimator
+
+
+def with_all_gains(gains: Gains) -> Gains:
+    """Reasoned gains with those that are zero filled in, on dy and on its integral."""
+    values = gains.values.copy()
+    if gains.estimator == "parameter_estimator":
+        L = values.reshape(2, 4)
+        L[:, :2] = [[0.2, -0.3], [0.1, -2.0]]
+        L[1, 2] = -1.0
+    elif gains.estimator == "disturbance_observer":
+        L = values[:16].reshape(4, 4)
+        L[:, 2:] = 0.3 * L[:, :2]
+    return gains.with_values(values)
 
 
 def write_fmu(path: Path, estimator: Estimator, fmi: int = 2) -> Path:

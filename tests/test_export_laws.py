@@ -25,17 +25,17 @@ from workbench.observers import Estimator, choose
 from workbench.observers.estimators.kalman import ExtendedKalmanFilter
 from workbench.observers.export import build_observer
 from workbench.observers.gains_file import format_gains
-from workbench.recordings.case import Case, read_case
+from workbench.recordings.case import Case, read_case, read_cases
 from workbench.system.registry import load_system, open_model
 from workbench.system.system import System
 
 from . import heater
-from .exported import Exported, instance, run_fmu, run_python, write_fmu
+from .exported import Exported, instance, run_fmu, run_python, with_all_gains, write_fmu
 from .processes import COMPILER
 
 ROOT = Path(__file__).parent.parent
 SYSTEM = load_system("wheelset")
-NAMES = ("ekf", "ukf", "mhe", "imm")
+NAMES = ("ekf", "ukf", "mhe", "imm", "disturbance_observer", "parameter_estimator")
 # Of the largest value of an output. Found here: equal to the bit, as the order of operations is the
 # same; elementary functions of another library may differ in their last bit.
 AGREEMENT = 1e-6
@@ -45,7 +45,7 @@ AGREEMENT = 1e-6
 def opened(system: System, name: str) -> Iterator[Estimator]:
     cls = choose(system, [name])[name]
     with open_model(system, cls.role) as fmu:
-        yield cls(fmu, system, cls.default_gains(fmu, system))
+        yield cls(fmu, system, with_all_gains(cls.default_gains(fmu, system)))
 
 
 @pytest.fixture(scope="module", params=NAMES)
@@ -79,6 +79,13 @@ def assert_same(values: np.ndarray, expected: np.ndarray) -> None:
 
 def test_fmu_reproduces_python_over_first_contact_and_slide(exported, dry_case, slide):
     for case in (dry_case, slide):
+        recording = case.time, case.u, case.y
+        assert_same(run_fmu(exported.path, *recording), run_python(exported.python, *recording))
+
+
+@pytest.mark.long
+def test_fmu_reproduces_python_on_all_recorded_stops(exported, root):
+    for case in read_cases([root / "cases"], SYSTEM):
         recording = case.time, case.u, case.y
         assert_same(run_fmu(exported.path, *recording), run_python(exported.python, *recording))
 
@@ -131,17 +138,17 @@ def test_a_restored_state_repeats_the_steps(exported, slide):
     samples = np.hstack([slide.u, slide.y])
     with instance(exported.path) as fmu:
 
-        def steps(numbers: range) -> list[list[float]]:
-            return [fmu.step(samples[k], 0.005 * k, 0.005) for k in numbers]
+        def steps(numbers: range) -> np.ndarray:
+            return np.array([fmu.step(samples[k], 0.005 * k, 0.005) for k in numbers])
 
         steps(range(900))
         state = fmu.fmi.getFMUstate()
         kept = fmu.fmi.serializeFMUstate(state)
         first = steps(range(900, 1000))
         fmu.fmi.setFMUstate(state)
-        assert steps(range(900, 1000)) == first
+        assert_array_equal(steps(range(900, 1000)), first)
         fmu.fmi.setFMUstate(fmu.fmi.deSerializeFMUstate(kept))
-        assert steps(range(900, 1000)) == first
+        assert_array_equal(steps(range(900, 1000)), first)
 
 
 def test_a_sample_that_fails_is_as_if_it_had_not_been(horizon, slide):
@@ -174,6 +181,8 @@ def assert_described(own: Exported) -> None:
     assert description.coSimulation.canHandleVariableCommunicationStepSize
     assert description.coSimulation.canGetAndSetFMUstate
     variables = {v.name: (v.causality, v.unit) for v in description.modelVariables}
+    gains = {name for name, (causality, _) in variables.items() if causality == "parameter"}
+    assert gains <= set(own.python.gains.names)
     shown = {
         f"{n}Estimate" if n in ("omegaW", "omegaR") else n: unit
         for n, unit in SYSTEM.columns.items()
@@ -182,7 +191,8 @@ def assert_described(own: Exported) -> None:
     expected |= {name: ("output", unit) for name, unit in shown.items()}
     expected |= {f"sigma_{name}": ("output", unit) for name, unit in SYSTEM.columns.items()}
     expected |= {f"probability_{name}": ("output", "1") for name in own.python.modes}
-    variables.pop("time", None)
+    for name in ("time", *gains):
+        variables.pop(name, None)
     assert variables == expected | {"nis": ("output", "1")}
 
 
