@@ -15,7 +15,10 @@ fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean a, fmi2Real b, fmi2R
 fmi2Status fmi2EnterInitializationMode(fmi2Component c) { return fmi2OK; }
 fmi2Status fmi2ExitInitializationMode(fmi2Component c) { return fmi2OK; }
 fmi2Status fmi2Terminate(fmi2Component c) { return fmi2OK; }
-fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean n) { ((double *)c)[X] += h * ((double *)c)[U]; return fmi2OK; }
+#ifndef ONLY /* size of a step, 0 for any */
+#define ONLY 0.0
+#endif
+fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean n) { if (ONLY && (h < 0.99 * ONLY || h > 1.01 * ONLY)) return fmi2Error; ((double *)c)[X] += h * ((double *)c)[U]; return fmi2OK; }
 fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference k[], size_t n, fmi2Real v[]) {
     for (size_t i = 0; i < n; i++) v[i] = ((double *)c)[k[i]];
     return fmi2OK;

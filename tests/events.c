@@ -70,7 +70,7 @@ fmi2Status fmi2GetDerivatives(fmi2Component c, fmi2Real x[], size_t n) {
     x[0] = m->r[DT];
 #ifdef WARNS /* above its table: 1 by a message and a status, 2 by a status alone, 3 by a message alone */
     if (m->r[T] > 292.0) {
-        if (WARNS != 2) m->callbacks->logger(m->callbacks->componentEnvironment, "room", fmi2Warning, "logStatusWarning", "T is above its table");
+        if (WARNS != 2) m->callbacks->logger(m->callbacks->componentEnvironment, "room", fmi2Warning, "logStatusWarning", "%s is above its table", "T");
         return WARNS == 3 ? fmi2OK : fmi2Warning;
     }
 #endif

@@ -645,6 +645,11 @@ COASTING = """
 @pytest.fixture
 def integrator(tmp_path, compiled) -> Path:
     """A system on a Co-Simulation alone: der(x) = u from 1, each step exact."""
+    return build_integrator(tmp_path, compiled("co_simulation.c"))
+
+
+def build_integrator(tmp_path: Path, library: Path) -> Path:
+    """The system of `integrator`, of a library that was built otherwise."""
     description = machine_file(
         "room_fmu/modelDescription.xml", count=0, start=0.0, variables=COASTING
     )
@@ -653,7 +658,6 @@ def integrator(tmp_path, compiled) -> Path:
     description = description.replace(structure, "<Outputs><Unknown index='1'/></Outputs>")
     with zipfile.ZipFile(tmp_path / "Alone.fmu", "w") as archive:
         archive.writestr("modelDescription.xml", description)
-        library = compiled("co_simulation.c")
         archive.write(library, f"{BINARY}/Alone{fmpy.sharedLibraryExtension}")
     (tmp_path / "system.toml").write_text(
         'title = "Alone"\nsample_time = "1 s"\nmodels.observer = { fmu = "Alone.fmu" }\n'
@@ -690,6 +694,29 @@ def test_whole_simulations_of_co_simulation_alone_have_derivatives(integrator):
         np.testing.assert_allclose(simulation.run(drive, {"x": 2.0})[:, 0], [2, 3, 4, 5])
         by = simulation.derivatives(drive, {"x": 2.0}, [("x",)])
     np.testing.assert_allclose(by.values[:, 0, 0], 1.0)
+
+
+def test_co_simulation_with_steps_of_one_size_goes_in_those_or_is_refused(tmp_path, compiled):
+    """Four steps of 0.25 s fit into a sample; after samples of 1 s, one of 0.5 s does not."""
+    folder = build_integrator(tmp_path, compiled("co_simulation.c", "-DONLY=0.25"))
+    path = folder / "Alone.fmu"
+    with zipfile.ZipFile(path) as archive:
+        parts = {name: archive.read(name) for name in archive.namelist()}
+    stated = b'startTime="0.0" stepSize="0.25"'
+    parts["modelDescription.xml"] = parts["modelDescription.xml"].replace(
+        b'startTime="0.0"', stated
+    )
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, data in parts.items():
+            archive.writestr(name, data)
+    with CoSimulation(path) as fmu:
+        simulation = Simulation(fmu, ["u"], ["x"], [True])
+        even = simulation.run(Drive(np.arange(4.0), np.ones((4, 1))), {})
+        np.testing.assert_allclose(even[:, 0], [1, 2, 3, 4])
+        with pytest.raises(
+            FMUError, match=r"steps of one size only.*after 0\.25 s comes one of 0\.3"
+        ):
+            simulation.run(Drive(np.array([0.0, 1.0, 1.3]), np.ones((3, 1))), {})
 
 
 @pytest.mark.parametrize("name", ["ekf", "mhe", "smoother"])

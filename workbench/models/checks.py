@@ -648,22 +648,27 @@ def _inject(path: Path, instantiations: int) -> Iterator[CheckResult]:
             yield replace(INJECTION, passed=True, value=0.0)
             return
         excitation = excite(fmu)
-        before = fmu.derivatives()
+        others = set(fmu.states)
+        shown = fmu.variables([y for y in fmu.outputs if fmu.is_real(y) and y not in others])
+        before = np.concatenate([fmu.derivatives(), fmu.get(shown)])
         wanted = fmu.get_states() + 0.01 * excitation.nominal
         fmu.set_states(wanted)
         by_vector = np.abs(fmu.get_states() - wanted)
         by_reference = np.abs(fmu.get(fmu.variables(fmu.states)) - wanted)
-        ignored = np.array_equal(fmu.derivatives(), before)
-        # A model may only integrate its inputs; then its own Jacobian says so.
+        ignored = np.array_equal(np.concatenate([fmu.derivatives(), fmu.get(shown)]), before)
+        # A model may only integrate its inputs; then its own Jacobian or structure says so.
         if ignored and fmu.has_directional_derivatives:
             ignored = bool(fmu.state_jacobian().any())
+        elif ignored:
+            known = [fmu.description.dependencies.get(rate) for rate in fmu.description.rates]
+            ignored = any(names is None or others.intersection(names) for names in known)
     name = fmu.states[int(np.argmax(np.maximum(by_vector, by_reference)))]
     if by_vector.any():
         reason = f"'{name}' was set, but the FMU returns another state"
     elif by_reference.any():
         reason = f"'{name}' was set, but the variable of this name has another value"
     else:
-        reason = "states were set, but the derivatives stay" if ignored else ""
+        reason = "states were set, but derivatives and outputs stay" if ignored else ""
     if reason:
         reason += "; the exporter protects its states: look for an option, or take another exporter"
     value = float(max(by_vector.max(), by_reference.max()))

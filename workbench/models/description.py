@@ -36,6 +36,7 @@ class Interface:
     needs_execution_tool: bool
     one_instance_per_process: bool
     completed_steps: bool
+    variable_steps: bool
 
 
 @dataclass(frozen=True)
@@ -434,6 +435,7 @@ def _interface(element: ElementTree.Element, version: str) -> Interface:
         completed_steps=has("needsCompletedIntegratorStep")
         if version == "3.0"
         else not has("completedIntegratorStepNotNeeded"),
+        variable_steps=has("canHandleVariableCommunicationStepSize"),
     )
 
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path, PurePosixPath
 from typing import Any, NamedTuple, Self
-from weakref import WeakMethod
+from weakref import WeakMethod, WeakValueDictionary
 
 import numpy as np
 from fmpy import fmi2, fmi3
@@ -34,7 +34,7 @@ from workbench.models.description import (
     Variable,
     read_description,
 )
-from workbench.models.trial import derivatives_hold, require_trial
+from workbench.models.trial import PROXY, derivatives_hold, require_trial
 from workbench.runtime.files import TemporaryFolder, own_umask
 
 _FUNCTIONS = {
@@ -81,6 +81,7 @@ _ACCESSORS = {
 }
 
 _WARNING, _LOGGED = 1, 3  # status of FMI; messages that an error shows
+_SAME_STEP = 1e-4  # by which sample times may differ: what rounding of time stamps leaves
 _MOST_ITERATIONS = 100  # of discrete states at one event; models need some
 
 _CLASSES = {
@@ -143,6 +144,21 @@ def _weakly(method: Callable[..., None]) -> Callable[..., None]:
     return call
 
 
+# FMI 2.0 hands a message as `printf` takes it, with arguments that only C can read. FMPy's proxy
+# formats it, for one callback of the process: this one, which finds who logged by the environment.
+_LOGGING: WeakValueDictionary[int, "FMUInstance"] = WeakValueDictionary()
+
+
+def _log_formatted(environment: int | None, *arguments: Any) -> None:
+    """Hand a message to the instance of its environment; to the last one if an FMU says none."""
+    instances = dict(_LOGGING)
+    if instances:
+        instances.get(environment or 0, instances[max(instances)])._note(*arguments)
+
+
+_LOGGER = fmi2.fmi2CallbackLoggerTYPE(_log_formatted)
+
+
 class FMUInstance:
     """An FMU that is unpacked and loaded, with one instance.
 
@@ -172,6 +188,8 @@ class FMUInstance:
         self.warned = np.zeros(1, np.int64)
         self._log: deque[str] = deque(maxlen=_LOGGED)
         self._warning_messages, self._first_warning = 0, ""
+        self._number = max(_LOGGING, default=0) + 1
+        _LOGGING[self._number] = self
         own_umask()  # before a model can change it
         self._scratch = TemporaryFolder()
         try:
@@ -231,9 +249,12 @@ class FMUInstance:
                 self._instance.instantiate(logMessage=_weakly(self._note))
             else:
                 callbacks = fmi2.fmi2CallbackFunctions()
-                callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(_weakly(self._note))
+                callbacks.logger = _LOGGER
+                callbacks.componentEnvironment = self._number
                 callbacks.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(fmi2.calloc)
                 callbacks.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(fmi2.free)
+                if PROXY is not None:
+                    PROXY.addLoggerProxy(ctypes.byref(callbacks))
                 self._instance.instantiate(callbacks=callbacks)
         except Exception as error:  # FMPy raises bare Exception where the FMU returns NULL
             raise FMUError(f"{self._description.path.name}: {error}: {self._logged()}") from None
@@ -241,7 +262,7 @@ class FMUInstance:
         self._used = False
 
     def _note(self, *arguments: Any) -> None:
-        """Keep what the FMU logs: its environment and name, then status, category, message."""
+        """Keep what the FMU logs, at last its status, category, message."""
         message = (arguments[-1] or b"").decode(errors="replace")
         self._log.append(message)
         if arguments[-3] == _WARNING:
@@ -700,7 +721,9 @@ class FMU:
                     + (", an array" if variable.array else "")
                     + (f", an element of '{variable.of}'" if variable.of else ""),
                     expected="a scalar of type Real (FMI 2.0) or Float64 (FMI 3.0)",
-                    remedy="export the model with a real variable in its place",
+                    remedy="export the model with a real variable in its place, or leave this one "
+                    "out. With it these run: workbench simulate --estimator open_loop, workbench "
+                    "fit, workbench diagnose",
                 )
         references = np.array([self._references[n] for n in names], np.uint32)
         return Variables(tuple(names), references, np.zeros(len(names)))
@@ -1048,7 +1071,7 @@ class CoSimulation(FMU):
     ) -> None:
         """Reset and initialise at `start_time`; see `FMU.start`."""
         super().start(states, parameters)
-        self._t = self.start_time
+        self._t, self._length = self.start_time, 0.0
 
     def check_event(self) -> None:
         """Nothing: a Co-Simulation treats its events itself."""
@@ -1066,23 +1089,40 @@ class CoSimulation(FMU):
     def step(self, h: float) -> Vector:
         """Advance by h [s] with inputs held; returns the new states, (n,).
 
+        An FMU that takes steps of one size only goes in those of its default experiment, where they
+        fit into h.
+
         Raises
         ------
         FMUError
-            If the FMU refuses the step, or asks to end.
+            If the FMU refuses the step, or asks to end; if it takes one size only, and h is another
+            than before.
         """
+        parts = 1
+        if not self.description.interfaces[CO_SIMULATION].variable_steps:
+            parts = max(1, round(h / (self.description.step or h)))
+            length = h / parts
+            if self._length and abs(length - self._length) > _SAME_STEP * self._length:
+                raise FMUError(
+                    f"{self.path.name}: it takes steps of one size only "
+                    "(canHandleVariableCommunicationStepSize is not true), and after "
+                    f"{self._length:.6g} s comes one of {length:.6g} s. Record at equal steps, or "
+                    "export the model with steps of any size"
+                )
+            self._length = self._length or length
         tail: tuple[object, ...] = ()
         event, end, early = (ctypes.c_bool() for _ in range(3))
         if self.version == "3.0":
             reached = ctypes.c_double()
             tail = tuple(ctypes.byref(value) for value in (event, end, early, reached))
-        # The zero: the state may be rolled back to before this point.
-        self._loaded.call(
-            "do_step", ctypes.c_double(self._t), ctypes.c_double(h), ctypes.c_int(0), *tail
-        )
-        if end.value or early.value:
-            raise self._loaded.end_error()
-        self._t += h
+        begin = self._t
+        for part in range(parts):
+            t, span = ctypes.c_double(begin + part * h / parts), ctypes.c_double(h / parts)
+            # The zero: the state may be rolled back to before this point.
+            self._loaded.call("do_step", t, span, ctypes.c_int(0), *tail)
+            if end.value or early.value:
+                raise self._loaded.end_error()
+        self._t = begin + h
         return self.get(self._state_variables).copy()
 
 

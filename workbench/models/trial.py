@@ -4,6 +4,7 @@ An FMU is foreign code, which may end, stop or fill the process that calls it. O
 here is taken as it is; any other is tried before it is loaded, and remembered by its hash.
 """
 
+import ctypes
 import json
 import os
 import re
@@ -34,6 +35,14 @@ class ContainedError(FMUError):
 class NoAnswerError(FMUError):
     """An FMU did not answer in time, while it used little of the processor: nothing is known."""
 
+
+try:
+    from fmpy.logging import logging as _proxy
+
+    # Formats what FMUs of FMI 2.0 log, as `printf` does. None on machines that FMPy has none for.
+    PROXY: ctypes.CDLL | None = _proxy
+except (ImportError, OSError):
+    PROXY = None
 
 _MOST_REPORTED = 16 << 20  # [byte]; the records of a trial take some 0.1 MB
 _GRACE = 5.0  # [s] beyond the limit, for the process that watches it to say so
@@ -227,6 +236,7 @@ def _task(description: Description, interface: str, folder: Path, limits: Limits
         "saves": offered.saves_state,
         "indicators": description.event_indicators,
         "completed": offered.completed_steps,
+        "proxy": None if PROXY is None else PROXY._name,
         "processor": limits.processor,
         "answer": limits.answer,
         "memory": limits.memory,

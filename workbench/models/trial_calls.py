@@ -103,6 +103,8 @@ class _Calls:
             _FREE(("free", libc)),
         )
         self._callbacks = _Callbacks(self._kept[0], *self._kept[2:], None, None)
+        if task["proxy"]:  # it formats messages
+            ctypes.CDLL(task["proxy"]).addLoggerProxy(ctypes.byref(self._callbacks))
 
     def _note(self, *arguments: Any) -> None:
         self._log = [*self._log[-2:], (arguments[-1] or b"")[:400].decode(errors="replace")]
