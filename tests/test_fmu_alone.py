@@ -19,6 +19,8 @@ from workbench.api import diagnose, read_cases
 from workbench.diagnosis import Outcome, Problem, catalogue, choose
 from workbench.diagnosis.effects.candidates import rate_terms
 from workbench.diagnosis.laws import propose
+from workbench.diagnosis.simulation.prediction import Predictor
+from workbench.diagnosis.simulation.residual_model import ModelSource, ResidualModel
 from workbench.errors import InputError
 from workbench.models.added import write_extended
 from workbench.models.fmu import FMU
@@ -283,6 +285,72 @@ def test_a_missing_friction_is_named_with_its_size(swing, tmp_path, form, size):
     expected = np.interp(run["time"], time, swung(LAWS[form], 0.5, time))
     assert_allclose(run["s"], expected, atol=4e-3)
     assert validate_fmu(str(outcome.extension.fmu)) == []
+
+
+def test_observability_needs_neither_inputs_nor_quantities(swing, tmp_path):
+    time = np.arange(0.0, 4.005, 0.01)
+    columns = {"time [s]": time, "s [m]": 0.5 * np.cos(np.sqrt(10.0) * time)}
+    case = write_case(tmp_path / "recordings/0", columns, "Released")
+    given = ["--system", str(swing.source), "--out", str(tmp_path / "out")]
+    assert main(["observability", str(case), *given]) == 0
+
+
+def test_dry_friction_stops_a_body_within_a_sample(swing, tmp_path):
+    """At samples 50 ms apart, a tenth of a noise of 1 mm from the closed form.
+
+    Each half swing is a cosine about -+ mu/c; below mu/c from the middle the body sticks.
+    """
+    mu, c, time = 1.3, 10.0, np.arange(0.0, 8.01, 0.05)
+    position, start, begin = np.empty(time.size), 0.5, 0.0
+    while abs(start) > mu / c:
+        middle = np.copysign(mu / c, start)
+        now = time >= begin
+        position[now] = middle + (start - middle) * np.cos(np.sqrt(c) * (time[now] - begin))
+        start, begin = 2.0 * middle - start, begin + np.pi / np.sqrt(c)
+    position[time >= begin] = start
+    write_case(tmp_path / "recordings/0", {"time [s]": time, "s [m]": position}, "Released")
+    (case,) = read_cases(tmp_path / "recordings", swing)
+    with FMU(swing.source.parent / "Swing.fmu") as model:
+        terms = rate_terms(model, swing)
+    write_extended(model.path, tmp_path / "Extended.fmu", terms, {"added.coulomb.v": mu}, {})
+    source = ModelSource(tmp_path / "Extended.fmu", swing, {})
+    with ResidualModel(source, [case]) as simulations, FMU(source.path) as model:
+        (samples,) = simulations.recordings
+        simulated = samples.y - Predictor(model, swing, ["s"]).errors(samples, {})
+    assert_allclose(simulated[:, 0], position, atol=1e-4)
+
+
+def test_a_single_recording_that_forgets_its_start_names_the_parameter(tmp_path):
+    """40 s of c der(x) = u - k x from x = u/k: what is left out first says how it began."""
+    text = """model Lag
+  parameter Real k = 0.5 "loss";
+  input Real u(start=1.0);
+  Real x(start=2.0, fixed=true);
+  output Real y;
+equation
+  der(x) = u - k*x;
+  y = x;
+end Lag;
+"""
+    build_text(tmp_path, text)
+    (tmp_path / "system.toml").write_text(
+        'title = "Lag"\nsample_time = "0.2 s"\nmodels.observer = { fmu = "Lag.fmu" }\n'
+        'inputs.u = { unit = "1", noise = 0.0, scale = 2.0, held = true }\n'
+        'outputs.y = { unit = "1", noise = 0.01, scale = 2.0 }\n'
+    )
+    system, time = load_system(tmp_path), np.arange(0.0, 40.1, 0.2)
+    u, x = 1.0 + np.floor(time / 8.0 + 1e-9) % 2, [1.0 / 0.6]
+    for held in u[:-1]:
+        x.append(held / 0.6 + (x[-1] - held / 0.6) * np.exp(-0.6 * 0.2))
+    y = np.array(x) + 0.01 * np.random.default_rng(1).standard_normal(time.size)
+    columns = {"time [s]": time, "u [1]": u, "y [1]": y}
+    write_case(tmp_path / "recordings/0", columns, "Steps")
+    cases = read_cases(tmp_path / "recordings", system)
+    outcome = diagnose(system, cases, out=tmp_path / "out", workers=1, report=lambda line: None)
+    (cause,) = outcome.diagnosis.causes
+    assert "k" in {cause.effect.name, *cause.confusable_with}
+    change = cause.parameters[cause.effect.size]
+    assert change.low < 0.1 < change.high < change.low + 0.03
 
 
 SENSORS = {

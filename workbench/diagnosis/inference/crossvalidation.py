@@ -4,6 +4,7 @@ Each recording is left out in turn; of a single recording, each of its parts. So
 (1974), J. R. Stat. Soc. B 36, 111-147.
 """
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -96,10 +97,17 @@ class CrossValidation:
         return self._extrapolated(fitted)
 
     def _refitted(self, fitted: FittedModel, part: int) -> Matrix:
-        """Whitened errors of one part, after a fit without it: laws may bend much within one."""
+        """Whitened errors of one part, after a fit without it: laws may bend much within one.
+
+        States at the start are those of the fit to all parts: later parts may not tell them, and
+        the first part would be predicted from a start that nobody has seen.
+        """
         hidden = self._fit.without(part)
         lin = hidden.refine(hidden.hide(fitted.linearised), fitted.active, _ROUNDS)
-        return self._fit.at(lin.point).residuals[0].errors[self._fit.blocks_of(part)]
+        starts = [name in self._fit.unknowns.starting for name in self._fit.unknowns.local]
+        seen = np.where(starts, fitted.point.deviations, lin.point.deviations)
+        point = replace(lin.point, deviations=seen)
+        return self._fit.at(point).residuals[0].errors[self._fit.blocks_of(part)]
 
     def _extrapolated(self, fitted: FittedModel) -> list[Matrix]:
         """Whitened errors of each recording, by one step from the fit to all of them."""

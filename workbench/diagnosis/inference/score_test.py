@@ -103,6 +103,11 @@ class ScoreTest:
         self._fit, self.joint, self._candidates = fit, joint, candidates
         self._stops = joint.stops()
         self._known = list(range(len(joint.known)))
+        unknowns = fit.unknowns
+        own = [
+            ("", f"own {j}") for j, name in enumerate(unknowns.local) if name in unknowns.starting
+        ]
+        self._starts = [joint.known.index(key) for key in own if key in joint.known]
         self.levels = joint.levels
         middle: dict[str, tuple[int, float]] = {}
         for effect, shape in candidates:
@@ -115,12 +120,17 @@ class ScoreTest:
             name: form for name, form in middle.items() if share[form[0]] > 2.0 * fit.decides.twin
         }
         alone = self._select({}, alone=True)
-        self._without, self._prior = _held_out(*alone), alone[1]
+        self._without, self._prior = _held_out(*alone, self._starts), alone[1]
         base = self._select({})
         total = add([*base[0], base[1]])
         best = minimum(total)
         self._reference, self._away = total.at(best), self._far(best)
         self._lacking = [form.at(minimum(form)) for form in _without_each(total, base[0])]
+
+    @property
+    def wrong(self) -> float:
+        """Chi-squared of errors where known unknowns do their best."""
+        return self._reference
 
     def _far(self, z: Vector) -> float:
         """Chi-squared of known unknowns against what is expected of them."""
@@ -208,7 +218,7 @@ class ScoreTest:
             gain=self._reference - total.at(best),
             by_levels=self._away - self._far(best),
             least=float(np.min(np.subtract(self._lacking, lacking))),
-            held_out=self._without - _held_out(alone, own_prior),
+            held_out=self._without - _held_out(alone, own_prior, self._starts),
             phases=phases,
         )
 
@@ -234,7 +244,28 @@ def _without_each(total: Quadratic, stops: Sequence[Quadratic]) -> list[Quadrati
     ]
 
 
-def _held_out(stops: Sequence[Quadratic], prior: Quadratic) -> Vector:
-    """Chi-squared of each stop at the optimum of the others, (K,)."""
+def _held_out(stops: Sequence[Quadratic], prior: Quadratic, starts: Sequence[int]) -> Vector:
+    """Chi-squared of each stop at the optimum of the others, (K,).
+
+    Parameters
+    ----------
+    starts : unknowns that are states at the start of a single recording, of which these are parts.
+        Each part is predicted with those that suit it: later parts may not tell how it began.
+    """
     others = _without_each(add([*stops, prior]), stops)
-    return np.array([stop.at(minimum(rest)) for stop, rest in zip(stops, others, strict=True)])
+    squares = []
+    for stop, rest in zip(stops, others, strict=True):
+        z = minimum(rest)
+        if starts:
+            own = add([stop, prior])
+            at_z = Quadratic(own.N, own.g + own.N @ z, 0.0, own.rows)
+            z[starts] += minimum(at_z.columns(_only(z, starts)))
+        squares.append(stop.at(z))
+    return np.array(squares)
+
+
+def _only(z: Vector, at: Sequence[int]) -> Matrix:
+    """Transform to some of the unknowns, (p, s)."""
+    transform = np.zeros((z.size, len(at)))
+    transform[at, range(len(at))] = 1.0
+    return transform

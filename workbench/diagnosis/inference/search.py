@@ -115,7 +115,7 @@ def _step(
     scores = tuple(score for score in trial.scores() if score.effect in catalogue)
     rivals: list[list[CandidateScore]] = []
     if len(best.active) < fit.decides.most:
-        rivals = _rivals(scores, best, fit.decides)
+        rivals = _rivals(scores, best, fit.decides, trial.wrong)
         if fit.free and not rivals:
             rivals = _predicting(scores, best, fit.decides)
         # Of a run that nothing corrects, sizes are far from where derivatives point.
@@ -520,16 +520,21 @@ def _predicting(
 
 
 def _rivals(
-    scores: Sequence[CandidateScore], best: FittedModel, decides: Thresholds
+    scores: Sequence[CandidateScore], best: FittedModel, decides: Thresholds, wrong: float
 ) -> list[list[CandidateScore]]:
     """Variants, best first, of effects that are large, significant and nearly as good as the best.
 
     While much is wrong, all is weighed against that, and little is significant: then a hint makes
     a rival, and its fit decides. Phases of an effect that turns explain something of any noise.
     What levels could stand for must be there without any one of the stops, too.
+
+    Parameters
+    ----------
+    wrong : chi-squared of what is wrong. Where few means last, it is small, and so is what an
+        effect explains of it: half of it is a hint, however few they are.
     """
     hinted = best.linearised.variance_factors.max() > decides.wrong
-    clear = decides.hint if hinted else decides.significant
+    clear = min(decides.hint, np.sqrt(0.5 * wrong)) if hinted else decides.significant
     able: dict[str, list[CandidateScore]] = {}
     for score in scores:
         phases = len(score.phases) if score.effect.order_locked else 0

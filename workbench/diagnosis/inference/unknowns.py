@@ -127,10 +127,10 @@ class Unknowns:
 
         Relative of a parameter, in its unit of a state at the start.
         """
-        return {**self._compare.tolerances, **self._starts}
+        return {**self._compare.tolerances, **self.starting}
 
     @cached_property
-    def _starts(self) -> dict[str, float]:
+    def starting(self) -> dict[str, float]:
         """Standard deviation of states at the start, in their units.
 
         What an output shows is as sure as the line that its first value is read from; a simulation
@@ -172,7 +172,7 @@ class Unknowns:
         """Least and greatest value of a parameter, SI."""
         variable = variables(effect, parameter)[0]
         declared = self._simulations.bounds[variable]
-        if effect.parameter in self._starts:
+        if effect.parameter in self.starting:
             middle = self._simulations.nominal.get(variable, 0.0)
             declared = declared[0] - middle, declared[1] - middle
         elif effect.parameter and parameter in effect.sizes:
@@ -240,7 +240,7 @@ class Unknowns:
             for part, value in parts.items():
                 names = variables(effect, part)
                 start = 0.0
-                if names[0] in self._starts:
+                if names[0] in self.starting:
                     start = values[names[0]]
                 elif part in effect.sizes:  # in the model that is diagnosed
                     nominal = self._simulations.nominal[names[0]] if effect.parameter else 0.0
@@ -253,13 +253,13 @@ class Unknowns:
         case = self._simulations.cases[k]
         if name in self._compare.levels:
             return point.levels[name, self.choice(name, case)]
-        if name in self._starts:
+        if name in self.starting:
             return self._simulations.begin[k].get(name, self._simulations.nominal.get(name, 0.0))
         return self._usual(name, case)
 
     def spread(self, point: Point, name: str, k: int, spread: float) -> float:
         """Standard deviation of a local deviation, in the parameter's or state's unit."""
-        return spread if name in self._starts else spread * self._middle(point, name, k)
+        return spread if name in self.starting else spread * self._middle(point, name, k)
 
     def shared(self, point: Point, name: str, k: int) -> float:
         """By how much a recording's own value moves with the common level."""

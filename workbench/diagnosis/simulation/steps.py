@@ -34,6 +34,9 @@ _BENT = 0.1  # share of rates by which the Jacobian may be wrong about them
 _FLAT = 1e-6  # change of a state in a step, relative to its nominal value, that is nothing
 _CLOSE = 1e-4  # of a step, that the last correction by Newton's method may be
 _ROUNDS, _HALVED = 40, 12  # of Newton's method; times that one of its corrections is halved
+# Parts of a step that is solved for: in ever more until the end moves by little of the step, for
+# how far a body goes before it stops within a step; a stop within one of the last is met to 1e-4.
+_FEWEST, _MOST_PARTS, _SETTLED = 2, 32, 1e-3
 _GAMMA = 1.0 - 1.0 / math.sqrt(2.0)
 
 
@@ -54,6 +57,7 @@ class Steps(NamedTuple):
     moved : (n,) rates where the first stage would lead explicitly; Newton's correction.
     k1, k2 : (n,) slopes of the two stages.
     begin, known, scale : (n,) of a step that is solved for: where it begins, the last guess, sizes.
+    coarse : (n,) end of it in half as many parts.
     picked : (p,) solution of a system of the stiff states.
     """
 
@@ -75,6 +79,7 @@ class Steps(NamedTuple):
     begin: Vector
     known: Vector
     scale: Vector
+    coarse: Vector
     picked: Vector
 
 
@@ -107,6 +112,7 @@ def steps(fmu: FMU, stiff: NDArray[np.intp], inputs: int) -> Steps:
         begin=np.zeros(n),
         known=np.zeros(n),
         scale=np.zeros(n),
+        coarse=np.zeros(n),
         picked=np.zeros(p),
     )
 
@@ -250,32 +256,63 @@ def step(model, work, h):  # type: ignore[no-untyped-def]
     if not bent or _solved(model, work, h):
         for i in range(n):
             model.x[i] = k2[i]
-    return set_time(model, work.time[0] + h) or set_states(model)
+    status = set_time(model, work.time[0] + h)
+    if bent:  # parts end with the inputs of theirs
+        for j in range(work.to.size):
+            model.u[j] = work.to[j]
+        status = status or set_inputs(model, 0, work.to.size)
+    return status or set_states(model)
 
 
 @compiled
 def _solved(model, work, h):  # type: ignore[no-untyped-def]
-    """Advance model.x from work.x by h [s], in two halves that are solved for; returns a status.
+    """Advance model.x from work.x by h [s], in parts that are solved for; returns a status.
 
-    Each half is a diagonally implicit Runge-Kutta step of two stages, L-stable and of order 2.
+    Their number is doubled until the end hardly moves. Where the last number cannot be solved for,
+    the one before stands.
+    """
+    parts, n = _FEWEST, model.x.size
+    if _in_parts(model, work, h, parts):
+        return 1
+    while parts < _MOST_PARTS:
+        parts *= 2
+        for i in range(n):
+            work.coarse[i] = model.x[i]
+        if _in_parts(model, work, h, parts):
+            for i in range(n):
+                model.x[i] = work.coarse[i]
+            break
+        moved = 0.0
+        for i in range(n):
+            moved = max(moved, abs(model.x[i] - work.coarse[i]) / work.scale[i])
+        if moved < _SETTLED:
+            break
+    return OK
+
+
+@compiled
+def _in_parts(model, work, h, parts):  # type: ignore[no-untyped-def]
+    """Advance model.x from work.x by h [s], in equal parts that are solved for; returns a status.
+
+    Each is a diagonally implicit Runge-Kutta step of two stages, L-stable and of order 2.
     Source: R. Alexander (1977), SIAM J. Numer. Anal. 14, 1006-1021.
     """
-    n, half = model.x.size, 0.5 * h
+    n, length = model.x.size, h / parts
     work.age[0] = _KEPT
     for i in range(n):
         model.x[i] = work.x[i]
-    for part in range(2):
+    for part in range(parts):
         for i in range(n):
             work.begin[i] = model.x[i]
         for stage in range(2):
-            share = 0.5 * (part + (_GAMMA if stage == 0 else 1.0))
+            share = (part + (_GAMMA if stage == 0 else 1.0)) / parts
             for j in range(work.to.size):
                 model.u[j] = work.from_[j] + share * (work.to[j] - work.from_[j])
             status = set_time(model, work.time[0] + share * h)
             if (
                 status
                 or set_inputs(model, 0, work.to.size)
-                or _implicit(model, work, _GAMMA * half)
+                or _implicit(model, work, _GAMMA * length)
             ):
                 return 1
             if stage == 0:
