@@ -66,6 +66,7 @@ def add(commands: arguments.Commands, text: str) -> argparse.ArgumentParser:
 
 def run(options: argparse.Namespace, output: Output) -> CommandResult:
     """Write the observer as an FMU, and the package."""
+    from workbench.errors import InputError
     from workbench.system.registry import load_system, model_path, open_model
     from workbench.system.system import REFERENCE
 
@@ -75,6 +76,16 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
 
     system = load_system(options.system)
     chosen = _choose(system, options.estimator, options.gains)
+    role = chosen.estimator.role
+    if not system.model(role).modelica:
+        raise InputError(
+            where=f"{system.source}, [models.{role}]",
+            found="an FMU, and no 'class'",
+            expected="the Modelica class of the model, which is compiled together with the "
+            "estimator",
+            remedy="put the Modelica library beside the system file and name its class. Without "
+            "source, estimators run in the workbench alone: workbench simulate",
+        )
     reference: Path | None = options.reference
     if reference is None and REFERENCE in system.models:
         reference = model_path(system, REFERENCE)
@@ -82,7 +93,7 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
     with (
         locked_folder(options.out),
         tempfile.TemporaryDirectory() as folder,
-        open_model(system, chosen.estimator.role) as fmu,
+        open_model(system, role) as fmu,
     ):
         estimator = chosen.estimator(fmu, system, chosen.gains)
         name = model_name(estimator).rpartition(".")[2]

@@ -33,8 +33,13 @@ from workbench.system.system import System
 
 
 def draw_observability(observability: CaseObservability, path: Path) -> None:
-    """Draw one recording to `path` (PNG): an input, then the bounds of quantities by model."""
-    draw_case(_figure(observability), [path])
+    """Draw one recording to `path` (PNG): an input, then the bounds of quantities by model.
+
+    Without either there is nothing to draw.
+    """
+    figure = _figure(observability)
+    if figure.panels:
+        draw_case(figure, [path])
 
 
 def write_windows(observability: CaseObservability, path: Path) -> None:
