@@ -610,6 +610,17 @@ def test_names_of_a_system_file_may_come_from_the_command_line(build, capsys):
     capsys.readouterr()
 
 
+def test_an_estimator_that_meets_an_event_at_once_leaves_the_others(build, capsys):
+    """The heating goes off 5 s after the first sample."""
+    path = build("TIMETABLE", start=595.0)
+    out, names = path.parent / "out", ("open_loop", "disturbance_observer")
+    given = ["--system", path.parent / "system.toml", recorded(path.parent), "--out", out]
+    chosen = [part for name in names for part in ("--estimator", name)]
+    assert main(["simulate", *map(str, given), *chosen, "--workers", "1"]) == 1
+    assert "open_loop.T [K]" in (out / "one.csv").read_text()
+    assert "disturbance_observer estimated nothing" in capsys.readouterr().err
+
+
 def test_a_recording_says_where_its_time_begins_for_the_model(build):
     """From 550 s of the timetable on, the heating goes off after 50 s, else after 600 s."""
     path = build("TIMETABLE")

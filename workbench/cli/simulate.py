@@ -7,13 +7,14 @@ import hashlib
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from workbench.cli import arguments
 from workbench.cli.output import CommandResult, Output, warn
-from workbench.errors import InputError
+from workbench.errors import FMUError, InputError
 from workbench.runtime.files import locked_folder, write_json
 from workbench.runtime.supervision import memory_limit
 
@@ -273,8 +274,9 @@ def _settings(simulation: Simulation, case: Case) -> dict[str, Any]:
     settings = {}
     with simulation.estimators() as running:
         for name, estimator in running.items():
-            estimator.run(case.time[:2], case.u[:2], case.y[:2])
-            settings[name] = estimator.settings()
+            with suppress(FMUError):  # of an event: its run on the recording says so
+                estimator.run(case.time[:2], case.u[:2], case.y[:2])
+                settings[name] = estimator.settings()
     return {name: setting for name, setting in settings.items() if setting}
 
 
