@@ -289,6 +289,17 @@ SAMPLES: dict[str, tuple[Callable[[Table], Table], str]] = {
         lambda t: held(t, SPEEDS[0], 57.7, 2000, 2001),
         r"line 2002, column 'omegaW': found 57\.7 rad/s at 10 s, beside .* and 0 more such",
     ),
+    "a wheel speed of three samples": (
+        lambda t: {
+            **t,
+            SPEEDS[0]: t[SPEEDS[0]] + 5.0 * (np.abs(np.arange(len(t[SPEEDS[0]])) - 1500) < 2),
+        },
+        r"line 1501, column 'omegaW': found .* at 7\.495 s, beside .* and 2 more such",
+    ),
+    "a first speed of another time": (
+        lambda t: held(t, SPEEDS[1], 3.0, 0, 1),
+        r"line 2, column 'omegaR': found 3 rad/s at 0 s, beside .* and 0 more such",
+    ),
     "a pressure that drops out": (
         lambda t: held(t, "pB [bar]", 0.0, 1500, 1503),
         r"line 1502, column 'pB': found .* bar at 7\.5 s, beside .* and \d more such samples",

@@ -7,9 +7,11 @@ and times between samples.
 
 from collections.abc import Iterator, Mapping, Set
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from workbench.arrays import Vector
 from workbench.errors import InputError
@@ -24,6 +26,7 @@ _FINE = 4.0  # steps of a signal in the standard deviation of its noise
 _BY_CHANCE = 1e-3  # runs that noise alone makes in a recording
 _BESIDE, _ALONE = 10, 3.0  # samples on each side, and times those that one among them stands out
 _JUDGED = 50  # samples that say how a signal moves
+_SHORT = 10  # samples that a loose contact or a lost word takes; machines that move so are slower
 # Standard deviations that no noise reaches out and back, see `Soundness.spike` of a diagnosis.
 _BEYOND = 8.0
 _CONTRADICTS = 300.0  # times the usual step: the unit of the time is another one
@@ -280,6 +283,8 @@ def _jumps(
         outwards = np.sign(before)
         wrong[2:-1] &= outwards[1:] * (before[1:] - before[:-1]) > limit
         wrong[1:-2] &= outwards[:-1] * (after[:-1] - after[1:]) > limit
+        if any(output.name == name for output in system.outputs):  # an input may be a short pulse
+            wrong |= _excursions(read, noise)
         # Of n samples that repeat with a chance p, n p^(k - 1) runs of k are expected.
         repeats = known.size - read.size - (lengths.max() - 1)
         chance = max(repeats, 1) / known.size
@@ -303,6 +308,25 @@ def _jumps(
             f"no {_JUDGED} equal samples",
             "check the sensor; a diagnosis sets such samples aside, estimators do not",
         )
+
+
+def _excursions(read: Vector, noise: float) -> NDArray[np.bool_]:
+    """Samples between two steps, out and back, or before a first one or after a last, (n,).
+
+    Both steps stand out of what the signal does beside them, and of 99 of 100 steps.
+    """
+    steps = np.abs(np.diff(read))
+    large = np.flatnonzero(steps > _BEYOND * max(noise, float(np.quantile(steps, 0.99))))
+    wrong = np.zeros(read.size, np.bool_)
+    for out, back in pairwise([-1, *large, steps.size]):
+        edges = [edge for edge in (out, back) if 0 <= edge < steps.size]
+        rises = np.sign(read[np.array(edges, int) + 1] - read[edges])
+        if back - out > (_SHORT if len(edges) == 2 else 1) or rises.sum() * (len(edges) - 1):
+            continue
+        beside = np.arange(max(edges[0] - _BESIDE, 0), min(edges[-1] + _BESIDE + 1, steps.size))
+        others = steps[np.setdiff1d(beside, edges)].max()
+        wrong[out + 1 : back + 1] = steps[edges].min() > _ALONE * others
+    return wrong
 
 
 def _sampling(time: Vector, system: System, origin: Origin) -> Iterator[_Finding]:
