@@ -478,7 +478,9 @@ class Arena:
     def points(self, domain: int) -> Iterator[tuple[int, ...]]:
         """Walk a domain of loop indices, binding each; yields the positions from 0."""
         binders = self.domains[domain]
-        ranges = [range(b["lower"], b["upper"] + 1, b["step"]) for b in binders]
+        ranges = [
+            range(b["lower"], b["upper"] + (1 if b["step"] > 0 else -1), b["step"]) for b in binders
+        ]
         for position in np.ndindex(*(len(r) for r in ranges)):
             for ordinal, (binder, at) in enumerate(zip(ranges, position, strict=True)):
                 self.binders[domain, ordinal] = binder[at]

@@ -21,12 +21,14 @@ from workbench.errors import InputError
 from workbench.models.compiler.expressions import BINARY, NO_EVENT, REWRITE, Arena, Value, each
 from workbench.models.modelica import Library, check, files, packages, read_library
 from workbench.models.modelica.classes import Class, Component, Modifier
+from workbench.models.modelica.source import EXPERIMENT
 from workbench.runtime.supervision import blaming, limited_memory, quiet_panics
 
 SCHEMA = 43
 # Bytes beyond which the front end overflows; 65 MB do for the reference model.
 _MEMORY = 2 << 30
 
+_EXPORT = "export the model as an FMU from another Modelica tool, and use that FMU"
 # What the front end says, and what to do about it; the first that fits.
 _REMEDIES = (
     (r"der\(\.\.\.\) must have exactly one", "name what is differentiated: e = ...; and der(e)"),
@@ -39,6 +41,11 @@ _REMEDIES = (
     (r"shape mismatch", "make the sizes of both sides equal; '.+' adds a scalar to an array"),
     (r"initial algorithm", "write it as an initial equation"),
     (r"function loop reduction", "use a for loop of constant length"),
+    (r"function loop domain", "loop over a range of whole numbers, such as 1:3"),
+    (
+        r"function (statement|return)",
+        f"use for loops of constant length and if-expressions, or {_EXPORT}",
+    ),
     (r"for-equation range", "loop over a range of numbers, such as 1:3"),
     (r"declarative algorithm", "write equations, or a function with this algorithm"),
     (r"violates constrainedby", "extend a common class, and name it after 'constrainedby'"),
@@ -47,8 +54,25 @@ _REMEDIES = (
         "add the missing equation or remove the one too many; inputs of components need a value",
     ),
     (r"not a discrete-time expression", "use a Real, or an if-expression inside noEvent(...)"),
+    (r"^unexpected `:?=`", "write '=' in equations, and ':=' in algorithms and functions"),
+    (r"^unexpected", "correct it; a ';', a bracket or an 'end' may be missing there or above it"),
+    (r"exponentiation", "put brackets: (a^b)^c, or a^(b^c)"),
+    (r"state-machine", f"write it as equations without modes, or {_EXPORT}"),
+    (r"`spatialDistribution`", f"write it as volumes in a row, or {_EXPORT}"),
+    (
+        r"unresolved Flat reference",
+        "correct the name; a component whose condition is false has no variables",
+    ),
+    (r"without elements", "give the array one element at least, or remove it"),
     (r"unresolved|not found|undefined", "correct the name"),
     (r"unsupported|no checked canonical|rejected", REWRITE),
+)
+
+
+_CALLED = re.compile(r"([A-Za-z_][\w.]*)\s*\(")
+_MAYBE_MISREAD = re.compile(r"\bterminate\s*\(|\bhomotopy\s*\(\s*simplified\b|,\s*\w+\s+in\b")
+_MISREAD = re.compile(
+    r"\bterminate\s*\(|\bhomotopy\s*\(\s*simplified\b|[([{}\])]|\bfor\b|,(?=\s*\w+\s+in\b)"
 )
 
 
@@ -139,6 +163,7 @@ def flatten(package: Path, model: str) -> FlatModel:
     library = read_library(package)
     reached = check(library, model)
     _refuse_dropped(library, reached)
+    _refuse_misread(library, reached)
     source = library.find(model)
     if source.partial or source.kind in ("package", "function", "type", "connector", "record"):
         raise InputError(
@@ -160,6 +185,8 @@ def flatten(package: Path, model: str) -> FlatModel:
             dae = rumoca.Session(roots=roots).load(str(package), model=model).to_dict("dae")
     except rumoca.RumocaError as error:
         drawn = _diagnostics(package, model)
+        if drawn and re.search("exponentiation|state-machine", drawn[1]):  # of file or model
+            drawn = _placed(library, reached, source, drawn[1])
         place, message = drawn or _placed(library, reached, source, str(error))
         raise _front_end_refusal(place, message) from None
     except BaseException as panic:  # a panic of the front end is no Exception
@@ -212,15 +239,20 @@ def _diagnostics(package: Path, model: str) -> tuple[str, str] | None:
     messages: dict[str, str] = {}
     for diagnostic in diagnostics:
         # Syntax errors carry their place in a drawing, all others as attributes.
-        drawn = re.findall(r"\u00d7 (.+?)\n\s*\u256d\u2500\[(.+?)\]", diagnostic.message)
+        drawn = re.findall(
+            r"\u00d7 (.+?(?:\n\s*\u2502.*?)*)\n\s*\u256d\u2500\[(.+?)\]", diagnostic.message
+        )
         for message, place in drawn:
-            messages.setdefault(place.rpartition(":")[0], message)
+            words = " ".join(re.sub(r"\n\s*\u2502", " ", message).split())
+            messages.setdefault(place.rpartition(":")[0], words)
         if not drawn and diagnostic.line is not None:
             place = f"{diagnostic.file or package}:{diagnostic.line}"
             messages.setdefault(place, diagnostic.message.strip())
     if not messages:
         return None
     first, *others = messages.items()
+    if first[1].startswith("unexpected"):  # what follows is its consequence
+        return first
     return first[0], "; ".join([first[1], *(f"{place}: {text}" for place, text in others)])
 
 
@@ -232,6 +264,8 @@ def _placed(library: Library, reached: Sequence[str], source: Class, text: str) 
     """
     message = re.sub(r"^\w+ failed: \S+ failed in \w+: ", "", text.split("\n")[0])
     message = message.split(";")[0]
+    if untyped := re.search(r'MissingEffectiveType \{ owner: VarName\("([^"]+)"\)', message):
+        message = f"`{untyped[1]}`, of no known type, as is an array without elements"
     if place := re.search(r" \[([^\[\]]+:\d+):\d+\]$", message):
         return place[1], message[: place.start()]
     quoted = re.findall(r"`([^`]+)`", message)
@@ -239,6 +273,10 @@ def _placed(library: Library, reached: Sequence[str], source: Class, text: str) 
         patterns = [r"\bder\s*\((?!\s*[\w.]+(\[[\w,:]*\])?\s*\))"]
     elif "for-equation range" in message:
         patterns = [r"\bfor\s+\w+\s+in\s+(?!\d+\s*:)"]
+    elif "exponentiation" in message:
+        patterns = [r"\^\s*[\w.]+\s*\^"]
+    elif "state-machine" in message:
+        patterns = [r"\binitialState\s*\("]
     elif "missing source scope" in message:
         patterns = [r"\(\s*,"]
     elif "unbalanced model" in message:
@@ -301,8 +339,11 @@ class _Reader:
             if entry["role"] == "state":
                 self.arena.rates[number] = each(lambda s: ca.SX.sym(f"der({s.name()})"), symbol)
         free, bound = self._bind_parameters()
-        substitute = _substitution(bound)
+        substitute = _substitution([pair[1:] for pair in bound])
         numeric = self._numbers(free, substitute)
+        for number, _, binding in bound:
+            for element in binding.flat:
+                numeric(element, self.variables[number])  # refuses what is no parameter
         groups: dict[str, list[FlatVariable]] = {"state": [], "algebraic": [], "input": []}
         outputs, input_equations = [], []
         for number, entry in enumerate(self.variables):
@@ -317,7 +358,8 @@ class _Reader:
             if self._interface_causality(entry) == "output":
                 outputs += [v.name for v in scalars]
         parameters = [v for n in free for v in self._scalars(n, substitute, numeric)]
-        _refuse_outside(parameters)
+        _refuse_outside("parameter", parameters)
+        _refuse_outside("the start of", [v for v in groups["state"] if v.fixed and v.has_start])
         tunable = [
             self.variables[n]["attributes"]["is_tunable"]
             for n in free
@@ -432,14 +474,22 @@ class _Reader:
         for part in [body] if kind == "not" else body.values() if kind in ("and", "or") else []:
             yield from self._relations(part)
 
-    def _bind_parameters(self) -> tuple[list[int], list[Any]]:
-        """Split into free parameters and (symbols, expression) pairs of bound ones."""
+    def _bind_parameters(self) -> tuple[list[int], list[tuple[int, Value, Value]]]:
+        """Split into free parameters and (number, symbols, expressions) of bound ones."""
         free: list[int] = []
-        bound: list[tuple[Value, Value]] = []
+        bound: list[tuple[int, Value, Value]] = []
         for number, entry in enumerate(self.variables):
             text = self.arena.types[entry["value_type"]]["scalar"] == "string"
             if entry["role"] not in ("parameter", "constant") or text:
                 continue
+            unset = entry["attributes"]["binding"] is None and not self.arena.has_start(number)
+            if entry["role"] == "constant" and unset:
+                raise self.arena.refuse(
+                    f"constant '{entry['name']}' without a value",
+                    entry,
+                    "constants with values",
+                    "give its value, or make it a parameter",
+                )
             if entry["attributes"]["fixed"] == [False]:
                 raise self.arena.refuse(
                     f"parameter '{entry['name']}' with fixed = false",
@@ -451,34 +501,50 @@ class _Reader:
             constant = all(element.is_constant() for element in binding.flat)
             if entry["role"] == "parameter" and constant and not self.arena.is_structural(number):
                 free.append(number)
-                if entry["attributes"]["binding"] is None and not self.arena.has_start(number):
+                if unset:
                     self.notes.append(
                         f"{self.arena.place(entry)}: parameter '{entry['name']}' has neither a "
                         "value nor a start, and is 0."
                     )
             else:
-                bound.append((self.arena.symbols[number], binding))
+                bound.append((number, self.arena.symbols[number], binding))
         return free, bound
 
     def _numbers(
         self, free: list[int], substitute: Callable[[ca.SX], ca.SX]
-    ) -> Callable[[ca.SX], float]:
-        """A function that evaluates expressions of parameters at their default values."""
+    ) -> Callable[[ca.SX, Mapping[str, Any]], float]:
+        """A function that evaluates expressions of parameters at their default values.
+
+        It refuses an expression of what is no parameter, at the entry that has it.
+        """
         symbols, values = [], []
         for number in free:
             symbols += list(self.arena.symbols[number].flat)
             values += list(self.arena.default(number).flat)
         free_symbols, defaults = ca.vertcat(*symbols), ca.vertcat(*values)
 
-        def number_of(expression: ca.SX) -> float:
+        def number_of(expression: ca.SX, entry: Mapping[str, Any]) -> float:
             if expression.is_constant():  # most are, and models have thousands
                 return float(expression)
-            return float(ca.evalf(ca.substitute(substitute(expression), free_symbols, defaults)))
+            value = ca.substitute(substitute(expression), free_symbols, defaults)
+            if varying := ca.symvar(value):
+                raise self.arena.refuse(
+                    f"'{entry['name']}' with a value, a start or a limit that depends on "
+                    f"'{varying[0].name()}'",
+                    entry,
+                    "one that parameters alone give",
+                    f"declare '{varying[0].name()}' a parameter, or write an equation or an "
+                    f"initial equation for '{entry['name']}'",
+                )
+            return float(ca.evalf(value))
 
         return number_of
 
     def _scalars(
-        self, number: int, substitute: Callable[[ca.SX], ca.SX], numeric: Callable[[ca.SX], float]
+        self,
+        number: int,
+        substitute: Callable[[ca.SX], ca.SX],
+        numeric: Callable[[ca.SX, Mapping[str, Any]], float],
     ) -> list[FlatVariable]:
         entry = self.variables[number]
         attributes = entry["attributes"]
@@ -490,7 +556,7 @@ class _Reader:
             return list(np.broadcast_to(self.arena.evaluate(node), symbol.shape).flat)
 
         def numbers(name: str) -> list[float | None]:
-            return [None if e is None else numeric(e) for e in elements(attributes[name])]
+            return [None if e is None else numeric(e, entry) for e in elements(attributes[name])]
 
         starts = elements(attributes["start"])
         if entry["role"] == "parameter":
@@ -513,7 +579,7 @@ class _Reader:
             FlatVariable(
                 name=s.name(),
                 symbol=s,
-                start=0.0 if start is None else numeric(start),
+                start=0.0 if start is None else numeric(start, entry),
                 unit=attributes["unit"],
                 description=attributes["description"],
                 minimum=minimum,
@@ -592,7 +658,7 @@ class _Reader:
             try:
                 numbers[name] = float(text)
             except ValueError:
-                if name not in ("StartTime", "StopTime", "Tolerance", "Interval"):
+                if name not in EXPERIMENT:
                     continue
                 raise InputError(
                     where=self.source.where,
@@ -603,17 +669,17 @@ class _Reader:
         return numbers
 
 
-def _refuse_outside(parameters: Sequence[FlatVariable]) -> None:
-    """Refuse a value of a parameter that its own limits exclude."""
-    for parameter in parameters:
-        low, high = parameter.minimum, parameter.maximum
-        if (low is not None and parameter.start < low) or (
-            high is not None and parameter.start > high
+def _refuse_outside(what: str, variables: Sequence[FlatVariable]) -> None:
+    """Refuse a value of a parameter, or a start of a state, that its own limits exclude."""
+    for variable in variables:
+        low, high = variable.minimum, variable.maximum
+        if (low is not None and variable.start < low) or (
+            high is not None and variable.start > high
         ):
             limits = {"min": low, "max": high}
             raise InputError(
-                where=parameter.place,
-                found=f"parameter '{parameter.name}' = {parameter.start:g}",
+                where=variable.place,
+                found=f"{what} '{variable.name}' = {variable.start:g}",
                 expected=" and ".join(f"{k} = {v:g}" for k, v in limits.items() if v is not None),
                 remedy="correct the value, or its limits",
             )
@@ -649,6 +715,61 @@ def _refuse_dropped(library: Library, reached: Iterable[str]) -> None:
                 _refuse_values(_inside(modification))
             if "outer" in component.prefixes:
                 _refuse_outer(component)
+
+
+def _refuse_misread(library: Library, reached: Iterable[str]) -> None:
+    """Refuse what the front end drops or turns round.
+
+    These are terminate(...) in an if-equation, homotopy(simplified = ..., actual = ...), and
+    {a for i in u, j in v}.
+
+    The first iterator of an array constructor is the innermost (spec 10.4.1.1); the front end
+    takes it for the outermost.
+    """
+    own = set(map(str, files(library.file)))
+    waiting = [name for name in reached if library.classes[name].where.rpartition(":")[0] in own]
+    for name in waiting:
+        file, _, line = library.classes[name].where.rpartition(":")
+        text = "\n".join(_own_lines(library.classes[name]))
+        for called in dict.fromkeys(_CALLED.findall(text)):
+            function = None
+            with contextlib.suppress(InputError):  # a part of a component, whose name a class has
+                function = library.classes.get(library.resolve(called, name))
+            if function is not None and function.kind == "function":
+                waiting += [function.name] * (function.name not in waiting)
+        if not _MAYBE_MISREAD.search(text):
+            continue
+        brackets: list[str] = []
+        for match in _MISREAD.finditer(text):
+            word = match[0]
+            where = f"{file}:{int(line) + text[: match.start()].count(chr(10))}"
+            if word.startswith("homotopy"):
+                raise InputError(
+                    where=where,
+                    found="homotopy(simplified = ..., actual = ...)",
+                    expected="'actual' first, as the Modelica front end takes the first argument",
+                    remedy="write homotopy(actual = ..., simplified = ...)",
+                )
+            if word.startswith("terminate"):
+                raise InputError(
+                    where=where,
+                    found="terminate(...)",
+                    expected="continuous equations without events",
+                    remedy=f"remove it, assert its contrary, or {_EXPORT}",
+                )
+            if word in "([{":
+                brackets.append(word)
+            elif word in ")]}":
+                del brackets[-1:]
+            elif word == "for" and brackets:
+                brackets[-1] += word
+            elif word == "," and brackets[-1:] == ["{for"]:
+                raise InputError(
+                    where=where,
+                    found="an array constructor with several iterators",
+                    expected="one iterator, as the Modelica front end takes them in another order",
+                    remedy="nest them: {a for i in u, j in v} is {{a for i in u} for j in v}",
+                )
 
 
 def _refuse_outer(component: Component) -> None:

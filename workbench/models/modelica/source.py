@@ -42,6 +42,7 @@ _KEYWORDS = KINDS | CLASS_PREFIXES | PREFIXES | SECTIONS | OPERATORS | {
 }
 # fmt: on
 VENDOR = "__Workbench"
+EXPERIMENT = ("StartTime", "StopTime", "Interval", "Tolerance")
 _BLOCKS = frozenset({"if", "for", "when", "while"})
 _PROPAGATION = frozenset({"each", "final"})
 DEEPEST = 100  # brackets or classes within each other; people give up long before
@@ -77,7 +78,10 @@ class Cursor:
             match = _TOKEN.match(text, at)
             if match is None:
                 self._tokens = [Token("error", text[at:].split("\n")[0][:30], at, at)]
-                raise self.refusal("Modelica; a string or a comment may lack its end")
+                raise self.refusal(
+                    "Modelica, whose names have the letters a to z; a string or a comment may lack "
+                    "its end"
+                )
             if match.lastgroup != "gap":
                 self._tokens.append(Token(str(match.lastgroup), match[0], at, match.end()))
                 depth += (match[0] in CLOSING) - (match[0] in CLOSING.values())
@@ -553,19 +557,27 @@ class Reader(Cursor):
             elif self.sees("experiment") and self.following.text == "(":
                 self.advance()
                 annotation.experiment = self._texts()
-            elif get_close_matches(self.token.text.lower(), [VENDOR.lower()], cutoff=0.8):
-                raise self.refusal(f"'{VENDOR}'")
             else:
+                self._refuse_misspelled(VENDOR, "experiment")
                 self.skip(",", ")")
             if not self.sees(")"):
                 self.expect(",")
         return annotation
 
+    def _refuse_misspelled(self, *known: str) -> None:
+        """Refuse a name that is nearly one of some: nobody would read it."""
+        names = {name.lower(): name for name in known}
+        if self.token.text in known:
+            return
+        if near := get_close_matches(self.token.text.lower(), names, n=1, cutoff=0.8):
+            raise self.refusal(f"'{names[near[0]]}'")
+
     def _texts(self) -> dict[str, str]:
-        """Values by name, as they are written."""
+        """Values of an experiment by name, as they are written."""
         texts: dict[str, str] = {}
         self.expect("(")
         while not self.took(")"):
+            self._refuse_misspelled(*EXPERIMENT)
             name = self.identifier()
             texts[name] = self.skip(",", ")").removeprefix("=").strip()
             self.took(",")
