@@ -610,6 +610,17 @@ def test_names_of_a_system_file_may_come_from_the_command_line(build, capsys):
     capsys.readouterr()
 
 
+def test_observability_says_what_the_fmu_warns_of(build, capsys):
+    path = build("RELAYS", flags=["-DWARNS=1"])
+    file = recorded(path.parent) / "measured.csv"
+    file.write_text(file.read_text().replace(",291.", ",293."))  # K: half are above its table
+    given = ["--system", path.parent / "system.toml", "--out", path.parent / "out"]
+    assert main(["observability", *map(str, [file.parent, *given])]) == 0
+    assert re.search(
+        r"one: the FMU Room.fmu warned \d+ times, first: T is", capsys.readouterr().out
+    )
+
+
 def test_an_estimator_that_meets_an_event_at_once_leaves_the_others(build, capsys):
     """The heating goes off 5 s after the first sample."""
     path = build("TIMETABLE", start=595.0)

@@ -93,7 +93,7 @@ def write_observability(
             result.case.name: {
                 "title": result.case.title,
                 "judged_windows": int(result.judged.sum()),
-                "warnings": _guesses(result),
+                "warnings": _warnings(result),
                 **{f"median_{name}": value for name, value in _medians(result).items()},
                 "models": {test.model: _shares(test, result) for test in result.tests},
             }
@@ -103,10 +103,11 @@ def write_observability(
     write_json(path, with_answer(observability_answer(system, summary), summary))
 
 
-def _guesses(result: CaseObservability) -> list[str]:
-    """What the whole recording does not tell, or not apart."""
-    known = result.information
-    return [] if known is None else guesses(known.inseparable, known.untold)
+def _warnings(result: CaseObservability) -> list[str]:
+    """What the FMU warned of, and what the whole recording does not tell, or not apart."""
+    known, warned = result.information, result.run.message
+    untold = [] if known is None else guesses(known.inseparable, known.untold)
+    return [warned, *untold] if warned else untold
 
 
 def _linear(test: LinearTest) -> dict[str, Any]:
@@ -155,7 +156,7 @@ def format_observability(
     """Table for the terminal: linear test by model and state, shares of judged time by case."""
     return "\n".join(
         [
-            *(f"{result.case.name}: {text}." for result in done for text in _guesses(result)),
+            *(f"{result.case.name}: {text}." for result in done for text in _warnings(result)),
             *_linear_lines(system, linear),
             "",
             *_case_lines(system, done),
