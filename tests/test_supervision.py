@@ -181,7 +181,7 @@ def test_a_recording_that_does_not_fit_is_refused_before_the_work(home):
             table.write(f"{number * 0.005:.3f},{row}\n")
     command = ("simulate", "long", "--estimator", "open_loop", "--out", "out")
     run = subprocess.run(
-        ["bash", "-c", f"ulimit -d 700000; {sys.executable} -m workbench {' '.join(command)}"],
+        ["bash", "-c", f"ulimit -d 400000; {sys.executable} -m workbench {' '.join(command)}"],
         cwd=home,
         env={**os.environ, "PYTHONPATH": str(ROOT)},
         capture_output=True,
@@ -189,7 +189,7 @@ def test_a_recording_that_does_not_fit_is_refused_before_the_work(home):
         check=False,
     )
     assert run.returncode == 2, run.stderr
-    assert "found 400000 samples, whose run takes about 732 MB; expected what fits" in run.stderr
+    assert "found 400000 samples, whose run takes about 402 MB; expected what fits" in run.stderr
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a full device")

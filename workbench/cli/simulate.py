@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 WORKERS_NEED = ("workbench.observers.simulation", "workbench.observers.report")
 
 # That a run holds at its peak for each number of the recording: measured, EKF of the wheelset.
-_NUMBERS = 40
+_NUMBERS = 22
 # Numbers of all estimates that are written as CSV unasked: 20 MB, of ten characters each. What is
 # larger opens slowly in the programs that people read CSV with.
 _SMALL = 2_000_000
