@@ -5,6 +5,7 @@ recordings come from equations of their own and an integrator with error control
 """
 
 import json
+import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -34,6 +35,7 @@ from .built import declare, machine, write_case
 LIBRARY, SYSTEM = machine("fan")
 J, K, DRAG, R, ALPHA, C, G = 0.02, 0.5, 5.3e-4, 1.0, 3.9e-3, 40.0, 0.4  # nominal drag is 5e-4
 STEP, SECONDS, HOLD = 0.02, 60.0, 5.0  # [s]
+GREASE = 1e-3  # [N.m.s/rad]
 FRICTION = 0.05  # [N.m] planted: a tenth of what the fan takes at 30 rad/s
 
 Torque = Callable[[float, float], float]
@@ -169,21 +171,24 @@ def test_a_logger_of_the_system_file_that_is_late_is_named(fan, tmp_path):
 
 
 @pytest.fixture(scope="module")
-def bounded(once) -> tuple[Outcome, Path]:
+def bounded(once) -> Callable[[Torque], tuple[Outcome, Path]]:
     """A bearing that rubs by more than its class allows, and brushes that cannot stand for it."""
     library = LIBRARY.replace("min=0.0, max=1.0", f"min=0.0, max={0.6 * FRICTION}")
 
-    def run(folder: Path) -> tuple[Outcome, Path]:
-        system = declare(folder, library.replace("max=3.0", "max=0.06"), SYSTEM)
-        cases = recorded(folder / "recordings", system, rubbing)
-        return diagnosis(system, cases, folder / "results"), folder / "results"
+    def run(load: Torque) -> tuple[Outcome, Path]:
+        def diagnose_load(folder: Path) -> tuple[Outcome, Path]:
+            system = declare(folder, library.replace("max=3.0", "max=0.06"), SYSTEM)
+            cases = recorded(folder / "recordings", system, load)
+            return diagnosis(system, cases, folder / "results"), folder / "results"
 
-    return once("fan beyond bounds", run)
+        return once(f"fan beyond bounds, {load.__name__}", diagnose_load)
+
+    return run
 
 
 def test_a_cause_beyond_its_bound_is_told_with_it(bounded):
     """And not two causes, of which one stands for what the other may not be."""
-    outcome, out = bounded
+    outcome, out = bounded(rubbing)
     assert outcome.diagnosis.verdict == "partly explained"
     (cause,) = outcome.diagnosis.causes
     friction = cause.parameters["tau_c"]
@@ -198,6 +203,24 @@ def test_a_cause_beyond_its_bound_is_told_with_it(bounded):
     assert f"doubt: {doubt}" in outcome.summary()
     assert "at its limit of 0.03 N.m" in doubt
     assert any("widens the intervals" in other for other in others)
+
+
+def greasy(t: float, w: float) -> float:
+    """A bearing that rubs, and is stiff with grease."""
+    return rubbing(t, w) + GREASE * w
+
+
+def test_beside_a_cause_beyond_its_bound_no_other_stands_for_it(bounded):
+    """Else the grease has the rest of the friction in it, and an interval far from its size."""
+    outcome, _ = bounded(greasy)
+    assert outcome.diagnosis.verdict == "unexplained"
+    (nearest,) = outcome.diagnosis.nearest
+    assert set(nearest.effects) == {"BearingFriction", "Grease"}
+    said = re.search(
+        r"tau_c of BearingFriction is at its bound; ([0-9.]+) N.m, beyond", nearest.text
+    )
+    assert float(said[1]) == pytest.approx(FRICTION, rel=0.05)
+    assert "widen the bounds" in outcome.summary()
 
 
 def windy(t: float, w: float) -> float:

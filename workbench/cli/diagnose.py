@@ -133,8 +133,7 @@ def _run(options: argparse.Namespace, output: Output, problem: Problem) -> Comma
         every_platform=options.platforms == "all",
         certainty=options.certainty,
     )
-    if not options.propose:
-        outcome = compared_with_one_law(outcome, problem, engine)
+    outcome = compared_with_one_law(outcome, problem, engine)
     with open_model(system) as model:
         provenance = {
             "run": run_of("diagnose", system, sources([*cases, *held_out])),

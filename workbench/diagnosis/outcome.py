@@ -56,6 +56,11 @@ class Extension:
     fmu: Path
     difference: float
 
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """All of them."""
+        return (self.fmu,) if self.modelica is None else (self.modelica, self.fmu)
+
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
@@ -199,11 +204,10 @@ class Outcome:
             if size.limit
         ]
         if self.one_law:
-            names = " and ".join(cause.effect.name for cause in diagnosis.causes)
             limits.insert(
                 0,
-                f"One law explains as much as {names} with less: {self.one_law}. Ask for its form "
-                "with --propose before you trust several causes.",
+                f"One law explains as much as {' and '.join(diagnosis.best.names)} with less: "
+                f"{self.one_law}. Ask for its form with --propose.",
             )
         named = {name for cause in diagnosis.causes for name in variables(cause.effect, "")}
         limits = [f"{self.warned}."] * bool(self.warned) + limits
@@ -295,8 +299,7 @@ class Outcome:
         lines += ["", *self._sample_errors()]
         if self.extension is not None:
             part = " (a part of what is missing)" * (self.diagnosis.verdict == "partly explained")
-            files = [str(f) for f in (self.extension.modelica, self.extension.fmu) if f is not None]
-            lines += ["", f"extended model{part}: {', '.join(files)}"]
+            lines += ["", f"extended model{part}: {', '.join(map(str, self.extension.files))}"]
         aside = sum(counts[FAULTY] + counts[MISSING] for counts in self.set_aside.values())
         if aside:
             lines.append(f"{aside} samples were missing or wrong, and are excluded")

@@ -135,10 +135,12 @@ def select(
             if frozenset(fit.active) not in exchanged
         ]
         better = min(replaced, key=lambda model: beyond(model, best), default=best)
-        if interrupted or beyond(best, better) < fit.decides.needed:
+        fewer = [model for model in replaced if _needs_fewer(fit, best, model)]
+        if interrupted or (beyond(best, better) < fit.decides.needed and not fewer):
             break
+        better = min(fewer, key=lambda model: beyond(model, best), default=better)
         exchanged.add(frozenset(better.active))
-        report(f"{better.active[-1].name} explains more than what it replaces")
+        report(f"{better.active[-1].name} explains more, or needs less, than what it replaces")
         best, trial, interrupted = forward_selection(fit, catalogue, better, steps, dropped, report)
     twins = {
         effect: dict(
@@ -168,6 +170,17 @@ def anew(fit: Fit, point: Point, active: tuple[Effect, ...]) -> FittedModel:
     # A point of its own, by which it is told from a fit to other samples.
     model = fitted(fit, fit.at(replace(point)), active)
     return replace(model, linearised=fit.linearise(model.linearised, active))
+
+
+def _needs_fewer(fit: Fit, best: FittedModel, model: FittedModel) -> bool:
+    """Whether a fit explains as much, with another effect beside which one of the causes is none.
+
+    An effect may do what two others do together, as of a supply that gives less: speed and current
+    that both are read as less.
+    """
+    *others, _ = model.active
+    sizes = ((abs(model.point.sizes[e.name, e.label]), e.matters) for e in others)
+    return beyond(model, best) < fit.decides.form and any(size < least for size, least in sizes)
 
 
 def _idle(

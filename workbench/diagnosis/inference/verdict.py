@@ -11,7 +11,11 @@ from scipy.stats import bootstrap
 from workbench.arrays import Matrix, Vector
 from workbench.diagnosis.effects.candidates import LAG, SHARES
 from workbench.diagnosis.effects.catalogue import Effect
-from workbench.diagnosis.inference.discrepancy import correlated_deviations, share_by_form
+from workbench.diagnosis.inference.discrepancy import (
+    correlated_deviations,
+    hidden_by_noise,
+    share_by_form,
+)
 from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.linearized import Point
 from workbench.diagnosis.inference.nuisance import ShiftedLevel, hidden_effects, shifted_levels
@@ -215,14 +219,42 @@ class Diagnosis:
     hidden: Mapping[str, tuple[str, ...]]
     shifted: tuple[ShiftedLevel, ...]
 
+    def outdone(self, law: str) -> "Diagnosis":
+        """The diagnosis where one free law explains as much as several causes with less.
+
+        Several effects bend to much that is neither of them: then they are no answer.
+        """
+        assert self.gain is not None
+        before, after = self.gain.before**2 - 1.0, self.gain.after**2 - 1.0
+        removed = float(np.clip((before - after) / max(before, 1e-9), 0.0, 1.0))
+        reason = f"one law explains as much with less: {law}"
+        return replace(
+            self,
+            verdict="unexplained",
+            causes=(),
+            gain=None,
+            partial=self.best.names,
+            nearest=(NearestCandidate(self.best.names, removed, (reason,)),),
+            rivals=(),
+        )
+
 
 def conclude(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnosis:
-    """Diagnose a set of recordings."""
+    """Diagnose a set of recordings, in steps that what is found needs."""
+    diagnosis = _concluded(fit, catalogue, report)
+    best = diagnosis.best
+    if best.active and not diagnosis.interrupted and fit.settle(best.point):
+        report("again, in the finer steps that what was found needs")
+        return conclude(fit, catalogue, report)
+    return diagnosis
+
+
+def _concluded(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnosis:
     chosen, astray = _selected(fit, catalogue, report)
-    chosen = _fewest(fit, catalogue, chosen, report)
-    verdict = "unexplained" if astray else _verdict(fit, chosen)
+    chosen, outside = _within_bounds(fit, catalogue, chosen, report)
+    verdict: Verdict = "unexplained" if astray or outside else _verdict(fit, chosen)
     late = None
-    if verdict != "nothing" and not astray and not chosen.interrupted:
+    if verdict != "nothing" and not astray and not outside and not chosen.interrupted:
         report("clocks of signals by themselves")
         late = by_themselves(fit, chosen.base, chosen.best, clean=_clean(fit, chosen))
         if late is not None and (begun := _with_clock(fit, catalogue, chosen, late)) is not None:
@@ -231,7 +263,7 @@ def conclude(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnos
         verdict = _verdict(fit, chosen) if late is None else "unexplained"
     base, best = chosen.base, chosen.best
     gain, objections, noise_alone = None, list[str](), True
-    if best.active and late is None:
+    if best.active and late is None and not outside:
         report("held-out recordings")
         gain = _gain(fit, chosen)
         if not chosen.interrupted and (verdict == "unexplained" or len(best.active) > 1):
@@ -251,6 +283,10 @@ def conclude(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnos
             _cause(fit, chosen, effect, noise_alone=noise_alone)
             for effect in _strongest_first(fit, chosen, catalogue)
         ]
+        # What is left of errors may be all that a size stands for.
+        if not noise_alone and (unsure := _of_no_sign(causes)):
+            objections += unsure
+            verdict, causes, gain = "unexplained", [], None
         # Beside others, a part that bends as far as its effect allows stands for another law.
         if verdict == "partly explained" and len(causes) > 1 and (bent := _at_bounds(causes)):
             objections += bent
@@ -265,7 +301,7 @@ def conclude(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnos
     nearest: tuple[NearestCandidate, ...] = ()
     if verdict == "unexplained" and late is None:
         report("candidates that come nearest")
-        nearest = _nearest(fit, chosen, objections)
+        nearest = (outside,) if outside else _nearest(fit, chosen, objections)
     part_of = verdict == "partly explained" or best.names in [
         candidate.effects for candidate in nearest
     ]
@@ -336,28 +372,65 @@ def _selected_with(
     return select(fit, catalogue, sought, report)
 
 
-def _fewest(
+def _within_bounds(
     fit: Fit, catalogue: Sequence[Effect], chosen: Selection, report: Reporter
-) -> Selection:
-    """One cause alone, where others only stand for what it has beyond its bound."""
+) -> tuple[Selection, NearestCandidate | None]:
+    """What is left of causes where others only stand for what one has beyond its bound.
+
+    Returns
+    -------
+    chosen : that cause alone, if it needs no other beyond its bound; else as it was.
+    outside : all causes that recordings need if it may pass its bound, within which sizes of others
+        are wrong.
+    """
     best = chosen.best
-    if len(best.active) < 2 or chosen.interrupted:
-        return chosen
-    for effect in best.active:
-        size = best.point.sizes[effect.name, effect.label]
-        limit = binding_bound(fit, best, effect, effect.label)
-        if not limit or _set_by_nature(size, fit.unknowns.unit(effect, effect.size)):
-            continue
-        if _passed(fit, best, effect, effect.label, limit)[1]:
-            report(f"{effect.name} alone, which is at its bound")
-            start = fit.tried(_only(best, effect))
-            if start is None:
-                continue
-            alone, trial = examine(fit, fitted(fit, start, (effect,)), catalogue, report)
-            steps = list(chosen.steps)
-            selection = ForwardSelection(alone, steps, trial, interrupted=True, begun=None)
-            return replace(select(fit, catalogue, selection, report), interrupted=False)
-    return chosen
+    held = {
+        effect: limit
+        for effect in best.active
+        if (limit := binding_bound(fit, best, effect, effect.label))
+        and not _set_by_nature(
+            best.point.sizes[effect.name, effect.label], fit.unknowns.unit(effect, effect.size)
+        )
+    }
+    if len(best.active) < 2 or chosen.interrupted or not held:
+        return chosen, None
+    other = fit
+    for effect, limit in held.items():
+        other = other.opened(effect, effect.size, limit)
+    start = replace(best.linearised, settled=False)
+    wide = differentiable(partial(fitted, other, start, best.active))
+    if wide is None or beyond(best, wide) < fit.decides.needed:
+        return chosen, None
+    report(f"bounds opened, of {', '.join(effect.name for effect in held)}")
+    needed = select(other, catalogue, search(other, catalogue, report), report)
+    kept = needed.best.active
+    outside = [e for e in kept if e in held and binding_bound(fit, needed.best, e, e.label)]
+    if not outside or needed.interrupted:
+        return chosen, None
+    if beyond(needed.best, best) > fit.decides.form:
+        return chosen, None
+    if len(kept) > 1:
+        fast = any(effect.order_locked for effect in kept)
+        removed = needed.validation.explained(needed.base, needed.best, fast=fast)[0]
+        reasons = [
+            f"{effect.label} of {effect.name} is at its bound; "
+            f"{_size_text(fit, needed.best, effect)}, beyond it, fits better"
+            for effect in outside
+        ]
+        return chosen, NearestCandidate(needed.best.names, removed, tuple(reasons))
+    (effect,) = kept
+    begun = fit.tried(_only(best, effect))
+    if begun is None:
+        return chosen, None
+    alone, trial = examine(fit, fitted(fit, begun, (effect,)), catalogue, report)
+    selection = ForwardSelection(alone, list(chosen.steps), trial, interrupted=True, begun=None)
+    return replace(select(fit, catalogue, selection, report), interrupted=False), None
+
+
+def _size_text(fit: Fit, model: FittedModel, effect: Effect) -> str:
+    """The size that an effect has in a fit, in words."""
+    size = model.point.sizes[effect.name, effect.label]
+    return with_unit(size, fit.unknowns.unit(effect, effect.size))
 
 
 def _only(best: FittedModel, effect: Effect) -> Point:
@@ -374,6 +447,15 @@ def _at_bounds(causes: Sequence[Cause]) -> list[str]:
         for cause in causes
         for name, interval in cause.parameters.items()
         if interval.limit and interval.open
+    ]
+
+
+def _of_no_sign(causes: Sequence[Cause]) -> list[str]:
+    """Causes whose interval has zero in it, in words."""
+    return [
+        f"the interval of {cause.effect.name} includes zero"
+        for cause in causes
+        if (size := cause.parameters[cause.effect.label]).low <= 0.0 <= size.high
     ]
 
 
@@ -589,6 +671,7 @@ def _cause(fit: Fit, chosen: Selection, effect: Effect, *, noise_alone: bool) ->
         )
         form_share = max(_FORM, share_by_form(left, explained))
         correlated = correlated_deviations(fit, best)
+    varied = hidden_by_noise(fit, best, effect)
     parameters = {}
     for key, value in best.point.sizes.items():
         if key[0] != effect.name:
@@ -600,13 +683,17 @@ def _cause(fit: Fit, chosen: Selection, effect: Effect, *, noise_alone: bool) ->
         share = form_share if of_size else _FORM
         form = np.hypot(share * value, _COMPANY * effect.matters * of_size)
         noise = np.hypot(sigma[trial.joint.known.index(key)], correlated.get(key, 0.0))
-        reach = float(BAND * np.hypot(noise, form))
+        # An error of form that noise hides is a share of the true size: it changes no sign.
+        hidden = varied.get(key, 0.0)
+        inner = max(form, hidden / (1.0 + BAND * hidden / max(abs(value), 1e-300)))
+        sides = (inner, max(form, hidden)) if value >= 0.0 else (max(form, hidden), inner)
+        below, above = (float(BAND * np.hypot(noise, side)) for side in sides)
         limit = binding_bound(fit, best, effect, key[1])
         unit = unknowns.unit(effect, parameter)
         # A parameter or a zero without a unit may be of any size: 2 is not 200 % of anything.
         own = bool(effect.parameter or effect.sensor) and key[1] not in SHARES
         plain = own and unit in ("", "1")
-        least, greatest = max(value - reach, low), min(value + reach, high)
+        least, greatest = max(value - below, low), min(value + above, high)
         further = (np.nan, False)
         # A value at a bound says nothing of the side beyond.
         if limit and not _set_by_nature(value, "" if plain else unit):

@@ -37,7 +37,7 @@ from workbench.models.modelica import Library
 from workbench.runtime.engine import Engine
 from workbench.runtime.files import write_whole
 
-__all__ = ["Proposal", "compared_with_one_law", "needs_law", "propose"]
+__all__ = ["Proposal", "compared_with_one_law", "needs_law", "one_law", "propose"]
 
 _OF_PLACE = 2  # of one place, since about the nominal model a wrong place may fake anything
 _OF_FORMS = 2  # closed forms: sizes of some are not sure beside their own shape
@@ -61,22 +61,42 @@ def _more(diagnosis: Diagnosis) -> bool:
     return len(diagnosis.causes) == 1 and lasting >= Thresholds.wrong
 
 
-def compared_with_one_law(outcome: Outcome, problem: Problem, engine: Engine) -> Outcome:
+def one_law(diagnosis: Diagnosis, problem: Problem, engine: Engine) -> str:
     """Ask whether one free law in a slot of several causes explains as much with less.
 
-    By the description length of the causes, and the marginal likelihood of the law. Returns the
-    outcome with the law's text, or as it was.
+    By the description length of the causes, and the marginal likelihood of the law. Returns what
+    the law is; empty if none does, or there are not several causes.
     """
-    diagnosis = outcome.diagnosis
     if len(diagnosis.causes) < 2 or diagnosis.interrupted or problem.library is None:
-        return outcome
+        return ""
     slots = {slot for cause in diagnosis.causes for slot in cause.effect.slots}
     able = _likeliest(Scan(problem, diagnosis.base, engine, slots).prospects)[:_BESIDE]
     laws = estimated(problem, able, diagnosis.base, engine) if able else []
     less = description_length(diagnosis.base) - description_length(diagnosis.best)
-    if not laws or laws[0].evidence < less:
+    return laws[0].law.text if laws and laws[0].evidence >= less else ""
+
+
+def compared_with_one_law(outcome: Outcome, problem: Problem, engine: Engine) -> Outcome:
+    """The outcome beside one law, see `one_law`, in place of which several causes are no answer.
+
+    What explains a part stays one.
+    """
+    diagnosis = outcome.diagnosis
+    if not (law := one_law(diagnosis, problem, engine)):
         return outcome
-    return replace(outcome, one_law=laws[0].law.text)
+    if diagnosis.verdict != "found":
+        return replace(outcome, one_law=law)
+    for path in outcome.extension.files if outcome.extension is not None else ():
+        path.unlink()
+    return replace(
+        outcome,
+        diagnosis=diagnosis.outdone(law),
+        one_law=law,
+        extension=None,
+        rivals=None,
+        certainty=None,
+        observers={},
+    )
 
 
 def propose(before: Outcome, problem: Problem, engine: Engine) -> Proposal:

@@ -88,7 +88,8 @@ class ResidualModel:
             self.simulated = self._prepared(restarting=restarting and not self.free)
             if not self.free:
                 try:
-                    parts = settled_parts(self._simulator(self.simulated), self.nominal)
+                    nominal = [self.nominal] * len(self.recordings)
+                    parts = settled_parts(self._simulator(self.simulated), nominal)
                     self.simulated = self.simulated._replace(parts=parts)
                 except EventError:
                     self._model, self.free = replace(self._model, motion=None), True
@@ -197,6 +198,20 @@ class ResidualModel:
             at[k] = form
         self._at = at
         self._choose()
+
+    def settle(self, points: Sequence[Mapping[str, float]]) -> bool:
+        """Take finer steps if those so far are too long at a point; whether they were.
+
+        Friction that was found is stiff near standstill, where the nominal model has none.
+        """
+        before = self.simulated.parts
+        parts = settled_parts(self._simulator(self.simulated), points, before)
+        if parts == before:
+            return False
+        self.simulated = self.simulated._replace(parts=parts)
+        every = self.simulated._replace(recordings=tuple(form for form, _ in self._forms))
+        self._pool = self._open.enter_context(self._workers_with(every))
+        return True
 
     def at(self, points: Sequence[Mapping[str, float]]) -> list[WhitenedResiduals]:
         """Errors of every recording at its own point.

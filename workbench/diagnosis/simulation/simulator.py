@@ -129,10 +129,10 @@ class Simulator:
         """Names of the FMU's variables that have a default."""
         return set(self._fmu.defaults)
 
-    def errors(self, values: Mapping[str, float]) -> list[Matrix]:
-        """Prediction errors of the samples that count, of each recording, (m, c)."""
-        recordings = enumerate(self._recordings)
-        return [self._simulated(k, values)[0][recording.told] for k, recording in recordings]
+    def errors(self, points: Sequence[Mapping[str, float]]) -> list[Matrix]:
+        """Prediction errors of the samples that count, of each recording at its point, (m, c)."""
+        pairs = enumerate(zip(self._recordings, points, strict=True))
+        return [self._simulated(k, values)[0][own.told] for k, (own, values) in pairs]
 
     def along(self, number: int, values: Mapping[str, float], watched: Sequence[str]) -> Matrix:
         """Variables of the FMU at each sample of one recording, (n, w)."""
@@ -449,7 +449,9 @@ def simulating(given: SimulatorSetup) -> Iterator[Simulator]:
         yield Simulator(given, fmu)
 
 
-def settled_parts(simulator: Simulator, values: Mapping[str, float]) -> int:
+def settled_parts(
+    simulator: Simulator, points: Sequence[Mapping[str, float]], parts: int = 1
+) -> int:
     """Steps of a sample time from which on finer ones hardly move prediction errors.
 
     A step that is long for what oscillates damps it and turns its phase, and a wrong law would be
@@ -457,13 +459,14 @@ def settled_parts(simulator: Simulator, values: Mapping[str, float]) -> int:
 
     Parameters
     ----------
-    values : of the FMU's variables, SI.
+    points : values of the FMU's variables, SI, in each recording.
+    parts : that are tried first.
     """
 
     def errors(parts: int) -> list[Matrix]:
-        return simulator.stepped(parts).errors(values)
+        return simulator.stepped(parts).errors(points)
 
-    parts, coarse = 1, errors(1)
+    coarse = errors(parts)
     while parts < _FINEST:
         fine = errors(2 * parts)
         moved = [np.square(a - b).sum(axis=0) for a, b in zip(fine, coarse, strict=True)]

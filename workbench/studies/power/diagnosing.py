@@ -9,7 +9,7 @@ import numpy as np
 
 from workbench import diagnosis
 from workbench.arrays import Vector
-from workbench.diagnosis import Diagnosis, Effect, catalogue
+from workbench.diagnosis import Diagnosis, Effect, Problem, catalogue, library_of
 from workbench.diagnosis.data.motion import ModelSource
 from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.quadratic import Joint, Key
@@ -17,11 +17,12 @@ from workbench.diagnosis.inference.rivals import Rivals, gathered
 from workbench.diagnosis.inference.score_test import shapes, signatures
 from workbench.diagnosis.inference.search import FittedModel, examine, extended
 from workbench.diagnosis.inference.verdict import conclude
+from workbench.diagnosis.laws import one_law
 from workbench.diagnosis.simulation.residual_model import ResidualModel
 from workbench.diagnosis.simulation.simulator import WhitenedResiduals
 from workbench.models.modelica import read_library
 from workbench.recordings.case import Case
-from workbench.runtime.engine import silent
+from workbench.runtime.engine import ALONE, silent
 from workbench.system.system import System
 
 _NONE: Mapping[Key, tuple[float, Sequence[Case]]] = {}
@@ -54,7 +55,11 @@ def diagnose_set(
 ) -> Diagnosis:
     """Diagnose one set of recordings, in this process alone."""
     with _fit(system, effects, everything, cases) as (_, fit):
-        return conclude(fit, effects, silent)
+        result = conclude(fit, effects, silent)
+    if result.verdict != "found":
+        return result
+    law = one_law(result, Problem(system, cases, library_of(system), effects), ALONE)
+    return result.outdone(law) if law else result
 
 
 def information_of_set(
