@@ -453,6 +453,12 @@ def test_a_system_without_a_plugin_is_planted_in_its_own_model(tmp_path, capsys)
     assert power["scale"]["chances"] == {"20": pytest.approx(1.0)}
     check("power", power)
     assert "an oracle, by chance" in capsys.readouterr().out
+    # Of a law that is wrong in form by a tenth, sizes are a fifth off, and intervals say so.
+    sets = ["--clean", "0", "--sizes", "20", "--repeats", "2", "--pairs", "0", "--workers", "1"]
+    assert main(["power", *options[:2], *sets, "--form-error", "0.1", "--out", str(tmp_path)]) == 0
+    power = json.loads((tmp_path / "power.json").read_text())
+    assert "wrong in form" in power["provenance"]["machine"]
+    assert power["coverage"]["hits"] == power["coverage"]["of"] > 0
 
 
 def test_one_effect_at_one_size_is_one_set():
@@ -474,6 +480,7 @@ def test_one_effect_at_one_size_is_one_set():
         ["--sigmas", "--oracle"],
         ["--effects", "BrakeFadee"],
         ["--clean", "0", "--pairs", "0", "--repeats", "0"],
+        ["--form-error", "0.1"],
     ],
 )
 def test_command_refuses_what_makes_no_sense(arguments, tmp_path, capsys):

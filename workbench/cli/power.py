@@ -50,7 +50,8 @@ def add(commands: arguments.Commands, text: str) -> argparse.ArgumentParser:
         "  workbench power --follow --case 24_alike_80_2.7 --case 25_alike_80_2.7\n"
         "  workbench power --leave-out-effect --sizes 8 --repeats 1 --clean 0\n"
         "  workbench power --sheet-error --repeats 2\n"
-        "  workbench power --system train --recorded labelled healthy",
+        "  workbench power --system train --recorded labelled healthy\n"
+        "  workbench power --system my_machine --sizes 20 --form-error 0.1",
     )
     _add_sets(parser)
     arguments.add_workers(parser)
@@ -114,6 +115,14 @@ def _add_sets(parser: argparse.ArgumentParser) -> None:
         help="recording of a set, may be repeated (default: the usual ones of the system). "
         "Without a plugin: a folder of recordings, whose inputs drive the system's own model",
     )
+    parser.add_argument(
+        "--form-error",
+        type=arguments.share,
+        default=0.0,
+        metavar="SHARE",
+        help="share of its effect by which each injected law is wrong in form: its size changes "
+        "with a quantity that it does not depend on. Needs a system without a rig of its own",
+    )
 
 
 def _add_checks(parser: argparse.ArgumentParser) -> None:
@@ -146,6 +155,7 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
     """Make, diagnose and count."""
     from workbench.studies.power import PowerStudy, open_virtual_rig, read_recorded_sets
     from workbench.studies.power.diagnosing import library_effects
+    from workbench.studies.power.own_model import OwnModel
     from workbench.system.registry import load_system, model_path
     from workbench.system.system import REFERENCE
 
@@ -177,6 +187,13 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
             options.reference or known,
             lambda: _own_model(options, system, effects),
         )
+        if options.form_error and not isinstance(rig, OwnModel):
+            raise InputError(
+                where="--form-error",
+                found=f"the simulated rig of the plugin of {system.name}, whose laws are its own",
+                expected="a system whose own model makes the recordings",
+                remedy="leave --form-error out, or choose a system without a simulated rig",
+            )
         study = PowerStudy(system, rig, effects)
         output.progress(f"sets of {len(rig.recordings)} recordings")
         if about := study.rig.identity.get("machine"):
@@ -205,7 +222,7 @@ def _own_model(
     path = options.out / "machine" / "AllEffects.fmu"
     path.parent.mkdir(parents=True, exist_ok=True)
     build_everything(system, effects, path)
-    return own_model(system, effects, path, templates)
+    return own_model(system, effects, path, templates, options.form_error)
 
 
 def _select(names: Sequence[str], rig: VirtualRig) -> tuple[Plantable, ...]:

@@ -193,7 +193,7 @@ class Fit:
         return self._simulations.free
 
     def settle(self, point: Point) -> bool:
-        """Take finer steps if a point needs them; whether it does, and fits have to be made anew."""
+        """Take finer steps if a point needs them; whether it does, so that fits are made anew."""
         return not self.free and self._simulations.settle(self.unknowns.values(point))
 
     @property

@@ -1,7 +1,8 @@
 """A virtual machine of any system: its own model, driven as recordings of the machine were.
 
-Laws have their exact form, so that a real machine is diagnosed less well; what differs from the
-model that diagnoses is stated in `OwnModel.about`. Equations of a plugin are better.
+Laws have their exact form unless an error of form is asked for; a real machine is diagnosed less
+well. What differs from the model that diagnoses is stated in `OwnModel.about`. Equations of a
+plugin are better.
 """
 
 import hashlib
@@ -13,12 +14,13 @@ from typing import Any
 
 import numpy as np
 
-from workbench.arrays import Matrix, Vector
+from workbench.arrays import Vector
 from workbench.diagnosis import Effect
 from workbench.diagnosis.data.clocks import late_signals, lateness, moved
 from workbench.diagnosis.data.motion import ModelSource
 from workbench.diagnosis.data.samples import Samples
 from workbench.diagnosis.effects.extension import variables
+from workbench.diagnosis.inference.discrepancy import quantities
 from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.quadratic import Key
 from workbench.diagnosis.inference.score_test import shapes
@@ -46,6 +48,8 @@ class OwnModel:
     effects : that it has.
     templates : recordings of the machine, whose inputs, times and conditions are those of a set.
     plantables : all effects.
+    form_error : share of its effect by which a law is wrong: its size goes with a quantity that is
+        drawn, see `quantities`.
     """
 
     system: System
@@ -53,14 +57,24 @@ class OwnModel:
     effects: tuple[Effect, ...]
     templates: tuple[Case, ...]
     plantables: tuple[Plantable, ...]
+    form_error: float = 0.0
 
     sheet_errors: tuple[SheetError, ...] = ()
 
-    about = (
-        "the system's own model, solved by the Co-Simulation of its FMU instead of the steps of "
-        "the diagnosis, with the tolerances, levels, noise and resolution of the system file. Laws "
-        "have their exact form: on the machine itself the diagnosis is right less often"
-    )
+    @property
+    def about(self) -> str:
+        """What makes the recordings, for people."""
+        form = "have their exact form: on the machine itself the diagnosis is right less often"
+        if self.form_error:
+            form = (
+                "are wrong in form: the size of each changes with a quantity that is drawn, by "
+                f"{self.form_error:.0%} rms"
+            )
+        return (
+            "the system's own model, solved by the Co-Simulation of its FMU instead of the steps "
+            "of the diagnosis, with the tolerances, levels, noise and resolution of the system "
+            f"file. Laws {form}"
+        )
 
     @property
     def recordings(self) -> tuple[str, ...]:
@@ -102,9 +116,22 @@ class OwnModel:
             drawn = replace(point, sizes=sizes, levels=levels, deviations=deviations, phases=phases)
             starts = list(unknowns.starts(drawn).values())
             recordings = simulations.recordings
+            wrong = [
+                variable
+                for name in gains
+                for size in unknowns.effects[name].sizes
+                for variable in variables(unknowns.effects[name], size)
+                if variable in simulations.nominal and self.form_error
+            ]
+        courses = quantities(recordings)
+        quantity, sign = rng.integers(courses[0].shape[1]), rng.choice([-1.0, 1.0])
+        sets = []
         with CoSimulation(self.everything) as model:
-            pairs = zip(recordings, starts, strict=True)
-            return seed, [self._recorded(model, *pair) for pair in pairs]
+            for recording, start, course in zip(recordings, starts, courses, strict=True):
+                factor = 1.0 + sign * self.form_error * course[:, quantity]
+                varied = {name: start[name] * factor for name in wrong}
+                sets.append(self._recorded(model, recording, start, varied))
+        return seed, sets
 
     def write(self, simulated: "Readings", gains: Mapping[str, float], folder: Path) -> None:
         """Write readings with noise, rounded to the resolution of their sensors."""
@@ -125,9 +152,18 @@ class OwnModel:
             write_whole(folder / case.name / "case.toml", self._description(case))
 
     def _recorded(
-        self, model: CoSimulation, recording: Samples, start: Mapping[str, float]
+        self,
+        model: CoSimulation,
+        recording: Samples,
+        start: Mapping[str, float],
+        varied: Mapping[str, Vector],
     ) -> dict[str, Vector]:
-        """Readings of one recording, (n,) by signal: structures and loggers included."""
+        """Readings of one recording, (n,) by signal: structures and loggers included.
+
+        Parameters
+        ----------
+        varied : parameters that change in time, (n,).
+        """
         system, states = self.system, set(model.states)
         known = {name: value for name, value in start.items() if name in model.defaults}
         model.start(
@@ -137,7 +173,13 @@ class OwnModel:
         inputs = [signal.name for signal in system.inputs]
         model.set(model.variables(inputs), recording.u[0])
         outputs = [system.signals[name].reading for name in recording.signals]
-        y = self._stepped(model, recording, inputs, outputs)
+        driven = np.column_stack([recording.u, *varied.values()])
+        holds = np.append(self.system.holds, np.zeros(len(varied)))
+        running = co_simulation_instance(model, [*inputs, *varied], outputs)
+        y = np.zeros((recording.time.size, len(outputs)))
+        for k, h in enumerate(np.diff(recording.time)):
+            pair = slice(k, k + 2)
+            raise_on_failure(step_block(running, float(h), holds, driven[pair], y[pair]), model)
         late = lateness(late_signals(system), start)
         readings = dict(zip(inputs, recording.u.T, strict=True))
         for j, name in enumerate(recording.signals):
@@ -146,21 +188,6 @@ class OwnModel:
             name: moved(recording.time, values, late[name]) if name in late else values.copy()
             for name, values in readings.items()
         }
-
-    def _stepped(
-        self,
-        model: CoSimulation,
-        recording: Samples,
-        inputs: Sequence[str],
-        outputs: Sequence[str],
-    ) -> Matrix:
-        """Readings at all samples, (n, c)."""
-        u, y = np.ascontiguousarray(recording.u), np.zeros((recording.time.size, len(outputs)))
-        running, holds = co_simulation_instance(model, inputs, outputs), self.system.holds
-        for k, h in enumerate(np.diff(recording.time)):
-            pair = slice(k, k + 2)
-            raise_on_failure(step_block(running, float(h), holds, u[pair], y[pair]), model)
-        return y
 
     def _description(self, case: Case) -> str:
         lines = [f"title = {json.dumps(f'{case.title}, simulated')}", "", "[conditions]"]
@@ -205,7 +232,11 @@ def template_cases(system: System, names: Sequence[str]) -> list[Case]:
 
 
 def own_model(
-    system: System, effects: Sequence[Effect], everything: Path, templates: Sequence[Case]
+    system: System,
+    effects: Sequence[Effect],
+    everything: Path,
+    templates: Sequence[Case],
+    form_error: float = 0.0,
 ) -> OwnModel:
     """The virtual machine of a system.
 
@@ -213,6 +244,7 @@ def own_model(
     ----------
     everything : FMU of its observer model with all effects.
     templates : recordings of the machine, see `template_cases`.
+    form_error : see `OwnModel`.
     """
     with CoSimulation(everything) as model:
         least = {v.name: v.minimum for v in model.description.variables if v.minimum is not None}
@@ -231,4 +263,5 @@ def own_model(
                 shapes=_middle_shape(effect),
             )
         )
-    return OwnModel(system, everything, tuple(effects), tuple(templates), tuple(plantables))
+    machine = OwnModel(system, everything, tuple(effects), tuple(templates), tuple(plantables))
+    return replace(machine, form_error=form_error)
