@@ -91,13 +91,14 @@ def quantities(recordings: Sequence[Samples]) -> list[Matrix]:
     one over all recordings, so that a size is that in the middle.
     """
     columns = [
-        np.column_stack([recording.time - recording.time[0], recording.u, recording.y])
-        for recording in recordings
+        np.column_stack([r.time - r.time[0], r.u, np.where(r.silent, np.nan, r.y)])
+        for r in recordings
     ]
     every = np.vstack([c[r.told] for c, r in zip(columns, recordings, strict=True)])
-    able = np.ptp(every, axis=0) > 0.0
-    mean, scale = every.mean(axis=0)[able], every.std(axis=0)[able]
-    return [np.clip((c[:, able] - mean) / scale, -_REACH, _REACH) for c in columns]
+    able = np.nanmax(every, axis=0) > np.nanmin(every, axis=0)
+    mean, scale = np.nanmean(every, axis=0)[able], np.nanstd(every, axis=0)[able]
+    courses = [np.clip((c[:, able] - mean) / scale, -_REACH, _REACH) for c in columns]
+    return [np.nan_to_num(course) for course in courses]
 
 
 def hidden_by_noise(fit: Fit, best: FittedModel, effect: Effect) -> dict[Key, float]:
