@@ -25,6 +25,7 @@ QUADRATIC, CONSTANT = "quadratic", "constant"
 SPEED = "speed"  # of a Stribeck term, at which 1/e is left
 _IDENTIFIER, _INNER = "Extended", "inner"
 _HEADERS = Path(fmpy.__file__).parent / "c-code"
+TERM = "added."  # how names of what scales a term begin
 _MOST_KNOWNS = 4096  # of one directional derivative
 # Of a state's size, within which friction is smooth: a body that sticks creeps by this share of its
 # speed. At 1e-3 a second at rest is seen by any sensor of 0.1 %; at 1e-5 a minute is not.

@@ -23,6 +23,7 @@ from workbench.models.added import (
     QUADRATIC,
     SPEED,
     STRIBECK,
+    TERM,
     VISCOUS,
     RateTerm,
 )
@@ -171,7 +172,7 @@ def rate_terms(model: FMU, system: System) -> tuple[RateTerm, ...]:
             power = {VISCOUS: 1, QUADRATIC: 2}.get(form, 0)
             terms.append(
                 RateTerm(
-                    name=f"added.{form}.{state}",
+                    name=f"{TERM}{form}.{state}",
                     state=i,
                     form=form,
                     typical=typical / float(scale[i]) ** power,

@@ -99,14 +99,16 @@ class CrossValidation:
     def _refitted(self, fitted: FittedModel, part: int) -> Matrix:
         """Whitened errors of one part, after a fit without it: laws may bend much within one.
 
-        States at the start are those of the fit to all parts: later parts may not tell them, and
-        the first part would be predicted from a start that nobody has seen.
+        The first part begins as the fit to all parts does: later parts may not tell how, and it
+        would be predicted from a start that nobody has seen.
         """
         hidden = self._fit.without(part)
         lin = hidden.refine(hidden.hide(fitted.linearised), fitted.active, _ROUNDS)
-        starts = [name in self._fit.unknowns.starting for name in self._fit.unknowns.local]
-        seen = np.where(starts, fitted.point.deviations, lin.point.deviations)
-        point = replace(lin.point, deviations=seen)
+        point, unknowns = lin.point, self._fit.unknowns
+        if part == 0:
+            starts = [name in unknowns.starting for name in unknowns.local]
+            seen = np.where(starts, fitted.point.deviations, point.deviations)
+            point = replace(point, deviations=seen)
         return self._fit.at(point).residuals[0].errors[self._fit.blocks_of(part)]
 
     def _extrapolated(self, fitted: FittedModel) -> list[Matrix]:

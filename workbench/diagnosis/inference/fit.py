@@ -12,9 +12,8 @@ from types import MappingProxyType
 
 import numpy as np
 
-from workbench.arrays import Matrix, Vector
+from workbench.arrays import Vector
 from workbench.diagnosis.data.clocks import apparent_lags, greatest_skew, own_clocks, reference
-from workbench.diagnosis.data.samples import Samples
 from workbench.diagnosis.effects.catalogue import Effect, variant
 from workbench.diagnosis.effects.extension import sizes_by_component, variables
 from workbench.diagnosis.inference.linearized import (
@@ -274,30 +273,6 @@ class Fit:
         sizes = sizes_by_component(self.unknowns.effects.values())
         more = self._simulations.derivatives(values, list(missing.values()), sizes)
         return self.hide(lin.extended(missing, more))
-
-    def varied(
-        self,
-        lin: LinearizedPoint,
-        effect: Effect,
-        courses: Callable[[Sequence[Samples]], Sequence[Matrix]],
-    ) -> tuple[LinearizedPoint, list[Key]]:
-        """Add derivatives by the size of an effect as it changes in time; their keys.
-
-        None of what turns, and of what no library states: clocks, and what an FMU alone has.
-
-        Parameters
-        ----------
-        courses : makes factors of the size, (n, q) in each recording.
-        """
-        if effect.order_locked or not effect.of_library:
-            return lin, []
-        names = variables(effect, effect.size)
-        factors = courses(self._simulations.recordings)
-        count = factors[0].shape[1]
-        columns = [Variation(names, size=effect.matters)] * count
-        more = self._simulations.responses(self.unknowns.values(lin.point), columns, factors)
-        keys = [(effect.name, f"{effect.size} varied {k}") for k in range(count)]
-        return self.hide(lin.extended(keys, more)), keys
 
     def quadratics(self, lin: LinearizedPoint, extra: Sequence[Key] = ()) -> Joint:
         """Every stop over the common unknowns, local ones eliminated.

@@ -250,13 +250,13 @@ def _held_out(stops: Sequence[Quadratic], prior: Quadratic, starts: Sequence[int
     Parameters
     ----------
     starts : unknowns that are states at the start of a single recording, of which these are parts.
-        Each part is predicted with those that suit it: later parts may not tell how it began.
+        The first is predicted with those that suit it: later parts may not tell how it began.
     """
     others = _without_each(add([*stops, prior]), stops)
     squares = []
-    for stop, rest in zip(stops, others, strict=True):
+    for part, (stop, rest) in enumerate(zip(stops, others, strict=True)):
         z = minimum(rest)
-        if starts:
+        if part == 0 and starts:
             own = add([stop, prior])
             at_z = Quadratic(own.N, own.g + own.N @ z, 0.0, own.rows)
             z[starts] += minimum(at_z.columns(_only(z, starts)))

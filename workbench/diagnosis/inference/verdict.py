@@ -13,7 +13,6 @@ from workbench.diagnosis.effects.candidates import LAG, SHARES
 from workbench.diagnosis.effects.catalogue import Effect
 from workbench.diagnosis.inference.discrepancy import (
     correlated_deviations,
-    hidden_by_noise,
     share_by_form,
 )
 from workbench.diagnosis.inference.fit import Fit
@@ -283,10 +282,6 @@ def _concluded(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagn
             _cause(fit, chosen, effect, noise_alone=noise_alone)
             for effect in _strongest_first(fit, chosen, catalogue)
         ]
-        # What is left of errors may be all that a size stands for.
-        if not noise_alone and (unsure := _of_no_sign(causes)):
-            objections += unsure
-            verdict, causes, gain = "unexplained", [], None
         # Beside others, a part that bends as far as its effect allows stands for another law.
         if verdict == "partly explained" and len(causes) > 1 and (bent := _at_bounds(causes)):
             objections += bent
@@ -447,15 +442,6 @@ def _at_bounds(causes: Sequence[Cause]) -> list[str]:
         for cause in causes
         for name, interval in cause.parameters.items()
         if interval.limit and interval.open
-    ]
-
-
-def _of_no_sign(causes: Sequence[Cause]) -> list[str]:
-    """Causes whose interval has zero in it, in words."""
-    return [
-        f"the interval of {cause.effect.name} includes zero"
-        for cause in causes
-        if (size := cause.parameters[cause.effect.label]).low <= 0.0 <= size.high
     ]
 
 
@@ -671,7 +657,6 @@ def _cause(fit: Fit, chosen: Selection, effect: Effect, *, noise_alone: bool) ->
         )
         form_share = max(_FORM, share_by_form(left, explained))
         correlated = correlated_deviations(fit, best)
-    varied = hidden_by_noise(fit, best, effect)
     parameters = {}
     for key, value in best.point.sizes.items():
         if key[0] != effect.name:
@@ -683,17 +668,13 @@ def _cause(fit: Fit, chosen: Selection, effect: Effect, *, noise_alone: bool) ->
         share = form_share if of_size else _FORM
         form = np.hypot(share * value, _COMPANY * effect.matters * of_size)
         noise = np.hypot(sigma[trial.joint.known.index(key)], correlated.get(key, 0.0))
-        # An error of form that noise hides is a share of the true size: it changes no sign.
-        hidden = varied.get(key, 0.0)
-        inner = max(form, hidden / (1.0 + BAND * hidden / max(abs(value), 1e-300)))
-        sides = (inner, max(form, hidden)) if value >= 0.0 else (max(form, hidden), inner)
-        below, above = (float(BAND * np.hypot(noise, side)) for side in sides)
+        reach = float(BAND * np.hypot(noise, form))
         limit = binding_bound(fit, best, effect, key[1])
         unit = unknowns.unit(effect, parameter)
         # A parameter or a zero without a unit may be of any size: 2 is not 200 % of anything.
         own = bool(effect.parameter or effect.sensor) and key[1] not in SHARES
         plain = own and unit in ("", "1")
-        least, greatest = max(value - below, low), min(value + above, high)
+        least, greatest = max(value - reach, low), min(value + reach, high)
         further = (np.nan, False)
         # A value at a bound says nothing of the side beyond.
         if limit and not _set_by_nature(value, "" if plain else unit):

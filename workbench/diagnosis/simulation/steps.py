@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.arrays import Matrix, Vector
+from workbench.models.added import TERM
 from workbench.models.fmu import FMU
 from workbench.models.native import (
     OK,
@@ -34,8 +35,9 @@ _BENT = 0.1  # share of rates by which the Jacobian may be wrong about them
 _FLAT = 1e-6  # change of a state in a step, relative to its nominal value, that is nothing
 _CLOSE = 1e-4  # of a step, that the last correction by Newton's method may be
 _ROUNDS, _HALVED = 40, 12  # of Newton's method; times that one of its corrections is halved
-# Parts of a step that is solved for: in ever more until the end moves by little of the step, for
-# how far a body goes before it stops within a step; a stop within one of the last is met to 1e-4.
+# Parts of a step that is solved for. Where a term beside a rate jumps at rest, in ever more until
+# the end moves by little of the step: for how far a body goes before it stops within a step; a stop
+# within one of the last is met to 1e-4. Laws of a library are smooth by themselves.
 _FEWEST, _MOST_PARTS, _SETTLED = 2, 32, 1e-3
 _GAMMA = 1.0 - 1.0 / math.sqrt(2.0)
 
@@ -58,6 +60,7 @@ class Steps(NamedTuple):
     k1, k2 : (n,) slopes of the two stages.
     begin, known, scale : (n,) of a step that is solved for: where it begins, the last guess, sizes.
     coarse : (n,) end of it in half as many parts.
+    most : (1,) parts that it is taken in at most.
     picked : (p,) solution of a system of the stiff states.
     """
 
@@ -80,6 +83,7 @@ class Steps(NamedTuple):
     known: Vector
     scale: Vector
     coarse: Vector
+    most: NDArray[np.intp]
     picked: Vector
 
 
@@ -93,6 +97,7 @@ def steps(fmu: FMU, stiff: NDArray[np.intp], inputs: int) -> Steps:
     """
     n, p = len(fmu.states), stiff.size
     nominal = {v.name: v.nominal for v in fmu.description.variables}
+    sharp = any(name.startswith(TERM) for name in nominal)
     return Steps(
         stiff=stiff,
         nominal=np.array([abs(nominal.get(name) or 1.0) for name in fmu.states]),
@@ -113,6 +118,7 @@ def steps(fmu: FMU, stiff: NDArray[np.intp], inputs: int) -> Steps:
         known=np.zeros(n),
         scale=np.zeros(n),
         coarse=np.zeros(n),
+        most=np.array([_MOST_PARTS if sharp else _FEWEST]),
         picked=np.zeros(p),
     )
 
@@ -274,7 +280,7 @@ def _solved(model, work, h):  # type: ignore[no-untyped-def]
     parts, n = _FEWEST, model.x.size
     if _in_parts(model, work, h, parts):
         return 1
-    while parts < _MOST_PARTS:
+    while parts < work.most[0]:
         parts *= 2
         for i in range(n):
             work.coarse[i] = model.x[i]

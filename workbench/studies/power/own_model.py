@@ -14,13 +14,12 @@ from typing import Any
 
 import numpy as np
 
-from workbench.arrays import Vector
+from workbench.arrays import Matrix, Vector
 from workbench.diagnosis import Effect
 from workbench.diagnosis.data.clocks import late_signals, lateness, moved
 from workbench.diagnosis.data.motion import ModelSource
 from workbench.diagnosis.data.samples import Samples
 from workbench.diagnosis.effects.extension import variables
-from workbench.diagnosis.inference.discrepancy import quantities
 from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.quadratic import Key
 from workbench.diagnosis.inference.score_test import shapes
@@ -33,6 +32,8 @@ from workbench.runtime.files import write_whole
 from workbench.studies.design.simulation import step_block
 from workbench.studies.power.planting import Plantable, SheetError
 from workbench.system.system import System
+
+_REACH = 3.0  # standard deviations of a quantity, beyond which a law goes no further with it
 
 Readings = tuple[int, list[dict[str, Vector]]]
 """Seed of the noise, and what is read by signal (n,) in each recording."""
@@ -265,3 +266,20 @@ def own_model(
         )
     machine = OwnModel(system, everything, tuple(effects), tuple(templates), tuple(plantables))
     return replace(machine, form_error=form_error)
+
+
+def quantities(recordings: Sequence[Samples]) -> list[Matrix]:
+    """What a law may depend on and does not, in each recording, (n, q).
+
+    Time, inputs and outputs as they were measured, each with the mean zero and the root mean square
+    one over all recordings, so that a size is that in the middle.
+    """
+    columns = [
+        np.column_stack([r.time - r.time[0], r.u, np.where(r.silent, np.nan, r.y)])
+        for r in recordings
+    ]
+    every = np.vstack([c[r.told] for c, r in zip(columns, recordings, strict=True)])
+    able = np.nanmax(every, axis=0) > np.nanmin(every, axis=0)
+    mean, scale = np.nanmean(every, axis=0)[able], np.nanstd(every, axis=0)[able]
+    courses = [np.clip((c[:, able] - mean) / scale, -_REACH, _REACH) for c in columns]
+    return [np.nan_to_num(course) for course in courses]
