@@ -37,7 +37,7 @@ _RIG = hashlib.sha256(b"".join(source.read_bytes() for source in _SOURCES)).hexd
 def record(scenario: Scenario, seed: int, effects: Effects, folder: Path, every: int = 100) -> None:
     """Write the recording of a stop, with the truth of every so many samples, to a new folder."""
     asked = repr((_RIG, np.__version__, scenario, seed, effects, every))
-    shelf = Path(platformdirs.user_cache_dir("wheelset-workbench")) / "recordings"
+    shelf = Path(platformdirs.user_cache_dir("observer-workbench")) / "recordings"
     kept = shelf / hashlib.sha256(asked.encode()).hexdigest()
     with contextlib.suppress(OSError):
         shutil.copytree(kept, folder)

@@ -101,7 +101,7 @@ def test_code_that_another_wrote_is_not_unpickled(mode, home):
     (file,) = files(home)
     content = pickle.dumps(Malice(home / "harmed"))
     file.write_bytes(hashlib.sha256(content).digest() + content)
-    folder = next(path for path in file.parents if path.name == "wheelset-workbench")
+    folder = next(path for path in file.parents if path.name == "observer-workbench")
     folder.chmod(mode)
     with started(home) as process:
         out, errors = process.communicate(timeout=100)

@@ -90,7 +90,7 @@ def test_compiled_code_is_kept_and_the_setting_of_numba_is_not_touched(root, tmp
     first = run("-c", SOLVE, cwd=root, env=environment)
     again = run("-c", SOLVE, cwd=root, env=environment)
     assert (first.stdout, again.stdout) == ("0 1\n", "1 0\n"), first.stderr + again.stderr
-    assert [p.name for p in tmp_path.iterdir()] == ["wheelset-workbench"]
+    assert [p.name for p in tmp_path.iterdir()] == ["observer-workbench"]
 
 
 def test_code_is_compiled_where_nothing_can_be_kept(root):

@@ -7,7 +7,6 @@ import sys
 import tempfile
 from collections.abc import Sequence
 from importlib import import_module
-from importlib.metadata import version
 from pathlib import Path
 
 from workbench.cli.output import Output
@@ -15,6 +14,7 @@ from workbench.cli.parser import command_line
 from workbench.cli.pdf import browser, print_page
 from workbench.errors import FMUError, InputError, WorkerError
 from workbench.runtime.pool import preload
+from workbench.runtime.resources import own_version
 from workbench.runtime.supervision import confine, run_program, supervised
 
 _CONFINED = "import sys; from workbench.__main__ import run_confined; sys.exit(run_confined())"
@@ -55,7 +55,7 @@ def main(arguments: Sequence[str] | None = None, *, confined: bool = False) -> i
     """
     given = sys.argv[1:] if arguments is None else arguments
     command = next((word for word in given if not word.startswith("-")), "")
-    parser = command_line(version("wheelset-workbench"), command)
+    parser = command_line(own_version(), command)
     options = parser.parse_args(given)
     output = Output(getattr(options, "json", False), getattr(options, "quiet", False))
     isolated = getattr(options, "isolated", False) and not confined

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 from collections.abc import Mapping
 from dataclasses import replace
-from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 from workbench.cli import arguments
@@ -13,6 +12,7 @@ from workbench.cli.extras import require_compiler
 from workbench.cli.output import CommandResult, Output, read_result
 from workbench.runtime.engine import Engine
 from workbench.runtime.files import locked_folder
+from workbench.runtime.resources import own_version
 
 if TYPE_CHECKING:
     from workbench.diagnosis import Outcome, Problem
@@ -137,7 +137,7 @@ def _run(options: argparse.Namespace, output: Output, problem: Problem) -> Comma
     with open_model(system) as model:
         provenance = {
             "run": run_of("diagnose", system, sources([*cases, *held_out])),
-            "workbench": version("wheelset-workbench"),
+            "workbench": own_version(),
             "system": system.name,
             "model": {"file": model.path.name, "model": model.name, "sha256": model.sha256},
             "effects": [effect.name for effect in problem.effects],

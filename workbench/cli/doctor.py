@@ -11,7 +11,6 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import asdict, dataclass
-from importlib.metadata import version
 from pathlib import Path
 from typing import Literal
 
@@ -20,7 +19,7 @@ from workbench.cli.extras import PURPOSES, missing_packages
 from workbench.cli.output import CommandResult, Output
 from workbench.errors import FMUError, InputError
 from workbench.runtime.files import require_writable
-from workbench.runtime.resources import CHECKOUT, fmus, installing
+from workbench.runtime.resources import CHECKOUT, DISTRIBUTION, fmus, installing, own_version
 from workbench.system.installed import built_models
 
 # dx/dt = -x: the smallest model that needs every part of the compiler.
@@ -89,7 +88,7 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
 
 def _inspect() -> Iterator[Inspection]:
     where = "a wheel" if CHECKOUT is None else f"the checkout {CHECKOUT}"
-    yield Inspection("workbench", "ok", f"{version('wheelset-workbench')} from {where}")
+    yield Inspection("workbench", "ok", f"{own_version()} from {where}")
     yield Inspection("Python", "ok", f"{platform.python_version()}, {sys.executable}")
     yield Inspection("machine", "ok", f"{platform.platform()}, {os.cpu_count()} processors")
     core = missing_packages("")
@@ -97,7 +96,7 @@ def _inspect() -> Iterator[Inspection]:
         "core packages",
         "wrong" if core else "ok",
         f"without {', '.join(core)}" if core else "complete",
-        "pip install wheelset-workbench" if core else "",
+        f"pip install {DISTRIBUTION}" if core else "",
     )
     for extra, purpose in PURPOSES.items():
         lacking = missing_packages(extra)

@@ -14,6 +14,7 @@ from workbench.cli import arguments
 from workbench.cli.extras import require_compiler
 from workbench.cli.output import CommandResult, Output
 from workbench.runtime.files import locked_folder, write_json, write_whole
+from workbench.runtime.resources import own_version
 
 if TYPE_CHECKING:
     from workbench.models.compiler import BuiltFMU
@@ -173,7 +174,7 @@ def _summary(system: System, chosen: _Choice, built: BuiltFMU) -> dict[str, Any]
         **{name: values.tolist() for name, values in gains.design.items()},
         "fmu": _identity(built),
         "provenance": {
-            "workbench": version("wheelset-workbench"),
+            "workbench": own_version(),
             "packages": {p: version(p) for p in ("rumoca", "casadi", "ziglang", "fmpy")},
             "source_sha256": source_hash(system.library),
             "gains": chosen.source,

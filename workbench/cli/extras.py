@@ -7,9 +7,7 @@ from importlib.util import find_spec
 
 from workbench.errors import InputError
 from workbench.runtime import resources
-from workbench.runtime.resources import installing
-
-_PACKAGE = "wheelset-workbench"
+from workbench.runtime.resources import DISTRIBUTION, installing
 
 PURPOSES = {
     "compiler": "Modelica to FMU: diagnose, power, export, bench, systems without a built FMU",
@@ -47,7 +45,7 @@ def _requirements(extra: str) -> list[str]:
         project = tomllib.loads(text)["project"]
         listed = project["optional-dependencies"][extra] if extra else project["dependencies"]
         return list(map(str, listed))
-    matches = {r: re.search(r"extra == ['\"](.*?)['\"]", r) for r in requires(_PACKAGE) or ()}
+    matches = {r: re.search(r"extra == ['\"](.*?)['\"]", r) for r in requires(DISTRIBUTION) or ()}
     return [r for r, match in matches.items() if (match[1] if match else "") == extra]
 
 

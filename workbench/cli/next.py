@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,6 +12,7 @@ from workbench.cli.output import CommandResult, Output, read_result
 from workbench.errors import InputError
 from workbench.runtime.engine import Engine
 from workbench.runtime.files import locked_folder, parse_table, read_text
+from workbench.runtime.resources import own_version
 
 if TYPE_CHECKING:
     from workbench.diagnosis.inference.rivals import Rivals
@@ -67,7 +67,7 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
         proposal = next_stop(system, rivals, Engine(options.workers, output.stage))
         provenance = {
             "run": run_of("next", system, {"diagnosis": file}),
-            "workbench": version("wheelset-workbench"),
+            "workbench": own_version(),
             "system": system.name,
             "diagnosis": str(options.result),
         }

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 from dataclasses import replace
-from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +14,7 @@ from workbench.cli.output import CommandResult, Output, read_result
 from workbench.errors import InputError, unknown_name
 from workbench.runtime.engine import Engine
 from workbench.runtime.files import locked_folder
+from workbench.runtime.resources import own_version
 
 if TYPE_CHECKING:
     from workbench.diagnosis import Effect
@@ -248,7 +248,7 @@ def _provenance(
 
     return {
         "run": run_of("power", study.system, {}),
-        "workbench": version("wheelset-workbench"),
+        "workbench": own_version(),
         "seed": options.seed,
         "stops": list(study.rig.recordings),
         "machine": study.rig.identity.get("machine", "a plugin's simulated rig"),

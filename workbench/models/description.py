@@ -18,7 +18,7 @@ from workbench.errors import InputError, unknown_name
 from workbench.models.archive import DESCRIPTION, damaged, opened
 from workbench.runtime.resources import CHECKOUT
 
-OWN_TOOL = "Wheelset observer workbench"  # that FMUs say they were made by, with its version
+OWN_TOOL = "Observer workbench"  # that FMUs say they were made by, with its version
 MODEL_EXCHANGE = "Model Exchange"
 CO_SIMULATION = "Co-Simulation"
 REAL_TYPES = ("Real", "Float64")  # of FMI 2.0 and 3.0

@@ -29,12 +29,12 @@ import platformdirs
 from workbench.errors import InputError
 from workbench.models.modelica import files, packages
 from workbench.runtime.files import TemporaryFolder, write_whole
+from workbench.runtime.resources import DISTRIBUTION
 
-_PROGRAM = "wheelset-workbench"
 _KEY_SIZE = 32  # [byte], of SHA-256
 _COMPILER = Path(__file__).parent / "compiler"
 _CODE = (".py", ".c", ".h")
-_TOOLS = (_PROGRAM, "rumoca", "casadi", "ziglang", "fmpy")
+_TOOLS = (DISTRIBUTION, "rumoca", "casadi", "ziglang", "fmpy")
 _MOST_KNOWN = 4096  # files of 32 bytes; a diagnosis builds some, a user has some
 # Files, of 0.1 MB: more than a run of all tests asks for, which is some hundreds. As the least used
 # are dropped, of a round that is longer than the cache nothing would ever be found again.
@@ -45,7 +45,7 @@ def cache_folder() -> Path:
     """Folder of what is kept between runs and can be made anew; it may be out of reach."""
     nowhere = Path(os.devnull) / "cache"
     try:
-        place = Path(platformdirs.user_cache_dir(_PROGRAM))
+        place = Path(platformdirs.user_cache_dir(DISTRIBUTION))
     except RuntimeError:  # a user without a home, as in some containers: nothing is kept
         return nowhere
     return place if _is_own(place) else nowhere
@@ -83,7 +83,7 @@ def _key() -> bytes:
     """Key of this user, made as needed; one of this process alone where it cannot be kept."""
     made = secrets.token_bytes(_KEY_SIZE)
     with contextlib.suppress(OSError, RuntimeError):
-        path = Path(platformdirs.user_data_dir(_PROGRAM)) / "key"
+        path = Path(platformdirs.user_data_dir(DISTRIBUTION)) / "key"
         if not path.exists():
             path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
             handle, part = tempfile.mkstemp(dir=path.parent, suffix=".part")  # of mode 600

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from workbench.recordings.case import Case
-from workbench.runtime.resources import commit
+from workbench.runtime.resources import commit, own_version
 from workbench.system.registry import open_model
 from workbench.system.system import System
 
@@ -29,7 +29,7 @@ def run_of(command: str, system: System, data: Mapping[str, Path]) -> dict[str, 
     return {
         "command": command,
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
-        "workbench": version("wheelset-workbench"),
+        "workbench": own_version(),
         "commit": commit(),
         "system": system.name,
         "title": system.title,
@@ -45,7 +45,7 @@ def sources(cases: Iterable[Case]) -> dict[str, Path]:
 def software(packages: Sequence[str]) -> dict[str, Any]:
     """Versions of the workbench, of Python and of packages."""
     return {
-        "workbench": version("wheelset-workbench"),
+        "workbench": own_version(),
         "commit": commit(),
         "python": platform.python_version(),
         "packages": {package: version(package) for package in packages},

@@ -4,7 +4,10 @@ A wheel holds them itself, in `workbench/data`; a checkout has them at its top l
 """
 
 import subprocess
+from importlib.metadata import version
 from pathlib import Path
+
+DISTRIBUTION = "observer-workbench"  # the name that pip knows
 
 _PACKAGE = Path(__file__).resolve().parents[1]
 _DATA = _PACKAGE / "data"
@@ -29,10 +32,15 @@ def cases() -> Path:
     return _ROOT / "cases"
 
 
+def own_version() -> str:
+    """Version of this workbench, as it is installed."""
+    return version(DISTRIBUTION)
+
+
 def installing(extra: str) -> str:
     """Say how an extra is installed: in a checkout with the versions that it pins."""
     if CHECKOUT is None:
-        return f"pip install 'wheelset-workbench[{extra}]'"
+        return f"pip install '{DISTRIBUTION}[{extra}]'"
     return f"pip install -e '.[{extra}]' -c constraints.txt"
 
 

@@ -21,6 +21,7 @@ from workbench.pages.answer import finite
 from workbench.recordings.case import Case
 from workbench.runtime.pool import NoWorkersError
 from workbench.runtime.progress import StepReporter
+from workbench.runtime.resources import own_version
 from workbench.system.registry import open_model
 from workbench.system.system import System
 from workbench.tuning.checkpoint import Generation
@@ -199,7 +200,7 @@ def pose(
         space = estimator_class.space(model, system, gains, slowest, fastest)
         meanings = estimator_class.meanings(model, system, gains)
         provenance = {
-            "workbench": version("wheelset-workbench"),
+            "workbench": own_version(),
             "python": platform.python_version(),
             "packages": {p: version(p) for p in ("fmpy", "numpy", "scipy", "numba")},
             "system": system.name,

@@ -15,7 +15,6 @@ import tempfile
 import zipfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from importlib.metadata import version
 from pathlib import Path
 
 import fmpy
@@ -24,7 +23,9 @@ from workbench.errors import InputError
 from workbench.models.compiler.ccode import generate, identifier
 from workbench.models.compiler.description import describe
 from workbench.models.compiler.explicit import StateSpace
+from workbench.models.description import OWN_TOOL
 from workbench.runtime.files import replacing
+from workbench.runtime.resources import own_version
 
 RUNTIME = Path(__file__).parent / "runtime"
 
@@ -110,7 +111,7 @@ def assemble(
     token = f"{{{'-'.join(digits[first:end] for first, end in ends)}}}"
     code = generate(space, token)
     name, files = identifier(space.name), library_sources(fmi)
-    tool = f"Wheelset observer workbench {version('wheelset-workbench')}"
+    tool = f"{OWN_TOOL} {own_version()}"
     description = describe(space, code, token, fmi, tool, files)
     generated = {"model.c": code.source, "model_data.h": code.header}
     with tempfile.TemporaryDirectory() as scratch:

@@ -6,7 +6,6 @@ folder -> recordings that are new -> estimates -> state on the disk -> watch -> 
 import hashlib
 from collections.abc import Callable
 from functools import partial
-from importlib.metadata import version
 from pathlib import Path
 
 from workbench.errors import InputError
@@ -14,6 +13,7 @@ from workbench.recordings.case import Case, read_case
 from workbench.runtime.engine import Engine
 from workbench.runtime.pool import Pool
 from workbench.runtime.progress import StepReporter
+from workbench.runtime.resources import own_version
 from workbench.studies.monitoring.chart import LevelChange as LevelChange
 from workbench.studies.monitoring.estimate import RecordingEstimate as RecordingEstimate
 from workbench.studies.monitoring.estimate import RecordingEstimator, open_estimator
@@ -72,7 +72,7 @@ def monitor(
         )
     with open_model(system, OBSERVER) as model:
         identity = {
-            "workbench": version("wheelset-workbench"),
+            "workbench": own_version(),
             "system": hashlib.sha256(system.source.read_bytes()).hexdigest(),
             "model": model.sha256,
         }

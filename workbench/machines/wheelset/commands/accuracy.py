@@ -13,6 +13,7 @@ from workbench.cli.arguments import Commands, add_pdf, add_recordings, add_syste
 from workbench.cli.output import CommandResult, Output, read_result
 from workbench.errors import InputError
 from workbench.runtime.files import locked_folder
+from workbench.runtime.resources import own_version
 
 if TYPE_CHECKING:
     from workbench.machines.wheelset.accuracy import StopAccuracy
@@ -87,7 +88,7 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
             estimators.append(estimator(fmu, system, gains[name]))
         provenance = {
             "run": run_of("accuracy", system, sources(cases)),
-            "workbench": version("wheelset-workbench"),
+            "workbench": own_version(),
             "packages": {p: version(p) for p in ("fmpy", "numpy", "scipy", "numba")},
             "fmus": [
                 {"file": fmu.path.name, "model": fmu.name, "sha256": fmu.sha256}
