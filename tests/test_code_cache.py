@@ -263,3 +263,20 @@ def test_fmus_are_those_of_their_manifest_and_it_is_of_these_sources():
 def test_fmus_match_their_sources():
     """Builds all of them for all platforms, unless this machine has built these sources before."""
     assert main(["fmu", "build", "--all", "--check"]) == 0
+
+
+def test_code_of_the_states_that_were_used_last_is_kept(tmp_path, monkeypatch):
+    package = tmp_path / "package"
+    package.mkdir()
+    monkeypatch.setattr(jit, "_PACKAGE", package)
+    monkeypatch.setattr(jit, "cache_folder", lambda: tmp_path / "cache")
+    states = []
+    for number in range(jit._STATES + 2):
+        (package / "law.py").write_text(f"import numba  # {number}")
+        states.append(jit._folder.__wrapped__())
+        os.utime(states[-1], (number, number))  # as used so long ago
+        if number == jit._STATES:  # the first is dropped, the second is used again
+            (package / "law.py").write_text("import numba  # 1")
+            assert jit._folder.__wrapped__() == states[1]
+    kept = {path for path in states if path.exists()}
+    assert kept == {*states} - {states[0], states[2]}

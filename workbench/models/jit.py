@@ -14,6 +14,7 @@ import hashlib
 import operator
 import os
 import pickle
+import shutil
 import tempfile
 import time
 from collections.abc import Callable
@@ -51,6 +52,9 @@ except ImportError:  # Windows: there each process compiles for itself
 _PACKAGE = Path(__file__).parents[1]
 _DIGEST = hashlib.sha256().digest_size
 _PATIENCE = 120.0  # [s]: several times what any function here takes to compile
+# States of the sources whose code is kept, of some 20 MB each: installations and checkouts that a
+# user works with in turn. What was not used for the longest time is dropped.
+_STATES = 8
 
 # --- code that is kept between runs ---
 
@@ -64,8 +68,13 @@ def _folder() -> Path:
     files = sorted(_PACKAGE.rglob("*.py"))
     sources = (file.read_bytes() for file in files)
     compiled = [s for s in sources if b"workbench.models.native import" in s or b"numba" in s]
-    state = hashlib.sha256(b"".join(compiled)).hexdigest()[:16]
-    return cache_folder() / state
+    place = cache_folder() / "loops" / hashlib.sha256(b"".join(compiled)).hexdigest()[:16]
+    with suppress(OSError):
+        place.mkdir(parents=True, exist_ok=True)
+        os.utime(place)  # of use, which decides what is dropped
+        for old in sorted(place.parent.iterdir(), key=lambda kept: -kept.stat().st_mtime)[_STATES:]:
+            shutil.rmtree(old, ignore_errors=True)
+    return place
 
 
 class _Locator(caching.UserWideCacheLocator):  # type: ignore[misc]
