@@ -22,11 +22,12 @@ from workbench.observers import choose, estimators_of
 from workbench.observers.export import build_observer
 from workbench.observers.replay import replay
 from workbench.observers.report import format_table, summarise_runs
-from workbench.observers.simulation import CaseResult, prepare
+from workbench.observers.simulation import CaseResult, followed, prepare
 from workbench.observers.trust import likely_reason, residual_tests
 from workbench.recordings.case import Case
 from workbench.system.registry import open_model
 from workbench.system.system import System
+from workbench.tuning.cost import Candidate, Evaluator
 from workbench.tuning.recipe import pose
 
 from .built import declare, machine
@@ -61,21 +62,35 @@ def test_innovations_do_not_contradict_bands_of_a_model_and_noise_that_are_right
     assert format_table(vessel, results[:1]).splitlines()[2].startswith("case")
 
 
-def test_a_score_by_what_corrects_an_estimator_says_so_and_no_gains_are_tuned_by_it(vessel):
-    """V follows its sensor as closely as gains let it: the best of them would repeat its noise."""
+def test_a_score_by_what_corrects_an_estimator_says_so(vessel):
+    """V follows its sensor as closely as gains let it."""
     result = result_of(vessel, 1.0, 0)
-    (said,) = [text for text in result.warnings() if text.startswith("V corrects the estimators")]
-    assert said in format_table(vessel, [result]).splitlines()[1]
+    said = "V corrects the estimators that it scores"
+    assert format_table(vessel, [result]).splitlines()[1].startswith(said)
     assert said in result.summary()
-    with pytest.raises(InputError, match="which ekf is fed: the gains that score best would repe"):
-        pose(vessel, "ekf", [result.case])
+    assert said in summarise_runs(vessel, [result], {"run": {}})["answer"]["sentence"]
     # A gauge of the outflow is fed to none.
     (meter,) = [output for output in vessel.outputs if output.name == "through"]
-    gauge = replace(meter, name="gauge")
     objective = replace(vessel.objective, signal="gauge", weights={"gauge": 1.0})
-    validated = replace(vessel, reference_signals=(gauge,), objective=objective)
-    assert "corrects the estimators" not in " ".join(replace(result, system=validated).warnings())
-    assert validated.validated
+    gauge = (replace(meter, name="gauge"),)
+    assert not followed(replace(vessel, reference_signals=gauge, objective=objective))
+
+
+def test_gains_that_repeat_the_noise_of_what_scores_them_score_worse(vessel):
+    """Each estimate is scored by samples after it: by its own, following it would be best."""
+    case = result_of(vessel, 100.0, 0).case  # with noise of 1e-3 m3
+    of_volume = replace(vessel, objective=replace(vessel.objective, weights={"V": 100.0}))
+    problem = pose(of_volume, "ekf", [case])
+    gains = problem.job.gains
+    with Evaluator(problem.job) as evaluator:
+        sound, repeating = (
+            evaluator.evaluate(Candidate(np.where(at, noise, gains.values), np.inf, (0,))).z
+            for at in [np.array(gains.names) == "V"]
+            for noise in (1e-3, 1e-6)
+        )
+    # A sample's noise beside that of the line through four others, 1.5 times its variance: 29 %,
+    # and less as lines cut the corners of the volume.
+    assert repeating > 1.1 * sound
 
 
 def test_bands_that_innovations_contradict_are_told_at_the_top_of_all_that_is_read(vessel):

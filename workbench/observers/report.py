@@ -12,7 +12,7 @@ from markupsafe import Markup
 from scipy.stats import t
 
 from workbench.observers import label
-from workbench.observers.simulation import CaseResult
+from workbench.observers.simulation import CaseResult, followed
 from workbench.observers.trust import Contradiction, contradiction_lines
 from workbench.pages.answer import Answer, Measure, percentage, recordings, with_answer
 from workbench.pages.columns import pack_estimates
@@ -86,7 +86,7 @@ def format_table(system: System, results: Sequence[CaseResult]) -> str:
     objective = system.objective
     when = f" {objective.when}" if objective.when else ""
     limits = ", ".join(filter(None, (below(system), window(system))))
-    lines = [f"Error of {objective.signal}, rms / mean{when} ({limits})"]
+    lines = [f"Error of {objective.signal}, rms / mean{when} ({limits})", *followed(system)]
     lines += warning_lines({result.case.name: result.warnings() for result in results})
     lines += contradiction_lines({result.case.name: result.contradictions for result in results})
     lines += [header, "-" * len(header)]
@@ -204,7 +204,7 @@ def simulation_answer(system: System, summary: Mapping[str, Any]) -> Answer:
         for case, values in summary["cases"].items()
         for name, score in values["estimators"].items()
     }
-    trust = "".join(f" {line}" for line in _contradictions(summary))
+    trust = "".join(f" {line}" for line in _said(system, summary))
     return Answer(_ranked(system, summary, ranking) + trust, headline, details)
 
 
@@ -285,7 +285,7 @@ def write_page(
         headline=_ranked(system, summary, ranking),
         parts=parts,
         warnings=[incomplete] * (missing > 0)
-        + [Markup.escape(line) for line in _contradictions(summary) + warning_lines(warnings)],
+        + [Markup.escape(line) for line in _said(system, summary) + warning_lines(warnings)],
         run=_run(system, summary),
     )
     page.write(summary, path)
@@ -374,7 +374,8 @@ def _cases(
     )
 
 
-def _contradictions(summary: Mapping[str, Any]) -> list[str]:
+def _said(system: System, summary: Mapping[str, Any]) -> list[str]:
+    """What contradicts the ranking of estimators, or their bands."""
     tested = {
         name: {
             estimator: [Contradiction(**test) for test in tests]
@@ -382,7 +383,7 @@ def _contradictions(summary: Mapping[str, Any]) -> list[str]:
         }
         for name, case in summary["cases"].items()
     }
-    return contradiction_lines(tested)
+    return followed(system) + contradiction_lines(tested)
 
 
 def warning_lines(warnings: Mapping[str, Sequence[str]]) -> list[str]:

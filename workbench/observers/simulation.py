@@ -177,14 +177,8 @@ class CaseResult:
         return [q.name for q in self.system.estimated if q.name in {*together, *self.untold}]
 
     def warnings(self) -> list[str]:
-        """What is said first of the recording: guesses, doubts by the model, what scores it."""
-        scored = self.system.objective.signal
-        followed = (
-            f"{scored} corrects the estimators that it scores: its errors say how closely each "
-            "follows the sensor, not how right it is. A validation sensor would score them"
-        )
-        fed = scored in (output.name for output in self.system.outputs)
-        return [*self.guesses(), *self.doubts, *[followed] * fed]
+        """What is said first of the recording: guesses, and doubts by the model."""
+        return [*self.guesses(), *self.doubts]
 
     def to_frame(self) -> pd.DataFrame:
         """All that the figure of the case shows: time, then `source.signal [unit]`.
@@ -248,7 +242,8 @@ class CaseResult:
         """Scores by estimator, for people."""
         table = pd.DataFrame(self.to_dict()["estimators"]).T
         title = f"{self.case.name}: {self.case.title}"
-        lines = [*self.warnings(), *contradiction_lines({self.case.name: self.contradictions})]
+        contradicted = contradiction_lines({self.case.name: self.contradictions})
+        lines = [*followed(self.system), *self.warnings(), *contradicted]
         return "\n".join([title, *lines, table.to_string(na_rep="n/a")])
 
     def plot(self) -> "Figure":
@@ -380,6 +375,17 @@ class Simulation:
         if any(signal.name in case for signal in self.system.reference_signals) or kept > _MOST:
             return None
         return runs.get(Smoother.name) or smoother_run(case, self.system)
+
+
+def followed(system: System) -> list[str]:
+    """Say that what scores estimators corrects them, if it does."""
+    scored = system.objective.signal
+    if scored not in (output.name for output in system.outputs):
+        return []
+    return [
+        f"{scored} corrects the estimators that it scores: its errors say how closely each follows "
+        "the sensor, not how right it is. A validation sensor would score them."
+    ]
 
 
 def hidden(system: System) -> tuple[str, ...]:

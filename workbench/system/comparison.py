@@ -94,7 +94,7 @@ class Rest:
         otherwise="it is at rest, before it is applied",
     )
     by: str = key(
-        "condition that the reading depends on: without it, a recording does not count here",
+        "condition that the reading depends on: without it, a recording is excluded here",
         of=CONDITION,
         absent="",
     )

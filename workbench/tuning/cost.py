@@ -16,7 +16,14 @@ from workbench.errors import FMUError, InputError, WorkerError
 from workbench.models.fmu import FMU
 from workbench.observers import Estimator, Gains, estimators_of
 from workbench.observers.operating import linearised
-from workbench.observers.score import corner, integrate, samples, scored_column, weights
+from workbench.observers.score import (
+    corner,
+    integrate,
+    references,
+    samples,
+    scored_column,
+    weights,
+)
 from workbench.recordings.case import Case, Value
 from workbench.runtime.pool import Pool
 from workbench.system.registry import open_file
@@ -99,8 +106,7 @@ def recording(case: Case, system: System) -> Recording:
             remedy="leave this case out of the tuning with --cases",
         )
     steps, shares = samples(case.time)
-    reference = np.column_stack([case[name] for name in names])
-    signals = case.u.copy(), case.y.copy(), reference
+    signals = case.u.copy(), case.y.copy(), references(case, system)
     return Recording(case.name, case.name, steps, *signals, shares, case.conditions)
 
 

@@ -172,19 +172,9 @@ def pose(
     Raises
     ------
     InputError
-        If there is no such estimator, the model is not fit for it, or a case cannot judge; or if
-        nothing would judge but what corrects the estimator, which the best gains then repeat.
+        If there is no such estimator, the model is not fit for it, or a case cannot judge.
     """
     estimator_class = tunable(system, estimator)
-    if not system.validated:
-        raise InputError(
-            where=f"[objective] of {system.name}",
-            found=f"only {' and '.join(system.objective.weights)}, which {estimator} is fed: the "
-            "gains that score best would repeat the noise of sensors",
-            expected="a signal that scores estimates and that no estimator is fed",
-            remedy="declare a validation sensor, [reference_signals.NAME]; without one, keep the "
-            "model-based gains, which follow from the declared noise",
-        )
     if judge_by is not None:
         cases = with_reference(cases, system, judge_by)
     if scale_errors is None:
