@@ -26,8 +26,8 @@ from workbench.system.system import System
 
 LIMIT = 1e-4  # of a signal's range: below what sensors tell
 _TOLERANCE = 1e-8  # of CVode
-# Of CVode where that is off: a force of slip is a small difference of states, and takes up what
-# they are wrong by. From the first to the second, its own error shows.
+# Of CVode where that is off: an output that is a small difference of states takes up what they are
+# wrong by. From the first to the second, CVode's own error shows.
 _TIGHT = 1e-11, 1e-12
 # Intervals between samples: a prime, so that samples do not fall on events at round times.
 _INTERVALS = 487
