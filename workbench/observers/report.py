@@ -211,7 +211,11 @@ def simulation_answer(system: System, summary: Mapping[str, Any]) -> Answer:
 def _ranked(system: System, summary: Mapping[str, Any], ranking: Sequence[Standing]) -> str:
     """Who errs least, in a sentence."""
     best, count = ranking[0], len(summary["cases"])
-    errors = [(s.worst, label(s.name, system)) for s in ranking if s.worst is not None]
+    errors = [
+        (standing.worst, label(standing.name, system))
+        for standing in ranking
+        if standing.worst is not None and standing.judged == best.judged
+    ]
     if not errors:
         return f"{len(ranking)} estimators ran on {recordings(count)}; none could be scored."
     signal = called(system, system.objective.signal)
@@ -425,6 +429,12 @@ def _terms(system: System) -> dict[str, str]:
         if reference in (output.name for output in system.outputs)
         else (f" {reference} is a validation sensor; no estimator uses it.")
     )
+    later = (
+        ""
+        if system.validated
+        else " As what is weighed corrects the estimators, each estimate is compared with the line "
+        "through the next samples, which it has not seen."
+    )
     weighed = " + ".join(
         f"{weight} {inverse(system.unit(name))} · |error of {name}|"
         for name, weight in system.objective.weights.items()
@@ -434,7 +444,8 @@ def _terms(system: System) -> dict[str, str]:
         f"{filtered if limit else ''}; root of the mean square {window(system)}, over the mean of "
         f"|{reference}| in the same time.{unseen}",
         "Objective z": "As in equation (12) of Schwarz, Brembeck, Heckmann (2018): the mean over "
-        f"the whole recording of {weighed}{f', of errors {limit}' if limit else ''}. Of several "
+        f"the whole recording of {weighed}{f', of errors {limit}' if limit else ''}."
+        f"{later} Of several "
         "cases, the largest counts.",
         "Computing time": "Wall time of the estimator on one processor, without reading, scoring "
         "and drawing. The first run on a machine compiles the loops of the "
