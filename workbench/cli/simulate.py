@@ -7,14 +7,13 @@ import hashlib
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from workbench.cli import arguments
 from workbench.cli.output import CommandResult, Output, warn
-from workbench.errors import FMUError, InputError
+from workbench.errors import InputError
 from workbench.runtime.files import locked_folder, write_json
 from workbench.runtime.supervision import memory_limit
 
@@ -150,7 +149,7 @@ def _run(
     simulation = prepare(system, chosen, options.gains, tuned=not options.untuned)
     output.stage("preparing the observers' loops (compiled once, up to a minute)")
     run = run_of("simulate", system, sources(cases))
-    settings = _settings(simulation, cases[0])
+    settings = _settings(simulation)
     provenance = {"run": run, **_models(simulation), **settings}
     provenance["meanings"] = {
         name: {gain: {"text": text, "unit": unit} for gain, (text, unit) in meaning.items()}
@@ -270,13 +269,9 @@ def _models(simulation: Simulation) -> dict[str, Any]:
     }
 
 
-def _settings(simulation: Simulation, case: Case) -> dict[str, Any]:
-    settings = {}
-    with simulation.estimators() as running:
-        for name, estimator in running.items():
-            with suppress(FMUError):  # of an event: its run on the recording says so
-                estimator.run(case.time[:2], case.u[:2], case.y[:2])
-                settings[name] = estimator.settings()
+def _settings(simulation: Simulation) -> dict[str, Any]:
+    with simulation.estimators() as estimators:
+        settings = {name: estimator.settings() for name, estimator in estimators.items()}
     return {name: setting for name, setting in settings.items() if setting}
 
 
