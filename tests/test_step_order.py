@@ -13,6 +13,7 @@ from workbench import case_from_frame
 from workbench.arrays import Matrix, Vector
 from workbench.models.fmu import FMU
 from workbench.models.native import instance
+from workbench.models.simulation import Drive, Simulation
 from workbench.observers import estimators_of
 from workbench.observers.estimators import step as method
 from workbench.observers.estimators.step import advance, model_step, restart
@@ -85,6 +86,21 @@ def test_a_swing_does_not_fade_without_feedback(spring, fmu):
     # 1e-4 of the range after 20 s, what is asked of an integrator with a tolerance of 1e-8.
     places = swing()[2]
     assert_allclose(run.signal("s"), places, rtol=0.0, atol=1e-4 * np.ptp(places))
+
+
+def test_a_whole_simulation_errs_by_no_more_than_the_tolerance_of_its_steps(spring, fmu):
+    time, force, places = swing()
+    simulated = Simulation(fmu, ["F"], ["s"], [1.0]).run(Drive(time, force[:, None]), {})
+    # 1e-8 of the state and its nominal value a step, which an undamped mass keeps.
+    assert_allclose(simulated[:, 0], places, rtol=0.0, atol=time.size * 1e-8 * (1.0 + 2.0))
+
+
+def test_a_whole_simulation_of_a_stiff_motion_goes_on_implicitly(relaxation):
+    time = 10.0 * np.arange(201)
+    with open_model(relaxation) as fmu:
+        drive = Drive(time, np.zeros((time.size, 1)))
+        simulated = Simulation(fmu, ["F"], ["s", "w"], [0.0]).run(drive, {})
+    assert_allclose(simulated, lienard(1000.0, time), rtol=0.0, atol=1e-4 * 4.0)
 
 
 @pytest.mark.parametrize("name", ["ekf", "ukf", "mhe", "imm", "smoother"])

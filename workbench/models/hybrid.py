@@ -8,6 +8,7 @@ Source: FMI 2.0.4, section 3.2; FMI 3.0, sections 2.5 and 3.
 
 import ctypes
 from collections.abc import Callable
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +16,9 @@ from scipy.integrate import RK45, Radau
 
 from workbench.arrays import Matrix, Vector
 from workbench.errors import FMUError
+from workbench.models.explicit_steps import Samples, State, go_on
 from workbench.models.fmu import FMU, CoSimulation, TypedVariables, central_differences
+from workbench.models.native import Instance, instance
 
 # Of a step, relative to the state and to its nominal value: far below what a sensor resolves.
 TOLERANCE = 1e-8
@@ -91,6 +94,56 @@ class HybridSimulation:
         self._before = self._after
         self._jump(u)
         return self._x.copy()
+
+    def run(self, time: Vector, u: Matrix, outputs: TypedVariables) -> Matrix:
+        """Take the first sample and go on to the last; returns the outputs at all, (n, l).
+
+        Parameters
+        ----------
+        time : (n,) of the FMU at the samples [s].
+        u : (n, m) inputs at the samples.
+
+        Raises
+        ------
+        FMUError
+            See `advance`.
+        """
+        self.begin(u[0])
+        rows = np.empty((time.size, len(outputs.names)))
+        rows[0] = self._fmu.get_typed(outputs)
+        model = self._compiled(outputs)
+        last = np.vstack([u[:1], u[:-1]])
+        begin, end = np.where(self._holds < 0.0, u, last), np.where(self._holds > 0.0, last, u)
+        samples = Samples(time, *(part[:, self._continuous_at].copy() for part in (u, begin, end)))
+        jumps = np.flatnonzero(self._jump_matters & ((begin != last) | (end != u)).any(axis=1))
+        k, tried, patience = 1, 1, 1
+        while k < time.size:
+            stop = int(next(iter(jumps[jumps >= k]), time.size))
+            if model is not None and stop > k >= tried:
+                state = State(self._x, self._nominal, self._signs)
+                reached = go_on(model, samples, state, slice(k, stop), rows, TOLERANCE)
+                # Where a motion is stiff, it soon is again: the next trial is ever further away.
+                patience = 1 if reached > k else 2 * patience
+                k, tried = reached, reached + patience
+                self._t, self._before = float(time[k - 1]), u[k - 1].copy()
+            if k < time.size:
+                self.advance(float(time[k]), u[k])
+                rows[k] = self._fmu.get_typed(outputs)
+                k += 1
+        return rows
+
+    def _compiled(self, outputs: TypedVariables) -> Instance | None:
+        """The FMU for compiled steps; None if they cannot set and read all that there is."""
+        fmu = self._fmu
+        if outputs.others or not self._x.size or not all(map(fmu.is_real, fmu.states)):
+            return None
+        return instance(fmu, self._continuous.names, [], outputs.names)
+
+    @cached_property
+    def _jump_matters(self) -> bool:
+        """Whether a jump of an input may be an event: indicators or discrete variables follow."""
+        variables = self._fmu.description.variables
+        return bool(self._signs.size) or any(v.variability == "discrete" for v in variables)
 
     def keep(self) -> None:
         """Keep the present point, to which `start_from` goes back; the FMU must save its state."""
@@ -293,6 +346,16 @@ class CoSimulationRun:
         self._states = fmu.typed(fmu.states)
         self._t = fmu.start_time
         self._before = fmu.get_typed(inputs)
+
+    def run(self, time: Vector, u: Matrix, outputs: TypedVariables) -> Matrix:
+        """See `HybridSimulation.run`."""
+        self.begin(u[0])
+        rows = np.empty((time.size, len(outputs.names)))
+        rows[0] = self._fmu.get_typed(outputs)
+        for k in range(1, time.size):
+            self.advance(float(time[k]), u[k])
+            rows[k] = self._fmu.get_typed(outputs)
+        return rows
 
     def begin(self, u: Vector) -> None:
         """Take the inputs of the first sample, (m,)."""

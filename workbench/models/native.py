@@ -236,6 +236,13 @@ def co_simulation_instance(
 
 
 @inlined
+def assign(target, source):  # type: ignore[no-untyped-def]
+    """Copy a vector, in rising order."""
+    for i in range(target.size):
+        target[i] = source[i]
+
+
+@inlined
 def set_inputs(model, first, count):  # type: ignore[no-untyped-def]
     """Set `count` inputs from number `first` on to model.u; returns a status."""
     references, values = model.inputs[first:], model.u[first:]
@@ -281,8 +288,18 @@ def set_time(model, t):  # type: ignore[no-untyped-def]
 def check_state_events(model):  # type: ignore[no-untyped-def]
     """EVENT if the FMU, at the end of a step, is beyond a state event or at a step event.
 
-    A state event: an indicator has another sign than at the start. A step event: the FMU says so.
+    A state event: an indicator has another sign than at the start.
     """
+    status = end_step(model) or read_indicators(model)
+    for i in range(model.indicators.size):
+        if (model.indicators[i] > 0.0) != model.event_signs[i]:
+            return status or EVENT
+    return status
+
+
+@inlined
+def end_step(model):  # type: ignore[no-untyped-def]
+    """Tell the FMU that a step is over; EVENT if it says that a step event is due."""
     if model.complete_step != 0:
         # The zero: states may be set back to before this point. FMI 3.0 writes one byte of each.
         words = model.address, 0, model.ended, model.ended[1:]
@@ -290,15 +307,15 @@ def check_state_events(model):  # type: ignore[no-untyped-def]
             return REFUSED
         if model.ended[0] != 0 or model.ended[1] != 0:
             return EVENT
-    n = model.indicators.size
-    if n == 0:
-        return OK
-    if _call(model, model.get_indicators, (model.address, model.indicators, n)):
-        return REFUSED
-    for i in range(n):
-        if (model.indicators[i] > 0.0) != model.event_signs[i]:
-            return EVENT
     return OK
+
+
+@inlined
+def read_indicators(model):  # type: ignore[no-untyped-def]
+    """Event indicators into model.indicators; returns a status."""
+    n = model.indicators.size
+    words = model.address, model.indicators, n
+    return _call(model, model.get_indicators, words) if n else OK
 
 
 @inlined

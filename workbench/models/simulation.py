@@ -127,13 +127,7 @@ class Simulation:
         self._start(drive, values)
         make = CoSimulationRun if isinstance(fmu, CoSimulation) else HybridSimulation
         along = make(fmu, self._inputs, self._holds)  # type: ignore[arg-type]
-        along.begin(drive.u[0])
-        outputs = np.empty((drive.time.size, len(self._outputs.names)))
-        outputs[0] = fmu.get_typed(self._outputs)
-        for k in range(1, drive.time.size):
-            along.advance(fmu.start_time + (drive.time[k] - drive.time[0]), drive.u[k])
-            outputs[k] = fmu.get_typed(self._outputs)
-        return outputs
+        return along.run(fmu.start_time + (drive.time - drive.time[0]), drive.u, self._outputs)
 
     def _start(self, drive: Drive, values: Mapping[str, float]) -> None:
         fmu = self.fmu

@@ -224,13 +224,6 @@ def stick(layout, x, before):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def assign(target, source):  # type: ignore[no-untyped-def]
-    """Copy a vector, in rising order."""
-    for i in range(target.size):
-        target[i] = source[i]
-
-
-@inlined
 def assign_rows(target, source):  # type: ignore[no-untyped-def]
     """Copy a matrix, in rising order."""
     for i in range(target.shape[0]):

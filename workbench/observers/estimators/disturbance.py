@@ -20,7 +20,7 @@ from scipy.linalg import LinAlgError, solve_continuous_are
 from workbench.arrays import Matrix, Vector
 from workbench.errors import InputError
 from workbench.models.fmu import FMU
-from workbench.models.native import compiled, evaluate, inlined, linearise, solve
+from workbench.models.native import assign, compiled, evaluate, inlined, linearise, solve
 from workbench.observers.contract import Estimator
 from workbench.observers.gains import (
     Gains,
@@ -33,7 +33,6 @@ from workbench.observers.layout import (
     Layout,
     act,
     add_slope,
-    assign,
     authority,
     clip,
     correct,

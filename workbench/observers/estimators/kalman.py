@@ -14,6 +14,7 @@ from workbench.arrays import Matrix, Vector
 from workbench.errors import FMUError
 from workbench.models.fmu import FMU, EventError
 from workbench.models.native import (
+    assign,
     compiled,
     evaluate,
     inlined,
@@ -34,15 +35,7 @@ from workbench.observers.estimators.step import (
 )
 from workbench.observers.estimators.through_events import EventMap
 from workbench.observers.gains import Gains, SearchSpace, noise_space
-from workbench.observers.layout import (
-    Layout,
-    assign,
-    clip,
-    fading,
-    measure,
-    put,
-    report,
-)
+from workbench.observers.layout import Layout, clip, fading, measure, put, report
 from workbench.observers.operating import start_spreads, walks
 from workbench.system.system import System
 

@@ -8,7 +8,7 @@ from workbench.arrays import Matrix, Vector
 from workbench.models.description import MODEL_EXCHANGE
 from workbench.models.fmu import FMU, CoSimulation
 from workbench.models.hybrid import CoSimulationRun, HybridSimulation
-from workbench.models.native import compiled, inlined, set_states
+from workbench.models.native import assign, compiled, inlined, set_states
 from workbench.observers.contract import Estimate, Estimator
 from workbench.observers.estimators.step import (
     Step,
@@ -21,7 +21,7 @@ from workbench.observers.estimators.step import (
     unbearable,
 )
 from workbench.observers.gains import Gains
-from workbench.observers.layout import Layout, assign, measure, output, report, write_estimate
+from workbench.observers.layout import Layout, measure, output, report, write_estimate
 from workbench.system.system import System
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from workbench.arrays import Matrix, Vector
 from workbench.models.fmu import FMU
-from workbench.models.native import compiled, evaluate, implicit, linearise, solve
+from workbench.models.native import assign, compiled, evaluate, implicit, linearise, solve
 from workbench.observers.contract import Estimator
 from workbench.observers.estimators.disturbance import effects
 from workbench.observers.gains import (
@@ -25,7 +25,6 @@ from workbench.observers.layout import (
     Layout,
     act,
     add_slope,
-    assign,
     authority,
     clip,
     correct,

@@ -6,7 +6,7 @@ import numpy as np
 
 from workbench.arrays import Matrix, Vector
 from workbench.errors import InputError
-from workbench.models.native import compiled, raise_on_failure
+from workbench.models.native import assign, compiled, raise_on_failure
 from workbench.observers.contract import Estimate
 from workbench.observers.estimators.kalman import carry, finish
 from workbench.observers.estimators.moving_horizon.estimator import (
@@ -28,7 +28,7 @@ from workbench.observers.estimators.moving_horizon.window import (
 from workbench.observers.estimators.moving_horizon.window_bounds import push
 from workbench.observers.estimators.moving_horizon.window_cost import cost
 from workbench.observers.estimators.moving_horizon.window_spread import gather_spread, spread
-from workbench.observers.layout import assign, assign_rows, clip, measure
+from workbench.observers.layout import assign_rows, clip, measure
 
 # Share of its noise below which a step follows the model: where feedback has faded to a thousandth.
 _FAINTEST = 1e-6

@@ -6,7 +6,7 @@ import numpy as np
 
 from workbench.arrays import Matrix, Vector
 from workbench.models.fmu import FMU
-from workbench.models.native import compiled, linearise, read
+from workbench.models.native import assign, compiled, linearise, read
 from workbench.observers.estimators.kalman import (
     ExtendedKalmanFilter,
     Levels,
@@ -30,7 +30,7 @@ from workbench.observers.estimators.step import (
     judge_sample,
 )
 from workbench.observers.gains import Gains
-from workbench.observers.layout import assign, clip, fading, measure, put
+from workbench.observers.layout import clip, fading, measure, put
 from workbench.system.system import System
 
 # Distance of sigma points, as a share of the cubature rule's: a quantity that nothing is known of

@@ -28,7 +28,7 @@ import numpy as np
 from workbench.arrays import Matrix, Vector
 from workbench.errors import InputError
 from workbench.models.fmu import FMU
-from workbench.models.native import compiled, read
+from workbench.models.native import assign, compiled, read
 from workbench.observers.estimators.block_filter.block_sample import (
     fed_deviation,
     measurement_update,
@@ -41,7 +41,7 @@ from workbench.observers.estimators.block_filter.blocks import Blocks, blocks, w
 from workbench.observers.estimators.kalman import ExtendedKalmanFilter, FilterSettings, variance
 from workbench.observers.estimators.step import Step
 from workbench.observers.gains import Gains
-from workbench.observers.layout import Layout, act, assign, clip, fading, measure, put, report
+from workbench.observers.layout import Layout, act, clip, fading, measure, put, report
 from workbench.system.system import System
 
 

@@ -8,7 +8,15 @@ from scipy.special import chdtri, ndtri
 from workbench.arrays import Vector
 from workbench.errors import InputError
 from workbench.models.fmu import FMU
-from workbench.models.native import compiled, inlined, linearise, raise_on_failure, read, read_only
+from workbench.models.native import (
+    assign,
+    compiled,
+    inlined,
+    linearise,
+    raise_on_failure,
+    read,
+    read_only,
+)
 from workbench.observers.estimators.kalman import (
     ExtendedKalmanFilter,
     FilterState,
@@ -41,7 +49,7 @@ from workbench.observers.estimators.step import (
     judge_sample,
 )
 from workbench.observers.gains import Gains
-from workbench.observers.layout import Layout, assign, assign_rows, fading, measure, put
+from workbench.observers.layout import Layout, assign_rows, fading, measure, put
 from workbench.system.system import System
 
 HORIZON = 20  # samples

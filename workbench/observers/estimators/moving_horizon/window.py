@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.arrays import Matrix, Vector
-from workbench.models.native import compiled, inlined
+from workbench.models.native import assign, compiled, inlined
 from workbench.observers.estimators.kalman import carry
-from workbench.observers.layout import assign, assign_rows
+from workbench.observers.layout import assign_rows
 
 Tensor = NDArray[np.float64]
 
