@@ -43,3 +43,9 @@ int model_jacobian_p(double t, const double *x, const double *u, const double *p
     nonzeros[1] = -p[0] * t * sin(p[1] * t) - sin(p[1] * t) - p[1] * t * cos(p[1] * t);
     return 0;
 }
+
+int model_linearisation(double t, const double *x, const double *u, const double *p,
+                        double *values) {
+    return model_derivatives(t, x, u, p, values) || model_algebraics(t, x, u, p, values + NX) ||
+           model_jacobian_xu(t, x, u, p, values + NX + NW);
+}

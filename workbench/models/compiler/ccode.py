@@ -77,6 +77,8 @@ def generate(model: StateSpace, token: str, prefix: str = "model") -> GeneratedC
         "assertions": ("holds", model.assertions),
         **({"starts": ("start", model.x0)} if model.follows and model.x0 is not None else {}),
         "jacobian_xu": ("nonzeros", _nonzeros(jacobian_xu)),
+        # At one point they share most of their operations.
+        "linearisation": ("values", ca.vertcat(rows, _nonzeros(jacobian_xu))),
         "jacobian_p": ("nonzeros", _nonzeros(jacobian_p)),
     }
     starts = model.initial_states() + [v.start for v in (*model.inputs, *model.parameters)]

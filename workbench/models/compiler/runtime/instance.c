@@ -200,41 +200,58 @@ static COLD Status not_finite(const Instance *i, int reference, double time) {
 
 /* Derivatives, brought up to date; NULL if one is not finite. */
 static const double *derivatives(Instance *i) {
+    double *const xdot = i->at_point;
     if ((i->valid & DERIVATIVES) == 0) {
         const State *const s = &i->state;
-        const int failed =
-            model_derivatives(s->time, s->value, inputs(i), parameters(i), i->xdot);
+        i->together |= (i->valid & JACOBIAN_XU) != 0;
+        const int failed = model_derivatives(s->time, s->value, inputs(i), parameters(i), xdot);
         for (int n = 0; n < NX; n++) {
-            if (failed || !isfinite(i->xdot[n])) {
+            if (failed || !isfinite(xdot[n])) {
                 not_finite(i, REFERENCE_XDOT + n, s->time);
                 return NULL;
             }
         }
         i->valid |= DERIVATIVES;
     }
-    return i->xdot;
+    return xdot;
 }
 
 /* Outputs and local variables, likewise. A value that is not asked for may be anything. */
 static const double *algebraics(Instance *i) {
+    double *const w = i->at_point + NX;
     if ((i->valid & ALGEBRAICS) == 0) {
         const State *const s = &i->state;
-        if (model_algebraics(s->time, s->value, inputs(i), parameters(i), i->w) != 0) {
+        if (model_algebraics(s->time, s->value, inputs(i), parameters(i), w) != 0) {
             not_finite(i, REFERENCE_W, s->time);
             return NULL;
         }
         i->valid |= ALGEBRAICS;
     }
-    return i->w;
+    return w;
+}
+
+/* Derivatives, algebraics and nonzeros of the Jacobian in one evaluation. */
+static int linearise(Instance *i) {
+    const State *const s = &i->state;
+    if (model_linearisation(s->time, s->value, inputs(i), parameters(i), i->at_point) != 0) {
+        return 1;
+    }
+    int finite = 1; /* else `derivatives` says what is not */
+    for (int n = 0; n < NX; n++) {
+        finite &= isfinite(i->at_point[n]) != 0;
+    }
+    i->valid |= ALGEBRAICS | (finite ? DERIVATIVES : 0);
+    return 0;
 }
 
 /* Nonzeros of the Jacobian with respect to [x, u] (JACOBIAN_XU) or to p (JACOBIAN_P). */
 static COLD const double *jacobian(Instance *i, unsigned which) {
-    double *const nonzeros = which == JACOBIAN_XU ? i->jacobian_xu : i->jacobian_p;
+    double *const nonzeros = which == JACOBIAN_XU ? i->at_point + NX + NW : i->jacobian_p;
     if ((i->valid & which) == 0) {
         const State *const s = &i->state;
         const int failed =
-            which == JACOBIAN_XU
+            which == JACOBIAN_XU && i->together ? linearise(i)
+            : which == JACOBIAN_XU
                 ? model_jacobian_xu(s->time, s->value, inputs(i), parameters(i), nonzeros)
                 : model_jacobian_p(s->time, s->value, inputs(i), parameters(i), nonzeros);
         if (failed) {
@@ -681,11 +698,12 @@ static inline int scale_column(const Instance *i, const unsigned unknown[], int 
         sensitivity[k] = zero;
     }
     double sum = zero; /* not finite if the seed or a product is not, so one check does for all */
+    const double *const nonzero = i->at_point + NX + NW;
     const int end = model_jacobian_xu_column[column + 1];
     for (int n = model_jacobian_xu_column[column]; n < end; n++) {
         const int k = model_jacobian_xu_row[n] - first;
         if (k >= 0 && k < count) {
-            sensitivity[k] = i->jacobian_xu[n] * seed;
+            sensitivity[k] = nonzero[n] * seed;
             sum += sensitivity[k];
         }
     }

@@ -74,8 +74,9 @@ struct Instance {
     Importer importer;
     const char *function; /* the function that is being called, for messages */
     unsigned valid;       /* which of the caches belong to the state */
-    double xdot[NX + 1], w[NW + 1];
-    double jacobian_xu[NNZ_XU + 1], jacobian_p[NNZ_P + 1];
+    int together; /* whether Jacobians bring derivatives along, for an importer that asks for both */
+    double at_point[NX + NW + NNZ_XU + 1]; /* xdot, w and nonzeros, as model_linearisation */
+    double jacobian_p[NNZ_P + 1];
     double work[2 * NX + NW + 1];
     /* Value references of the Jacobian's rows, der(x) and w, and of its columns, x and u. */
     unsigned rows[NX + NW + 1], columns[NX + NU + 1];

@@ -55,6 +55,10 @@ extern const int model_jacobian_xu_row[];    /* NNZ_XU */
 int model_jacobian_xu(double t, const double *x, const double *u, const double *p,
                       double *nonzeros);
 
+/* values: NX+NW values of xdot and w, then the nonzeros of that Jacobian; bit for bit as above. */
+int model_linearisation(double t, const double *x, const double *u, const double *p,
+                        double *values);
+
 /* Jacobian of [xdot; w] with respect to p, in compressed columns. */
 extern const int model_jacobian_p_column[]; /* NP+1 */
 extern const int model_jacobian_p_row[];    /* NNZ_P */
