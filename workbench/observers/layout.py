@@ -9,7 +9,14 @@ from numpy.typing import NDArray
 from workbench.arrays import Vector
 from workbench.errors import InputError
 from workbench.models.fmu import FMU
-from workbench.models.native import inlined, read, set_inputs, set_sample, set_states
+from workbench.models.native import (
+    check_state_events,
+    inlined,
+    read,
+    set_inputs,
+    set_sample,
+    set_states,
+)
 from workbench.system.system import System
 
 
@@ -247,6 +254,15 @@ def act(layout, before, u, acting):  # type: ignore[no-untyped-def]
 def measure(model, u):  # type: ignore[no-untyped-def]
     """Set the measured inputs and the time, see `set_sample`; returns a status."""
     return set_sample(model, u)
+
+
+@inlined
+def measure_end(model, acted, u):  # type: ignore[no-untyped-def]
+    """The same of the sample at the end of a step, (m + 1,), after those that acted in it."""
+    for j in range(u.size):
+        if acted[j] != u[j]:
+            return measure(model, u)
+    return check_state_events(model)
 
 
 @inlined

@@ -40,6 +40,7 @@ from workbench.observers.layout import (
     fading,
     lag,
     measure,
+    measure_end,
     output,
     report,
     stick,
@@ -111,7 +112,10 @@ def disturbance_step(model, settings, state, h, u, y, estimate):  # type: ignore
     status = 0
     if h > 0.0:
         act(layout, state.inputs, u, state.acting)
-        status = measure(model, state.acting) or evaluate(model)
+        status = measure(model, state.acting)
+        for j in range(outputs):
+            innovation[j] = y[j] - output(model, layout, j)
+        status = status or linearise(model, layout.columns) or evaluate(model)
         for i in range(n):
             state.others[i] = h * model.dx[i]
         for i in range(s):
@@ -119,9 +123,6 @@ def disturbance_step(model, settings, state, h, u, y, estimate):  # type: ignore
         for i in range(q):
             decay = settings.decay[i] * (z[i] - state.target[i])
             change[s + i] = h * decay + state.drift[i]
-        for j in range(outputs):
-            innovation[j] = y[j] - output(model, layout, j)
-        status = status or linearise(model, layout.columns)
         fade = fading(layout, y)
         for i in range(s + q):
             equation, total, share = system[i], change[i], fade
@@ -158,8 +159,10 @@ def disturbance_step(model, settings, state, h, u, y, estimate):  # type: ignore
         for i in range(q):
             z[i] = clip(z[i] + change[s + i], layout.low[i], layout.high[i])
         stick(layout, model.x, before)
+        status = measure_end(model, state.acting, u) or correct(model, z)
+    else:
+        status = measure(model, u) or correct(model, z)
     assign(state.inputs, u)
-    status = status or measure(model, u) or correct(model, z)
     return status or report(model, layout, estimate)
 
 

@@ -13,7 +13,7 @@ from workbench.observers.contract import Estimate, Estimator
 from workbench.observers.estimators.step import (
     Step,
     advance,
-    begin_interval,
+    begin_alone,
     euler,
     judge,
     model_step,
@@ -21,7 +21,14 @@ from workbench.observers.estimators.step import (
     unbearable,
 )
 from workbench.observers.gains import Gains
-from workbench.observers.layout import Layout, measure, output, report, write_estimate
+from workbench.observers.layout import (
+    Layout,
+    measure,
+    measure_end,
+    output,
+    report,
+    write_estimate,
+)
 from workbench.system.system import System
 
 
@@ -38,7 +45,7 @@ def _step(model, settings, step, h, u, y, estimate):  # type: ignore[no-untyped-
         restart(step, u)
         return measure(model, u) or report(model, layout, estimate)
     assign(step.x, model.x)
-    status = begin_interval(model, layout, step, step.x, u, h) or measure(model, step.end)
+    status = begin_alone(model, layout, step, step.x, u, h) or measure(model, step.end)
     if step.accurate[0] > 0.0:
         status = status or advance(model, layout, step, step.x, h, False)
     else:
@@ -48,9 +55,12 @@ def _step(model, settings, step, h, u, y, estimate):  # type: ignore[no-untyped-
         status = status or euler(model, layout, step, step.x, h, False)
         for i in range(step.x.size):
             step.error[i] = step.system[i, step.x.size + 1]
+        assign(step.ended, step.end)
+        step.lasted[0] = h
     assign(model.x, step.x)
     assign(step.inputs, u)
-    status = status or set_states(model) or measure(model, u) or report(model, layout, estimate)
+    status = status or set_states(model) or measure_end(model, step.end, u)
+    status = status or report(model, layout, estimate)
     if step.accurate[0] == 0.0:
         _judge(model, settings, step, y)
     return status

@@ -31,6 +31,7 @@ from workbench.observers.layout import (
     explained,
     fading,
     measure,
+    measure_end,
     output,
     report,
 )
@@ -66,12 +67,12 @@ def _step(model, settings, state, h, u, y, estimate):  # type: ignore[no-untyped
     status = 0
     if h > 0.0:
         act(layout, state.inputs, u, state.acting)
-        status = measure(model, state.acting) or evaluate(model)
-        for i in range(n):
-            system[i, n] = h * model.dx[i]
+        status = measure(model, state.acting)
         for j in range(outputs):
             innovation[j] = y[j] - output(model, layout, j)
-        status = status or linearise(model, layout.columns)
+        status = status or linearise(model, layout.columns) or evaluate(model)
+        for i in range(n):
+            system[i, n] = h * model.dx[i]
         fade = fading(layout, y)
         for i in range(q):
             share = fade * authority(model, layout, settings.effect, i)
@@ -104,9 +105,11 @@ def _step(model, settings, state, h, u, y, estimate):  # type: ignore[no-untyped
                 direct += gains[k, j] * innovation[j]
             integral[k] = clip(integral[k], layout.low[k], layout.high[k])
             z[k] = clip(integral[k] + direct, layout.low[k], layout.high[k])
-        status = correct(model, z)
+        status = correct(model, z) or measure_end(model, state.acting, u)
+    else:
+        status = measure(model, u)
     assign(state.inputs, u)
-    return status or measure(model, u) or report(model, layout, estimate)
+    return status or report(model, layout, estimate)
 
 
 @compiled

@@ -87,7 +87,7 @@ class Step(NamedTuple):
     columns : of the Jacobian that is left in the model: n of rates, or those of outputs, too.
     accurate : (1,) 1 where steps are of order 3, 0 where they are Euler's.
     system : (n, n + 1) of Euler's step, with its right-hand side; of a model alone one more.
-    spread : (n, n + s) of its derivatives.
+    spread : (n, n + s + 1) of its derivatives, and its right-hand side.
     left : (n,) what it leaves out, g above.
     predicted, error : (s,) what that has added up to, before and after the last sample.
     seen : (2,) squares of it in the last sample over the innovations' variances; their number.
@@ -99,10 +99,13 @@ class Step(NamedTuple):
     coarse : (1,) steps that the most parts leave too large an error of.
     inputs : (m + 1,) the last sample of the inputs, and its time.
     begin, end, between : (m + 1,) inputs and time at the beginning of a step, its end, within it.
+    ended : (m + 1,) inputs and time at the end of a model's step before, which took `lasted`.
+    lasted : (1,) [s].
     x : (n,) states that advance, of a law that keeps no others.
     rates : (n,) f at the beginning.
     W, pivots : (n, n) and (n,), see `invert`.
-    d, r : (n,) change of the states without what bends it, and by that: 3/2 h psi r.
+    d, r : (n,) change of the states without what bends it, and by that: 3/2 h psi r; d of
+        Euler's step, too.
     w1, w2, w3 : (n,) powers of W times a vector.
     bend : (n,) what the rates have beyond their Jacobian.
     bent, curved : (n,) error of d by the step of order 2; that of r, of curvature alone.
@@ -133,6 +136,8 @@ class Step(NamedTuple):
     begin: Vector
     end: Vector
     between: Vector
+    ended: Vector
+    lasted: Vector
     x: Vector
     rates: Vector
     W: Matrix
@@ -170,7 +175,7 @@ def model_step(fmu: FMU, walk: Vector, inputs: int, size: int, columns: int = 0)
         columns=columns or n,
         accurate=np.zeros(1),
         system=np.zeros((n, n + 1)),
-        spread=np.zeros((n, n + size)),
+        spread=np.zeros((n, n + size + 1)),
         left=np.zeros(n),
         predicted=np.zeros(size),
         error=np.zeros(size),
@@ -187,6 +192,8 @@ def model_step(fmu: FMU, walk: Vector, inputs: int, size: int, columns: int = 0)
         begin=np.zeros(m),
         end=np.zeros(m),
         between=np.zeros(m),
+        ended=np.zeros(m),
+        lasted=np.ones(1),
         x=np.zeros(n),
         rates=np.zeros(n),
         W=np.zeros((n, n)),
@@ -218,6 +225,7 @@ def restart(step, u):  # type: ignore[no-untyped-def]
         step.reach[i] = step.left[i] = 0.0
     for j in range(u.size):
         step.inputs[j] = u[j]
+        step.ended[j] = u[j] + 1.0  # not those of a step before, of which there is none
 
 
 @inlined
@@ -241,6 +249,31 @@ def begin_interval(model, layout, step, z, u, h):  # type: ignore[no-untyped-def
             z[i] += step.error[i]
             step.error[i] = step.predicted[i] = 0.0
         return OK
+    return _rates_at_begin(model, layout, step, u, h)
+
+
+@inlined
+def begin_alone(model, layout, step, z, u, h):  # type: ignore[no-untyped-def]
+    """Begin a step of a model whose states nothing has corrected, see `begin_interval`; a status.
+
+    Euler's step ends with the rate (x(h) - x)/h = f + A d, which is f(x(h)) but for what bends f
+    within the step: to first order, as all that is said of the error. Where the step begins at the
+    inputs that the one before has ended at, that saves an evaluation.
+    """
+    interval(layout, step, step.inputs, u)
+    follows = step.accurate[0] == 0.0
+    for j in range(u.size):
+        follows = follows and step.begin[j] == step.ended[j]
+    if not follows:
+        return begin_interval(model, layout, step, z, u, h)
+    for i in range(step.rates.size):
+        step.rates[i] = h / step.lasted[0] * step.d[i]
+    return OK
+
+
+@inlined
+def _rates_at_begin(model, layout, step, u, h):  # type: ignore[no-untyped-def]
+    """Write h f(z, u(0)) to the rates; returns a status."""
     status = 0
     for j in range(u.size):
         if layout.holds[j] < 0.0 and step.begin[j] != step.inputs[j] and not status:
@@ -449,29 +482,33 @@ def euler(model, layout, step, z, h, differentiated):  # type: ignore[no-untyped
     Its derivatives are (I - hA)^-1 [I, hB]; the rows of quantities are those of a unit matrix.
     """
     n, system, spread = model.x.size, step.system, step.spread
-    status = evaluate(model)
-    for i in range(n):
-        system[i, n] = h * model.dx[i]
-    status = status or linearise(model, step.columns)
-    implicit(model, h, system)
-    status = status or solve(system)
+    size = step.F.shape[1]
+    status = linearise(model, step.columns) or evaluate(model)
+    if differentiated:
+        implicit(model, h, spread)
+        for i in range(n):
+            for j in range(n):
+                spread[i, n + j] = 1.0 if j == i else 0.0
+            for j in range(n, size):
+                spread[i, n + j] = h * model.jacobian[j, i]
+            spread[i, n + size] = h * model.dx[i]
+        status = status or solve(spread)
+        for i in range(n):
+            for j in range(size):
+                step.F[i, j] = spread[i, n + j]
+            step.d[i] = spread[i, n + size]
+    else:
+        implicit(model, h, system)
+        for i in range(n):
+            system[i, n] = h * model.dx[i]
+        status = status or solve(system)
+        for i in range(n):
+            step.d[i] = system[i, n]
     before = lag(layout, z)
     for i in range(n):
-        z[i] += system[i, n]
-        step.left[i] = 0.5 * (step.rates[i] - system[i, n])
+        z[i] += step.d[i]
+        step.left[i] = 0.5 * (step.rates[i] - step.d[i])
     stick(layout, z, before)
-    if not differentiated:
-        return status
-    implicit(model, h, spread)
-    for i in range(n):
-        for j in range(n, spread.shape[1]):
-            spread[i, j] = 1.0 if j == n + i else 0.0
-        for j in range(n, step.F.shape[1]):
-            spread[i, n + j] = h * model.jacobian[j, i]
-    status = status or solve(spread)
-    for i in range(n):
-        for j in range(step.F.shape[1]):
-            step.F[i, j] = spread[i, n + j]
     return status
 
 
@@ -525,10 +562,10 @@ def _go_in_parts(model, layout, step, z, h, differentiated):  # type: ignore[no-
             status = put(model, z)
         else:
             _interpolate(step, done)
-            status = measure(model, step.between) or put(model, z) or evaluate(model)
+            status = measure(model, step.between) or put(model, z)
+            status = status or linearise(model, step.columns) or evaluate(model)
             for i in range(n):
                 step.rates[i] = model.dx[i]
-            status = status or linearise(model, step.columns)
         if status:
             return status
         tried += 1
