@@ -506,6 +506,15 @@ def solve_part(a, n, columns):  # type: ignore[no-untyped-def]
             if factor != 0.0:
                 for j in range(columns):
                     a[i, j] -= factor * a[k, j]
+    if columns == n + 1:
+        # A sum in a register takes two thirds of the time.
+        for k in range(n - 1, -1, -1):
+            total = a[k, n]
+            for i in range(k + 1, n):
+                if a[k, i] != 0.0:
+                    total -= a[k, i] * a[i, n]
+            a[k, n] = total / a[k, k]
+        return OK
     for k in range(n - 1, -1, -1):
         for i in range(k + 1, n):
             factor = a[k, i]
