@@ -3,6 +3,7 @@
 import asyncio
 import errno
 import json
+import math
 import os
 import shutil
 import signal
@@ -10,16 +11,17 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future
-from contextlib import AbstractContextManager, closing, contextmanager
+from contextlib import AbstractContextManager, closing, contextmanager, nullcontext
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
 import workbench
-from workbench.errors import InputError
+from workbench.errors import InputError, WorkerError
 from workbench.runtime.files import previous_path
 from workbench.runtime.pool import Pool
 from workbench.tuning import (
@@ -121,6 +123,38 @@ def test_a_cluster_finds_the_same_gains(problem, alone, tmp_path):
     ):
         tuned = run(remote, problem, tmp_path / "remote.json", SMALL)
     assert_array_equal(tuned.best, alone.best)
+
+
+def test_of_several_calls_in_a_task_only_the_one_that_ends_its_workers_is_lost(monkeypatch):
+    """Powers of 2 by a cluster, whose worker would die of 2^7."""
+    import distributed
+
+    from workbench.runtime import cluster
+
+    sizes, work, send = [], cluster._work, cluster.DaskPool._send
+
+    def note_size(pool: cluster.DaskPool[float], task: cluster._Task) -> None:
+        sizes.append(len(task.calls))
+        send(pool, task)
+
+    def die_of_seven(function: Callable[..., float], calls: Sequence[tuple[int]]) -> list[float]:
+        if (7,) in calls:
+            raise distributed.KilledWorker("a task", SimpleNamespace(address="here"), 3)
+        return work(function, calls)
+
+    monkeypatch.setattr(cluster, "_work", die_of_seven)
+    monkeypatch.setattr(cluster.DaskPool, "_send", note_size)
+    options = {"n_workers": 1, "threads_per_worker": 1, "memory_limit": 0}
+    with (
+        distributed.LocalCluster(processes=False, dashboard_address=":0", **options) as local,
+        closing(cluster.DaskPool(local.scheduler_address, nullcontext, 2.0, 60.0)) as pool,
+    ):
+        answers = pool.submit_all(math.pow, [(k,) for k in range(40)])
+        results = [answer.exception() or answer.result() for answer in answers]
+    assert isinstance(results.pop(7), WorkerError)
+    assert results == [2.0**k for k in range(40) if k != 7]
+    # Tasks become smaller, so that workers end together; the calls of the first are tried alone.
+    assert sizes == [16, 12, 6, 3, 2, 1, *[1] * 16]
 
 
 LATE = """
@@ -298,12 +332,17 @@ class Deadly:
         self._pool = pool
         self._candidate = candidate
 
-    def submit(
-        self, function: Callable[[Evaluator, Candidate], Evaluation], candidate: Candidate
-    ) -> "Future[Evaluation]":
-        if candidate.values[0] == self._candidate:
-            return self._pool.submit(die)
-        return self._pool.submit(function, candidate)
+    def submit_all(
+        self,
+        function: Callable[[Evaluator, Candidate], Evaluation],
+        calls: Sequence[tuple[Candidate]],
+    ) -> "list[Future[Evaluation]]":
+        return [
+            self._pool.submit(die)
+            if candidate.values[0] == self._candidate
+            else self._pool.submit(function, candidate)
+            for (candidate,) in calls
+        ]
 
 
 def die(evaluator: Evaluator) -> Evaluation:

@@ -342,6 +342,10 @@ class Estimator(ABC):
         """
         return self._split(self._run(steps, u, y))
 
+    def advance_values(self, steps: Vector, u: Matrix, y: Matrix) -> Matrix:
+        """The values of `advance` alone, (n, w), as they are scored."""
+        return self._run(steps, u, y)[:, : len(self.system.columns)]
+
     def _take(self, h: float, u: Vector, y: Vector) -> Estimate:
         """One sample, by the loop over many: a law is compiled once."""
         return self._split(self._run(np.array([h]), np.atleast_2d(u), np.atleast_2d(y))[0])

@@ -151,6 +151,12 @@ class Pool(Generic[State]):
         self._tasks.put((future, message))
         return future
 
+    def submit_all(
+        self, function: Callable[[State, *Arguments], Result], calls: Iterable[tuple[*Arguments]]
+    ) -> "list[Future[Result]]":
+        """Have workers call function(state, *arguments) for each of many."""
+        return [self.submit(function, *arguments) for arguments in calls]
+
     def completed(
         self, function: Callable[[State, Item], Result], items: Iterable[Item]
     ) -> Iterator[tuple[int, Result]]:

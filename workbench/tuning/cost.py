@@ -287,8 +287,8 @@ class Evaluator:
             for begin, end in pairwise(edges):
                 part = slice(begin, end)
                 steps, y = case.steps[part], case.y[part]
-                estimate = estimator.advance(steps, case.u[part], y)
-                deviations = estimate.values[:, self._scored] - case.reference[part]
+                values = estimator.advance_values(steps, case.u[part], y)
+                deviations = values[:, self._scored] - case.reference[part]
                 z = integrate(z, low_pass, deviations, shares, steps, case.shares[part], pole)
                 if not z <= limit:
                     break
@@ -304,12 +304,15 @@ LIMIT = 60.0  # [s] for one candidate, which takes about 0.1 s
 class Workers(Protocol):
     """Who evaluates candidates: a `workbench.runtime.pool.Pool`, or one like it."""
 
-    def submit(
-        self, function: Callable[[Evaluator, Candidate], Evaluation], candidate: Candidate, /
-    ) -> "Future[Evaluation]":
-        """Have a worker evaluate a candidate.
+    def submit_all(
+        self,
+        function: Callable[[Evaluator, Candidate], Evaluation],
+        calls: Sequence[tuple[Candidate]],
+        /,
+    ) -> "list[Future[Evaluation]]":
+        """Have workers evaluate candidates.
 
-        WorkerError if it cannot, NoWorkersError if there is none.
+        WorkerError of one that they cannot, NoWorkersError if there is none.
         """
 
 
@@ -333,7 +336,7 @@ def evaluate_all(pool: Workers, candidates: Sequence[Candidate], cases: int) -> 
     tasks: list[Future[Evaluation]] = []
     evaluations = []
     try:
-        tasks.extend(pool.submit(Evaluator.evaluate, candidate) for candidate in candidates)
+        tasks = pool.submit_all(Evaluator.evaluate, [(candidate,) for candidate in candidates])
         for candidate, task in zip(candidates, tasks, strict=True):
             try:
                 evaluations.append(task.result())
