@@ -365,9 +365,11 @@ class Estimator(ABC):
         """Inputs with the model's time, (n, m + 1), as `measure` sets them, and outputs, (n, l)."""
         y = self._measured(y)
         self._check_shapes(steps.size, u, y)
-        time = self._model_time + np.cumsum(steps)
-        self._model_time = float(time[-1]) if time.size else self._model_time
-        return read_only(np.column_stack([u, time])), read_only(y)
+        samples = np.empty((steps.size, u.shape[1] + 1))
+        samples[:, :-1] = u
+        samples[:, -1] = self._model_time + np.cumsum(steps)
+        self._model_time = float(samples[-1, -1]) if steps.size else self._model_time
+        return read_only(samples), read_only(y)
 
     def _check_shapes(self, count: int, u: Matrix, y: Matrix) -> None:
         """Refuse samples of other sizes than compiled code reads, which would go beyond them."""
@@ -385,4 +387,6 @@ class Estimator(ABC):
     def _split(self, rows: Any) -> Estimate:
         width = len(self.system.columns)
         values, sigma, probability = np.split(rows[..., :-1], [width, 2 * width], axis=-1)
-        return Estimate(values, self.bands * sigma, rows[..., -1], probability)
+        if (self.bands != 1.0).any():
+            sigma = self.bands * sigma
+        return Estimate(values, sigma, rows[..., -1], probability)

@@ -44,12 +44,6 @@ static inline int plant_set_sample(LawModelView *model, const double *u) {
     return plant_set_inputs(model, 0, LAW_INPUTS);
 }
 
-/* The plant has no events either. */
-static inline int plant_check_state_events(LawModelView *model) {
-    (void)model;
-    return LAW_OK;
-}
-
 static inline int plant_set_point(LawModelView *model, const double *u) {
     return plant_set_sample(model, u);
 }

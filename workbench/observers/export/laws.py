@@ -44,7 +44,6 @@ _SOURCES = {"integrator.c": _HERE / "law.c", "memory.h": _HERE / "law.h"}
 
 # Functions of the kernel that call the FMU, by the number of their arguments; law.c has them.
 _CALLS = {
-    "check_state_events": 1,
     "set_sample": 2,
     "set_point": 2,
     "set_inputs": 3,
