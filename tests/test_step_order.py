@@ -88,6 +88,22 @@ def test_a_swing_does_not_fade_without_feedback(spring, fmu):
     assert_allclose(run.signal("s"), places, rtol=0.0, atol=1e-4 * np.ptp(places))
 
 
+def test_a_step_of_a_linear_model_ends_at_the_rate_that_the_next_one_begins_with(spring, fmu):
+    """Its error is the same with and without an evaluation there."""
+    case, kind, errors = recorded(spring, 0.0), estimators_of(spring)["open_loop"], []
+    estimator = kind(fmu, spring, kind.default_gains(fmu, spring))
+    steps = np.diff(case.time, prepend=case.time[0])
+    for evaluated in (False, True):
+        estimator.start(case.u[0], case.y[0])
+        for k in range(10):
+            estimator.advance(steps[k : k + 1], case.u[k : k + 1], case.y[k : k + 1])
+            if evaluated:
+                estimator._state.ended[:] = np.nan  # no inputs that a step begins at
+        errors.append(estimator._state.error.copy())
+    assert_allclose(errors[0], errors[1], rtol=1e-9)
+    assert np.abs(errors[0]).min() > 0.0
+
+
 def test_a_whole_simulation_errs_by_no_more_than_the_tolerance_of_its_steps(spring, fmu):
     time, force, places = swing()
     simulated = Simulation(fmu, ["F"], ["s"], [1.0]).run(Drive(time, force[:, None]), {})
