@@ -363,6 +363,7 @@ def test_a_line_that_breaks_the_format_is_refused(tmp_path, line, text, match):
         ("\n".join(LINES[:20]), "found 19 samples over 1.8 s; expected at least 20 .*noise"),
         ("\n".join(LINES[:21]), "found 20 samples over 1.9 s; expected .*noise, over 2 s"),
         ("\n".join([*LINES[:5], *LINES[24:]]), "found 6 samples over 2.4 s"),
+        ("\n".join(LINES)[:-1], "line 26: found '-120.' at the end, shorter than the numbers"),
     ],
 )
 def test_a_file_without_a_usable_recording_is_refused(tmp_path, csv, match):

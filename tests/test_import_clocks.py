@@ -61,7 +61,7 @@ def local(begin: datetime, count: int, form: str, step: float = QUARTER) -> list
 
 BERLIN_NIGHT = datetime(2024, 3, 1, 23, tzinfo=ZoneInfo("Europe/Berlin"))
 BERLIN, NEW_YORK = ZoneInfo("Europe/Berlin"), ZoneInfo("America/New_York")
-SYDNEY = ZoneInfo("Australia/Sydney")
+SYDNEY, LORD_HOWE = ZoneInfo("Australia/Sydney"), ZoneInfo("Australia/Lord_Howe")
 
 
 @pytest.mark.parametrize(
@@ -79,6 +79,11 @@ SYDNEY = ZoneInfo("Australia/Sydney")
         (datetime(2024, 10, 26, tzinfo=BERLIN), "%H:%M:%S", 900.0),
         (datetime(2024, 10, 24, tzinfo=BERLIN), "%Y-%m-%d %H:%M", 7200.0),
         (datetime(2024, 3, 28, tzinfo=BERLIN), "%Y-%m-%d %H:%M", 7200.0),
+        (datetime(2024, 4, 6, tzinfo=LORD_HOWE), "%Y-%m-%d %H:%M", 900.0),
+        (datetime(2024, 10, 5, tzinfo=LORD_HOWE), "%d/%m/%Y %H:%M", 900.0),
+        (datetime(2024, 4, 4, tzinfo=LORD_HOWE), "%Y-%m-%d %H:%M", 3600.0),
+        (datetime(2024, 10, 3, tzinfo=LORD_HOWE), "%Y-%m-%d %H:%M", 3600.0),
+        (datetime(2024, 4, 6, tzinfo=LORD_HOWE), "%H:%M:%S", 600.0),
     ],
 )
 def test_local_times_go_on_through_changes_of_the_clock(tmp_path, tank, begin, form, step):
@@ -246,6 +251,11 @@ UNIX = 1709281000  # s, of 2024-03-01T08:16:40
         ("elapsed_ms", every(lambda k: 900000 * k), ""),
         ("t [h]", every(lambda k: (80000 + 900 * k) % 86400 / 3600), ""),
         ("t [min]", every(lambda k: 900 * k % 3600 / 60), ""),
+        ("t [1/10 s]", every(lambda k: 9000 * k), ""),
+        ("t (0.1 s)", every(lambda k: 9000 * k), ""),
+        ("t (10 ms)", every(lambda k: 90000 * k), ""),
+        ("t [100us]", every(lambda k: 9000000 * k), ""),
+        ("t [10^-3 s]", every(lambda k: 900000 * k), ""),
         ("tick [ms]", every(lambda k: (900000 * k) % 2**24), ""),
         ("Time [d]", every(lambda k: f"{45352 + k / 96:.9f}"), "2024-03-01"),
         ("Julian date", every(lambda k: f"{2460370.5 + k / 96:.8f}"), "2024-03-01"),
@@ -268,6 +278,13 @@ def test_counts_are_seconds_from_their_first(tmp_path, tank, name, values, start
     assert read_clock.certain
     assert iso(read_clock.start).startswith(start)
     assert bool(start) == bool(iso(read_clock.start))
+
+
+def test_days_that_may_count_from_1904_are_told(tmp_path, tank):
+    (told,) = clock(
+        table(tmp_path / "a.csv", every(lambda k: f"{43890 + k / 96:.9f}")), tank
+    ).corrections
+    assert "2020-02-29; a workbook that counts from 1904 means 2024-03-01" in told
 
 
 def test_clocks_that_contradict_each_other_are_refused_with_both(tmp_path, tank):

@@ -4,7 +4,7 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from datetime import datetime
+from datetime import UTC, datetime
 from itertools import combinations
 
 import numpy as np
@@ -44,6 +44,7 @@ _DAYS = {
     "MATLAB": (719529.0, 724000.0, 754000.0),
     "Julian days": (2440587.5, 2445000.0, 2475000.0),
 }
+_FROM_1904 = 1462 * 86400.0  # s that the other zero of workbooks is later: their option date1904
 # Figures of dates and times, as of Unix' date: 1015, 101500, 240305101500, 202403051015.
 _PACKED = ("%H%M", "%H%M%S", "%y%m%d%H%M", "%y%m%d%H%M%S", "%Y%m%d%H%M", "%Y%m%d%H%M%S")
 _DAY = 86400.0  # s
@@ -430,7 +431,8 @@ def _since(channel: FileChannel, system: System) -> Clock | None:
             times = np.round((channel.values - held[0]) * _DAY, 6)
             start = round((float(held[0]) - zero) * _DAY, 3)
             reason = f"days as {name} counts them" if name in ("Excel", "MATLAB") else name
-            clock = Clock(channel.name, times, reason, start=start, unit="d")
+            told = _by_1904(start) if name == "Excel" else ()
+            clock = Clock(channel.name, times, reason, start=start, unit="d", corrections=told)
     if _DAYS_OF_YEAR.intersection(words(channel.name)) and held.max() <= 367.0:
         clock = Clock(channel.name, channel.values * _DAY, "days of a year", unit="d")
     if clock is None:
@@ -438,6 +440,19 @@ def _since(channel: FileChannel, system: System) -> Clock | None:
     steps = np.abs(np.diff(clock.times[np.isfinite(clock.times)]))
     ratio = float(np.median(steps)) / system.sample_time
     return clock if 1.0 / _LIKE < ratio < _LIKE else None
+
+
+def _by_1904(start: float) -> tuple[str, ...]:
+    """That days of a spreadsheet may count from 1904, where they are not of tomorrow then."""
+    days = (start, start + _FROM_1904)
+    first, other = (datetime.fromtimestamp(day, UTC) for day in days)
+    if other > datetime.now(UTC):
+        return ()
+    return (
+        f"days are counted from 1900, the first is {first:%Y-%m-%d}; a workbook that counts from "
+        f"1904 means {other:%Y-%m-%d}. Times are the same, correct 'date' in case.toml if it is "
+        "so",
+    )
 
 
 def _unit_reason(unit: str) -> str:

@@ -1,5 +1,6 @@
 """Units as recorders spell them, and those that have a zero of their own."""
 
+import math
 import re
 from dataclasses import dataclass
 
@@ -34,6 +35,11 @@ _SPELLINGS = {
     "kp/cm^2": "kgf/cm2", "kg/cm^2": "kgf/cm2",
     "meter": "m", "Meter": "m", "Prozent": "%", "percent": "%",
 }  # fmt: skip
+# A unit of time with a factor: 1/10 s, 0.1 s, 10 ms, 10^-3 s, 1e-6 s.
+_MULTIPLE = re.compile(
+    r"[x*]?\s*(?P<number>\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?)(?:\s*/\s*(?P<parts>\d+)"
+    r"|\^(?P<power>[+-]?\d{1,2}))?\s*[*.]?\s*(?P<unit>[^\W\d]\w*\.?)"
+)
 _POWERS = str.maketrans({"²": "2", "³": "3", "⁻": "-", "¹": "1", "·": ".", "⋅": "."})
 # Value in SI of one, and of zero, where a factor alone is not enough: temperatures; and units of
 # trade that the workbench's own files do not have.
@@ -82,6 +88,8 @@ def conversion(unit: str, si: str) -> Conversion | None:
     ----------
     unit : as `spell_unit`.
     """
+    if si == "s" and (multiple := _multiple_of_time(unit)) is not None:
+        return multiple
     base, factor, zero = _OTHER.get(unit, (unit, 1.0, 0.0))
     try:
         return Conversion(factor * si_factor(base, si, ""), zero)
@@ -89,9 +97,23 @@ def conversion(unit: str, si: str) -> Conversion | None:
         return None
 
 
+def _multiple_of_time(unit: str) -> Conversion | None:
+    """How counts become seconds, in a unit of time with a factor; None if it is no such unit."""
+    match = _MULTIPLE.fullmatch(unit)
+    scale = conversion(spell_unit(match["unit"]), "s") if match else None
+    if match is None or scale is None:
+        return None
+    number = float(match["number"].replace(",", "."))
+    parts = float(match["parts"] or 1.0)
+    size = number ** float(match["power"]) if match["power"] else number / (parts or math.inf)
+    return Conversion(size * scale.factor) if 0.0 < size < math.inf else None
+
+
 def is_unit(text: str) -> bool:
     """Whether a text is a unit that can be converted, or a sign for none."""
     unit = spell_unit(text)
+    if _multiple_of_time(unit) is not None:
+        return True
     try:
         check_unit(unit, "")
     except InputError:

@@ -83,6 +83,7 @@ _TIMES_ALONE = (_OF_DAY, _OF_HOUR, _OF_MINUTES, _DURATION)
 _EPOCH = date(1970, 1, 1).toordinal()
 _START = datetime(1970, 1, 1)
 _HOUR = 3600
+_HALF_HOUR = 1800  # by which Lord Howe Island changes its clocks
 ORDERS = {"ymd": "year, month, day", "dmy": "day, month, year", "mdy": "month, day, year"}
 # Hours that zones are ahead of UTC, by the letters that recorders write.
 _AHEAD = {
@@ -95,7 +96,7 @@ _AHEAD = {
 # Zones that change their clocks at local times of their own; others change as one of these.
 _CHANGING = (
     *("Europe/Berlin", "Europe/London", "Europe/Athens", "America/New_York"),
-    *("Australia/Sydney", "Pacific/Auckland", "America/Santiago"),
+    *("Australia/Sydney", "Pacific/Auckland", "America/Santiago", "Australia/Lord_Howe"),
 )
 # Letters of several zones: alone they only say that times are local.
 _AMBIGUOUS = frozenset(("CST", "IST", "BST", "AST", "SST"))
@@ -430,32 +431,41 @@ def _utc_offset(moment: datetime, zone: ZoneInfo, fold: int) -> float:
 
 
 def _mend_changes(times: Vector, *, dated: bool) -> tuple[Vector, tuple[str, ...]]:
-    """Local times that go on through changes of the clock, and what was changed, in words.
+    """Local times that go on through changes of the clock, and what was changed, in words."""
+    times, words = _mend_changes_by(_HOUR, times, dated=dated)
+    times, more = _mend_changes_by(_HALF_HOUR, times, dated=dated)
+    return times, (*words, *more)
 
-    A step back by an hour is the end of summer time; a step that is an hour too long is its begin
+
+def _mend_changes_by(by: int, times: Vector, *, dated: bool) -> tuple[Vector, tuple[str, ...]]:
+    """Mend changes of the clock by so many seconds.
+
+    A step back by them is the end of summer time; a step that is too long by them is its begin
     where some zone changes its clock just there.
     """
+    called = "hour" if by == _HOUR else "half-hour"
+    an = "an" if by == _HOUR else "a"
     steps = np.diff(times)
     ahead = steps[steps > 0.0]
     usual = float(np.median(ahead)) if ahead.size else 0.0
     if not 0.0 < usual <= 12 * _HOUR:
         return times, ()
-    twice = steps + _HOUR
+    twice = steps + by
     back = np.flatnonzero((steps <= 0.0) & (twice > 0.0) & (twice <= _EVEN * usual))
-    if usual > _HOUR:  # a step that is an hour too short is one ahead
-        back = np.flatnonzero(np.abs(twice - usual) <= 0.1 * _HOUR)
-    long = np.flatnonzero(np.abs(steps - _HOUR - usual) <= 0.1 * min(usual, _HOUR))
+    if usual > by:  # a step that is too short by them is one ahead
+        back = np.flatnonzero(np.abs(twice - usual) <= 0.1 * by)
+    long = np.flatnonzero(np.abs(steps - by - usual) <= 0.1 * min(usual, by))
     words = []
     if dated:
-        near = np.flatnonzero((steps > _HOUR) & (steps < _HOUR + _EVEN * usual))
-        begins = [k for k in near if _changes(times[k], times[k + 1], _HOUR)]
+        near = np.flatnonzero((steps > by) & (steps < by + _EVEN * usual))
+        begins = [k for k in near if _changes(times[k], times[k + 1], by)]
         words = [
-            f"an hour may be missing after {_moment(times[k]):%Y-%m-%d %H:%M:%S}, where summer "
-            "time begins in some zones; say the zone, such as [Europe/Berlin], or [UTC]"
+            f"{an} {called} may be missing after {_moment(times[k]):%Y-%m-%d %H:%M:%S}, where "
+            "summer time begins in some zones; say the zone, such as [Europe/Berlin], or [UTC]"
             for k in begins
             if k not in long
         ]
-        back = back[[_changes(times[k], times[k + 1], -_HOUR) for k in back]] if back.size else back
+        back = back[[_changes(times[k], times[k + 1], -by) for k in back]] if back.size else back
         long = np.array([k for k in begins if k in long], dtype=np.int64)
     else:
         of_day = times % (24 * _HOUR)
@@ -463,21 +473,23 @@ def _mend_changes(times: Vector, *, dated: bool) -> tuple[Vector, tuple[str, ...
         back = back[np.abs(twice[back] - usual) <= 0.1 * usual]
         night = (of_day[long] <= 3 * _HOUR) & (of_day[long + 1] >= 2 * _HOUR)
         words = [
-            f"an hour is missing after {_moment(times[k]):%H:%M:%S}: a gap, or summer time begins, "
-            "which only a date tells; times after it are as they are written"
+            f"{an} {called} is missing after {_moment(times[k]):%H:%M:%S}: a gap, or summer time "
+            "begins, which only a date tells; times after it are as they are written"
             for k in long[night]
-            if usual <= _HOUR
+            if usual <= by
         ]
         long = long[:0]
     shift = np.zeros(times.size)
-    shift[back + 1] += _HOUR
-    shift[long + 1] -= _HOUR
+    shift[back + 1] += by
+    shift[long + 1] -= by
     for k in sorted([*back.tolist(), *long.tolist()]):
         at = f"{_moment(times[k]):%Y-%m-%d %H:%M:%S}" if dated else f"{_moment(times[k]):%H:%M:%S}"
         if k in back:
-            words.append(f"the hour after {at} comes twice: summer time ends, later times go on")
+            words.append(
+                f"the {called} after {at} comes twice: summer time ends, later times go on"
+            )
         else:
-            words.append(f"the hour after {at} is missing: summer time begins, no gap is left")
+            words.append(f"the {called} after {at} is missing: summer time begins, no gap is left")
     return times + np.cumsum(shift), tuple(words)
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from workbench.errors import InputError
+from workbench.recordings.csv import is_cut
 from workbench.recordings.formats.cells import Cells, by_tag, find_table, is_quantity, read_group
 from workbench.recordings.formats.contents import Contents
 from workbench.recordings.formats.numbers import is_missing, is_number
@@ -32,18 +33,16 @@ def read(path: Path, raw: bytes) -> Contents:
         If it holds no table, or one that can be read in two ways.
     """
     text, encoding = _decode(path, raw)
-    lines = (
-        text.replace("\r\r\n", "\n")
-        .replace("\r\n", "\n")
-        .replace("\r", "\n")
-        .rstrip("\n")
-        .split("\n")
-    )
+    text = text.replace("\r\r\n", "\n").replace("\r\n", "\n").replace("\r", "\n")
+    lines = text.rstrip("\n").split("\n")
     separator = _separator(path, lines)
     rows, numbers, broken = _rows(lines, separator)
     table = find_table(rows, numbers, str(path))
     if lines[0].startswith("LabVIEW Measurement"):
         table = _of_labview(table)
+    cut = _cut_line(table) if table.lines[-1] == len(lines) and text[-1:].isalnum() else ""
+    if cut:
+        table = replace(table, rows=table.rows[:-1], lines=table.lines[:-1])
     # Between commas, a number has a comma only in quotation marks.
     commas = separator != "," or any("," in cell for row in table.rows for cell in row)
     parts = [read_group(own, tag, str(path), commas=commas) for tag, own in by_tag(table)]
@@ -51,14 +50,27 @@ def read(path: Path, raw: bytes) -> Contents:
     notes = list(dict.fromkeys(note for *_, own in parts for note in own))
     words = ["CSV", _SEPARATORS[separator], reading, encoding]
     below = [number for number in numbers if number >= table.lines[0]]
-    broken += max(0, len(below) - len(table.lines))
+    broken += max(0, len(below) - len(table.lines) - bool(cut))
     if broken:
         kept = set(table.lines)
         first = next((number for number in below if number not in kept), 0)
         at = f", the first in line {first}" if first else ""
         notes.append(f"{broken} lines that are no samples were left out{at}")
+    if cut:
+        notes.append(cut)
     words.append(f"samples from line {table.lines[0]}")
     return Contents(", ".join(words), groups, notes)
+
+
+def _cut_line(table: Cells) -> str:
+    """That the last line ends within a number, in words; empty: it does not."""
+    column = [row[-1] for row in table.rows]
+    if not is_cut(column):
+        return ""
+    return (
+        f"line {table.lines[-1]} was left out: the file ends there within a line, and its last "
+        f"number {column[-1].strip()!r} is shorter than those above it"
+    )
 
 
 def _decode(path: Path, raw: bytes) -> tuple[str, str]:
