@@ -422,22 +422,32 @@ def test_what_does_not_go_through_events_says_so_of_an_fmu_that_saves_its_state_
         run(fmu, name, 900.0)
 
 
-def test_a_tuning_names_the_events_that_it_does_not_go_through(build, tmp_path, capsys):
-    folder = build("TIMETABLE", saves=True).parent
+@pytest.mark.parametrize(
+    ("what", "flags", "status", "said"),
+    [
+        ("TIMETABLE", [], 1, "it has events, which disturbance_observer does not go through"),
+        ("RELAYS", ["-DWARNS=1"], 0, "day: the FMU Room.fmu warned "),
+    ],
+)
+def test_a_tuning_tells_events_that_it_does_not_go_through_and_what_the_fmu_warns_of(
+    what, flags, status, said, build, tmp_path, capsys
+):
+    folder = build(what, saves=True, flags=flags).parent
     (folder / "day").mkdir()
     time = 10.0 * np.arange(91.0)
     columns = {"time [s]": time, "Ta [K]": 280.0 + 0.0 * time, "T [K]": along("TIMETABLE", time)}
+    if what == "RELAYS":
+        columns["T [K]"] = exact(1500.0, time)
     columns["G [W/K]"] = 50.0 + 0.0 * time
     pd.DataFrame(columns).to_csv(folder / "day" / "measured.csv", index=False)
     (folder / "day" / "case.toml").write_text('title = "day"\nmeasurement.file = "measured.csv"\n')
     file, line = folder / "system.toml", 'G = { unit = "W/K", noise = "1 W/K", scale = "50 W/K" }'
     file.write_text(file.read_text().replace("[est", f"reference_signals.{line}\n[est"))
     options = ["--system", folder, "--cases", folder / "day", "--workers", "1", "--quiet"]
-    out = ["--out", tmp_path / "tuned"]
-    assert main(["tune", "disturbance_observer", *map(str, [*options, *out])]) == 1
-    assert (
-        "it has events, which disturbance_observer does not go through" in capsys.readouterr().err
-    )
+    out = ["--out", tmp_path / "tuned", "--budget", "2"]
+    assert main(["tune", "disturbance_observer", *map(str, [*options, *out])]) == status
+    told = capsys.readouterr()
+    assert said in told.out + told.err
 
 
 def test_the_open_loop_stops_where_a_model_asks_for_event_mode_that_has_no_indicators(build):

@@ -322,6 +322,7 @@ def _tune() -> Schema:
         "beside": by_name(closed({"label worst": TEXT, "z": ERROR})),
         "work": closed(work),
         "convergence": NUMBERS,
+        "warned": TEXT,
     }
     return summary("tune", closed(provenance), entries)
 
@@ -509,7 +510,7 @@ def _monitor() -> Schema:
         "alarms": listed({"type": "object", "required": ["told_at", "quantity", "change"]}),
         "quantities": by_name(closed(quantity)),
         "work": by_name(closed({"label": TEXT, "work of_the_mean": NUMBER})),
-        "refused again": by_name(TEXT),
+        "refused again warned": by_name(TEXT),
         "interrupted": FLAG,
     }
     return summary("monitor", closed(MODEL_RUN), entries)

@@ -29,9 +29,10 @@ _UNIT = re.compile(
 )
 _LONGEST = 60  # characters, twice what any unit has; pint takes the square of them
 _REVOLUTIONS_PER_MINUTE = frozenset({"1/min", "min-1", "min^-1", "U/min", "rpm"})
+_BARE = re.compile(r"[+-]?[0-9]{1,15}(\.[0-9]+)?([eE][+-]?[0-9]{1,2})?")
 _QUANTITY = re.compile(
-    r"(?P<number>[+-]?[0-9]{1,15}(\.[0-9]+)?([eE][+-]?[0-9]{1,2})?)"
-    r"(?: *(?=[^0-9., ])| +(?=1/))(?P<unit>.*)"
+    r"(?P<number>[+-]?[0-9]{1,15}(\.[0-9]+)?([eE][+-]?[0-9]{1,2})?+)"
+    r"(?: *(?=[^0-9., ])| +(?=1(?:/|$)))(?P<unit>.*)"
 )
 
 
@@ -150,7 +151,18 @@ def quantity(text: str, si: str, where: str) -> float:
     420000.0
     >>> quantity("0.3 1/s", "1/s", "system.toml")
     0.3
+    >>> quantity("1e-4", "1", "system.toml")
+    0.0001
     """
+    if bare := _BARE.fullmatch(text.strip()):
+        if si == "1":
+            return float(bare[0])
+        raise InputError(
+            where=where,
+            found=f"{text!r}, a number without a unit",
+            expected=f"a number and a unit, {_EXAMPLES.get(si, si)}",
+            remedy=f"write '{text.strip()} {si}', or another unit of the same kind",
+        )
     match = _QUANTITY.fullmatch(text)
     if match is None:
         raise InputError(

@@ -14,7 +14,7 @@ from workbench.arrays import Matrix, Vector
 from workbench.errors import FMUError, InputError, unknown_name
 from workbench.observers import Estimator, Gains, SearchSpace, estimators_of
 from workbench.observers.gains_file import format_gains
-from workbench.observers.replay import run_on_model
+from workbench.observers.replay import replay, run_on_model
 from workbench.observers.run import Ending
 from workbench.observers.score import with_readings
 from workbench.pages.answer import finite
@@ -71,6 +71,7 @@ class TuningResult:
     beside : (k,) z_k of methods that were not tuned, by name.
     folds : those that were finished.
     interrupted : whether Ctrl-C ended it before its end.
+    warned : what the FMU warned of with the best gains; empty: nothing.
     """
 
     problem: Problem
@@ -81,6 +82,7 @@ class TuningResult:
     sensitivities: Sequence[Sensitivity] = ()
     beside: Mapping[str, Vector] = field(default_factory=dict)
     folds: Sequence[Fold] = ()
+    warned: str = ""
 
     @property
     def gains(self) -> Gains:
@@ -270,9 +272,23 @@ def tune(
     result = run.search(0, range(len(job.recordings)))
     if result is None:
         return None
-    tuned = TuningResult(problem, plan, result, before, result.interrupted)
+    warned = _warnings(problem, result.best)
+    tuned = TuningResult(problem, plan, result, before, result.interrupted, warned=warned)
     run.progress.found(tuned)
     return tuned if result.interrupted else run.examine(tuned)
+
+
+def _warnings(problem: Problem, gains: Vector) -> str:
+    """What the FMU first warns of in a case, with these gains; empty: nothing in any."""
+    job = problem.job
+    estimator_class = estimators_of(job.system)[job.estimator]
+    with open_model(job.system, estimator_class.role) as fmu:
+        estimator = estimator_class(fmu, job.system, job.gains.with_values(gains))
+        for case in problem.cases:
+            run = replay(case, estimator)
+            if run.ending is Ending.OK and run.message:
+                return f"{case.name}: {run.message}"
+    return ""
 
 
 def _events(job: Job) -> str:
@@ -393,6 +409,7 @@ def summarise_tuning(tuned: TuningResult) -> dict[str, Any]:
             "folds": tuned.plan.folds,  # asked for; an interruption may have left fewer
         },
         "convergence": [g.z for g in history],
+        "warned": tuned.warned,
         "provenance": _provenance(tuned),
     }
 

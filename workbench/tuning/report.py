@@ -76,6 +76,8 @@ def bad_news(summary: Mapping[str, Any]) -> list[str]:
             f"Incomplete: the search without each fold was interrupted after {done} of {asked}. "
             "The same command with --resume goes on from there."
         )
+    if warned := summary.get("warned"):
+        news.append(f"{warned}.")
     if worse := [case for case in _worst_first(summary) if case["z_k"] > case["z_k_reasoned"]]:
         cases = ", ".join(
             f"{case['name']} ({case['z_k_reasoned']:.4g} to {case['z_k']:.4g})" for case in worse
@@ -470,7 +472,8 @@ def format_tuned(summary: Mapping[str, Any]) -> str:
     """Table for the terminal: cases, and what is to be said of gains and folds."""
     cases = summary["cases"]
     width = max(map(len, cases))
-    lines = [f"{'case':<{width}} {'model-based':>11} {'tuned':>9}  z_k, worst first"]
+    lines = [f"warning: {summary['warned']}"] * bool(summary.get("warned"))
+    lines.append(f"{'case':<{width}} {'model-based':>11} {'tuned':>9}  z_k, worst first")
     for name, case in sorted(cases.items(), key=lambda item: -item[1]["z_k"]):
         lines.append(f"{name:<{width}} {case['z_k_reasoned']:>11.4f} {case['z_k']:>9.4f}")
     work = summary["work"]

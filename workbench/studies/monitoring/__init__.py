@@ -107,7 +107,7 @@ def _estimate(
 def _estimate_folder(
     read: Reader, estimator: RecordingEstimator, recording: RecordingFolder
 ) -> RecordingResult:
-    date, estimate, refusal = "", None, ""
+    date, estimate, refusal, estimator.warned = "", None, "", ""
     try:
         case = read(recording.path, estimator.system)
         date, estimate = case.date, estimator(case)
@@ -115,4 +115,5 @@ def _estimate_folder(
         refusal = str(error)
     except Exception as error:  # one recording must not cost the others; it is listed
         refusal = f"{recording.path}: found what no reader expects ({error!r})"
-    return RecordingResult(recording.name, recording.content, date, estimate, refusal)
+    warned = "" if refusal else estimator.warned
+    return RecordingResult(recording.name, recording.content, date, estimate, refusal, warned)

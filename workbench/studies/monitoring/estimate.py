@@ -88,6 +88,7 @@ class RecordingEstimator:
             system, estimated=tuple(constant), learns=math.inf, intermittent=()
         )
         self._model = model
+        self.warned = ""  # by the FMU, in the recording that was estimated last
         self._filters: dict[tuple[tuple[str, float], ...], ExtendedKalmanFilter] = {}
 
     def __call__(self, case: Case) -> RecordingEstimate:
@@ -105,6 +106,7 @@ class RecordingEstimator:
         clean = case.with_signals(samples.clean)
         estimator = self._filter(_parameters(case, self._constant))
         run = replay(clean.part(slice(0, end)), estimator)
+        self.warned = run.message
         if run.ending is not Ending.OK:
             raise InputError(
                 where=str(case.source),

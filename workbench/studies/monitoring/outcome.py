@@ -36,6 +36,7 @@ class MonitoringResult:
     work : (n, w) of friction [J], by the system's `work`.
     counted : (n,) time that the estimates rest on [s].
     refused : why a recording is not used, by name.
+    warned : what the FMU warned of, by name of a recording.
     again : which recording one repeats, by name.
     interrupted : whether there are more recordings, which are yet to be estimated.
     """
@@ -50,6 +51,7 @@ class MonitoringResult:
     work: Matrix
     counted: Vector
     refused: Mapping[str, str]
+    warned: Mapping[str, str]
     again: Mapping[str, str]
     interrupted: bool
 
@@ -86,6 +88,7 @@ class MonitoringResult:
             ]
         )
         lines += self.sentences
+        lines += [f"{name}: {what}" for name, what in self.warned.items()]
         lines += [f"not used: {name}: {why}" for name, why in self.refused.items()]
         lines += [f"there twice: {name} is {other}" for name, other in self.again.items()]
         return "\n".join(lines)
@@ -170,6 +173,7 @@ class MonitoringResult:
             },
             "work": self._work_sums(),
             "refused": dict(self.refused),
+            "warned": dict(self.warned),
             "again": dict(self.again),
             "interrupted": self.interrupted,
         }
@@ -260,6 +264,7 @@ def conclude(
         work=np.array([estimate.work for estimate in estimates]),
         counted=np.array([estimate.counted for estimate in estimates]),
         refused=refused,
+        warned={name: last[name].warned for name in sorted(last) if last[name].warned},
         again=again,
         interrupted=interrupted,
     )

@@ -88,13 +88,14 @@ _ROUNDING = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class RecordingResult:
-    """What came of one recording: an estimate, or why there is none."""
+    """What came of one recording: an estimate, or why there is none; what the FMU warned of."""
 
     name: str
     content: str
     date: str
     estimate: RecordingEstimate | None
     refusal: str
+    warned: str = ""
 
 
 class State:
