@@ -84,6 +84,8 @@ SYDNEY, LORD_HOWE = ZoneInfo("Australia/Sydney"), ZoneInfo("Australia/Lord_Howe"
         (datetime(2024, 4, 4, tzinfo=LORD_HOWE), "%Y-%m-%d %H:%M", 3600.0),
         (datetime(2024, 10, 3, tzinfo=LORD_HOWE), "%Y-%m-%d %H:%M", 3600.0),
         (datetime(2024, 4, 6, tzinfo=LORD_HOWE), "%H:%M:%S", 600.0),
+        (datetime(2024, 4, 25, tzinfo=ZoneInfo("Africa/Cairo")), "%Y-%m-%d %H:%M", 900.0),
+        (datetime(2024, 3, 30, tzinfo=ZoneInfo("Asia/Beirut")), "%Y-%m-%d %H:%M", 900.0),
     ],
 )
 def test_local_times_go_on_through_changes_of_the_clock(tmp_path, tank, begin, form, step):

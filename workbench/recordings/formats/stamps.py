@@ -97,6 +97,8 @@ _AHEAD = {
 _CHANGING = (
     *("Europe/Berlin", "Europe/London", "Europe/Athens", "America/New_York"),
     *("Australia/Sydney", "Pacific/Auckland", "America/Santiago", "Australia/Lord_Howe"),
+    *("Africa/Cairo", "America/Asuncion", "America/Havana", "Asia/Beirut", "Asia/Gaza"),
+    *("Asia/Tehran", "Pacific/Chatham", "Africa/Casablanca"),
 )
 # Letters of several zones: alone they only say that times are local.
 _AMBIGUOUS = frozenset(("CST", "IST", "BST", "AST", "SST"))

@@ -40,7 +40,11 @@ def read(path: Path, raw: bytes) -> Contents:
     table = find_table(rows, numbers, str(path))
     if lines[0].startswith("LabVIEW Measurement"):
         table = _of_labview(table)
-    cut = _cut_line(table) if table.lines[-1] == len(lines) and text[-1:].isalnum() else ""
+    cut = (
+        _cut_line(table)
+        if table.lines[-1] == len(lines) and text[-1:] in "0123456789.,eE+-"
+        else ""
+    )
     if cut:
         table = replace(table, rows=table.rows[:-1], lines=table.lines[:-1])
     # Between commas, a number has a comma only in quotation marks.
