@@ -352,7 +352,7 @@ def test_killed_run_leaves_no_process_and_goes_on_where_it_was(tmp_path):
         assert "clean" in process.stdout.readline()
         # The next set is under way in a worker.
         assert comes_true(lambda: len(living(process.pid)) > 1)
-        time.sleep(3.0)  # while it starts, it would end by itself
+        time.sleep(1.0)  # while it starts, it would end by itself; its work takes longer
         process.kill()
     assert comes_true(lambda: not living(process.pid))
 
