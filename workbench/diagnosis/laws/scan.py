@@ -34,7 +34,7 @@ from workbench.diagnosis.simulation.residual_model import ResidualModel
 from workbench.models.modelica import Library
 from workbench.runtime.engine import Engine
 
-_AT_ONCE = 300  # columns of derivatives: some hundred megabytes
+_AT_ONCE = 100  # columns of derivatives: some ten megabytes
 _SPAN = 0.25  # of what lasts, over which a rate is taken: it settles within that
 _SEEN = 0.01  # share of the samples that are beyond the ends of a function
 _BEGINS = 10.0  # of what lasts, that a beginning takes at most
@@ -95,7 +95,7 @@ class Scan:
     Parameters
     ----------
     about : what is known, fitted.
-    slots : where laws are sought; None: in all.
+    slots : where laws are sought, which do not begin anew; None: all laws, in all of them.
 
     Attributes
     ----------
@@ -145,7 +145,8 @@ class Scan:
                 every = [law for place in where for law in laws(place, self._recordings, span)]
                 engine.report(f"{len(every)} laws in {len(where)} places")
                 scores = self._judged(simulations, values, every)
-                scores += self._turning(simulations, values, where)
+                if slots is None:
+                    scores += self._turning(simulations, values, where)
         self.prospects = sorted(scores, key=lambda prospect: -prospect.smoothness.evidence)
 
     def _judged(

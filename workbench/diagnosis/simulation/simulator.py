@@ -171,13 +171,18 @@ class Simulator:
         values : of the FMU's variables and of delays, SI.
         """
         simulated, rest = self._simulated(number, values)
-        read_ = self._read(number, simulated, values)
+        seen = sensed(
+            self._recordings[number], self._recordings[number].y - simulated, self._wrong(values)
+        )
+        behind = self._behind(number, seen)
+        read_ = self._compared(number, self._late(number, seen, values, behind), values)
         errors = self._whitened(number, read_)
         columns = []
         for name, spread in self._delays.values():
             step = _DELAY_STEP * spread
             delayed = {**values, name: values[name] + step}
-            late = self._whitened(number, self._read(number, simulated, delayed))
+            later = self._late(number, seen, delayed, behind)
+            late = self._whitened(number, self._compared(number, later, delayed))
             columns.append(np.append((late - errors).ravel() / step, np.zeros(rest.size)))
         rows = errors.size + rest.size
         jacobian = np.column_stack(columns) if columns else np.zeros((rows, 0))
@@ -208,15 +213,15 @@ class Simulator:
         unsure: dict[str, float] = {}
         differing = {*self._clocks, *self._typical}
         beside = [j for j, column in enumerate(columns) if column.variables[0] in differing]
-        if beside:
-            varied = [columns[j] for j in beside]
-            jacobian[:blocks, beside] = self._by_differences(number, values, varied)
+        simulated: Matrix | None = None  # errors at the values, which a run without settings has
         for part in _compatible(columns, beside):
             varied = [columns[j] for j in part]
             shares = None if courses is None else courses[:, part]
             absent = self._absent(values, varied, sizes or {})
             given = recording, self._known(values), varied, shares, absent
             errors, along = self._predictor.derivatives(*given)
+            if not any(column.setting for column in varied):
+                simulated = errors + (self._recordings[number].y - recording.y)
             by_sensor = sensed_changes(
                 recording, along.errors, recording.y - errors, self._wrong(values)
             )
@@ -231,6 +236,9 @@ class Simulator:
                     acting = [name for name in column.variables if name not in fmu.states]
                     slopes[:, j] += fmu.jacobian(place, fmu.variables(acting)).sum(axis=1)
                 jacobian[blocks:, part] = -slopes / recording.rest_noise[:, None]
+        if beside:
+            varied = [columns[j] for j in beside]
+            jacobian[:blocks, beside] = self._by_differences(number, values, varied, simulated)
         return jacobian, unsure
 
     def _absent(
@@ -248,21 +256,32 @@ class Simulator:
         ]
 
     def _by_differences(
-        self, number: int, values: Mapping[str, float], varied: Sequence[Variation]
+        self,
+        number: int,
+        values: Mapping[str, float],
+        varied: Sequence[Variation],
+        simulated: Matrix | None,
     ) -> Matrix:
         """Derivatives of the errors by clocks, sensors, and parameters of an FMU alone, (b*c, p).
 
         Of a time over a sample: within one, a signal that is moved is a straight line. What is read
         in steps follows no step; by its size it goes from what is not.
+
+        Parameters
+        ----------
+        simulated : errors of samples at the values, (n, c), where they are known.
         """
         recording = self._recordings[number]
         sample = float(np.median(np.diff(recording.time)))
 
-        def errors(values: Mapping[str, float]) -> Matrix:
-            simulated, _ = self._simulated(number, values)
+        def read(simulated: Matrix, values: Mapping[str, float]) -> Matrix:
             return self._whitened(number, self._read(number, simulated, values)).ravel()
 
-        now, columns = errors(values), []
+        def errors(values: Mapping[str, float]) -> Matrix:
+            return read(self._simulated(number, values)[0], values)
+
+        now = errors(values) if simulated is None else read(simulated, values)
+        columns = []
         for column in varied:
             name, known = column.variables[0], {**values, **column.setting}
             at = values.get(name, self._fmu.defaults.get(name, 0.0))
@@ -392,20 +411,40 @@ class Simulator:
 
     def _read(self, number: int, errors: Matrix, values: Mapping[str, float]) -> Matrix:
         """Errors of samples (n, c) with sensors behind structures, as late as `values` say."""
-        recording, late = self._recordings[number], lateness(self._clocks, values)
-        wrong = self._wrong(values)
-        seen = sensed(recording, recording.y - errors, wrong)
-        read_ = recording.y - self._late(number, seen, values)
-        return mirrored(recording, read_, late) if late else read_
+        recording = self._recordings[number]
+        seen = sensed(recording, recording.y - errors, self._wrong(values))
+        return self._compared(number, self._late(number, seen, values), values)
 
-    def _late(self, number: int, signals: Matrix, values: Mapping[str, float]) -> Matrix:
-        """What sensors read of signals (n, c, ...), behind structures, late."""
+    def _compared(self, number: int, read_: Matrix, values: Mapping[str, float]) -> Matrix:
+        """Errors of samples (n, c) of what sensors read."""
+        recording, late = self._recordings[number], lateness(self._clocks, values)
+        errors = recording.y - read_
+        return mirrored(recording, errors, late) if late else errors
+
+    def _behind(self, number: int, signals: Matrix) -> dict[int, tuple[Matrix, Matrix]]:
+        """What sensors behind structures read of signals (n, c, ...), and its rates, by column."""
+        recording = self._recordings[number]
+        behind = {j: recording.behind_structure(j, signals[:, j]) for j in self._delays}
+        return {j: (own, np.gradient(own, recording.time, axis=0)) for j, own in behind.items()}
+
+    def _late(
+        self,
+        number: int,
+        signals: Matrix,
+        values: Mapping[str, float],
+        behind: Mapping[int, tuple[Matrix, Matrix]] | None = None,
+    ) -> Matrix:
+        """What sensors read of signals (n, c, ...), behind structures, late.
+
+        Parameters
+        ----------
+        behind : see `_behind`, where that is known.
+        """
         recording, late = self._recordings[number], lateness(self._clocks, values)
         if self._delays or late:
             signals = signals.copy()
-        for j, (name, _) in self._delays.items():
-            behind = recording.behind_structure(j, signals[:, j])
-            signals[:, j] = behind - values[name] * np.gradient(behind, recording.time, axis=0)
+        for j, (own, rate) in (self._behind(number, signals) if behind is None else behind).items():
+            signals[:, j] = own - values[self._delays[j][0]] * rate
         for j, name in enumerate(recording.signals):
             if name in late:
                 signals[:, j] = moved(recording.time, signals[:, j], late[name])
