@@ -186,6 +186,16 @@ def test_whole_simulations_say_derivatives_through_events(build):
     assert (by.unsure == 0.0).all()
 
 
+def test_whole_simulations_switch_at_the_sample_at_which_a_time_event_is(build):
+    """Every tenth sample is one: the heating has switched there, as in the samples after it."""
+    time = 60.0 * np.arange(41.0)
+    with FMU(build("TIMETABLE")) as fmu:
+        simulation = Simulation(fmu, ["Ta"], ["T", "P"], [False])
+        simulated = simulation.run(Drive(time, np.full((time.size, 1), 280.0)), {})
+    assert simulated[:, 0] == pytest.approx(along("TIMETABLE", time), abs=1e-4)
+    assert (simulated[:, 1] == np.where(np.arange(41) // 10 % 2 == 0, 1500.0, 0.0)).all()
+
+
 def test_a_parameter_is_fitted_through_events(build):
     """The heat loss of a room whose thermostat switches, from the closed form with noise."""
     folder = build("THERMOSTAT").parent

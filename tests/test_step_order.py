@@ -111,6 +111,16 @@ def test_a_whole_simulation_errs_by_no_more_than_the_tolerance_of_its_steps(spri
     assert_allclose(simulated[:, 0], places, rtol=0.0, atol=time.size * 1e-8 * (1.0 + 2.0))
 
 
+def test_a_whole_simulation_takes_parts_where_samples_are_far_apart(spring, fmu):
+    """Four samples in a period: a step from one to the next errs by some 1e-3 of the swing."""
+    time = 0.5 * np.arange(41.0)
+    drive = Drive(time, np.zeros((time.size, 1)))
+    simulated = Simulation(fmu, ["F"], ["s"], [0.0]).run(drive, {"s": 1.5})
+    # At most 100 parts of 1e-8 (1 + 1.5) in each interval, by the limit of their number.
+    exact = 1.0 + 0.5 * np.cos(OMEGA * time)
+    assert_allclose(simulated[:, 0], exact, rtol=0.0, atol=40 * 100 * 2.5e-8)
+
+
 def test_a_whole_simulation_of_a_stiff_motion_goes_on_implicitly(relaxation):
     time = 10.0 * np.arange(201)
     with open_model(relaxation) as fmu:

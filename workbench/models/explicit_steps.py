@@ -41,7 +41,7 @@ class _Method(NamedTuple):
     Attributes
     ----------
     a, c : (6, 5), (6,) of the stages.
-    b, e : (7,) weights of the end and of its error, per h.
+    b, e : (6,), (7,) weights of the end and of its error, per h.
     looks : (3, 7) weights of the points at `_LOOKS`, per h.
     """
 
@@ -55,7 +55,7 @@ class _Method(NamedTuple):
 _METHOD = _Method(
     np.ascontiguousarray(RK45.A),
     np.ascontiguousarray(RK45.C),
-    np.append(RK45.B, 0.0),
+    np.ascontiguousarray(RK45.B),
     np.ascontiguousarray(RK45.E),
     np.power.outer(_LOOKS, np.arange(1.0, 5.0)) @ RK45.P.T,
 )

@@ -116,9 +116,10 @@ class HybridSimulation:
         begin, end = np.where(self._holds < 0.0, u, last), np.where(self._holds > 0.0, last, u)
         samples = Samples(time, *(part[:, self._continuous_at].copy() for part in (u, begin, end)))
         jumps = np.flatnonzero(self._jump_matters & ((begin != last) | (end != u)).any(axis=1))
+        stops = np.append(jumps, time.size)
         k, tried, patience = 1, 1, 1
         while k < time.size:
-            stop = int(next(iter(jumps[jumps >= k]), time.size))
+            stop = int(stops[np.searchsorted(stops, k)])
             if model is not None and stop > k >= tried:
                 state = State(self._x, self._nominal, self._signs)
                 reached = go_on(model, samples, state, slice(k, stop), rows, TOLERANCE)
