@@ -7,6 +7,7 @@ here, with file and line.
 
 import contextlib
 import io
+import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -40,7 +41,10 @@ _REMEDIES = (
     (r"expected Real, found Integer", "write real numbers, such as 1.0"),
     (r"shape mismatch", "make the sizes of both sides equal; '.+' adds a scalar to an array"),
     (r"initial algorithm", "write it as an initial equation"),
-    (r"function loop reduction", "use a for loop of constant length"),
+    (
+        r"function loop reduction",
+        "use a for loop of constant length without 'break', and if-expressions in it",
+    ),
     (r"function loop domain", "loop over a range of whole numbers, such as 1:3"),
     (
         r"function (statement|return)",
@@ -70,6 +74,10 @@ _REMEDIES = (
 
 
 _CALLED = re.compile(r"([A-Za-z_][\w.]*)\s*\(")
+# The front end takes 15 s for so many turns of a function, and time grows by their square.
+_MOST_TURNS = 10_000
+_LOOP = re.compile(r"\bfor\s+\w+\s+in\s+((?:\d+\s*:\s*){1,2})(\w+)\s+loop\b|\b(?:end\s+)?for\b")
+_COUNT = re.compile(r"\bInteger\s+(\w+)[^;=]*=\s*(\d+)\s*[;\"]")
 _MAYBE_MISREAD = re.compile(r"\bterminate\s*\(|\bhomotopy\s*\(\s*simplified\b|,\s*\w+\s+in\b")
 _MISREAD = re.compile(
     r"\bterminate\s*\(|\bhomotopy\s*\(\s*simplified\b|[([{}\])]|\bfor\b|,(?=\s*\w+\s+in\b)"
@@ -737,6 +745,7 @@ def _refuse_misread(library: Library, reached: Iterable[str]) -> None:
                 function = library.classes.get(library.resolve(called, name))
             if function is not None and function.kind == "function":
                 waiting += [function.name] * (function.name not in waiting)
+        _refuse_long_loops(text, file, int(line))
         if not _MAYBE_MISREAD.search(text):
             continue
         brackets: list[str] = []
@@ -770,6 +779,36 @@ def _refuse_misread(library: Library, reached: Iterable[str]) -> None:
                     expected="one iterator, as the Modelica front end takes them in another order",
                     remedy="nest them: {a for i in u, j in v} is {{a for i in u} for j in v}",
                 )
+
+
+def _refuse_long_loops(text: str, file: str, line: int) -> None:
+    """Refuse loops of more turns than the front end unrolls in seconds.
+
+    Parameters
+    ----------
+    text : of a class, without strings and comments; from `line` of the file on.
+    """
+    counts = dict(_COUNT.findall(text))
+    open_loops: list[int] = []
+    for match in _LOOP.finditer(text):
+        if match[0].startswith("end"):
+            del open_loops[-1:]
+            continue
+        if match[2] is None and not re.match(r"[^;]*?\bloop\b", text[match.end() :]):
+            continue  # of an array constructor
+        last = str(counts.get(match[2], match[2]))
+        count = 1  # where it is not known here
+        if match[1] and last.isdigit():
+            first, *step = map(int, re.findall(r"\d+", match[1]))
+            count = max(1, (int(last) - first) // max(1, *step, 1) + 1)
+        open_loops.append(count)
+        if (turns := math.prod(open_loops)) > _MOST_TURNS:
+            raise InputError(
+                where=f"{file}:{line + text[: match.start()].count(chr(10))}",
+                found=f"a loop of {turns} turns, nested ones multiplied",
+                expected=f"at most {_MOST_TURNS}, as the Modelica front end unrolls each",
+                remedy=f"write a sum in closed form, take fewer turns, or {_EXPORT}",
+            )
 
 
 def _refuse_outer(component: Component) -> None:
