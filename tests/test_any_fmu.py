@@ -17,6 +17,7 @@ import pytest
 import workbench as wb
 from workbench.__main__ import main
 from workbench.errors import FMUError, InputError
+from workbench.models.added import CONSTANT, RateTerm, write_extended
 from workbench.models.fmu import FMU, CoSimulation, EventError
 from workbench.models.simulation import Drive, Simulation
 from workbench.observers import choose, estimators_of
@@ -26,6 +27,8 @@ from workbench.observers.gains_file import usual_gains
 from workbench.observers.replay import replay
 from workbench.observers.simulation import prepare
 from workbench.recordings.case import read_case
+from workbench.studies.distance.forecast import stopping_of
+from workbench.studies.distance.simulation import DrivingInputs, StopSimulation
 from workbench.system.registry import load_system, open_model
 
 from .built import machine_file
@@ -245,6 +248,26 @@ def test_what_the_fmu_warns_of_stands_at_the_top_of_each_answer(
     case = wb.case_from_frame(system, pd.DataFrame(columns | {"T [K]": 293.0 + noise[1]}))
     outcome = wb.fit(system, [case], ["T"], settings=settings, workers=1, report=lambda line: None)
     assert re.search(rf"warned \d+ times, first: {said}", outcome.doubts[0])
+    # A diagnosis runs an FMU around this one.
+    around = system.source.parent / "Around.fmu"
+    term = RateTerm("added", 0, CONSTANT, 1.0, "", 1.0, "", "a constant")
+    write_extended(system.source.parent / "Room.fmu", around, [term], {}, {})
+    with FMU(around) as fmu:
+        fmu.start({"T": 293.0})
+        fmu.derivatives()
+        assert re.search(f"Around.fmu warned once: {said}", fmu.take_warning())
+
+
+def test_a_stop_says_what_the_fmu_warns_of(build):
+    """What falls to rest from 296 K is above its table at first, from 291.5 K it is not."""
+    system = load_system(build("TIMETABLE", start=600.0, flags=["-DWARNS=1"]).parent)
+    stopping = replace(stopping_of(load_system("train")), state="T", longest=600.0)
+    drive = DrivingInputs(np.zeros(1), np.zeros(1), np.zeros(1), np.full((1, 2), 280.0))
+    with open_model(system) as fmu:
+        for rest, begin, warns in ((293.0, 296.0, True), (290.0, 291.5, False)):
+            simulation = StopSimulation(fmu, system, replace(stopping, rest=rest))
+            stop = simulation.run(drive, {"T": begin})
+            assert ("T is above its table" in stop.warned) == warns
 
 
 @pytest.mark.parametrize(
@@ -460,12 +483,14 @@ def test_a_tuning_tells_events_that_it_does_not_go_through_and_what_the_fmu_warn
     assert said in told.out + told.err
 
 
-def test_the_open_loop_stops_where_a_model_asks_for_event_mode_that_has_no_indicators(build):
-    """The fuse blows at 295 K, after 470 s, which only the end of a step tells."""
+def test_the_open_loop_goes_on_where_a_model_asks_for_event_mode_that_has_no_indicators(build):
+    """The fuse blows after 470 s, at 295 K, which only the end of a step of 10 s tells."""
     with FMU(build("FUSE")) as fmu:
-        assert run(fmu, "open_loop", 460.0)[-1] == pytest.approx(exact(1500.0, 460.0), abs=0.03)
-        with pytest.raises(EventError, match="the model asks for Event Mode"):
-            run(fmu, "open_loop", 600.0)
+        estimated = run(fmu, "open_loop", 1000.0)
+    late = np.abs(exact(0.0, 10.0, begin=295.0) - exact(1500.0, 10.0, begin=295.0))
+    expected = along("FUSE", 10.0 * np.arange(estimated.size))
+    assert estimated == pytest.approx(expected, abs=late)
+    assert estimated[-1] < 293.0
 
 
 @pytest.mark.parametrize("what", ["THERMOSTAT", "FUSE"])

@@ -78,6 +78,9 @@ static double sum(const Model *m, size_t state, double x, double *slope) {
     return total;
 }
 
+/* The worse of two: a warning of the inner FMU is handed on. */
+static fmi2Status worse(fmi2Status a, fmi2Status b) { return a > b ? a : b; }
+
 static fmi2Status change(Model *m) {
     for (size_t k = 0; k < TERMS; k++) {
         m->own[k] = terms[k].start;
@@ -161,8 +164,8 @@ void fmi2FreeInstance(fmi2Component c) {
 
 fmi2Status fmi2Reset(fmi2Component c) {
     Model *m = c;
-    fmi2Status status = m->Reset(m->inner), set = status < fmi2Discard ? change(m) : status;
-    return set > status ? set : status;
+    const fmi2Status status = m->Reset(m->inner);
+    return status > fmi2Warning ? status : worse(status, change(m));
 }
 
 /* One call of the inner FMU for a run of variables that are its own. */
@@ -177,23 +180,24 @@ static int rate_of(fmi2ValueReference vr, size_t *state) {
 fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n,
                        const fmi2Real value[]) {
     Model *m = c;
-    for (size_t k = 0, end; k < n; k = end) {
+    fmi2Status status = fmi2OK;
+    for (size_t k = 0, end; k < n && status <= fmi2Warning; k = end) {
         end = k + 1;
         if (OWN(vr[k])) {
             m->own[vr[k] - FIRST] = value[k];
             continue;
         }
         while (end < n && !OWN(vr[end])) end++;
-        fmi2Status status = m->SetReal(m->inner, vr + k, end - k, value + k);
-        if (status > fmi2Warning) return status;
+        status = worse(status, m->SetReal(m->inner, vr + k, end - k, value + k));
     }
-    return fmi2OK;
+    return status;
 }
 
 fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Real value[]) {
     Model *m = c;
     double x[STATES + 1], slope;
     int known = 0;
+    fmi2Status status = fmi2OK;
     for (size_t k = 0, end; k < n; k = end) {
         end = k + 1;
         if (OWN(vr[k])) {
@@ -201,17 +205,17 @@ fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n,
             continue;
         }
         while (end < n && !OWN(vr[end])) end++;
-        fmi2Status status = m->GetReal(m->inner, vr + k, end - k, value + k);
+        status = worse(status, m->GetReal(m->inner, vr + k, end - k, value + k));
         if (status > fmi2Warning) return status;
         for (size_t j = k, i; j < end; j++) {
             if (!rate_of(vr[j], &i)) continue;
-            if (!known && (status = m->GetContinuousStates(m->inner, x, STATES)) > fmi2Warning)
-                return status;
+            if (!known) status = worse(status, m->GetContinuousStates(m->inner, x, STATES));
+            if (status > fmi2Warning) return status;
             known = 1;
             value[j] += sum(m, i, x[i], &slope);
         }
     }
-    return fmi2OK;
+    return status;
 }
 
 fmi2Status fmi2GetDerivatives(fmi2Component c, fmi2Real rate[], size_t n) {
@@ -219,7 +223,7 @@ fmi2Status fmi2GetDerivatives(fmi2Component c, fmi2Real rate[], size_t n) {
     double x[STATES + 1], slope;
     fmi2Status status = m->GetDerivatives(m->inner, rate, n);
     if (status > fmi2Warning) return status;
-    status = m->GetContinuousStates(m->inner, x, n);
+    status = worse(status, m->GetContinuousStates(m->inner, x, n));
     for (size_t i = 0; i < n; i++) rate[i] += sum(m, i, x[i], &slope);
     return status;
 }
@@ -241,7 +245,7 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReferenc
     for (size_t j = 0; j < nu; j++) result[j] = 0.0;
     if (count) status = m->GetDirectionalDerivative(m->inner, unknown, nu, inner, count, seed, result);
     if (status > fmi2Warning) return status;
-    status = m->GetContinuousStates(m->inner, x, STATES);
+    status = worse(status, m->GetContinuousStates(m->inner, x, STATES));
     for (size_t j = 0; j < nu && status <= fmi2Warning; j++) {
         if (!rate_of(unknown[j], &i)) continue;
         sum(m, i, x[i], &slope);

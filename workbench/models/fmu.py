@@ -80,6 +80,7 @@ _ACCESSORS = {
     },
 }
 
+_STATUSES: Mapping[int | str, str] = {2: "discard", 3: "error", 4: "fatal", 5: "pending"}
 _WARNING, _LOGGED = 1, 3  # status of FMI; messages that an error shows
 _SAME_STEP = 1e-4  # by which sample times may differ: what rounding of time stamps leaves
 _MOST_ITERATIONS = 100  # of discrete states at one event; models need some
@@ -472,9 +473,9 @@ class FMUInstance:
         call = self._call.get(use)
         return int(ctypes.cast(call, ctypes.c_void_p).value or 0) if call else 0
 
-    def refusal(self, function: str, status: int) -> FMUError:
+    def refusal(self, function: str, status: int | str) -> FMUError:
         """The error for a call that returned `status`, with what the FMU logged."""
-        name = {2: "discard", 3: "error", 4: "fatal", 5: "pending"}.get(status, status)
+        name = _STATUSES.get(status, status)
         return FMUError(
             f"{self._description.path.name}: {function} returned {name}: {self._logged()}"
         )
@@ -722,8 +723,9 @@ class FMU:
                     + (f", an element of '{variable.of}'" if variable.of else ""),
                     expected="a scalar of type Real (FMI 2.0) or Float64 (FMI 3.0)",
                     remedy="export the model with a real variable in its place, or leave this one "
-                    "out. With it these run: workbench simulate --estimator open_loop, workbench "
-                    "fit, workbench diagnose",
+                    "out"
+                    + ". With it these run: workbench simulate --estimator open_loop, workbench "
+                    "fit, workbench diagnose" * (variable.type in _ACCESSORS),
                 )
         references = np.array([self._references[n] for n in names], np.uint32)
         return Variables(tuple(names), references, np.zeros(len(names)))
@@ -812,7 +814,7 @@ class FMU:
         """Address of the FMU's function for a use such as "get"; 0 if it has none."""
         return self._loaded.function_address(use)
 
-    def refusal(self, function: str, status: int) -> FMUError:
+    def refusal(self, function: str, status: int | str) -> FMUError:
         """The error for a call that returned `status`, with what the FMU logged."""
         return self._loaded.refusal(function, status)
 
@@ -880,8 +882,8 @@ class FMU:
         return EventError(
             f"{self.path.name}: an event of the model by {self.time[0]:.6g} s of its time, or in "
             "the step after: an event indicator changes its sign, a time event is due, or the "
-            "model asks for Event Mode. Only the open loop, fit and diagnose go through events, "
-            "and the Kalman filters ekf and ukf on an FMU that saves its state "
+            "model asks for Event Mode or to end. Only the open loop, fit and diagnose go through "
+            "events, and the Kalman filters ekf and ukf on an FMU that saves its state "
             "(canGetAndSetFMUState); results of other estimators would be wrong from there on. "
             "Replace jumps of the model by smooth functions, or cut the recording before the event"
         )

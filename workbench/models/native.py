@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from workbench.arrays import Matrix, Vector
 from workbench.errors import FMUError, InputError
-from workbench.models.description import CO_SIMULATION
+from workbench.models.description import CO_SIMULATION, MODEL_EXCHANGE
 from workbench.models.fmu import FMU, CoSimulation, References, co_simulation_alone
 from workbench.models.jit import jit
 
@@ -543,7 +543,10 @@ def raise_on_failure(status: int, fmu: FMU) -> None:
         model has an event, at which estimators do not stop.
     """
     if status == REFUSED:
-        raise fmu.refusal("a call of the observer's loop", 3)
+        refusal = fmu.refusal("a call of the observer's loop", "discard, error or fatal")
+        # A Co-Simulation keeps its time to itself.
+        at = f"; at {fmu.time[0]:.9g} s of its time" * (fmu.interface == MODEL_EXCHANGE)
+        raise FMUError(f"{refusal}{at}")
     if status == SINGULAR:
         raise FMUError(f"{fmu.path.name}: the implicit step has no solution at this point")
     if status == EVENT:

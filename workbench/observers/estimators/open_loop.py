@@ -6,7 +6,7 @@ import numpy as np
 
 from workbench.arrays import Matrix, Vector
 from workbench.models.description import MODEL_EXCHANGE
-from workbench.models.fmu import FMU, CoSimulation
+from workbench.models.fmu import FMU, CoSimulation, EventError
 from workbench.models.hybrid import CoSimulationRun, HybridSimulation
 from workbench.models.native import assign, compiled, inlined, set_states
 from workbench.observers.contract import Estimate, Estimator
@@ -108,6 +108,7 @@ class OpenLoop(Estimator):
         super().__init__(fmu, system, gains)
         n = len(fmu.states)
         self._simulation: HybridSimulation | CoSimulationRun | None = None
+        self._eventful = False  # known where an FMU names no events, and asks for one on the way
         self._read = fmu.typed(self._outputs)
         # Whether the compiled loop can set and read all that there is.
         self._plain = (
@@ -130,8 +131,16 @@ class OpenLoop(Estimator):
         return self._settings, self._state
 
     def run(self, time: Vector, u: Matrix, y: Matrix) -> Estimate:
-        """See Estimator; accurate steps, where they turn out to be needed, begin at the start."""
-        estimate = super().run(time, u, y)
+        """See Estimator; accurate steps, where they turn out to be needed, begin at the start.
+
+        So does a simulation that goes through events, where one turns up that nothing announced.
+        """
+        self._eventful = False
+        try:
+            estimate = super().run(time, u, y)
+        except EventError:
+            self._eventful = True
+            return super().run(time, u, y)
         if not unbearable(self._state):
             return estimate
         self.start(u[0], y[0])
@@ -145,7 +154,7 @@ class OpenLoop(Estimator):
         inputs = self.fmu.typed([signal.name for signal in self.system.inputs])
         if isinstance(self.fmu, CoSimulation):
             self._simulation = CoSimulationRun(self.fmu, inputs, self.system.holds)
-        elif self.fmu.has_events or not self._plain:
+        elif self._eventful or self.fmu.has_events or not self._plain:
             self._simulation = HybridSimulation(self.fmu, inputs, self.system.holds)
         if self._simulation is not None:
             self._simulation.begin(u)

@@ -124,7 +124,9 @@ class _Prediction:
             at = places(past.joint.shared, system, recorded.stop.conditions)
             values = {**{name: float(past.mean[j]) for name, j in at.items()}, **tolerances}
             tasks.append(pool.submit(Forecaster.stop, recorded.stop, values))
-        self._model = np.array([task.result().distance for task in tasks])
+        results = [task.result() for task in tasks]
+        self._model = np.array([result.distance for result in results])
+        self._warned = [result.warned for result in results]
         measured = np.array([recorded.distance for recorded in stops])
         self._left = np.log(measured / self._model)
 
@@ -147,15 +149,15 @@ class _Prediction:
             (distances, certain), outside = task.result()
             forecasts.append(Forecast(np.sort(distances), np.sort(certain), outside))
         *others, ahead = forecasts
-        nominal = self._pool.submit(Forecaster.stop, stop, {}).result().distance
-        rate = NominalRate(stop.asked[SPEED], self._stopping.response, nominal)
+        sheet = self._pool.submit(Forecaster.stop, stop, {}).result()
+        rate = NominalRate(stop.asked[SPEED], self._stopping.response, sheet.distance)
         safety, interrupted = self._safety(asked, rate)
         plain, short = self._plain(asked, rate)
         return Distance(
             system=self._system,
             stop=stop,
             ahead=ahead,
-            nominal=nominal,
+            nominal=sheet.distance,
             past=tuple(
                 PastStop(recorded, float(model), forecast)
                 for recorded, model, forecast in zip(self._stops, self._model, others, strict=True)
@@ -163,6 +165,7 @@ class _Prediction:
             safety=safety,
             plain=plain,
             interrupted=interrupted or short,
+            warned=next(filter(None, [sheet.warned, *self._warned]), ""),
         )
 
     def _question(self, stop: Stop, without: int | None) -> Question:

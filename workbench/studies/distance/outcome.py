@@ -188,6 +188,7 @@ class Distance:
     safety : None where it was not asked for, or interrupted early.
     plain : the same by plain samples; None where they were not asked for.
     interrupted : whether runs are missing.
+    warned : what the FMU warned of in one of the stops; empty: nothing.
     """
 
     system: System
@@ -198,6 +199,7 @@ class Distance:
     safety: Safety | None
     plain: PlainSampling | None
     interrupted: bool
+    warned: str = ""
 
     @property
     def valid(self) -> list[PastStop]:
@@ -247,7 +249,7 @@ class Distance:
     def warnings(self) -> list[str]:
         """What the data do not carry."""
         count = len(self.valid)
-        warnings = []
+        warnings = [self.warned] * bool(self.warned)
         if self.safety is not None:
             warnings.append(
                 f"{count} stops show what happens once in {count + 1}; levels beyond that follow "

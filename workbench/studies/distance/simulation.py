@@ -57,11 +57,13 @@ class StopResult:
     distance : from the command to standstill [m].
     time : until then [s].
     outputs : (n, l) readings of the outputs, by samples; none where steps are longer.
+    warned : what the FMU warned of; empty: nothing.
     """
 
     distance: float
     time: float
     outputs: Matrix
+    warned: str
 
 
 @compiled
@@ -156,6 +158,7 @@ class StopSimulation:
         FMUError
             If the model cannot be evaluated, or does not come to rest in time.
         """
+        self._fmu.take_warning()  # of a stop that failed
         self._fmu.start(values)
         self._model.x[:], self._model.u[:] = self._fmu.get_states(), 0.0
         y = self._y if stride == 1 else self._y[:0]
@@ -170,4 +173,5 @@ class StopSimulation:
         raise_on_failure(status, self._fmu)
         assert status == OK
         distance, time, count = self._result
-        return StopResult(float(distance), float(time), y[: int(count)].copy())
+        outputs = y[: int(count)].copy()
+        return StopResult(float(distance), float(time), outputs, self._fmu.take_warning())
