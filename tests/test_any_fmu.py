@@ -5,6 +5,7 @@ import re
 import subprocess
 import zipfile
 from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -588,6 +589,32 @@ def test_compiled_code_gets_samples_of_the_size_that_it_needs(build):
                 filter_.run(time, u, y)
 
 
+def test_values_outside_of_the_ranges_of_the_model_are_refused(build):
+    limited = VARIABLES.replace('<Integer start="0"/>', '<Integer start="0" max="3"/>')
+    file = build("RELAYS", variables=limited).parent / "system.toml"
+    text = file.read_text()
+    for value, refused in ((3, False), (4, True), (-1, False)):
+        file.write_text(f"{text}[parameters]\nmode = {value}.0\n")
+        with (
+            pytest.raises(InputError, match="mode = 4; expected -inf to 3")
+            if refused
+            else nullcontext()
+        ):
+            load_system(file)
+
+
+def test_a_model_that_waits_for_clocks_is_refused(tmp_path):
+    """Its clocked equations would stand still."""
+    text = machine_file("arrays_fmu/modelDescription.xml")
+    clock = '<Clock name="tick" valueReference="5" causality="input" intervalVariability="%s"/>'
+    for kind in ("constant", "triggered"):
+        with zipfile.ZipFile(tmp_path / "Clocked.fmu", "w") as archive:
+            clocked = text.replace("</ModelVariables>", f"{clock % kind}</ModelVariables>")
+            archive.writestr("modelDescription.xml", clocked)
+        with pytest.raises(InputError, match="found input clocks, tick"):
+            FMU(tmp_path / "Clocked.fmu")
+
+
 def recorded(folder: Path, outside: str = "Ta", inside: str = "T") -> Path:
     """A recording of ten minutes at 280 K outside; returns its folder."""
     case = folder / "cases" / "one"
@@ -655,15 +682,25 @@ def test_names_of_a_system_file_may_come_from_the_command_line(build, capsys):
     capsys.readouterr()
 
 
-def test_observability_says_what_the_fmu_warns_of(build, capsys):
-    path = build("RELAYS", flags=["-DWARNS=1"])
+@pytest.mark.parametrize(
+    ("flag", "said"),
+    [
+        ("-DWARNS=1", r"one: the FMU Room.fmu warned \d+ times, first: T is"),
+        (
+            "-DLOST",
+            r"no solution; at 10 s",
+        ),
+    ],
+)
+def test_observability_says_where_the_fmu_leaves_its_table(flag, said, build, capsys):
+    path = build("RELAYS", flags=[flag])
     file = recorded(path.parent) / "measured.csv"
     file.write_text(file.read_text().replace(",291.", ",293."))  # K: half are above its table
     given = ["--system", path.parent / "system.toml", "--out", path.parent / "out"]
-    assert main(["observability", *map(str, [file.parent, *given])]) == 0
-    assert re.search(
-        r"one: the FMU Room.fmu warned \d+ times, first: T is", capsys.readouterr().out
-    )
+    status = main(["observability", *map(str, [file.parent, *given])])
+    told = capsys.readouterr()
+    assert status == int(flag == "-DLOST")
+    assert re.search(said, told.out + told.err)
 
 
 def test_an_estimator_that_meets_an_event_at_once_leaves_the_others(build, capsys):

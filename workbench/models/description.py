@@ -21,6 +21,7 @@ from workbench.runtime.resources import CHECKOUT
 OWN_TOOL = "Observer workbench"  # that FMUs say they were made by, with its version
 MODEL_EXCHANGE = "Model Exchange"
 CO_SIMULATION = "Co-Simulation"
+_NO_NUMBERS = ("String", "Binary", "Clock")
 REAL_TYPES = ("Real", "Float64")  # of FMI 2.0 and 3.0
 _FLOATS = (*REAL_TYPES, "Float32")  # of states
 
@@ -72,7 +73,7 @@ class Variable:
     @property
     def holds_number(self) -> bool:
         """Whether its type is of numbers, of which a Boolean has two."""
-        return self.type not in ("String", "Binary", "Clock")
+        return self.type not in _NO_NUMBERS
 
 
 @dataclass(frozen=True)
@@ -167,8 +168,17 @@ class Description:
         Raises
         ------
         InputError
-            If the FMU has no such interface, or no binary for this machine.
+            If the FMU has no such interface, waits for clocks, or has no binary for this machine.
         """
+        clocks = [v.name for v in self.variables if v.type == "Clock" and v.causality == "input"]
+        if clocks:
+            raise InputError(
+                where=str(self.path),
+                found=f"input clocks, {', '.join(clocks)}",
+                expected="a model that keeps its own time: nobody ticks clocks here, and what "
+                "waits for them would stand still",
+                remedy="export the model without clocks, with time events in their place",
+            )
         if interface not in self.interfaces:
             raise InputError(
                 where=str(self.path),
@@ -451,8 +461,10 @@ def _variable(variable: "fmpy.model_description.ModelVariable") -> Variable:
         _number(variable.start, f"the start value of '{name}'")
 
     def limit(key: str) -> float | None:
+        if variable.dimensions or variable.type in (*_NO_NUMBERS, "Boolean"):
+            return None
         text = getattr(variable, key) or (getattr(declared, key) if declared else None)
-        return _number(text, f"{key} of '{name}'", endless=key != "nominal") if real else None
+        return _number(text, f"{key} of '{name}'", endless=key != "nominal")
 
     minimum, maximum = limit("min"), limit("max")
     if minimum is not None and maximum is not None and minimum > maximum:

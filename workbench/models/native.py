@@ -542,12 +542,12 @@ def raise_on_failure(status: int, fmu: FMU) -> None:
         If the FMU refused a call, with what it logged; an implicit step had no solution; or the
         model has an event, at which estimators do not stop.
     """
+    # A Co-Simulation keeps its time to itself.
+    at = f"; at {fmu.time[0]:.9g} s of its time" * (fmu.interface == MODEL_EXCHANGE)
     if status == REFUSED:
         refusal = fmu.refusal("a call of the observer's loop", "discard, error or fatal")
-        # A Co-Simulation keeps its time to itself.
-        at = f"; at {fmu.time[0]:.9g} s of its time" * (fmu.interface == MODEL_EXCHANGE)
         raise FMUError(f"{refusal}{at}")
     if status == SINGULAR:
-        raise FMUError(f"{fmu.path.name}: the implicit step has no solution at this point")
+        raise FMUError(f"{fmu.path.name}: the implicit step has no solution{at}")
     if status == EVENT:
         raise fmu.event_error()

@@ -590,6 +590,11 @@ def linearise_along(fmu: FMU, system: System, time: Vector, x: Matrix, u: Matrix
         else:
             generator[k, :count, :count] = fmu.state_jacobian()
             generator[k, :count, count:] = fmu.input_jacobian(inputs)
+        if not all(np.isfinite(part[k]).all() for part in (x, generator, slopes, y)):
+            raise FMUError(
+                f"{fmu.path.name}: its states, outputs or derivatives are no finite numbers at "
+                f"{fmu.time[0]:.6g} s of its time"
+            )
     steps = np.append(np.diff(time), time[-1] - time[-2])
     # Exact for inputs held over the step; Van Loan (1978), IEEE Trans. Autom. Control 23, 395.
     transition = exponentials(generator * steps[:, None, None])

@@ -1,5 +1,6 @@
 """A system against its model: whatever its file names is there, and in the same unit."""
 
+import math
 from collections.abc import Collection, Iterable, Iterator
 
 from workbench.errors import InputError, closest, unknown_name
@@ -25,6 +26,13 @@ from workbench.system.stopping import ASKED, MOVED, OUTSIDE, RISING
 from workbench.system.system import System
 from workbench.system.units import si_factor
 
+# What to do about a name in [parameters] that is no parameter, by its causality.
+_REMEDIES = {
+    "calculatedParameter": "set the parameters that it follows from",
+    "structuralParameter": "export the model with the size that it is to have: sizes stay as they "
+    "are here",
+    "input": "record it, or give it a value in the model",
+}
 _NAME_IT = (
     "if the FMU names it otherwise, write variable = 'NAME' in the table of '{0}', or {0} = 'NAME' "
     "in [variables], or --map {0}=NAME"
@@ -69,6 +77,7 @@ def check_model(system: System, model: Description) -> None:
                 expected=f"[{unit}] for {ours}; nothing is converted silently",
                 remedy=f"export the model with this variable in {unit}",
             )
+    _check_ranges(system, model)
     _check_corrections(system, model)
     for name in system.given:
         if name not in model.names("parameter"):
@@ -78,9 +87,31 @@ def check_model(system: System, model: Description) -> None:
                 if name in variables
                 else "no such parameter of the model",
                 expected=f"a parameter of {model.name}{closest(name, model.names('parameter'))}",
-                remedy="set the parameters that it follows from"
+                remedy=_REMEDIES.get(variables[name].causality, "leave it out")
                 if name in variables
                 else "correct the name",
+            )
+
+
+def _check_ranges(system: System, model: Description) -> None:
+    """Refuse values that the model does not allow, of [parameters] and of conditions."""
+    given = [(f"[parameters] {name}", name, value) for name, value in system.given.items()]
+    for condition in system.conditions:
+        for parameters in condition.parameters.values():
+            given += [(f"[conditions.{condition.name}]", *item) for item in parameters.items()]
+    variables = {v.name: v for v in model.variables}
+    for where, name, value in given:
+        variable = variables.get(name)
+        if variable is None:
+            continue
+        low = -math.inf if variable.minimum is None else variable.minimum
+        high = math.inf if variable.maximum is None else variable.maximum
+        if not low <= value <= high:
+            raise InputError(
+                where=f"{system.source}, {where}",
+                found=f"{name} = {value:g} {variable.unit or ''}".rstrip(),
+                expected=f"{low:g} to {high:g}, the range of {model.name}",
+                remedy="correct the value, or the range in the model",
             )
 
 
