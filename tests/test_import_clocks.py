@@ -100,6 +100,39 @@ def test_a_mended_clock_is_told(tmp_path, tank):
     assert "the hour after 2024-10-27 02:45:00 comes twice" in doubt
 
 
+@pytest.mark.parametrize(
+    ("zone", "begin", "missing"),
+    [
+        ("Antarctica/Troll", datetime(2024, 3, 30, 12), "120 min are missing after 2024-03-31 00"),
+        ("America/Caracas", datetime(2016, 4, 30, 12), "30 min are missing after 2016-05-01 02"),
+        ("Asia/Kathmandu", datetime(1985, 12, 31, 12), "15 min are missing after 1985-12-31 23"),
+        ("Pacific/Apia", datetime(2011, 12, 29, 12), "1440 min are missing after 2011-12-29 23"),
+    ],
+)
+def test_one_gap_that_a_clock_may_have_made_is_told(tmp_path, tank, zone, begin, missing):
+    """Where no summer time begins; the zone, where it is said, closes it."""
+    path = table(
+        tmp_path / "a.csv", local(begin.replace(tzinfo=ZoneInfo(zone)), 160, "%Y-%m-%d %H:%M")
+    )
+    (told,) = clock(path, tank).corrections
+    assert missing in told
+    known = clock(path, tank, f"Time [{zone}]")
+    assert_allclose(known.times, QUARTER * np.arange(160))
+    assert not known.corrections
+
+
+@pytest.mark.parametrize(
+    ("rate", "every", "day"), [(25, 1, ""), (30, 3, ""), (24, 6, "2024-03-05 "), (0, 50, "")]
+)
+def test_frames_behind_the_last_colon_are_parts_of_a_second(tmp_path, tank, rate, every, day):
+    """SMPTE time codes; 0: hundredths, as 00 and 50 are."""
+    seconds = [divmod(every * k, rate or 100) for k in range(160)]
+    stamps = [f"{day}00:{s // 60:02d}:{s % 60:02d}:{part:02d}" for s, part in seconds]
+    read = clock(table(tmp_path / "a.csv", stamps), tank)
+    assert_allclose(read.times, every / (rate or 100) * np.arange(160), atol=1e-9)
+    assert [f"{rate} in a second" in text for text in read.corrections] == [True] * bool(rate)
+
+
 def test_an_hour_without_samples_on_another_day_stays_a_gap(tmp_path, tank):
     stamps = local(datetime(2024, 6, 1, tzinfo=UTC), 60, "%Y-%m-%d %H:%M")
     del stamps[30:34]

@@ -357,10 +357,10 @@ def test_a_last_line_that_is_cut_within_a_number_is_no_sample(tmp_path, tank):
     path = write(tmp_path / "a.csv", LEVEL)
     path.write_text(path.read_text()[:-2])
     recorded = read_recorded_file(path)
-    assert "line 201 was left out: the file ends there within a line" in recorded.notes[-1]
+    assert "line 201 was left out: the file ends there within a line" in recorded.doubts[-1]
     assert recorded.groups[0].channels[0].values.size == 199
     path.write_text(path.read_text() + "\n")
-    assert not read_recorded_file(path).notes
+    assert not read_recorded_file(path).doubts
 
 
 def test_a_value_that_may_be_a_marker_is_asked_about_and_declared(tmp_path, tank):

@@ -83,6 +83,7 @@ _TIMES_ALONE = (_OF_DAY, _OF_HOUR, _OF_MINUTES, _DURATION)
 _EPOCH = date(1970, 1, 1).toordinal()
 _START = datetime(1970, 1, 1)
 _HOUR = 3600
+_QUARTER = 900
 _HALF_HOUR = 1800  # by which Lord Howe Island changes its clocks
 ORDERS = {"ymd": "year, month, day", "dmy": "day, month, year", "mdy": "month, day, year"}
 # Hours that zones are ahead of UTC, by the letters that recorders write.
@@ -103,6 +104,7 @@ _CHANGING = (
 # Letters of several zones: alone they only say that times are local.
 _AMBIGUOUS = frozenset(("CST", "IST", "BST", "AST", "SST"))
 MINUTES, HOURS = "min:s", "h:min"  # what 10:15 may be
+_FRAMES = (24, 25, 30, 50, 60)  # in a second, of films and television (SMPTE ST 12-1)
 _EVEN = 3.0  # median steps, above which one step is a jump
 
 
@@ -218,8 +220,9 @@ def _of_day(name: str, texts: Sequence[str], pattern: re.Pattern[str]) -> FileCh
     matches = [pattern.fullmatch(text) for text in texts]
     known = np.array([match is not None for match in matches])
     whole = np.array([_clock(match) if match else 0 for match in matches])
-    times = whole + _fractions(matches) - np.array([_offset(match) for match in matches])
-    period, words = 24 * _HOUR, list[str]()
+    parts, words = _counted_frames(matches, whole)
+    times = whole + parts - np.array([_offset(match) for match in matches])
+    period = 24 * _HOUR
     if pattern in (_OF_HOUR, _OF_MINUTES):
         period = _HOUR
     elif _twelve_hours(matches):
@@ -275,7 +278,8 @@ def _by_date(
 ) -> FileChannel | None:
     matches = [pattern.fullmatch(text) for text in texts]
     known = np.array([match is not None for match in matches])
-    parts = _fractions(matches)
+    clocks = np.array([_clock(match) if match else 0 for match in matches])
+    parts, said = _counted_frames(matches, clocks)
     zones = {str(match["zone"]) for match in matches if match and match.groupdict().get("zone")}
     letters = {own.upper() for own in zones if own.isalpha()}
     local = len(zones) == 1 and bool(letters & _AMBIGUOUS or letters - _AHEAD.keys())
@@ -288,10 +292,10 @@ def _by_date(
             days = _days(matches, reading)
         except ValueError:  # a 31st of February
             continue
-        whole = days + np.array([_clock(match) if match else 0 for match in matches])
+        whole = days + clocks
         zoned = bool(zones) and not local
         channel = _channel(name, texts, known, (whole, parts, shift), zone, zoned=zoned)
-        readings[reading] = channel
+        readings[reading] = replace(channel, corrections=(*said, *channel.corrections))
     return _choose_reading(name, texts, readings, matches)
 
 
@@ -436,7 +440,29 @@ def _mend_changes(times: Vector, *, dated: bool) -> tuple[Vector, tuple[str, ...
     """Local times that go on through changes of the clock, and what was changed, in words."""
     times, words = _mend_changes_by(_HOUR, times, dated=dated)
     times, more = _mend_changes_by(_HALF_HOUR, times, dated=dated)
-    return times, (*words, *more)
+    words = (*words, *more)
+    return times, words if words or not dated else _set_ahead(times)
+
+
+def _set_ahead(times: Vector) -> tuple[str, ...]:
+    """Say which one gap may be a clock that was set ahead, in samples that are even otherwise.
+
+    Offsets of zones are multiples of a quarter of an hour; a zone may also leave out a day.
+    """
+    steps = np.diff(times)
+    if steps.size < 2:
+        return ()
+    at, usual = int(np.argmax(steps)), float(np.median(steps))
+    gap, others = float(steps[at]) - usual, np.delete(steps, at)
+    even = np.abs(others - usual).max() <= 0.1 * usual
+    quarters = gap / _QUARTER
+    if not even or not 0.5 < quarters <= 100.0 or abs(quarters - round(quarters)) > 1e-3:
+        return ()
+    return (
+        f"{gap / 60.0:g} min are missing after {_moment(times[at]):%Y-%m-%d %H:%M:%S}: a gap, or a "
+        "clock that was set ahead; say the zone, such as [Europe/Berlin], or [UTC]; times after "
+        "it are as they are written",
+    )
 
 
 def _mend_changes_by(by: int, times: Vector, *, dated: bool) -> tuple[Vector, tuple[str, ...]]:
@@ -586,6 +612,30 @@ def _fractions(matches: Sequence[re.Match[str] | None]) -> Vector:
     if colons and max(widths) <= 3 < 3 * len(widths):
         return np.array([int(own["f"]) * 1e-3 if own.get("f") else 0.0 for own in digits])
     return np.array([float(f"0.{own['f']}") if own.get("f") else 0.0 for own in digits])
+
+
+def _counted_frames(
+    matches: Sequence[re.Match[str] | None], whole: np.ndarray
+) -> tuple[Vector, list[str]]:
+    """Parts of a second, (n,), and what is said of them: behind a colon may be frames of a film.
+
+    They are where times go on evenly as such, and not as decimals.
+    """
+    parts = _fractions(matches)
+    held = [match for match in matches if match and match.groupdict().get("f")]
+    if len(held) < len(matches) or any(
+        m.groupdict().get("dot") != ":" or len(m["f"]) != 2 for m in held
+    ):
+        return parts, []
+    frames = np.array([int(match["f"]) for match in held])
+    for rate in [0, *(rate for rate in _FRAMES if rate > frames.max())]:
+        steps = np.diff(whole + (frames / rate if rate else parts))
+        if steps.size and np.abs(steps - np.median(steps)).max() <= 1.0 / (rate or 50):
+            break
+    else:
+        rate = 0
+    said = [f"behind the last colon are frames, {rate} in a second"] if rate else []
+    return frames / rate if rate else parts, said
 
 
 def _from_first(times: Vector, known: np.ndarray) -> Vector:

@@ -60,10 +60,8 @@ def read(path: Path, raw: bytes) -> Contents:
         first = next((number for number in below if number not in kept), 0)
         at = f", the first in line {first}" if first else ""
         notes.append(f"{broken} lines that are no samples were left out{at}")
-    if cut:
-        notes.append(cut)
     words.append(f"samples from line {table.lines[0]}")
-    return Contents(", ".join(words), groups, notes)
+    return Contents(", ".join(words), groups, notes, (cut,) if cut else ())
 
 
 def _cut_line(table: Cells) -> str:
