@@ -589,6 +589,17 @@ def test_compiled_code_gets_samples_of_the_size_that_it_needs(build):
                 filter_.run(time, u, y)
 
 
+@pytest.mark.parametrize("reference", [2, 3])
+def test_a_correction_that_is_another_variable_by_its_reference_is_refused(reference, build):
+    """That of Ta, and of G: the estimate would add what overwrote G."""
+    one = VARIABLES.replace(
+        'name="dG" valueReference="4"', f'name="dG" valueReference="{reference}"'
+    )
+    file = build("RELAYS", variables=one).parent / "system.toml"
+    with pytest.raises(InputError, match=f"another name of '(Ta|G)'.*reference {reference}"):
+        load_system(file)
+
+
 def test_values_outside_of_the_ranges_of_the_model_are_refused(build):
     limited = VARIABLES.replace('<Integer start="0"/>', '<Integer start="0" max="3"/>')
     file = build("RELAYS", variables=limited).parent / "system.toml"

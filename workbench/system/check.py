@@ -77,6 +77,7 @@ def check_model(system: System, model: Description) -> None:
                 expected=f"[{unit}] for {ours}; nothing is converted silently",
                 remedy=f"export the model with this variable in {unit}",
             )
+    _check_aliases(system, model)
     _check_ranges(system, model)
     _check_corrections(system, model)
     for name in system.given:
@@ -90,6 +91,26 @@ def check_model(system: System, model: Description) -> None:
                 remedy=_REMEDIES.get(variables[name].causality, "leave it out")
                 if name in variables
                 else "correct the name",
+            )
+
+
+def _check_aliases(system: System, model: Description) -> None:
+    """Refuse what estimators set under one name and the model has under another, too.
+
+    One of the two would overwrite the other. Of aliases, FMI lets one be set at most.
+    """
+    settable = [v for v in model.variables if v.causality in ("input", "parameter")]
+    known = {(v.type, v.reference, v.element): v.name for v in reversed(settable)}
+    names = {*(signal.name for signal in system.inputs), *system.corrections}
+    for variable in settable:
+        other = known[variable.type, variable.reference, variable.element]
+        if other != variable.name and names & {other, variable.name}:
+            raise InputError(
+                where=f"{model.path}, variable '{variable.name}'",
+                found=f"another name of '{other}': both have the value reference "
+                f"{variable.reference}",
+                expected="values of their own, since both can be set",
+                remedy="export the model again, with a value reference for each",
             )
 
 
