@@ -39,6 +39,14 @@ FAULTS = {
         "return status == STATUS_OK ? set_columns(i, 0, NX, x) : status;",
         "return status;",
     ),
+    "derivatives count calls at one time": (
+        "state injection",
+        "        xdot[k] = source[k];\n    }\n    return STATUS_OK;",
+        "        xdot[k] = source[k];\n    }\n"
+        "    static double at = -1.0;\n    static int calls;\n"
+        "    calls = i->state.time == at ? calls + 1 : 0;\n    at = i->state.time;\n"
+        "    xdot[0] *= 1.0 + 0.01 * calls;\n    return STATUS_OK;",
+    ),
     "rollback forgets a state": (
         "rollback",
         "    i->state = *s;",
