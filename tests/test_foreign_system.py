@@ -189,6 +189,7 @@ def test_filters_are_the_kalman_filter_where_the_model_is_linear(fmu, tanks, cas
     assert_allclose(np.sqrt(estimate.nis), np.sqrt(nis[1:]), rtol=1e-6, atol=1e-6 + left)
 
 
+@pytest.mark.usefixtures("tanks")
 @pytest.mark.parametrize("name", ["disturbance_observer", "parameter_estimator", "ekf"])
 def test_tuning_improves_z_and_its_page_speaks_of_the_system(folder, tmp_path, name):
     chosen = ["--system", str(folder), "--cases", str(folder / "cases"), "--out", str(tmp_path)]
