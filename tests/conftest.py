@@ -18,6 +18,7 @@ from typing import Any, TypeVar
 import fmpy
 import lxml.html
 import pytest
+from threadpoolctl import threadpool_limits
 
 from workbench import __main__ as program
 from workbench.diagnosis import build_everything, read_effects
@@ -62,6 +63,13 @@ def workers_begin_with_most() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         for module in (program, pools):
             patch.setattr(module, "preload", preload)
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def one_blas_thread() -> Iterator[None]:
+    """Tests run side by side: threads that wait for one another take the time of others."""
+    with threadpool_limits(1):
         yield
 
 

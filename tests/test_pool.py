@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from threadpoolctl import threadpool_info
+from threadpoolctl import threadpool_info, threadpool_limits
 
 from workbench.errors import InputError, WorkerError
 from workbench.runtime import pool as pools
@@ -166,8 +166,9 @@ def test_finishing_keeps_what_is_under_way_and_drops_what_waits():
         assert tasks[0].result() is None
 
 
-def test_workers_use_one_blas_thread():
-    with Pool(1, nullcontext, np.zeros(1), isolated=True) as pool:
+@pytest.mark.parametrize("isolated", [False, True])
+def test_workers_use_one_blas_thread(isolated):
+    with threadpool_limits(2), Pool(1, nullcontext, np.zeros(1), isolated=isolated) as pool:
         assert set(pool.submit(blas_threads).result()) == {1}
 
 

@@ -110,10 +110,11 @@ class Pool(Generic[State]):
         self._running: dict[int, _Worker] = {}
         self._threads: list[threading.Thread] = []
         self._prepare: Callable[[], State] = lambda: self._stack.enter_context(begin(given))
+        # Matrices are small: BLAS threads would wait for one another, and for other programs.
+        self._stack.enter_context(threadpool_limits(1))
         if workers == 1 and limit == math.inf and not isolated:
             return
         self._folder = self._stack.enter_context(temporary_folder())
-        self._stack.enter_context(threadpool_limits(1))
         self._secret = os.urandom(_SECRET_SIZE)
         self._call = usual_limits().call
         # In a file, because handing so much to a process that dies as it starts waits for ever.
