@@ -202,6 +202,7 @@ def _task(description: Description, interface: str, folder: Path, limits: Limits
     references = {v.name: v.reference for v in real}
     # Others may be set, and differentiated, in Event Mode alone.
     continuous = {v.name for v in real if v.variability == "continuous"}
+    nominal = {v.name: v.nominal for v in description.variables}
 
     def known(names: tuple[str, ...]) -> list[int]:
         return [references[name] for name in names if name in continuous]
@@ -224,6 +225,9 @@ def _task(description: Description, interface: str, folder: Path, limits: Limits
         "token": description.token,
         "exchange": exchange,
         "states": len(description.states),
+        "nominal": [abs(nominal.get(name) or 1.0) for name in description.states],
+        "rates": list(description.rates),
+        "shown": [name for name in description.names("output") if name in continuous],
         "reals": list(references.values()),
         "inputs": inputs,
         "outputs": outputs,

@@ -24,6 +24,7 @@ _ROUNDS = 10  # of set and get, as an observer goes through them sample by sampl
 _STEP, _LEAST = 6e-6, 1e-3  # relative step of differences, cube root of eps; and the least size
 _EPSILON = sys.float_info.epsilon
 _BENDS, _WRONG = 0.01, 0.1  # shares of a derivative: more is a bend, or no derivative of that rate
+_MOVED, _SAME = 0.01, 1e-4  # iterations within models end at 1e-6, calls that add up do not
 _OK, _WARNING, _DISCARD, _FATAL = 0, 1, 2, 4
 _STATUS = {_DISCARD: "discard", 3: "error", _FATAL: "fatal", 5: "pending"}
 _DIE_WITH_PARENT, _ADOPT = 1, 36  # PR_SET_PDEATHSIG, PR_SET_CHILD_SUBREAPER
@@ -307,6 +308,54 @@ def _is_wrong(
     return False
 
 
+def _require_function(call: _Calls, task: dict[str, Any]) -> None:
+    """Refuse rates and outputs that change where time, states and inputs are set off and back.
+
+    Raises
+    ------
+    _RefusedError
+        If one is off by more than a share of itself and of what it was moved by.
+    """
+    n, inputs, outputs = task["states"], task["inputs"], task["outputs"]
+    states, rates = (_DOUBLE * n)(), (_DOUBLE * n)()
+    held, shown = (_DOUBLE * len(inputs))(), (_DOUBLE * len(outputs))()
+    time = task["time"] + 1e-3 * _ROUNDS
+    if n:
+        call("GetContinuousStates", states, _SIZE(n))
+    call.reals("Get", inputs, held)
+    begun, given = list(states), list(held)
+
+    def at(share: float, later: float = 0.0) -> list[float]:
+        call("SetTime", _DOUBLE(time + later))
+        held[:] = [u + share * max(abs(u), 1.0) for u in given]
+        call.reals("Set", inputs, held)
+        sizes = [max(abs(x), size) for x, size in zip(begun, task["nominal"], strict=True)]
+        states[:] = [x + share * size for x, size in zip(begun, sizes, strict=True)]
+        if n:
+            call("SetContinuousStates", states, _SIZE(n))
+            rate = "GetContinuousStateDerivatives" if call.three else "GetDerivatives"
+            call(rate, rates, _SIZE(n))
+        call.reals("Get", outputs, shown)
+        return [*rates, *shown]
+
+    try:
+        before, moved, again = at(_MOVED), at(-_MOVED), at(_MOVED)  # at rest, much is 0
+        at(-_MOVED, 1e-3)
+        after = at(_MOVED)
+    except _RefusedError:  # nobody else moves them so
+        return
+    names = [*task["rates"], *task["shown"]]
+    for name, a, b, *others in zip(names, before, moved, again, after, strict=True):
+        other = max(others, key=lambda c: abs(c - a))
+        if abs(other - a) > _SAME * max(abs(a), abs(b - a)):
+            raise _RefusedError(
+                f"'{name}' is {a:.6g}, and {other:.6g} once time, states and inputs were set to "
+                "others and back: the model remembers calls, which no integrator and no observer "
+                "can follow. Export it with equations that follow from states and inputs alone",
+                3,
+            )
+
+
 def _roll_back(call: _Calls) -> None:
     saved = _POINTER()
     name = "FMUState" if call.three else "FMUstate"
@@ -343,6 +392,8 @@ def _try(task: dict[str, Any], tell: Callable[[str], None]) -> tuple[str, bool]:
         # Last, and without a word where it is refused: nobody else moves states so.
         with suppress(_RefusedError):
             contradicted = call.component is not None and _contradicted(call, task)
+        if call.component is not None and task["exchange"]:
+            _require_function(call, task)
     except _RefusedError as error:
         if call.component is None or error.status != _DISCARD or task["exchange"]:
             raise
