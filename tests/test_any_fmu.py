@@ -296,6 +296,26 @@ def test_another_unit_is_asked_about_where_the_model_says_no_start(what, recorde
     assert [text[: len(said)] for text in warnings] == [said] * bool(said)
 
 
+def test_a_boolean_input_that_starts_as_a_word_is_0_and_1(build):
+    """The recording of a system with one ended in a traceback; 1 K/s come with it for 10 s."""
+    command = VARIABLES.replace(
+        'name="flag" valueReference="1" causality="parameter" variability="fixed"',
+        'name="flag" valueReference="1" causality="input" variability="discrete"',
+    )
+    file = build("RELAYS", variables=command).parent / "system.toml"
+    line = 'inputs.flag = { unit = "1", noise = 0.0, scale = 1.0, held = true }'
+    file.write_text(file.read_text().replace("outputs.T", f"{line}\noutputs.T"))
+    system, time = load_system(file), 10.0 * np.arange(30.0)
+    noise = 1e-4 * np.random.default_rng(1).standard_normal((2, time.size))
+    columns = {"time [s]": time, "Ta [K]": 280.0 + noise[0], "flag [1]": 1.0 * (time == 30.0)}
+    case = wb.case_from_frame(system, pd.DataFrame(columns | {"T [K]": 291.0 + noise[1]}))
+    simulation = prepare(system, {"open_loop": estimators_of(system)["open_loop"]})
+    heated = simulation.run(case).runs["open_loop"].signal("T")
+    begun = exact(1500.0, 30.0)
+    more = exact(1500.0, 10.0, begun) + 2000.0 * (1.0 - np.exp(-10.0 / 2000.0))
+    assert heated[[3, 4]] == pytest.approx([begun, more], abs=0.01)
+
+
 def test_derivatives_stop_at_limits_and_say_where_steps_disagree(build):
     """G may not fall below 50; a heating that jumps has no derivative by a start."""
     limited = VARIABLES.replace('<Real start="50"/>', '<Real start="50" min="50"/>')

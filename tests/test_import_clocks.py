@@ -478,6 +478,41 @@ def test_a_recording_has_the_date_of_its_first_sample(tmp_path, tank, form, date
 
 
 @pytest.mark.parametrize(
+    ("names", "factor", "date"),
+    [
+        ("GPS week;TOW [s]", 1.0, "2024-03-02T23:49:42"),
+        ("GPSWeek;GPSMilliseconds", 1e3, "2024-03-02T23:49:42"),
+        ("GWk;GMS", 1e3, "2024-03-02T23:49:42"),
+    ],
+)
+def test_weeks_of_satellites_go_on_with_what_has_gone_of_them(tmp_path, tank, names, factor, date):
+    """From ten minutes before the end of week 2303, a Saturday."""
+    seconds = 604200 + QUARTER * np.arange(300)
+    rows = [
+        f"{2303 + int(t // 604800)};{factor * (t % 604800):.0f};1.{k % 7};2{k % 10}"
+        for k, t in enumerate(seconds)
+    ]
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join([f"{names};inflow [l/s];h [mm]", *rows]))
+    read_clock = clock(path, tank)
+    assert_allclose(np.diff(read_clock.times), QUARTER)
+    assert iso(read_clock.start + read_clock.times[0]).startswith(date)
+
+
+@pytest.mark.parametrize(
+    ("order", "said"),
+    [
+        (range(299, -1, -1), r"the newest sample stands first.*sort the rows"),
+        ([*range(150), *range(150)], r"times begin anew.*part the file before sample 151"),
+    ],
+)
+def test_times_that_go_back_say_what_to_do(tmp_path, tank, order, said):
+    """A stated rate would take both for one recording that goes on."""
+    with pytest.raises(InputError, match=said):
+        clock(table(tmp_path / "a.csv", [f"{900 * k}" for k in order], "t [s]"), tank)
+
+
+@pytest.mark.parametrize(
     ("begin", "form"),
     [
         (datetime(2024, 2, 27, tzinfo=UTC), "%d.%m.%Y %H:%M"),

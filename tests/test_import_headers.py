@@ -5,6 +5,7 @@ import struct
 import tomllib
 import zipfile
 from collections.abc import Sequence
+from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
@@ -66,6 +67,18 @@ def test_statistics_above_samples_are_no_samples(tmp_path):
     rows = [f"{k};{0.5 * k};4.{k % 9};95{k % 7}.1" for k in range(60)]
     path = table(tmp_path / "a.csv", [*head, "Nr;Time [s];inflow [l/s];h [mm]", *rows])
     assert channels(path)[1:] == [("Time", "s"), ("inflow", "l/s"), ("h", "mm")]
+
+
+@pytest.mark.parametrize("row", ["Scale;1;10;1", "Gain;1,0;1,5;1", "Offset;0;2;0", "Faktor;1;1;1"])
+def test_factors_above_samples_are_refused_unless_they_change_nothing(tmp_path, row):
+    rows = [f"{k};4,{k % 9};95{k % 7},1" for k in range(60)]
+    path = table(tmp_path / "a.csv", ["time [s];inflow [l/s];h [mm]", row[:-2], *rows])
+    with (
+        nullcontext()
+        if row.startswith("Faktor")
+        else pytest.raises(InputError, match=r"line 2: found '\w+' of columns, .*apply it to the")
+    ):
+        assert read_recorded_file(path).groups[0].channels[0].values.size == 60
 
 
 def test_columns_of_fixed_places_may_be_empty(tmp_path):

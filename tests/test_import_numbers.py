@@ -319,11 +319,13 @@ TIME = 0.5 * np.arange(200)  # s
 LEVEL = 900.0 + 50.0 * np.sin(0.1 * TIME)  # mm
 
 
-def system_with_temperature(folder: Path, scale: str, label: str) -> System:
+def system_with(folder: Path, name: str, unit: str, label: str, scale: str) -> System:
+    """The tank, with a signal that judges; its noise is a hundredth of its scale."""
     write_system(folder)
     path = folder / "system.toml"
-    text = path.read_text()
-    judged = f'\n[judged.T]\nunit = "K"\nlabel = "{label}"\nnoise = "0.1 K"\nscale = "{scale}"\n'
+    text, size = path.read_text(), float(scale.split()[0])
+    judged = f'\n[judged.{name}]\nunit = "{unit}"\nlabel = "{label}"\n'
+    judged += f'noise = "{size / 100:g} {unit}"\nscale = "{scale}"\n'
     path.write_text(text + judged)
     return load_system(folder)
 
@@ -497,7 +499,7 @@ def test_a_thousandth_in_the_own_unit_is_asked_about(tmp_path, tank):
     ],
 )
 def test_a_temperature_has_the_zero_of_its_signal(tmp_path, scale, label, values, unit, first):
-    system = system_with_temperature(tmp_path / "system", scale, label)
+    system = system_with(tmp_path / "system", "T", "K", label, scale)
     path = write(tmp_path / "a.csv", LEVEL, extra=f";T [{unit}]", more=f";{values}")
     proposal = proposed(path, system)
     if isinstance(first, str):
@@ -505,6 +507,49 @@ def test_a_temperature_has_the_zero_of_its_signal(tmp_path, scale, label, values
     else:
         assert not proposal.doubts
         assert_allclose(proposal.assigned["T"].values[0], first)
+
+
+@pytest.mark.parametrize(
+    ("signal", "header", "doubt", "column", "first"),
+    [
+        ("pressure", "p [barg]", "is a pressure above that of the air", "p=p [bar]", 2e5),
+        ("pressure", "p rel [bar]", "is a pressure above that of the air", "p=p rel [bar]", 2e5),
+        ("pressure", "p (kPa abs)", "is a pressure above a vacuum", "p=p [kPa]", 2e3),
+        ("gauge pressure", "p [bar(g)]", "", "", 2e5),
+        ("gauge pressure", "p [psia]", "is a pressure above a vacuum, and p is gauge", "", None),
+        ("pressure", "p [0.1 bar]", "may be a unit of 1e+04 Pa", "p=p [0.1 bar]", 2e4),
+        ("pressure", "p [x10 kPa]", "may be a unit of 1e+04 Pa", "p=p [kPa]", 2e3),
+    ],
+)
+def test_a_pressure_has_the_zero_and_the_size_of_its_signal(
+    tmp_path, signal, header, doubt, column, first
+):
+    """Values of 2; what name and unit leave open is asked, and taken as it is said to be."""
+    system = system_with(tmp_path / "system", "p", "Pa", signal, "100000 Pa")
+    path = write(tmp_path / "a.csv", LEVEL, extra=f";{header}", more=";2")
+    proposal = proposed(path, system)
+    assert any(doubt in text for text in proposal.doubts) == bool(doubt)
+    if first is not None:
+        proposal = proposed(path, system, *filter(None, [column]))
+        assert not any(text.startswith(f"p: {doubt}") for text in proposal.doubts if doubt)
+        assert_allclose(proposal.assigned["p"].values[0], first)
+
+
+def test_an_angle_that_goes_round_is_asked_about(tmp_path):
+    """Seven degrees a sample, within a turn; as it is, or with its turns counted."""
+    system = system_with(tmp_path / "system", "phi", "rad", "angle", "6 rad")
+    angles = 7.0 * np.arange(TIME.size)
+    for values, rounds in (
+        (angles % 360.0, True),
+        (angles, False),
+        ((angles + 180.0) % 360.0, True),
+    ):
+        path = write(tmp_path / "a.csv", LEVEL, extra=";phi [deg]")
+        head, *rows = path.read_text().splitlines()
+        more = [f"{row};{value}" for row, value in zip(rows, values, strict=True)]
+        path.write_text("\n".join([head, *more]))
+        assert any("go round" in doubt for doubt in proposed(path, system).doubts) == rounds
+        assert not proposed(path, system, "phi=phi [deg]").doubts
 
 
 def test_milliseconds_declared_as_seconds_are_refused(tmp_path, tank):

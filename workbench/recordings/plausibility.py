@@ -180,11 +180,13 @@ def _sizes(signals: Mapping[str, Vector], system: System, origin: Origin) -> Ite
             high = np.inf if variable.maximum is None else variable.maximum
             outside = np.flatnonzero((values < low - noise) | (values > high + noise))
             begins = float(np.median(values[:_FEW]))
-            unset = variable.causality == "input" and float(variable.start or 0.0) == 0.0
-            if not unset and (factor := _other_unit(begins, variable.start, signal)):
+            known = variable.start is not None and variable.type != "Boolean"
+            start = float(variable.start or 0.0) if known else np.nan
+            unset = variable.causality == "input" and start == 0.0
+            if not unset and (factor := _other_unit(begins, start, signal)):
                 finding = (
                     f"{_value_text(signal, begins)} at the start, {factor} that of the model",
-                    f"about {_value_text(signal, float(variable.start or 0.0))}",
+                    f"about {_value_text(signal, start)}",
                 )
             elif outside.size >= _FEW:
                 finding = (
@@ -208,12 +210,8 @@ def _sizes(signals: Mapping[str, Vector], system: System, origin: Origin) -> Ite
             )
 
 
-def _other_unit(begins: float, start: str | None, signal: Signal) -> str:
+def _other_unit(begins: float, expected: float, signal: Signal) -> str:
     """By what a first value is off the model's start, if another unit explains it; else empty."""
-    try:
-        expected = float(start or "nan")
-    except ValueError:
-        return ""
     if signal.unit == "K":
         for offset in (_CELSIUS, -_CELSIUS):
             # Nearer than a machine may be off by what is between the two zeros.

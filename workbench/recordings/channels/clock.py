@@ -37,6 +37,10 @@ _EPOCHS = {
     "100 ns since the year 1, as .NET counts": (62135596800.0, 1e-7),
 }
 _GPS = 315964800.0 - 18.0  # [s] from 1970 to the zero of GPS, less leap seconds since 2017
+_WEEK = re.compile("(gps)?(week|wk|wn|weeknumber|weekno)|gwk")
+_OF_WEEK = re.compile(
+    "(gps|i)?(tow|sow|timeofweek|secondsofweek)(ms|s)?|gps(seconds|milliseconds|secs|ms|time)|gms"
+)
 # Days: that of the year 1970, and what they count in recordings.
 _DAYS = {
     "Excel": (25569.0, 30000.0, 50000.0),
@@ -129,6 +133,8 @@ def _read_clock(
         time, said = group.time, "the file says it"
         own_clock = Clock("", time.values, said, start=time.start, zoned=time.zoned)
         return _going_on(own_clock, where)
+    if (weeks := _weeks_of_gps(group)) is not None:
+        return _going_on(weeks, where)
     # Stamps are often coarser than a counted time beside them.
     channels = sorted(group.channels, key=lambda channel: channel.stamp)
     clocks = [clock for channel in channels if (clock := _candidate(channel, group, system))]
@@ -442,6 +448,24 @@ def _since(channel: FileChannel, system: System) -> Clock | None:
     return clock if 1.0 / _LIKE < ratio < _LIKE else None
 
 
+def _weeks_of_gps(group: Group) -> Clock | None:
+    """Times by the number of a week and what has gone of it, as receivers of satellites count."""
+    named = {"".join(words(channel.name)): channel for channel in group.channels}
+    week = next((named[name] for name in named if _WEEK.fullmatch(name)), None)
+    within = next((named[name] for name in named if _OF_WEEK.fullmatch(name)), None)
+    if week is None or within is None:
+        return None
+    parts = conversion(within.unit, "s") if within.unit else None
+    largest = float(np.nanmax(within.values, initial=0.0))
+    factor = parts.factor if parts else 1.0 if largest <= 7.0 * _DAY else 1e-3
+    times = 7.0 * _DAY * (week.values - week.values[0]) + factor * within.values
+    # Receivers that count to 1023 weeks do not tell the date.
+    first = float(week.values[0])
+    start = 7.0 * _DAY * first + _GPS if first >= 1024.0 else math.nan
+    reason = f"weeks of GPS, with {within.name}"
+    return Clock(within.name, times, reason, start=start, zoned=True)
+
+
 def _by_1904(start: float) -> tuple[str, ...]:
     """That days of a spreadsheet may count from 1904, where they are not of tomorrow then."""
     days = (start, start + _FROM_1904)
@@ -483,7 +507,13 @@ def _going_on(clock: Clock, where: str) -> Clock:
     count = int((np.diff(held) <= 0).sum()) if held.size > 1 else 0
     fault += f" in sample {late + 2}" + (f", and {count - 1} more" if count > 1 else "")
     remedy = "if samples are evenly spaced say how, --sample-rate '200 Hz'; else export more digits"
-    if held.size > 1 and count >= 0.3 * held.size and not (np.diff(held) < 0).any():
+    if held.size > 1 and (np.diff(held) < 0).all():
+        fault += ": the newest sample stands first"
+        remedy = "sort the rows by their time"
+    elif held.size > 1 and count == 1 and held[late + 1] <= held[0] < held[-1]:
+        fault += ": times begin anew"
+        remedy = f"part the file before sample {late + 2}, where another recording begins"
+    elif held.size > 1 and count >= 0.3 * held.size and not (np.diff(held) < 0).any():
         rate = (held.size - 1) / (held[-1] - held[0]) if held[-1] > held[0] else math.nan
         fault += ": stamps are coarser than samples"
         remedy = f"say the rate, about --sample-rate '{rate:.4g} Hz', or export more digits"

@@ -1,5 +1,6 @@
 """Channels that may be signals: by name, by unit, and by what values are plausible."""
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -14,10 +15,18 @@ from workbench.recordings.channels.names import (
     NamedChannel,
     is_asked,
     likeness_to,
+    words,
 )
 from workbench.recordings.formats import FileChannel, Group
 from workbench.recordings.formats.numbers import markers
-from workbench.recordings.formats.spelling import Conversion, conversion, is_unit, spell_unit
+from workbench.recordings.formats.spelling import (
+    Conversion,
+    conversion,
+    is_unit,
+    multiple,
+    pressure_zero,
+    spell_unit,
+)
 from workbench.system.parts import Signal
 from workbench.system.system import System
 
@@ -185,6 +194,57 @@ def size_doubt(values: Vector, unit: str, signal: Signal, column: str) -> str:
     return ""
 
 
+def meaning_doubt(name: str, unit: str, values: Vector, signal: Signal, column: str) -> str:
+    """What a channel's name, unit or values leave open of its zero or its size; empty: nothing.
+
+    Parameters
+    ----------
+    name, unit : of the channel.
+    values : (n,) SI.
+    column : how the user names the channel, SIGNAL=CHANNEL.
+    """
+    base, zero = pressure_zero(unit)
+    if signal.unit == "Pa":
+        zero = zero or _zero_in(name)
+        said = next(filter(None, map(_zero_in, signal.names)), "")
+        if zero and zero != said:
+            means = "above that of the air" if zero == "gauge" else "above a vacuum"
+            return (
+                f"'{name}' [{unit}] is a pressure {means}, and {signal.name} is "
+                f"{said or 'not said to be one'}; add or take off the pressure of the air where "
+                f"they differ, --column '{column} [{base}]' takes the values as they are"
+            )
+    if counted := multiple(unit, signal.unit):
+        own, size = counted
+        return (
+            f"[{unit}] may be a unit of {size.factor:.4g} {signal.unit}, or [{own}] with the range "
+            f"of a sensor; --column '{column} [{unit}]' takes the one, [{own}] the other"
+        )
+    if signal.unit == "rad" and (rounds := _rounds(values)):
+        return (
+            f"its values go round, by one turn back {rounds} times; have the turns counted before "
+            f"the import, or --column '{column} [{unit}]' keeps the jumps"
+        )
+    return ""
+
+
+def _zero_in(name: str) -> str:
+    """What words of a name say of the zero of a pressure: "gauge", "absolute", or nothing."""
+    own = set(words(name))
+    return "gauge" if own & _GAUGE else "absolute" if own & _ABSOLUTE else ""
+
+
+def _rounds(values: Vector) -> int:
+    """How often an angle within a turn jumps by a turn, where it moves by far less else."""
+    held = values[np.isfinite(values)]
+    steps = np.abs(np.diff(held))
+    far = steps > math.pi
+    usual = float(steps[~far].max(initial=0.0))
+    turned = np.abs(steps[far] - 2.0 * math.pi) <= usual + 1e-3
+    within = bool(held.size) and float(np.ptp(held)) <= 2.0 * math.pi * (1.0 + 1e-3)
+    return int(far.sum()) if within and usual < math.pi / 2.0 and turned.all() else 0
+
+
 def unit_doubt(signal: str, channel: str, unit: str) -> str:
     """That nobody has said a unit, and how to."""
     return f"no unit in the file, --column '{signal}={channel} [{unit}]' confirms [{unit}]"
@@ -252,7 +312,11 @@ def _candidate(
     elif not likeness:
         confirms = f"--column '{signal.name}={place.label}' confirms it"
         doubt = f"nothing but its unit speaks for it, {confirms}"
-    own_doubts = marked, size_doubt(values, unit, signal, column)
+    own_doubts = (
+        marked,
+        size_doubt(values, unit, signal, column),
+        meaning_doubt(channel.name, unit, values, signal, column),
+    )
     doubt = "; ".join(filter(None, (doubt, *own_doubts)))
     return Assignment(
         file=place.file,
@@ -356,6 +420,8 @@ _DIFFERENCE = re.compile(
 _HUGE = 1e100  # no sample, and its square would be no number
 _COLD = 100.0  # K, below which no machine's temperature is
 _THOUSANDFOLD = 300.0  # times the typical size of a signal: a unit is another one
+_GAUGE = frozenset(("gauge", "gage", "rel", "relative", "relativ", "ueberdruck"))
+_ABSOLUTE = frozenset(("abs", "absolute", "absolut", "absolutdruck"))
 _TYPICAL = 10.0  # times the typical size of a signal, or a tenth, is what its largest sample may be
 
 

@@ -13,6 +13,7 @@ from workbench.recordings.channels.matching import (
     conversion_to,
     fitting_units,
     match,
+    meaning_doubt,
     missing_of,
     samples_of,
     size_doubt,
@@ -201,7 +202,10 @@ def _as_named(
     scale, formula = way
     with np.errstate(over="ignore", invalid="ignore"):  # what no machine reads
         values = scale.factor * samples + scale.zero
-    large = "" if channel.unit else size_doubt(values, unit, signal, column)
+    doubts = [marked]
+    if not channel.unit:
+        doubts.append(size_doubt(values, unit, signal, column))
+        doubts.append(meaning_doubt(place.channel.name, unit, values, signal, column))
     doubt = unit_doubt(signal.name, place.label, unit) if concluded else ""
     return Assignment(
         file=place.file,
@@ -213,9 +217,9 @@ def _as_named(
         zero=turn * scale.zero,
         formula=formula,
         reason=unit_reason("named", unit, concluded) + said,
-        certain=not (concluded or marked or large),
+        certain=not (concluded or any(doubts)),
         concluded=concluded or bool(channel.unit),
-        doubt="; ".join(filter(None, (doubt, marked, large))),
+        doubt="; ".join(filter(None, (doubt, *doubts))),
         missing=missing,
         declared=channel.missing,
     )

@@ -46,6 +46,11 @@ _UNIT_BEFORE = re.compile(  # Abtastrate [Hz]: 200
     r"(?P<value>\d[\d.,]{0,20}([eE][+-]?\d+)?)\s*$",
     re.IGNORECASE,
 )
+_SCALES = re.compile(
+    r"\b(scale|scaling|gain|factor|multiplier|slope|faktor|skalierung|steigung|(?P<offset>offset))\b",
+    re.IGNORECASE,
+)
+_ONE, _NOTHING = re.compile(r"\+?1([.,]0*)?([eE][+-]?0+)?"), re.compile(r"[+-]?0([.,]0*)?([eE].*)?")
 _ABOUT = 100  # characters before a quantity that may say of what it is
 # Words for samples, for their rate and for the time between two; and of what else there are such.
 _SAMPLES = re.compile("sampl|abtast|scan|mess(?!age)|meas|zeit|time|\\bdt\\b", re.IGNORECASE)
@@ -167,6 +172,7 @@ def find_table(rows: Sequence[Sequence[str]], lines: Sequence[int], where: str) 
             expected="a table: names, then a row for each sample, at least a time and a signal",
             remedy="export the recording as a table",
         )
+    _refuse_scales(rows[:first], lines, width, where)
     names, units = _header(rows[:first], width)
     head = tuple(" ".join(filter(None, row)) for row in rows[:first])
     kept = [i for i in samples if i >= first]
@@ -184,6 +190,26 @@ def find_table(rows: Sequence[Sequence[str]], lines: Sequence[int], where: str) 
     listed = {row[0].strip(): row[1].strip() for row in rows[:first] if len(row) > 2}
     about = tuple(said if (said := listed.get(name, "")) not in names else "" for name in names)
     return Cells(body, [lines[i] for i in kept], head, own_names, own_units, about)
+
+
+def _refuse_scales(
+    rows: Sequence[Sequence[str]], lines: Sequence[int], width: int, where: str
+) -> None:
+    """Refuse a row of factors or offsets above samples: nobody says whether they are applied."""
+    for row, line in zip(rows, lines, strict=False):
+        label, *cells = row or [""]
+        match = _SCALES.search(label)
+        numbers = [cell for cell in cells if is_number(cell)]
+        if match is None or 2 * len(numbers) < width - 1:
+            continue
+        neutral = _NOTHING if match["offset"] else _ONE
+        if other := next((n for n in numbers if not neutral.fullmatch(n.strip())), ""):
+            raise InputError(
+                where=f"{where}, line {line}",
+                found=f"'{label.strip()}' of columns, {other} among them",
+                expected="samples in the units that stand above them",
+                remedy="apply it to the samples, unless they have it, and delete the line",
+            )
 
 
 def _with_slashes(names: list[str]) -> list[str]:

@@ -33,12 +33,16 @@ _SPELLINGS = {
     "lbf*ft": "lbf.ft", "lbf-ft": "lbf.ft", "lbf ft": "lbf.ft", "lbfft": "lbf.ft",
     "kp": "kgf", "kp/cm2": "kgf/cm2", "kg/cm2": "kgf/cm2", "kgf/cm^2": "kgf/cm2",
     "kp/cm^2": "kgf/cm2", "kg/cm^2": "kgf/cm2",
-    "meter": "m", "Meter": "m", "Prozent": "%", "percent": "%",
+    "meter": "m", "Meter": "m", "Prozent": "%", "percent": "%", "‰": "permille",
 }  # fmt: skip
-# A unit of time with a factor: 1/10 s, 0.1 s, 10 ms, 10^-3 s, 1e-6 s.
+# A unit with a factor: 1/10 s, 0.1 s, 10 ms, 10^-3 l/s, 1e-6 s.
 _MULTIPLE = re.compile(
     r"[x*]?\s*(?P<number>\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?)(?:\s*/\s*(?P<parts>\d+)"
-    r"|\^(?P<power>[+-]?\d{1,2}))?\s*[*.]?\s*(?P<unit>[^\W\d]\w*\.?)"
+    r"|\^(?P<power>[+-]?\d{1,2}))?\s*[*.]?\s*(?P<unit>[^\W\d].*)"
+)
+# A pressure above that of the air, or above nothing: barg, bar(g), bar rel, psia, kPa abs.
+_FROM_ZERO = re.compile(
+    r"(?P<unit>\w*(?:bar|psi|Pa))\s*\(?(?:(?P<gauge>g|gauge|rel|ü)|a|abs)\.?\)?", re.IGNORECASE
 )
 _POWERS = str.maketrans({"²": "2", "³": "3", "⁻": "-", "¹": "1", "·": ".", "⋅": "."})
 # Value in SI of one, and of zero, where a factor alone is not enough: temperatures; and units of
@@ -54,6 +58,7 @@ _OTHER = {
     "kgf/cm2": ("Pa", 98066.5, 0.0),
     "in": ("m", 0.0254, 0.0),
     "ft": ("m", 0.3048, 0.0),
+    "gon": ("rad", math.pi / 200.0, 0.0),
     "ns": ("s", 1e-9, 0.0),
     "d": ("s", 86400.0, 0.0),
 }
@@ -88,31 +93,49 @@ def conversion(unit: str, si: str) -> Conversion | None:
     ----------
     unit : as `spell_unit`.
     """
-    if si == "s" and (multiple := _multiple_of_time(unit)) is not None:
-        return multiple
+    unit, _ = pressure_zero(unit) if si == "Pa" else (unit, "")
     base, factor, zero = _OTHER.get(unit, (unit, 1.0, 0.0))
     try:
         return Conversion(factor * si_factor(base, si, ""), zero)
     except InputError:
-        return None
+        counted = multiple(unit, si)
+        return counted[1] if counted else None
 
 
-def _multiple_of_time(unit: str) -> Conversion | None:
-    """How counts become seconds, in a unit of time with a factor; None if it is no such unit."""
+def pressure_zero(unit: str) -> tuple[str, str]:
+    """Unit without what it says of its zero, and that: "gauge", "absolute", or nothing.
+
+    >>> pressure_zero("barg"), pressure_zero("kPa abs"), pressure_zero("mbar")
+    (('bar', 'gauge'), ('kPa', 'absolute'), ('mbar', ''))
+    """
+    match = _FROM_ZERO.fullmatch(unit)
+    base = spell_unit(match["unit"]) if match else unit
+    if match is None or conversion(base, "Pa") is None:
+        return unit, ""
+    return base, "gauge" if match["gauge"] else "absolute"
+
+
+def multiple(unit: str, si: str) -> tuple[str, Conversion] | None:
+    """The unit of a unit with a factor, and how counts become SI; None if it is no such unit.
+
+    >>> multiple("0.1 l/s", "m3/s")
+    ('l/s', Conversion(factor=0.0001, zero=0.0))
+    """
     match = _MULTIPLE.fullmatch(unit)
-    scale = conversion(spell_unit(match["unit"]), "s") if match else None
-    if match is None or scale is None:
+    own = spell_unit(match["unit"]) if match else ""
+    scale = conversion(own, si) if match and not _MULTIPLE.fullmatch(own) else None
+    if match is None or scale is None or scale.zero:
         return None
     number = float(match["number"].replace(",", "."))
     parts = float(match["parts"] or 1.0)
     size = number ** float(match["power"]) if match["power"] else number / (parts or math.inf)
-    return Conversion(size * scale.factor) if 0.0 < size < math.inf else None
+    return (own, Conversion(size * scale.factor)) if 0.0 < size < math.inf else None
 
 
 def is_unit(text: str) -> bool:
     """Whether a text is a unit that can be converted, or a sign for none."""
-    unit = spell_unit(text)
-    if _multiple_of_time(unit) is not None:
+    unit, _ = pressure_zero(spell_unit(text))
+    if multiple(unit, "s") is not None:
         return True
     try:
         check_unit(unit, "")
