@@ -120,8 +120,9 @@ def _step(
             rivals = _predicting(scores, best, fit.decides)
         # Of a run that nothing corrects, sizes are far from where derivatives point.
         ranked = [variants[0].effect for variants in rivals]
-        starts = _misjudged(fit, best, scores, [] if fit.free else ranked)
-        for start in starts:
+        simulated = _misjudged(fit, best, scores, [] if fit.free else ranked)
+        rivals = [_starts(variants) for variants in rivals]
+        for start in simulated:
             if start.effect in ranked:
                 rivals[ranked.index(start.effect)].insert(0, start)
             else:
@@ -347,14 +348,20 @@ def misfits(fits: Sequence[FittedModel]) -> Vector:
     return np.array([fit.linearised.weighed(variance_factors) for fit in fits])
 
 
-def _begun(fit: Fit, best: FittedModel, variants: Sequence[CandidateScore]) -> FittedModel | None:
-    """First rounds of a fit with one more effect, begun elsewhere where that gained nothing.
+def _starts(variants: Sequence[CandidateScore]) -> list[CandidateScore]:
+    """Where fits of an effect begin, one after the other where that before gained nothing.
 
     A law bends: half a stiffness is twice the deflection, and where it sets in shows only there.
     """
-    first, tried = variants[0], []
+    first = variants[0]
     halves = [replace(first, size=0.5**k * first.size) for k in range(1, _HALVINGS + 1)]
-    for start in (*variants[:_VARIANTS], *halves):
+    return [*variants[:_VARIANTS], *halves]
+
+
+def _begun(fit: Fit, best: FittedModel, starts: Sequence[CandidateScore]) -> FittedModel | None:
+    """First rounds of a fit with one more effect, from the first start that gains by it."""
+    tried = []
+    for start in starts:
         if (model := extended(fit, best, start, BEGUN)) is None:
             continue
         if _gains(fit, best, model):

@@ -16,7 +16,7 @@ from workbench.diagnosis.effects.extension import ExtendedModel, build
 from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.linearized import LinearizedPoint
 from workbench.diagnosis.inference.quadratic import Key
-from workbench.diagnosis.inference.search import FittedModel, fitted
+from workbench.diagnosis.inference.search import BEGUN, FittedModel, fitted, misfits
 from workbench.diagnosis.inference.selection import anew
 from workbench.diagnosis.laws.places import Law
 from workbench.diagnosis.laws.scan import LawScore, effect_at
@@ -137,12 +137,20 @@ def _bump(knot: int) -> str:
 
 
 def estimated(
-    problem: Problem, prospects: Sequence[LawScore], about: FittedModel, engine: Engine
+    problem: Problem,
+    prospects: Sequence[LawScore],
+    about: FittedModel,
+    engine: Engine,
+    rival: FittedModel | None = None,
 ) -> list[FittedLaw]:
     """Fit free functions in full, best first.
 
     What is large bends what the other quantities do, so that each function is fitted anew about
     where it led, with the smoothness that is likeliest there.
+
+    Parameters
+    ----------
+    rival : that they are to outdo; one that is far behind it is not finished, as in the search.
     """
     with tempfile.TemporaryDirectory() as scratch:
         path = Path(scratch) / "Free.fmu"
@@ -155,7 +163,7 @@ def estimated(
         with ResidualModel(source, problem.cases, engine) as simulations:
             fit = Fit(simulations, [*about.active, *effects])
             engine.report("fitting free functions")
-            job = partial(_estimate, simulations, anew(fit, about.point, about.active))
+            job = partial(_estimate, simulations, anew(fit, about.point, about.active), rival)
             tried = fit.together(job, list(zip(effects, able, strict=True)))
     fits = [smoothness for smoothness in tried if smoothness is not None]
     return sorted(fits, key=lambda smoothness: -smoothness.evidence)
@@ -196,18 +204,25 @@ def _compiled(
 
 
 def _estimate(
-    simulations: ResidualModel, base: FittedModel, item: tuple[FreeFunction, LawScore]
+    simulations: ResidualModel,
+    base: FittedModel,
+    rival: FittedModel | None,
+    item: tuple[FreeFunction, LawScore],
 ) -> FittedLaw | None:
-    """Fit one function; None if it leads where the model has no solution."""
+    """Fit one function; None if it leads where the model has no solution, or stays far behind."""
     try:
-        return _fitted(simulations, base, *item)
+        return _fitted(simulations, base, rival, *item)
     except (FMUError, np.linalg.LinAlgError):
         return None
 
 
 def _fitted(
-    simulations: ResidualModel, base: FittedModel, effect: FreeFunction, prospect: LawScore
-) -> FittedLaw:
+    simulations: ResidualModel,
+    base: FittedModel,
+    rival: FittedModel | None,
+    effect: FreeFunction,
+    prospect: LawScore,
+) -> FittedLaw | None:
     """The likelier of all rounds: smoothness about a point may promise what bends away from it."""
     smoothness, best = prospect.smoothness, base
     keys = [(effect.name, name) for name in effect.sizes]
@@ -218,6 +233,12 @@ def _fitted(
         active = (*base.active, effect)
         fit = Fit(simulations, active)
         start = _started(fit, best, keys, smoothness.coefficients)
+        if rival is not None:
+            begun = fitted(fit, start, active, BEGUN, start.spread)
+            left, least = misfits([begun, rival])
+            if left >= fit.decides.behind * least:
+                return None
+            start = begun.linearised
         best = fitted(fit, start, active, spread=start.spread)
         lin = fit.linearise(best.linearised, active)
         N, g = fit.quadratics(lin).reduced(keys)
