@@ -34,15 +34,43 @@ class CrossValidation:
         ----------
         fast : of blocks instead of means over a lasting time.
         """
+        return np.array([squares.mean() for squares in self._of_means(fitted, fast=fast)])
+
+    def where_acting(
+        self, less: FittedModel, best: FittedModel, *, fast: bool
+    ) -> tuple[float, float]:
+        """Mean squares beyond noise that two fits leave, each by how far they differ there.
+
+        What remains where an effect does nothing says nothing of its form.
+        """
+        before, after = (self._of_means(model, fast=fast) for model in (less, best))
+        weights = self._of_means(best, fast=fast, beside=less)
+        total = sum(weight.sum() for weight in weights)
+        left, without = (
+            sum((weight * (own - 1.0)).sum() for weight, own in zip(weights, squares, strict=True))
+            for squares in (after, before)
+        )
+        return float(left / total), float(without / total)
+
+    def _of_means(
+        self, fitted: FittedModel, *, fast: bool, beside: FittedModel | None = None
+    ) -> list[Matrix]:
+        """Squares of means of each recording; of the difference to another fit, if there is one."""
+        span = 1 if fast else fitted.linearised.lasting
+        every = self._held_out(fitted)
+        if beside is not None:
+            pairs = zip(every, self._held_out(beside), strict=True)
+            every = [own - other for own, other in pairs]
+        return [
+            lasting(errors[:, told], span)
+            for errors, told in zip(every, self._told(fitted), strict=True)
+        ]
+
+    def _held_out(self, fitted: FittedModel) -> list[Matrix]:
+        """Whitened errors of each recording, fitted to the others."""
         if id(fitted) not in self._known:
             self._known[id(fitted)] = fitted, self._errors(fitted)
-        span = fitted.linearised.lasting
-        return np.array(
-            [
-                (errors[:, told] ** 2 if fast else lasting(errors[:, told], span)).mean()
-                for errors, told in zip(self._known[id(fitted)][1], self._told(fitted), strict=True)
-            ]
-        )
+        return self._known[id(fitted)][1]
 
     def chance(self, fitted: FittedModel, *, fast: bool) -> Vector:
         """Mean square of each recording that noise exceeds as seldom as it raises an alarm, (K,).

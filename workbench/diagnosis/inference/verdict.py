@@ -651,10 +651,7 @@ def _cause(fit: Fit, chosen: Selection, effect: Effect, *, noise_alone: bool) ->
     sigma = np.sqrt(np.diag(trial.covariance()))
     fast, form_share, correlated = effect.order_locked, _FORM, dict[Key, float]()
     if not noise_alone:
-        left, explained = (
-            float(chosen.validation.squares(model, fast=fast).mean()) - 1.0
-            for model in (best, chosen.less[effect])
-        )
+        left, explained = chosen.validation.where_acting(chosen.less[effect], best, fast=fast)
         form_share = max(_FORM, share_by_form(left, explained))
         correlated = correlated_deviations(fit, best)
     parameters = {}
