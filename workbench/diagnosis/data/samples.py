@@ -38,6 +38,7 @@ from workbench.system.system import System
 
 _STARTING = 40  # samples at usual rates, of a first value
 _RELEASED = 0.1  # share of the greatest value
+_REACH = 3.0  # standard deviations of a quantity, beyond which a law goes no further with it
 _WEIGHTLESS = 1e6  # times its size, by which a silent channel may be wrong: 1e-12 of chi-squared
 
 
@@ -391,3 +392,20 @@ def _shown(case: Case, system: System, fmu: FMU, begin: Mapping[str, float]) -> 
     fmu.start(own, {**given, **dict(zip(case.inputs, u, strict=True))})
     shown = shown_states(fmu, without_guesses(system, fmu), u, begin, own)
     return {name: start.value for name, start in shown.items()}
+
+
+def standardised(recordings: Sequence[Samples]) -> list[Matrix]:
+    """What a law may depend on and should not, in each recording, (n, q).
+
+    Time, inputs and outputs as they were measured, each with the mean zero and the root mean square
+    one over all recordings, so that a size is that in the middle.
+    """
+    columns = [
+        np.column_stack([r.time - r.time[0], r.u, np.where(r.silent, np.nan, r.y)])
+        for r in recordings
+    ]
+    every = np.vstack([c[r.told] for c, r in zip(columns, recordings, strict=True)])
+    able = np.nanmax(every, axis=0) > np.nanmin(every, axis=0)
+    mean, scale = np.nanmean(every, axis=0)[able], np.nanstd(every, axis=0)[able]
+    courses = [np.clip((c[:, able] - mean) / scale, -_REACH, _REACH) for c in columns]
+    return [np.nan_to_num(course) for course in courses]

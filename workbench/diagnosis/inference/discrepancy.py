@@ -9,6 +9,8 @@ A law that is wrong in form moves its size by more, since the fit takes what of 
 size, whatever the number of samples (M. C. Kennedy, A. O'Hagan 2001, J. R. Stat. Soc. B 63,
 425-464). What is left tells how large it is: of a smooth law, about its slope and its bend remain,
 so that its scale is known by two degrees of freedom, and Student's t of two makes the interval.
+Where noise hides the form, recordings say at least how wrong it may be: a size that goes with a
+quantity which the law should not depend on leaves errors of its own, and moves all that is fitted.
 """
 
 from collections.abc import Sequence
@@ -18,11 +20,14 @@ from scipy.linalg import matmul_toeplitz
 from scipy.stats import t
 
 from workbench.arrays import Vector
+from workbench.diagnosis.effects.catalogue import Effect
 from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.quadratic import Key, covariance
 from workbench.diagnosis.inference.search import FittedModel
 from workbench.system.units import BAND
 
+_WRONG = 0.2  # share of its effect by which a law may be wrong in form, at most
+_SHARES = (np.arange(20) + 0.5) / 20.0 * _WRONG
 _SHAPES = 2  # of a smooth law that a fitted size does not take: slope and bend
 
 
@@ -39,6 +44,33 @@ def share_by_form(left: float, explained: float) -> float:
     """
     scale = float(t.isf(0.025, _SHAPES)) / BAND
     return float(scale * np.sqrt(max(left, 0.0) / max(explained, left, 1e-9)))
+
+
+def hidden_by_noise(fit: Fit, best: FittedModel, effect: Effect) -> dict[Key, float]:
+    """Standard deviation of each common unknown by the form of a law that seems right.
+
+    The size z may go with any one of `standardised`, z (1 + s q). Beforehand each q is as likely,
+    and s is normal with a standard deviation up to a fifth, each as likely; recordings say more.
+    A fit without it is moved by N_zz^-1 N_zs s. Of what is no class of a library, nothing is known.
+    """
+    if fit.free or not effect.of_library or effect.order_locked:
+        return {}
+    lin, forms = fit.modulated(fit.linearise(best.linearised, best.active), effect)
+    joint = fit.quadratics(lin, forms)
+    total, known = joint.total(), len(joint.known)
+    size = best.point.sizes[effect.name, effect.label]
+    coupling = size * total.N[:known, known:]  # (p, q)
+    moved = covariance(total.N[:known, :known]) @ coupling
+    shown = np.maximum(size**2 * np.diag(total.N)[known:] - (coupling * moved).sum(axis=0), 0.0)
+    gradient = size * total.g[known:] - moved.T @ total.g[:known]
+    # Of s by each q and each standard deviation beforehand, (q, 20).
+    precision = shown[:, None] + 1.0 / _SHARES**2
+    mean = gradient[:, None] / precision
+    evidence = 0.5 * (mean * gradient[:, None] - np.log(precision * _SHARES**2))
+    weights = np.exp(evidence - evidence.max())
+    squares = (weights / weights.sum() * (mean**2 + 1.0 / precision)).sum(axis=1)
+    deviations = np.sqrt(moved**2 @ squares)
+    return dict(zip(joint.known, map(float, deviations), strict=True))
 
 
 def correlated_deviations(fit: Fit, best: FittedModel) -> dict[Key, float]:

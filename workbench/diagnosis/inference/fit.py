@@ -14,6 +14,7 @@ import numpy as np
 
 from workbench.arrays import Vector
 from workbench.diagnosis.data.clocks import apparent_lags, greatest_skew, own_clocks, reference
+from workbench.diagnosis.data.samples import standardised
 from workbench.diagnosis.effects.catalogue import Effect, variant
 from workbench.diagnosis.effects.extension import sizes_by_component, variables
 from workbench.diagnosis.inference.linearized import (
@@ -273,6 +274,22 @@ class Fit:
         sizes = sizes_by_component(self.unknowns.effects.values())
         more = self._simulations.derivatives(values, list(missing.values()), sizes)
         return self.hide(lin.extended(missing, more))
+
+    def modulated(self, lin: LinearizedPoint, effect: Effect) -> tuple[LinearizedPoint, list[Key]]:
+        """Add derivatives by the size of an effect as it goes with what it should not depend on.
+
+        Returns
+        -------
+        lin : with them.
+        keys : of them, one for each of `standardised`.
+        """
+        simulations = self._simulations
+        courses = standardised(simulations.recordings)
+        keys = [(effect.name, f"form {j}") for j in range(courses[0].shape[1])]
+        column = Variation(variables(effect, effect.size), size=effect.matters)
+        columns = [column] * len(keys)
+        more = simulations.responses(self.unknowns.values(lin.point), columns, courses)
+        return self.hide(lin.extended(keys, more)), keys
 
     def quadratics(self, lin: LinearizedPoint, extra: Sequence[Key] = ()) -> Joint:
         """Every stop over the common unknowns, local ones eliminated.

@@ -13,12 +13,12 @@ from workbench.diagnosis.effects.candidates import LAG, SHARES
 from workbench.diagnosis.effects.catalogue import Effect
 from workbench.diagnosis.inference.discrepancy import (
     correlated_deviations,
+    hidden_by_noise,
     share_by_form,
 )
 from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.linearized import Point
 from workbench.diagnosis.inference.nuisance import ShiftedLevel, hidden_effects, shifted_levels
-from workbench.diagnosis.inference.quadratic import Key
 from workbench.diagnosis.inference.score_test import CandidateScore
 from workbench.diagnosis.inference.search import (
     BEGUN,
@@ -646,14 +646,16 @@ def _apart_by_starts(fit: Fit, effect: Effect) -> list[str]:
 
 
 def _cause(fit: Fit, chosen: Selection, effect: Effect, *, noise_alone: bool) -> Cause:
-    """A cause with intervals, which what is left widens unless that is noise alone."""
+    """A cause with intervals, which what is left widens, or the form that noise may hide."""
     best, trial, unknowns = chosen.best, chosen.trial, fit.unknowns
     sigma = np.sqrt(np.diag(trial.covariance()))
-    fast, form_share, correlated = effect.order_locked, _FORM, dict[Key, float]()
-    if not noise_alone:
+    fast, form_share = effect.order_locked, _FORM
+    if noise_alone:
+        more = hidden_by_noise(fit, best, effect)
+    else:
         left, explained = chosen.validation.where_acting(chosen.less[effect], best, fast=fast)
         form_share = max(_FORM, share_by_form(left, explained))
-        correlated = correlated_deviations(fit, best)
+        more = correlated_deviations(fit, best)
     parameters = {}
     for key, value in best.point.sizes.items():
         if key[0] != effect.name:
@@ -664,7 +666,7 @@ def _cause(fit: Fit, chosen: Selection, effect: Effect, *, noise_alone: bool) ->
         of_size = key[1] == effect.label
         share = form_share if of_size else _FORM
         form = np.hypot(share * value, _COMPANY * effect.matters * of_size)
-        noise = np.hypot(sigma[trial.joint.known.index(key)], correlated.get(key, 0.0))
+        noise = np.hypot(sigma[trial.joint.known.index(key)], more.get(key, 0.0))
         reach = float(BAND * np.hypot(noise, form))
         limit = binding_bound(fit, best, effect, key[1])
         unit = unknowns.unit(effect, parameter)

@@ -14,11 +14,11 @@ from typing import Any
 
 import numpy as np
 
-from workbench.arrays import Matrix, Vector
+from workbench.arrays import Vector
 from workbench.diagnosis import Effect
 from workbench.diagnosis.data.clocks import late_signals, lateness, moved
 from workbench.diagnosis.data.motion import ModelSource
-from workbench.diagnosis.data.samples import Samples
+from workbench.diagnosis.data.samples import Samples, standardised
 from workbench.diagnosis.effects.extension import variables
 from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.quadratic import Key
@@ -32,8 +32,6 @@ from workbench.runtime.files import write_whole
 from workbench.studies.design.simulation import step_block
 from workbench.studies.power.planting import Plantable, SheetError
 from workbench.system.system import System
-
-_REACH = 3.0  # standard deviations of a quantity, beyond which a law goes no further with it
 
 Readings = tuple[int, list[dict[str, Vector]]]
 """Seed of the noise, and what is read by signal (n,) in each recording."""
@@ -124,7 +122,7 @@ class OwnModel:
                 for variable in variables(unknowns.effects[name], size)
                 if variable in simulations.nominal and self.form_error
             ]
-        courses = quantities(recordings)
+        courses = standardised(recordings)
         quantity, sign = rng.integers(courses[0].shape[1]), rng.choice([-1.0, 1.0])
         sets = []
         with CoSimulation(self.everything) as model:
@@ -266,20 +264,3 @@ def own_model(
         )
     machine = OwnModel(system, everything, tuple(effects), tuple(templates), tuple(plantables))
     return replace(machine, form_error=form_error)
-
-
-def quantities(recordings: Sequence[Samples]) -> list[Matrix]:
-    """What a law may depend on and does not, in each recording, (n, q).
-
-    Time, inputs and outputs as they were measured, each with the mean zero and the root mean square
-    one over all recordings, so that a size is that in the middle.
-    """
-    columns = [
-        np.column_stack([r.time - r.time[0], r.u, np.where(r.silent, np.nan, r.y)])
-        for r in recordings
-    ]
-    every = np.vstack([c[r.told] for c, r in zip(columns, recordings, strict=True)])
-    able = np.nanmax(every, axis=0) > np.nanmin(every, axis=0)
-    mean, scale = np.nanmean(every, axis=0)[able], np.nanstd(every, axis=0)[able]
-    courses = [np.clip((c[:, able] - mean) / scale, -_REACH, _REACH) for c in columns]
-    return [np.nan_to_num(course) for course in courses]
