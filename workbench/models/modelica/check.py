@@ -13,7 +13,7 @@ from collections.abc import Iterator, Mapping
 from typing import NoReturn
 
 from workbench.errors import InputError, closest
-from workbench.models.modelica.classes import Component, Connection, Modifier
+from workbench.models.modelica.classes import Class, Component, Connection, Modifier
 from workbench.models.modelica.library import Library
 
 _SCALAR = frozenset({"quantity", "min", "max", "start", "fixed"})
@@ -80,6 +80,7 @@ class _Checker:
             self._modifier(base.modifier, type_name, _NOTHING, inherits=True)
         if written.constraint:
             self._type(written.constraint, name, written.where)
+            _repeated(written.constraining, _NOTHING, "what stands in its place")
         seen: dict[str, str] = {}
         for component in written.components:
             if component.name in seen:
@@ -91,6 +92,9 @@ class _Checker:
                 )
             seen[component.name] = component.where
             self._component(component)
+            if "redeclare" in component.prefixes:
+                for old in self._redeclared(component, written):
+                    _repeated(old.constraining, component.modifier, f"'{component.name}'")
         for connection in written.connections:
             self._connection(connection, name)
         return tuple(self._reached)
@@ -126,7 +130,15 @@ class _Checker:
         if component.constraint:
             constraint = self._type(component.constraint, component.owner, component.where)
             self._modifier(component.constraining, constraint, _NOTHING, inherits=False)
+            _repeated(component.constraining, component.modifier, f"'{component.name}'")
             self._fits(type_name, constraint, component)
+
+    def _redeclared(self, component: Component, written: Class) -> Iterator[Component]:
+        """What an element that is declared anew was in the classes that its own one extends."""
+        for base in written.extends:
+            parts = self._parts(self.library.resolve(base.name, written.name), base.modifier)
+            if component.name in parts:
+                yield parts[component.name]
 
     def _type(self, name: str, scope: str, where: str) -> str:
         """Dotted name of a class that something is of."""
@@ -363,6 +375,22 @@ def _not_replaceable(where: str, name: str, declared: str) -> NoReturn:
         "a replaceable element",
         f"declare '{name}' replaceable, or modify it without 'redeclare'",
     )
+
+
+def _repeated(constraining: Modifier, given: Modifier, of: str) -> None:
+    """Refuse what `constrainedby` modifies and a declaration does not: the front end drops it."""
+    for name, modification in constraining.inner.items():
+        own = given.inner.get(name, _NOTHING)
+        new = modification.redeclared
+        if (modification.value and not own.value) or (new and not own.redeclared):
+            what = f"redeclare {new.type} {name}" if new else f"{name}={modification.value}"
+            _refuse(
+                modification.where,
+                f"a modifier ({what}) after 'constrainedby', and not for {of}",
+                "the same modifier where a component is declared, and none of a class",
+                f"write ({what}) at each declaration, too; of a class, at each of its components",
+            )
+        _repeated(modification, own, of)
 
 
 def _refuse(where: str, found: str, expected: str, remedy: str) -> NoReturn:

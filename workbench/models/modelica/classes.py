@@ -74,6 +74,7 @@ class Class:
     kind : model, package, type, ...
     prefixes : such as partial, expandable, replaceable.
     constraint : of a replaceable class, named as written there; empty without `constrainedby`.
+    constraining : what modifies the constraint.
     imports : (name, what it stands for); the name is "*" for all that a package holds.
     equations : components that stand alone on the left side of an equation.
     vendor : content of `annotation(__Workbench(...))`: numbers, strings, booleans, tuples and, for
@@ -86,6 +87,7 @@ class Class:
     kind: str
     prefixes: frozenset[str]
     constraint: str
+    constraining: Modifier
     description: str
     extends: tuple[Extends, ...]
     imports: tuple[tuple[str, str], ...]

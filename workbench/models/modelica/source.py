@@ -297,11 +297,13 @@ class Reader(Cursor):
             self._composition(name, body)
         self._owner = outer
         annotation = body.annotation or _Annotation()
+        constraint, constraining, _ = self._constraint()
         made = Class(
             name=name,
             kind=kind,
             prefixes=prefixes,
-            constraint=self._constraint()[0],
+            constraint=constraint,
+            constraining=constraining,
             description=description,
             extends=tuple(body.extends),
             imports=tuple(body.imports),
