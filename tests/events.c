@@ -1,12 +1,13 @@
 /* FMI 2.0 Model Exchange of a heated room, C der(T) = P - G (T - Ta). What switches the heating P is
  * chosen by WHAT: a thermostat with hysteresis (state events), a timetable (time events), a relay
- * that switches a relay (two iterations at the start), or a fuse (step events). MODE and FLAG are an Integer and a Boolean
- * parameter whose value references are those of T and its derivative. */
+ * that switches a relay (two iterations at the start), a fuse (step events), or nothing at a time
+ * event that stays due. MODE and FLAG are an Integer and a Boolean parameter whose value references
+ * are those of T and its derivative. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include "fmi2FunctionTypes.h"
-enum { THERMOSTAT, TIMETABLE, RELAYS, FUSE };
+enum { THERMOSTAT, TIMETABLE, RELAYS, FUSE, STUCK };
 enum { T, DT, TA, G, DG, C, P, SIZE };
 typedef struct { double r[SIZE], time; int mode, flag, relay; const fmi2CallbackFunctions *callbacks; } Room;
 static void reset(Room *m) {
@@ -48,6 +49,7 @@ fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *e) {
         m->r[P] = part % 2 == 0 ? 1500.0 : 0.0;
         e->nextEventTimeDefined = fmi2True, e->nextEventTime = 600.0 * (part + 1);
     }
+    if (WHAT == STUCK) e->nextEventTimeDefined = fmi2True, e->nextEventTime = m->time < 30.0 ? 30.0 : 20.0;
     if (WHAT == RELAYS) {
         m->r[P] = m->relay ? 1500.0 : 0.0;
         e->newDiscreteStatesNeeded = !m->relay, m->relay = 1;

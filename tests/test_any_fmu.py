@@ -157,6 +157,15 @@ def test_the_open_loop_goes_through_events(what, build):
     assert estimated == pytest.approx(along(what, 10.0 * np.arange(estimated.size)), abs=1e-4)
 
 
+def test_a_time_event_that_stays_due_is_told(build):
+    """At a sample, where no time is left for it to pass: the open loop did not end."""
+    with (
+        FMU(build("STUCK")) as fmu,
+        pytest.raises(FMUError, match=r"more than 500 events at one time at 30 s of its time"),
+    ):
+        run(fmu, "open_loop", 100.0)
+
+
 def test_a_jump_of_an_input_is_an_event_where_it_happens(build):
     """Outside, it falls from 280 K to 270 K at 100 s: held inputs jump there, and not before."""
     with FMU(build("TIMETABLE")) as fmu:
@@ -762,6 +771,15 @@ def test_a_recording_says_where_its_time_begins_for_the_model(build):
     assert values[""] == pytest.approx([heated, exact(1500.0, 200.0, begin=291.05)], abs=1e-4)
     off = exact(0.0, 150.0, begin=heated)
     assert values['model_time = "550 s"\n'] == pytest.approx([heated, off], abs=1e-4)
+
+
+def test_a_new_system_file_quotes_names_with_other_letters(build, tmp_path):
+    """The file that `new` had written was no TOML, and the command ended with that."""
+    path = build("RELAYS", variables=VARIABLES.replace('name="T"', 'name="Fühler T"'))
+    log = recorded(tmp_path, inside="Fühler T") / "measured.csv"
+    options = ["new", path.parent / "new", "--fmu", path, "--recordings", log, "--yes", "--quiet"]
+    assert main([*map(str, options)]) == 0
+    assert [output.name for output in load_system(path.parent / "new").outputs] == ["Fühler_T"]
 
 
 def test_what_needs_modelica_asks_for_the_class(build):

@@ -940,8 +940,17 @@ class FMU:
         return self._x.copy()
 
     def derivatives(self) -> Vector:
-        """Derivatives of the states, (n,)."""
-        self._states("derivatives", self._dx)
+        """Derivatives of the states, (n,).
+
+        Raises
+        ------
+        FMUError
+            If the FMU refuses the call; with the time that it was set to.
+        """
+        try:
+            self._states("derivatives", self._dx)
+        except FMUError as error:
+            raise FMUError(f"{error}; at {self.time[0]:.9g} s of its time") from None
         return self._dx.copy()
 
     def _states(self, use: str, buffer: Vector) -> None:
@@ -1121,9 +1130,14 @@ class CoSimulation(FMU):
         for part in range(parts):
             t, span = ctypes.c_double(begin + part * h / parts), ctypes.c_double(h / parts)
             # The zero: the state may be rolled back to before this point.
-            self._loaded.call("do_step", t, span, ctypes.c_int(0), *tail)
-            if end.value or early.value:
-                raise self._loaded.end_error()
+            try:
+                self._loaded.call("do_step", t, span, ctypes.c_int(0), *tail)
+                if end.value or early.value:
+                    raise self._loaded.end_error()
+            except FMUError as error:
+                raise FMUError(
+                    f"{error}; in its step of {span.value:.9g} s from {t.value:.9g} s of its time"
+                ) from None
         self._t = begin + h
         return self.get(self._state_variables).copy()
 

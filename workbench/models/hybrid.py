@@ -311,6 +311,8 @@ class HybridSimulation:
         self.passed += u is None
         if self._events % _PILED == 0:
             left, took = self._end - self._t, self._t - self._piled
+            if not took > 0.0:  # the next one is due by now, each time
+                raise self._error(f"has more than {_PILED} events at one time")
             if left * _PILED > took * (_MOST_EVENTS - self._events) and self._events > _PILED:
                 raise self._error(f"has more than {_MOST_EVENTS} events between two samples")
             self._piled = self._t

@@ -435,7 +435,7 @@ def _signal_table(draft: Draft, signal: DraftSignal) -> list[str]:
     samples = draft.samples(signal)
     largest = max(float(np.abs(values).max()) for values in samples)
     low, high = min(v.min() for v in samples), max(v.max() for v in samples)
-    lines = ["", f"# {signal.reason}", f"[{signal.role}.{signal.name}]"]
+    lines = ["", f"# {signal.reason}", f"[{signal.role}.{_key(signal.name)}]"]
     lines += [_entry("variable", variable.name)] * (variable.name != signal.name)
     ours = "as the file says" if not variable.unit else "of the model's variable"
     if variable.unit and unit != variable.unit:
