@@ -77,6 +77,8 @@ _DURATION = re.compile(  # PT1H15M, 1h 15m 0s
     r"((?P<s>\d+)([.,](?P<f>\d{1,12}))?\s*s(ec)?)?",
     re.IGNORECASE,
 )
+# What a sample most often is, and no time is: the shortest without a mark has 14 figures.
+_NUMBER = re.compile(r"[+-]?\d{0,13}([.,]\d*)?([eE][+-]?\d+)?")
 _OF_CONTROLLERS = re.compile(r"^(DATE_AND_TIME|DT|TIME_OF_DAY|TOD|TIME|T)#", re.IGNORECASE)
 _ZONE_WITHIN = re.compile(r"(?<=:\d\d )([A-Z]{3,4}) ((?:19|20)\d\d)$")  # 10:00:00 CEST 2024
 _TIMES_ALONE = (_OF_DAY, _OF_HOUR, _OF_MINUTES, _DURATION)
@@ -110,7 +112,8 @@ _EVEN = 3.0  # median steps, above which one step is a jump
 
 def is_stamp(cell: str) -> bool:
     """Whether a cell is a date, a time of day, or both."""
-    return _match(cell.strip()) is not None
+    text = cell.strip()
+    return _NUMBER.fullmatch(text) is None and _match(text) is not None
 
 
 def _match(text: str) -> re.Match[str] | None:
