@@ -24,13 +24,7 @@ def open_cluster(
     system: System,
     warn: Callable[[str], None] = lambda message: None,
 ) -> "DaskPool[State]":
-    """Workers of a cluster, which must have the system's plugin, too; see DaskPool.
-
-    Raises
-    ------
-    InputError
-        If there is no scheduler, or its workers will not do.
-    """
+    """Workers of a cluster, which must have the system's plugin, too; see DaskPool."""
     require("distributed", "cluster", "which works with a Dask cluster", "command line, --cluster")
     from workbench.runtime.cluster import DaskPool
 

@@ -50,25 +50,13 @@ def _requirements(extra: str) -> list[str]:
 
 
 def require_compiler() -> None:
-    """Refuse to go on without the extra that holds the Modelica compiler.
-
-    Raises
-    ------
-    InputError
-        If one of its packages is missing.
-    """
+    """Refuse to go on without the extra that holds the Modelica compiler."""
     for name in ("rumoca", "casadi", "ziglang"):
         require(name, "compiler", "which holds the Modelica compiler", "workbench.models.compiler")
 
 
 def require(package: str, extra: str, purpose: str, where: str) -> None:
-    """Refuse to go on without a package of an extra.
-
-    Raises
-    ------
-    InputError
-        If it is not installed.
-    """
+    """Refuse to go on without a package of an extra."""
     if find_spec(package) is None:
         raise InputError(
             where=where,

@@ -66,13 +66,7 @@ def confirm(
 
 
 def answers(files: Sequence[RecordedFile], missing: bool) -> list[str]:
-    """Ask the user for corrections of a proposal, from which something is missing or not.
-
-    Raises
-    ------
-    InputError
-        If it is refused, or nobody answers.
-    """
+    """Ask the user for corrections of a proposal, from which something is missing or not."""
     action = "name what is missing" if missing else "Enter takes this"
     print(f"{action}; correct with 'SIGNAL=CHANNEL [unit]; CONDITION=VALUE'; n refuses: ", end="")
     try:

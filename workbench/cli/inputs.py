@@ -18,13 +18,7 @@ from workbench.system.units import quantity
 
 
 def recording_options(options: argparse.Namespace, system: System) -> RecordingOptions:
-    """What is said of recordings without a case.toml.
-
-    Raises
-    ------
-    InputError
-        If an entry cannot be read.
-    """
+    """What is said of recordings without a case.toml."""
     conditions = dict(read_condition(entry, system) for entry in options.condition)
     columns = dict(
         parse_named(entry, "command line, --column", system.signals) for entry in options.column
@@ -33,13 +27,7 @@ def recording_options(options: argparse.Namespace, system: System) -> RecordingO
 
 
 def step_of(options: argparse.Namespace) -> float | None:
-    """Time between two samples of files without times, as --sample-rate says [s].
-
-    Raises
-    ------
-    InputError
-        If it is no rate.
-    """
+    """Time between two samples of files without times, as --sample-rate says [s]."""
     if options.sample_rate is None:
         return None
     rate = quantity(options.sample_rate, "Hz", "command line, --sample-rate")
@@ -54,13 +42,7 @@ def step_of(options: argparse.Namespace) -> float | None:
 
 
 def read_condition(text: str, system: System) -> tuple[str, Any]:
-    """One condition as people type it, NAME=VALUE, as case.toml has it.
-
-    Raises
-    ------
-    InputError
-        If it is none of the system's.
-    """
+    """One condition as people type it, NAME=VALUE, as case.toml has it."""
     name, equals, value = (part.strip() for part in text.partition("="))
     known = next((condition for condition in system.conditions if condition.name == name), None)
     if not equals or known is None:
@@ -81,13 +63,7 @@ def read_condition(text: str, system: System) -> tuple[str, Any]:
 
 
 def given_cases(options: argparse.Namespace, system: System) -> list[Case]:
-    """The cases that are asked for, or those that come with the system.
-
-    Raises
-    ------
-    InputError
-        If there are none, or one cannot be read.
-    """
+    """The cases that are asked for, or those that come with the system."""
     paths: list[Path] = options.cases
     if not paths and system.cases is None:
         raise InputError(
@@ -105,13 +81,7 @@ def given_cases(options: argparse.Namespace, system: System) -> list[Case]:
 
 
 def chosen_system(options: argparse.Namespace) -> tuple[System, list[Case]]:
-    """The system that is asked for, with the models and names that are given, and the cases.
-
-    Raises
-    ------
-    InputError
-        If system, models or cases cannot be read, or do not fit each other.
-    """
+    """The system that is asked for, with the models and names that are given, and the cases."""
     system = _load(options)
     cases = given_cases(options, system)
     names = model_names(options.map, system, cases)

@@ -14,13 +14,7 @@ _LONGEST = 120  # [s] that a page may take; it takes some five
 
 
 def browser() -> str:
-    """The program that prints.
-
-    Raises
-    ------
-    InputError
-        If there is none.
-    """
+    """The program that prints."""
     for name in _BROWSERS:
         if program := shutil.which(name):
             return program

@@ -650,13 +650,7 @@ def recording_figures(outcome: Outcome) -> list[CaseFigure]:
 
 
 def shown_first(figures: Sequence[CaseFigure], recording: str) -> CaseFigure:
-    """The figure of a recording by name, or the first one without a name.
-
-    Raises
-    ------
-    InputError
-        If there is no such recording.
-    """
+    """The figure of a recording by name, or the first one without a name."""
     known = {figure.name: figure for figure in figures}
     if not recording:
         return figures[0]

@@ -198,13 +198,7 @@ def build_everything(
 
 
 def given_values(everything: Path, system: System) -> dict[str, float]:
-    """Parameters of the diagnosed model that differ from the library's defaults.
-
-    Raises
-    ------
-    InputError
-        If the model is no observer model of this library.
-    """
+    """Parameters of the diagnosed model that differ from the library's defaults."""
     with open_file(everything, system, {}) as extended, open_model(system) as diagnosed:
         compare = system.comparison
         asked = [*compare.tolerances, *compare.levels, *sorted(system.constants)]

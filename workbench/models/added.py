@@ -124,13 +124,7 @@ def write_extended(
 
 
 def refuse_unfit(description: Description) -> None:
-    """Refuse an FMU around which there can be none.
-
-    Raises
-    ------
-    InputError
-        If it is none of FMI 2.0 with Model Exchange.
-    """
+    """Refuse an FMU around which there can be none."""
     if description.version != "2.0" or MODEL_EXCHANGE not in description.interfaces:
         raise InputError(
             where=str(description.path),

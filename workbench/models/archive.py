@@ -31,13 +31,7 @@ _DAMAGE = (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError)
 
 @contextmanager
 def opened(path: Path) -> Iterator[zipfile.ZipFile]:
-    """The archive of an FMU, whose list of contents has been checked.
-
-    Raises
-    ------
-    InputError
-        If it cannot be read, or holds what no FMU needs and no reader should unpack.
-    """
+    """The archive of an FMU, whose list of contents has been checked."""
     try:
         archive = zipfile.ZipFile(path)
     except (OSError, ValueError, *_DAMAGE) as error:
@@ -116,11 +110,6 @@ def unpack(path: Path, folder: Path, binaries: str) -> None:
     ----------
     folder : to unpack into.
     binaries : folder of this machine's binary in the FMU.
-
-    Raises
-    ------
-    InputError
-        If the archive is damaged, or holds more than should be unpacked.
     """
     with opened(path) as archive:
         wanted = [

@@ -126,11 +126,6 @@ class Description:
         Parameters
         ----------
         names : new names and the FMU's own, such as {"p": "pressure"}.
-
-        Raises
-        ------
-        InputError
-            If the FMU has no variable of a name.
         """
         if not names:
             return self
@@ -209,13 +204,7 @@ class Description:
         return self.interfaces[interface]
 
     def library(self, interface: str) -> str:
-        """Name in the archive of this machine's binary for an interface.
-
-        Raises
-        ------
-        InputError
-            If there is none, or it is empty.
-        """
+        """Name in the archive of this machine's binary for an interface."""
         file = f"{self.interfaces[interface].identifier}{fmpy.sharedLibraryExtension}"
         names = [f"binaries/{platform}/{file}" for platform in (fmpy.platform, fmpy.platform_tuple)]
         if library := next((name for name in names if self.binaries.get(name)), None):
@@ -230,13 +219,7 @@ class Description:
 
 
 def read_description(path: Path) -> Description:
-    """Read the model description of an FMU.
-
-    Raises
-    ------
-    InputError
-        If the file is no FMU of FMI 2.0 or 3.0.
-    """
+    """Read the model description of an FMU."""
     try:
         found_one = path.is_file()
     except OSError:  # of names that no file can have

@@ -695,13 +695,7 @@ class FMU:
     # --- variables ---
 
     def variables(self, names: Sequence[str]) -> Variables:
-        """Look names up once, for many calls of `get` and `set`.
-
-        Raises
-        ------
-        InputError
-            If the FMU has no variable of a name, or not as a real scalar.
-        """
+        """Look names up once, for many calls of `get` and `set`."""
         for name in names:
             if name not in self._references:
                 raise unknown_name(
@@ -731,13 +725,7 @@ class FMU:
         return Variables(tuple(names), references, np.zeros(len(names)))
 
     def typed(self, names: Sequence[str]) -> TypedVariables:
-        """Look up names of variables of any types that hold numbers.
-
-        Raises
-        ------
-        InputError
-            If the FMU has no variable of a name, or it holds no number, or several.
-        """
+        """Look up names of variables of any types that hold numbers."""
         whole = {v.name: v for v in self._whole}
         others = [i for i, name in enumerate(names) if name in whole]
         real = [i for i, name in enumerate(names) if name not in whole]
@@ -757,13 +745,7 @@ class FMU:
         return values
 
     def set_typed(self, variables: TypedVariables, values: Vector) -> None:
-        """Set values, (k,) in the FMU's units.
-
-        Raises
-        ------
-        InputError
-            If a type does not hold its number.
-        """
+        """Set values, (k,) in the FMU's units."""
         self.set(variables.real, values[variables.real_at])
         for variable, value in zip(variables.others, values[variables.others_at], strict=True):
             self._loaded.set_whole(variable, float(value))

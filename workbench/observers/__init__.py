@@ -19,13 +19,7 @@ __all__ = ["Estimate", "Estimator", "Gains", "SearchSpace", "choose", "estimator
 
 
 def estimators_of(system: System) -> dict[str, type[Estimator]]:
-    """All estimators that run on a system, by name, in the order of tables.
-
-    Raises
-    ------
-    InputError
-        If the system has bands of an estimator that there is not.
-    """
+    """All estimators that run on a system, by name, in the order of tables."""
     packages = (f"{__name__}.estimators", find_plugin(system.plugin).estimators)
     kinds = [estimator for package in packages if package for estimator in _estimators(package)]
     known = {
@@ -38,13 +32,7 @@ def estimators_of(system: System) -> dict[str, type[Estimator]]:
 
 
 def choose(system: System, names: Sequence[str]) -> dict[str, type[Estimator]]:
-    """Estimators by name, in the order of tables; the standard ones if none is named.
-
-    Raises
-    ------
-    InputError
-        If there is none of a name.
-    """
+    """Estimators by name, in the order of tables; the standard ones if none is named."""
     known = estimators_of(system)
     for name in names:
         _refuse_unknown(name, known, f"estimator '{name}'")

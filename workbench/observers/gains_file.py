@@ -25,11 +25,6 @@ def read_gains(path: Path, reasoned: Mapping[str, Gains]) -> Gains:
     Parameters
     ----------
     reasoned : gains of the estimators that it may be for, by name; their values are not used.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, is for another estimator, or lacks a gain.
     """
     content = _content(path)
     blank = reasoned[estimator_of(path, reasoned)]
@@ -49,13 +44,7 @@ def read_gains(path: Path, reasoned: Mapping[str, Gains]) -> Gains:
 
 
 def estimator_of(path: Path, known: Collection[str]) -> str:
-    """Name of the estimator that a file of gains is for, one of those that are known.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, or is for another estimator.
-    """
+    """Name of the estimator that a file of gains is for, one of those that are known."""
     estimator = _content(path).get("estimator")
     if not isinstance(estimator, str) or estimator not in known:
         raise _wrong(path, f"estimator = {shown(estimator)}", f"one of {', '.join(known)}")

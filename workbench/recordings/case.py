@@ -418,11 +418,6 @@ def check_recording(time: Vector, system: System, where: str, first_line: int | 
     ----------
     where : place for the message of an error.
     first_line : line of the first sample in a file, None without one.
-
-    Raises
-    ------
-    InputError
-        If samples are out of order, or too few or too short to tell signal from noise.
     """
     steps = np.diff(time)
     if not (steps > 0).all():

@@ -130,11 +130,6 @@ def published(which: str) -> PublishedSet:
     Parameters
     ----------
     which : name of a system, its file, or the folder that holds its file.
-
-    Raises
-    ------
-    InputError
-        If there is no such system, or its recordings were not published.
     """
     path = system_path(which)
     table = read_table(path, "name a system", 'title = "..."')
@@ -197,13 +192,7 @@ def write_cases(which: str, source: Path, out: Path) -> list[PublishedRecording]
 
 
 def read_recorded(folder: Path, system: System) -> Case:
-    """Read a case folder, or a recording as its machine wrote it, whose format is known.
-
-    Raises
-    ------
-    InputError
-        If it cannot be read.
-    """
+    """Read a case folder, or a recording as its machine wrote it, whose format is known."""
     document = read_table(folder / _CASE, "repair the folder, or remove it", 'title = "..."')
     known: PublishedSet | None = load(find_plugin(system.plugin).published)
     layouts = known.layouts if known else ()

@@ -275,25 +275,13 @@ def _piece(
 
 
 def store(out: Path, named: Mapping[str, NamedChannel]) -> None:
-    """Keep confirmed channels for all files of a folder; those of earlier files stay.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be written.
-    """
+    """Keep confirmed channels for all files of a folder; those of earlier files stay."""
     tables = {signal: channel.to_dict() for signal, channel in named.items()}
     write_whole(out / COLUMNS, tomli_w.dumps({"columns": tables}))
 
 
 def write(imported: Import, out: Path, system: System) -> None:
-    """Write case folders of an import.
-
-    Raises
-    ------
-    InputError
-        If they cannot be written.
-    """
+    """Write case folders of an import."""
     written: dict[str, str] = {}
     for piece in imported.pieces:
         names = ", ".join(file.path.name for file in imported.recording.files)
@@ -392,13 +380,7 @@ def _described_channels(imported: Import, system: System) -> dict[str, dict[str,
 
 
 def imported(out: Path) -> list[dict[str, Any]]:
-    """What was imported into a folder before; empty if nothing was.
-
-    Raises
-    ------
-    InputError
-        If the folder holds other files.
-    """
+    """What was imported into a folder before; empty if nothing was."""
     path = out / IMPORTED
     if path.is_file():
         remedy = f"import into another folder, or restore {IMPORTED}"
@@ -431,11 +413,6 @@ def write_record(out: Path, system: System, imports: Sequence[Mapping[str, Any]]
     Parameters
     ----------
     imports : of `describe`, and those before.
-
-    Raises
-    ------
-    InputError
-        If it cannot be written.
     """
     content = {"system": system.name, "workbench": commit(), "imports": list(imports)}
     write_json(out / IMPORTED, content)

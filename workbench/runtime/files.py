@@ -35,11 +35,6 @@ def locked_folder(folder: Path) -> Iterator[None]:
 
     It is made as needed. What a killed run, or a worker that is ended, left of a half-written file
     is removed.
-
-    Raises
-    ------
-    InputError
-        If files cannot be made there, there is no room, or another run writes there.
     """
     with _refusing_in_words(folder):
         if folder.exists() and not folder.is_dir():
@@ -104,13 +99,7 @@ def _prove_room(folder: Path) -> None:
 
 
 def require_writable(path: Path) -> None:
-    """Refuse a file that could not be written, before the work that leads to it.
-
-    Raises
-    ------
-    InputError
-        If it is a folder, files cannot be made beside it, or there is no room.
-    """
+    """Refuse a file that could not be written, before the work that leads to it."""
     with _refusing_in_words(path):
         if path.is_dir():
             raise IsADirectoryError(0, "a folder, and no file")
@@ -123,11 +112,6 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
     """A stream whose content takes the place of a file when all of it is on the disk.
 
     Folders are made as needed. If anything fails the file stays as it was.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be written there.
     """
     end_copy()
     # Named after the process: two that write the same file do not write into each other's. Names
@@ -147,13 +131,7 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
 
 
 def append_line(path: Path, line: str) -> None:
-    """Add a line to a file; it is on the disk when this returns.
-
-    Raises
-    ------
-    InputError
-        If it cannot be written.
-    """
+    """Add a line to a file; it is on the disk when this returns."""
     with _refusing_in_words(path), path.open("ab") as stream:
         stream.write(f"{line}\n".encode())
         stream.flush()
@@ -387,13 +365,7 @@ def _remove(folder: Path, lock: int | None, owner: int) -> None:
 
 
 def read_bytes(path: Path, remedy: str) -> bytes:
-    """Read a file that ends.
-
-    Raises
-    ------
-    InputError
-        If it cannot be read.
-    """
+    """Read a file that ends."""
     try:
         kind = path.stat().st_mode
         if not stat.S_ISREG(kind) and not stat.S_ISDIR(kind):  # a pipe or a device may never end

@@ -80,11 +80,6 @@ def usual_limits() -> Limits:
     """Limits that hold unless others are given: WORKBENCH_TRIAL="processor=20 answer=60".
 
     The variable of the environment names times in seconds and sizes in MB.
-
-    Raises
-    ------
-    InputError
-        If it cannot be read.
     """
     # WORKBENCH_PROOF is its name before version 0.2.
     text = os.environ.get("WORKBENCH_TRIAL", os.environ.get("WORKBENCH_PROOF", ""))

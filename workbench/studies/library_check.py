@@ -105,11 +105,6 @@ def check_library(
     ----------
     cases : recordings, whose inputs drive the effects.
     report : takes lines of progress.
-
-    Raises
-    ------
-    InputError
-        If the system has no library, or the library has errors.
     """
     if not system.library.is_file():
         raise InputError(
@@ -190,11 +185,6 @@ def failures_of_claim(package: Path, model: str) -> list[str]:
     Co-Simulation by the FMU's own integrator, then Model Exchange by CVODE: what holds at the
     accuracy of one integrator alone is no claim on the model. It is built once for each state of
     library and compiler.
-
-    Raises
-    ------
-    InputError
-        If the model cannot be compiled.
     """
     from workbench.models import compiler  # an extra: everything else runs without it
 

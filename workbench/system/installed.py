@@ -59,13 +59,7 @@ def built_models() -> dict[Path, list[str]]:
 
 
 def system_path(which: str | Path) -> Path:
-    """The file of a system, by its name, its file, or the folder that holds its file.
-
-    Raises
-    ------
-    InputError
-        If there is none.
-    """
+    """The file of a system, by its name, its file, or the folder that holds its file."""
     known, path = system_files(), Path(which)
     if str(which) in known:
         return known[str(which)]

@@ -91,13 +91,7 @@ def plugin_of(file: "Table") -> str:
 
 @cache
 def find_plugin(plugin: str) -> Plugin:
-    """The plugin that a system file names; an empty one where it names none.
-
-    Raises
-    ------
-    InputError
-        If there is none of this name, or it cannot be imported.
-    """
+    """The plugin that a system file names; an empty one where it names none."""
     if not plugin:
         return Plugin()
     place = place_of(plugin)

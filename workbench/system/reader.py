@@ -137,13 +137,7 @@ def _names(file: Table) -> dict[str, str]:
 
 
 def with_model(system: System, role: str, path: Path | None) -> System:
-    """The same system with another FMU in a role, checked; its parameters are then those of it.
-
-    Raises
-    ------
-    InputError
-        If the FMU lacks a variable, or has it in another unit.
-    """
+    """The same system with another FMU in a role, checked; its parameters are then those of it."""
     models = {**system.models, role: replace(system.model(role), path=path)}
     changed = replace(system, models=models)
     if role != OBSERVER or path is None:

@@ -26,11 +26,6 @@ def load_system(
 
     A model without an FMU is compiled from the system's library, once for each state of it; that
     needs the extra [compiler].
-
-    Raises
-    ------
-    InputError
-        If there is none of this name, or its file or its library has a mistake.
     """
     system = read_system(system_path(which), fmu, names)
     missing = {role: model for role, model in system.models.items() if model.path is None}
@@ -60,13 +55,7 @@ def _build(system: System, model: Model) -> Path:
 
 
 def model_path(system: System, role: str) -> Path:
-    """The FMU of a role.
-
-    Raises
-    ------
-    InputError
-        If the system has no model in this role.
-    """
+    """The FMU of a role."""
     model = system.models.get(role)
     if model is None or model.path is None:
         raise InputError(
@@ -79,13 +68,7 @@ def model_path(system: System, role: str) -> Path:
 
 
 def open_model(system: System, role: str = OBSERVER) -> FMU:
-    """Open the model of a role, with the parameters of this machine that it has.
-
-    Raises
-    ------
-    InputError
-        If its file is no FMU.
-    """
+    """Open the model of a role, with the parameters of this machine that it has."""
     path = system.model(role).path
     assert path is not None
     return open_file(path, system)

@@ -41,13 +41,7 @@ class Table:
         return key in self.content
 
     def take(self, key: str, kind: type[_T]) -> _T:
-        """An entry that must be there, of this very type and no empty text.
-
-        Raises
-        ------
-        InputError
-            If it is missing, or another type.
-        """
+        """An entry that must be there, of this very type and no empty text."""
         if key not in self.content:
             raise unknown_name(
                 key,
@@ -161,11 +155,6 @@ class Table:
         Parameters
         ----------
         keys : that are read; a text holds several, with spaces between them.
-
-        Raises
-        ------
-        InputError
-            If the table has another key.
         """
         known = tuple(keys.split()) if isinstance(keys, str) else tuple(keys)
         for key in self.content:
@@ -200,11 +189,6 @@ def read_table(path: Path, remedy: str, example: str) -> Table:
     ----------
     remedy : what to do if it cannot be read.
     example : of its lines, for the message of an error.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, or is no TOML.
     """
     text = read_text(path, remedy)
     try:

@@ -75,13 +75,7 @@ def si_factor(unit: str, si: str, where: str) -> float:
 
 
 def check_unit(unit: str, where: str) -> None:
-    """Refuse a text that is no unit; 1 is that of a number.
-
-    Raises
-    ------
-    InputError
-        If the unit is unknown.
-    """
+    """Refuse a text that is no unit; 1 is that of a number."""
     if unit != "1" and _parse(unit) is None:
         raise InputError(
             where=where,

@@ -86,13 +86,7 @@ class Checkpoint:
 
 
 def save(checkpoint: Checkpoint, path: Path) -> None:
-    """Write a checkpoint in place of the one before, which is kept beside it.
-
-    Raises
-    ------
-    InputError
-        If it cannot be written.
-    """
+    """Write a checkpoint in place of the one before, which is kept beside it."""
     with suppress(FileNotFoundError, InputError):
         last = path.read_text()
         _parse(last, path)  # a damaged one does not take the place of a sound one

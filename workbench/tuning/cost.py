@@ -79,11 +79,6 @@ def recordings(
     Parameters
     ----------
     scale_errors : by output, relative [1]; alternately too small and too large.
-
-    Raises
-    ------
-    InputError
-        If a case lacks a measured signal to judge by.
     """
     prepared = [recording(case, system) for case in cases]
     for output, error in scale_errors.items():

@@ -170,11 +170,6 @@ def pose(
     estimator : its name.
     scale_errors : relative [1], by output; see `recordings`. None: as the system says.
     judge_by : estimator to score by where no sensor does, see `with_reference`. None: as measured.
-
-    Raises
-    ------
-    InputError
-        If there is no such estimator, the model is not fit for it, or a case cannot judge.
     """
     estimator_class = tunable(system, estimator)
     if judge_by is not None:
@@ -209,13 +204,7 @@ def pose(
 
 
 def tunable(system: System, estimator: str) -> type[Estimator]:
-    """An estimator that has gains.
-
-    Raises
-    ------
-    InputError
-        If the system has none of this name.
-    """
+    """An estimator that has gains."""
     known = {
         name: estimator_class
         for name, estimator_class in estimators_of(system).items()

@@ -125,11 +125,6 @@ def refuse_too_few(cases: Sequence[Case], system: System, held_out: int = 0) -> 
     Parameters
     ----------
     held_out : number of recordings beside, to which nothing is fitted.
-
-    Raises
-    ------
-    InputError
-        If there is only one, and parameters differ from recording to recording.
     """
     compare = system.comparison
     if not cases or (len(cases) == 1 and (compare.tolerances or compare.begins is not None)):

@@ -97,13 +97,7 @@ class Samples:
     model_time: float | None = None
 
     def falls(self, signal: str) -> bool:
-        """Whether an input falls, by more than its sensor's noise and a valve's overshoot.
-
-        Raises
-        ------
-        InputError
-            If it is none of the recorded inputs.
-        """
+        """Whether an input falls, by more than its sensor's noise and a valve's overshoot."""
         if signal not in self.inputs:
             raise InputError(
                 where=f"recording {self.name}",

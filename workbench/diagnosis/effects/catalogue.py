@@ -266,13 +266,7 @@ def read_effects(library: Library, base: str) -> tuple[Effect, ...]:
 
 
 def choose(names: Sequence[str], effects: Sequence[Effect]) -> tuple[Effect, ...]:
-    """Effects by name, in their order; all of them if none is named.
-
-    Raises
-    ------
-    InputError
-        If there is no effect of a name.
-    """
+    """Effects by name, in their order; all of them if none is named."""
     known = dict.fromkeys(name for effect in effects for name in (effect.kind, effect.name))
     for name in names:
         if name not in known:

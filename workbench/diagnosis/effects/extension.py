@@ -246,11 +246,6 @@ def build(library: Library, name: str, text: str, fmu: Path, *, every_platform: 
     ----------
     library : that the source extends; its files are left alone.
     every_platform : for all platforms, or only for this machine's.
-
-    Raises
-    ------
-    InputError
-        If the source has errors.
     """
 
     def make(path: Path) -> None:

@@ -43,13 +43,7 @@ class Slot:
 
 
 def read_slots(library: Library, base: str) -> tuple[Slot, ...]:
-    """Slots of a base model, in its order: replaceable components with a constraining class.
-
-    Raises
-    ------
-    InputError
-        If there is no such model, or a constraining class is none of the library.
-    """
+    """Slots of a base model, in its order: replaceable components with a constraining class."""
     model = library.find(base).name
     slots = []
     for component in library.components(model).values():

@@ -69,13 +69,7 @@ class RecordedTrain:
 
 
 def recorded_sets(folders: Sequence[Path]) -> RecordedTrain:
-    """Sets of stops: folders with a `truth.json`, or folders of such.
-
-    Raises
-    ------
-    InputError
-        If there is none in a folder, or a truth is not understood.
-    """
+    """Sets of stops: folders with a `truth.json`, or folders of such."""
     all_sets: list[Path] = []
     for folder in folders:
         inner = [folder, *sorted(path for path in folder.glob("*") if path.is_dir())]

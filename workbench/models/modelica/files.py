@@ -22,11 +22,6 @@ def packages(file: Path) -> tuple[Path, ...]:
     Parameters
     ----------
     file : `package.mo` of the library, or its only file; it comes first in what is returned.
-
-    Raises
-    ------
-    InputError
-        If there is no such file, or a library that it uses is in neither place.
     """
     resolved = {file: file.resolve()}
     waiting = [file]
@@ -63,13 +58,7 @@ def library_folder(file: Path) -> Path:
 
 
 def read(file: Path) -> str:
-    """Text of a file.
-
-    Raises
-    ------
-    InputError
-        If there is none, or it is not UTF-8.
-    """
+    """Text of a file."""
     if not file.is_file():
         raise InputError(
             where=str(file),

@@ -108,13 +108,7 @@ class Library:
         self._bases: dict[str, tuple[str, ...]] = {}
 
     def find(self, name: str) -> Class:
-        """The class of a name, dotted from the library's name on, or from what follows it.
-
-        Raises
-        ------
-        InputError
-            If there is none.
-        """
+        """The class of a name, dotted from the library's name on, or from what follows it."""
         for dotted in (name, f"{self.name}.{name}"):
             if dotted in self.classes:
                 return self.classes[dotted]

@@ -16,13 +16,7 @@ from workbench.observers.export.translation.data import contents
 
 
 def plant_of(estimator: Estimator) -> StateSpace:
-    """The model of an estimator from the library, with the outputs that its law reads.
-
-    Raises
-    ------
-    InputError
-        If the library has an error, or the estimator's FMU is not of it.
-    """
+    """The model of an estimator from the library, with the outputs that its law reads."""
     system, fmu = estimator.system, estimator.fmu
     library = read_library(system.library).name
     name = f"{library}.{system.model(estimator.role).name}"

@@ -60,13 +60,7 @@ class NamedChannel:
 
 
 def read_named(table: Table, system: System) -> dict[str, NamedChannel]:
-    """Channels by signal, as a table of TOML has them: a name, or a table.
-
-    Raises
-    ------
-    InputError
-        If a signal is none of the system, or an entry is unknown.
-    """
+    """Channels by signal, as a table of TOML has them: a name, or a table."""
     table.refuse_unknown((TIME, *system.signals))
     channels: dict[str, NamedChannel] = {}
     for signal, entry in table.content.items():
@@ -90,11 +84,6 @@ def parse_named(text: str, where: str, signals: Collection[str]) -> tuple[str, N
     """One entry as people type it: `SIGNAL=CHANNEL`, `SIGNAL=-CHANNEL [unit]`.
 
     Values that stand for no sample follow it: `SIGNAL=CHANNEL [unit] missing -9999, 7999`, or none.
-
-    Raises
-    ------
-    InputError
-        If it is none.
     """
     signal, equals, channel = (part.strip() for part in text.partition("="))
     if not equals or not channel.lstrip("-") or signal not in (TIME, *signals):
@@ -179,13 +168,7 @@ class RecordingOptions:
 
 
 def stored_columns(folder: Path, system: System) -> dict[str, NamedChannel]:
-    """Channels by signal that were confirmed for a folder; empty where none were.
-
-    Raises
-    ------
-    InputError
-        If the file is no TOML, or names no signal of the system.
-    """
+    """Channels by signal that were confirmed for a folder; empty where none were."""
     path = folder / COLUMNS
     if not path.is_file():
         return {}

@@ -81,13 +81,7 @@ def is_other_format(path: Path) -> bool:
 
 
 def read_recorded_file(path: Path) -> RecordedFile:
-    """Read a file of a recorder.
-
-    Raises
-    ------
-    InputError
-        If it cannot be read, its format is not known, or the package that reads it is missing.
-    """
+    """Read a file of a recorder."""
     raw = read_bytes(path, "correct the path")
     if not raw:
         raise InputError(

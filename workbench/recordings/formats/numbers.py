@@ -146,13 +146,7 @@ def plain(cell: str) -> str:
 
 
 def reading_of(columns: Sequence[Sequence[str]], where: str, *, commas: bool) -> str:
-    """The one way in which all numbers can be read.
-
-    Raises
-    ------
-    InputError
-        If there are two that differ, or none.
-    """
+    """The one way in which all numbers can be read."""
     marks = frozenset().union(*("".join(cells) for cells in columns)) & {",", "."}
     if not commas or not marks:
         return _POINT

@@ -81,13 +81,7 @@ def read_others(path: Path, raw: bytes) -> Contents:
 def _read_sheets(
     path: Path, called: str, sheets: Mapping[str, Sequence[Sequence[Any]]], hidden: Collection[str]
 ) -> Contents:
-    """Kind, groups and notes of rows of cells, by sheet.
-
-    Raises
-    ------
-    InputError
-        If no sheet holds a table.
-    """
+    """Kind, groups and notes of rows of cells, by sheet."""
     groups: list[Group] = []
     notes: list[str] = []
     refusal: InputError | None = None

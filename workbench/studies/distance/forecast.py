@@ -239,13 +239,7 @@ def open_forecaster(system: System) -> Iterator[Forecaster]:
 
 
 def stopping_of(system: System) -> Stopping:
-    """How a system stops.
-
-    Raises
-    ------
-    InputError
-        If it does not say so.
-    """
+    """How a system stops."""
     if system.stopping is None:
         raise InputError(
             where=str(system.source),

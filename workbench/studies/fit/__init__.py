@@ -137,11 +137,6 @@ def fit(
     parameters : names and patterns of parameters and states; all of `[fit]` of the system file if
         there are none.
     held_out : recordings on which only errors are measured.
-
-    Raises
-    ------
-    InputError
-        If there is no such parameter, or the model cannot be simulated with its own values.
     """
     if settings.loss not in LOSSES:
         raise unknown_name(
@@ -189,13 +184,7 @@ def _simulation(system: System) -> Iterator[Simulation]:
 def resolve_parameters(
     system: System, description: Description, parameters: Sequence[str | FittedParameter]
 ) -> list[FittedParameter]:
-    """What is fitted, with ranges and priors of the system file.
-
-    Raises
-    ------
-    InputError
-        If nothing is, or a name is none of a parameter that can be set, or of a state.
-    """
+    """What is fitted, with ranges and priors of the system file."""
     known = [
         v.name
         for v in description.variables

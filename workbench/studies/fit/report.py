@@ -214,13 +214,7 @@ def write_ssv(values: Mapping[str, float], path: Path) -> None:
 
 
 def write_fmu(source: Path, values: Mapping[str, float], path: Path) -> None:
-    """Write an FMU whose model description has other start values; all else stays as it is.
-
-    Raises
-    ------
-    InputError
-        If the source cannot be read.
-    """
+    """Write an FMU whose model description has other start values; all else stays as it is."""
     with (
         opened(source) as archive,
         replacing(path) as stream,

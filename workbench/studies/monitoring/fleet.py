@@ -47,13 +47,7 @@ class Fleet:
         return fsspec.url_to_fs(self.location)
 
     def machines(self) -> list[str]:
-        """Names of all machines.
-
-        Raises
-        ------
-        InputError
-            If the location cannot be read, or holds none.
-        """
+        """Names of all machines."""
         try:
             if (remote := self._remote) is None:
                 entries = [path for path in Path(self.location).iterdir() if path.is_dir()]
@@ -158,11 +152,6 @@ def watch_fleet(
     -------
     watched : by name.
     interrupted : whether Ctrl-C left some out; their states are as they were.
-
-    Raises
-    ------
-    InputError
-        If there are no machines.
     """
     names, results, interrupted = fleet.machines(), list[MachineResult](), False
     tasks: list[Future[MachineResult]] = []

@@ -223,11 +223,6 @@ def conclude(
 
     Of a recording that came several times, the last one that could be used counts; of those with
     the same content, the first by name.
-
-    Raises
-    ------
-    InputError
-        If none can be used.
     """
     last = {result.name: result for result in results}
     refused = {name: last[name].refusal for name in sorted(last) if last[name].refusal}

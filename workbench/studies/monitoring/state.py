@@ -38,13 +38,7 @@ class RecordingFolder:
 
 
 def recording_folders(folder: Path) -> list[RecordingFolder]:
-    """All recordings in a folder, by name: each sub-folder is one, whole or not.
-
-    Raises
-    ------
-    InputError
-        If there is no such folder, or no recording in it.
-    """
+    """All recordings in a folder, by name: each sub-folder is one, whole or not."""
     try:
         paths = sorted(
             (path for path in folder.iterdir() if path.is_dir() and not path.name.startswith(".")),

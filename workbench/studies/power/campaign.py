@@ -56,11 +56,6 @@ def predict_campaign(
     wanted : those that the campaign is asked for.
     sizes : multiples of what matters.
     seed : of the machine's tolerances and the sensors' noise.
-
-    Raises
-    ------
-    InputError
-        If a model or the library is not what it should be.
     """
     with study.setup() as setup:
         clean = Planting("clean", seed, 0.0, {}, ())
@@ -111,11 +106,6 @@ def limits_of_effects(
     study : whose rig makes the recordings.
     wanted : effects that are asked for.
     seed : of the machine's tolerances and the sensors' noise.
-
-    Raises
-    ------
-    InputError
-        If a model or the library is not what it should be.
     """
     names = {effect.name for effect in study.effects}
     repertoire = Repertoire(study.rig.plantables, tuple(study.effects))
@@ -182,11 +172,6 @@ def by_oracle(
     Parameters
     ----------
     sizes : that will be planted [standard deviations].
-
-    Raises
-    ------
-    InputError
-        If a model or the library is not what it should be, or recordings show none of it.
     """
     limits = limits_of_effects(study, wanted, seed)
     planted = tuple(

@@ -29,24 +29,12 @@ _NONE: Mapping[Key, tuple[float, Sequence[Case]]] = {}
 
 
 def library_effects(system: System) -> tuple[Effect, ...]:
-    """Effects of a system's library, which a diagnosis may find.
-
-    Raises
-    ------
-    InputError
-        If the library cannot be read.
-    """
+    """Effects of a system's library, which a diagnosis may find."""
     return catalogue(system, read_library(system.library))
 
 
 def build_everything(system: System, effects: Sequence[Effect], path: Path) -> None:
-    """Build the FMU of the observer model with every effect, at zero.
-
-    Raises
-    ------
-    InputError
-        If the library has errors.
-    """
+    """Build the FMU of the observer model with every effect, at zero."""
     diagnosis.build_everything(system, read_library(system.library), effects, path)
 
 

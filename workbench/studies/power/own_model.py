@@ -211,13 +211,7 @@ def _middle_shape(effect: Effect) -> dict[str, float]:
 
 
 def template_cases(system: System, names: Sequence[str]) -> list[Case]:
-    """Recordings of the machine: folders, or those of this name that come with the system.
-
-    Raises
-    ------
-    InputError
-        If there are none, or one cannot be read.
-    """
+    """Recordings of the machine: folders, or those of this name that come with the system."""
     if system.cases is None and not all(Path(name).exists() for name in names or [""]):
         raise InputError(
             where=f"{system.source}, --case",

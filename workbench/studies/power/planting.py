@@ -62,13 +62,7 @@ class Plantable:
 
 
 def assigned(assignments: Sequence[str], known: Mapping[str, Plantable]) -> dict[str, float]:
-    """Sizes by name, of texts NAME=VALUE [SI].
-
-    Raises
-    ------
-    InputError
-        If a name or a value is not understood, or a name comes twice.
-    """
+    """Sizes by name, of texts NAME=VALUE [SI]."""
     gains: dict[str, float] = {}
     for assignment in assignments:
         name, _, text = assignment.partition("=")

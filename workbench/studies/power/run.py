@@ -101,11 +101,6 @@ def diagnose_sets(
     -------
     results : of this and of resumed runs.
     interrupted : whether Ctrl-C ended the run; sets that were under way are in the results.
-
-    Raises
-    ------
-    InputError
-        If a model is not what it should be, or verdicts of another run are there.
     """
     with study.setup() as setup:
         identity = {

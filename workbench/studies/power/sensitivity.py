@@ -169,11 +169,6 @@ def vary_sets(
     -------
     results : of the sets that were diagnosed; one that failed is reported and left out.
     interrupted : whether Ctrl-C ended the run; sets that were under way are in the results.
-
-    Raises
-    ------
-    InputError
-        If a model is not what it should be.
     """
     results: list[ThresholdSensitivity] = []
     progress = StepReporter(engine.report, len(plantings))

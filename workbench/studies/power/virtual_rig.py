@@ -68,11 +68,6 @@ def open_virtual_rig(
     names : of the recordings of a set; the usual ones if none is named.
     model : FMU that makes them; None where the rig has equations of its own.
     own : makes one of the system's own model, where no plugin has any.
-
-    Raises
-    ------
-    InputError
-        If the system has none, or it refuses what is asked.
     """
     make = load(find_plugin(system.plugin).virtual_rig)
     if make is None and own is not None:
@@ -100,13 +95,7 @@ class RecordedSets(VirtualRig, Protocol):
 
 
 def read_recorded_sets(system: System, folders: Sequence[Path]) -> RecordedSets:
-    """Recorded sets of a system, with what is wrong in them.
-
-    Raises
-    ------
-    InputError
-        If the system's plugin reads none, or a folder is not understood.
-    """
+    """Recorded sets of a system, with what is wrong in them."""
     read = load(find_plugin(system.plugin).recorded_sets)
     if read is None:
         raise InputError(

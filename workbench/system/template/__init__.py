@@ -24,11 +24,6 @@ def write_system(folder: Path, seepage: float = SEEPAGE) -> list[Path]:
     Parameters
     ----------
     seepage : of the tank that is recorded [m2/s].
-
-    Raises
-    ------
-    InputError
-        If one of its files is there already.
     """
     here = Path(__file__).parent
     paths = [folder / name for name in _FILES]
@@ -41,13 +36,7 @@ def write_system(folder: Path, seepage: float = SEEPAGE) -> list[Path]:
 
 
 def refuse_present(paths: Sequence[Path]) -> None:
-    """Refuse to write over files of a system.
-
-    Raises
-    ------
-    InputError
-        If one is there already.
-    """
+    """Refuse to write over files of a system."""
     for path in paths:
         if path.exists():
             raise InputError(

@@ -30,11 +30,6 @@ class CLoop:
     fmu : minimal model, FMI 2.0, with C sources.
     system : the wheelset.
     gains : of the disturbance observer.
-
-    Raises
-    ------
-    InputError
-        If the sources do not compile.
     """
 
     def __init__(self, fmu: FMU, system: System, gains: Gains) -> None:

@@ -100,11 +100,6 @@ def plant(base: Effects, assignments: Sequence[str]) -> Effects:
     base : gains of all effects that are not named.
     assignments : texts NAME=VALUE, with the value in the effect's SI unit.
 
-    Raises
-    ------
-    InputError
-        If a name or a value is not understood, or a name comes twice.
-
     Examples
     --------
     >>> plant(CONSTANT_PADS, ["fx_gain=0.015"]).fx_gain

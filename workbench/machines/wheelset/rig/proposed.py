@@ -32,11 +32,6 @@ def proposed_stop(result: Path, system: System) -> Scenario:
     Parameters
     ----------
     result : folder with next.json.
-
-    Raises
-    ------
-    InputError
-        If there is none, or it asks for what the rig cannot do.
     """
     file = result / "next.json"
     remedy = "give the folder that 'workbench next' wrote for this rig"

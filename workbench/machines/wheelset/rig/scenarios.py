@@ -179,11 +179,6 @@ SCENARIOS = {
 def select(names: Sequence[str]) -> list[Scenario]:
     """Scenarios by name, with or without its number; the standard ones if none is named.
 
-    Raises
-    ------
-    InputError
-        If there is no scenario of a name.
-
     Examples
     --------
     >>> [scenario.name for scenario in select(["locked_wheel", "01_dry_80_1.5"])]
