@@ -176,6 +176,30 @@ def test_merged_cells_of_a_workbook_name_all_columns_below(tmp_path):
     assert names == ["Zeit", "Zulauf roh", "Zulauf gefiltert", "Pegel roh", "Pegel gefiltert"]
 
 
+@pytest.mark.parametrize("header", ["valve [%]", "valve"])
+@pytest.mark.parametrize("old", [False, True], ids=["xlsx", "xls"])
+def test_cells_that_are_shown_in_percent_are_percent(tmp_path, header, old):
+    """The number below 42 % is 0.42; under a header with % it was taken for 0.42 %."""
+    rows = [["time [s]", header], *([k, (40 + k % 9) / 100] for k in range(60))]
+    path = tmp_path / ("a.xls" if old else "a.xlsx")
+    if old:
+        book = xlwt.Workbook()
+        sheet, percent = book.add_sheet("one"), xlwt.easyxf(num_format_str="0.0%")
+        for i, (t, share) in enumerate(rows):
+            sheet.write(i, 0, t)
+            sheet.write(i, 1, share, percent if i else xlwt.XFStyle())
+    else:
+        book = openpyxl.Workbook()
+        for row in rows:
+            book.active.append(row)
+        for row in book.active.iter_rows(min_row=2, min_col=2):
+            row[0].number_format = "0.0%"
+    book.save(path)
+    valve = read_recorded_file(path).groups[0].channels[1]
+    assert valve.unit == "%"
+    assert_allclose(valve.values, 40.0 + np.arange(60) % 9)
+
+
 def test_a_number_in_brackets_is_that_of_a_channel():
     assert name_and_unit("log(1)") == ("log(1)", "")
     assert name_and_unit("log(1)[s]") == ("log(1)", "s")

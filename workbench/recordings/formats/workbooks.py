@@ -14,6 +14,7 @@ from workbench.recordings.formats.cells import by_tag, find_table, read_group
 from workbench.recordings.formats.contents import Contents, Group
 from workbench.runtime.supervision import quiet_panics
 
+_LOOKED = 200  # rows that tell whether a sheet shows percent
 _HOUR = timedelta(hours=1)
 _MOST = 1_048_576  # rows of a sheet of Excel
 _WHOLE = 2.0**53  # below which doubles hold whole numbers
@@ -24,7 +25,19 @@ def read_excel(path: Path, raw: bytes) -> Contents:
     import openpyxl
 
     book = openpyxl.load_workbook(io.BytesIO(raw), read_only=True, data_only=True)
-    sheets = {sheet.title: list(sheet.iter_rows(values_only=True)) for sheet in book.worksheets}
+    sheets = {}
+    for sheet in book.worksheets:
+        above = [cell for row in sheet.iter_rows(max_row=_LOOKED) for cell in row]
+        if any(cell.value is not None and "%" in cell.number_format for cell in above):
+            sheets[sheet.title] = [
+                [
+                    cell.value if cell.value is None else _as_shown(cell.value, cell.number_format)
+                    for cell in row
+                ]
+                for row in sheet.iter_rows()
+            ]
+        else:
+            sheets[sheet.title] = list(sheet.iter_rows(values_only=True))
     hidden = {sheet.title for sheet in book.worksheets if sheet.sheet_state != "visible"}
     return _read_sheets(path, "Excel", sheets, hidden)
 
@@ -40,12 +53,15 @@ def read_excel_97(path: Path, raw: bytes) -> Contents:
         if cell.ctype == xlrd.XL_CELL_DATE:  # the part of a day, to a millisecond as Excel shows it
             seconds, rest = divmod(round(cell.value * 86_400_000) % 86_400_000, 1000)
             return time(seconds // 3600, seconds // 60 % 60, seconds % 60, rest * 1000)
-        if cell.ctype in (xlrd.XL_CELL_TEXT, xlrd.XL_CELL_NUMBER):
+        if cell.ctype == xlrd.XL_CELL_NUMBER:
+            return _as_shown(cell.value, formats[book.xf_list[cell.xf_index].format_key].format_str)
+        if cell.ctype == xlrd.XL_CELL_TEXT:
             return cell.value
         return bool(cell.value) if cell.ctype == xlrd.XL_CELL_BOOLEAN else None
 
     log = io.StringIO()  # of what may be damaged
-    book = xlrd.open_workbook(file_contents=raw, logfile=log)
+    book = xlrd.open_workbook(file_contents=raw, logfile=log, formatting_info=True)
+    formats = book.format_map
     sheets = {
         sheet.name: [list(map(value, row)) for row in sheet.get_rows()] for sheet in book.sheets()
     }
@@ -108,6 +124,12 @@ def _read_sheets(
         raise refusal
     count = f"{len(groups)} sheet{'s' * (len(groups) != 1)}"
     return Contents(f"{called}, {count} with samples", groups, notes)
+
+
+def _as_shown(value: Any, form: str) -> Any:
+    """A value as its cell shows it, if that is in percent: the number itself is a hundredth."""
+    shown = "%" in form and isinstance(value, int | float)
+    return f"{100.0 * value!r}%" if shown else value
 
 
 def _text(cell: Any) -> str:
