@@ -19,6 +19,8 @@ from workbench.diagnosis.inference.quadratic import (
     minimum,
 )
 
+_LARGEST = 1e4  # times what matters, up to which a size is sought
+_UNSEEN = 1e-12  # share of all information on an unknown, which stops that do not show it have
 Candidate = tuple[Effect, Mapping[str, float]]
 
 
@@ -34,7 +36,8 @@ class CandidateScore:
     gain : fall of chi-squared when it is fitted to all stops, beside immaterial companions.
     by_levels : what of it is that levels, or the one recording's own, are less far from expected.
     least : the same fall without any one of the stops, the least.
-    held_out : (K,) fall of chi-squared of each stop when it is fitted, alone, to the others.
+    held_out : (K,) rise of twice the log density of each stop, as the others predict it, when it is
+        fitted alone.
     phases : (K,) [rad] of an order-locked effect.
     """
 
@@ -103,11 +106,6 @@ class ScoreTest:
         self._fit, self.joint, self._candidates = fit, joint, candidates
         self._stops = joint.stops()
         self._known = list(range(len(joint.known)))
-        unknowns = fit.unknowns
-        own = [
-            ("", f"own {j}") for j, name in enumerate(unknowns.local) if name in unknowns.starting
-        ]
-        self._starts = [joint.known.index(key) for key in own if key in joint.known]
         self.levels = joint.levels
         middle: dict[str, tuple[int, float]] = {}
         for effect, shape in candidates:
@@ -120,7 +118,7 @@ class ScoreTest:
             name: form for name, form in middle.items() if share[form[0]] > 2.0 * fit.decides.twin
         }
         alone = self._select({}, alone=True)
-        self._without, self._prior = _held_out(*alone, self._starts), alone[1]
+        self._without, self._prior = _held_out(*alone), alone[1]
         base = self._select({})
         total = add([*base[0], base[1]])
         best = minimum(total)
@@ -205,6 +203,7 @@ class ScoreTest:
             best = minimum(total)
         lacking = [form.at(minimum(form)) for form in _without_each(total, stops)]
         alone, own_prior = self._select(own, alone=True)
+        own_prior.N[-1, -1] += (_LARGEST * effect.matters) ** -2
         single = float(minimum(add([*alone, own_prior]))[-1])
         if not low <= single <= high:
             single = float(np.clip(single, low, high))
@@ -218,7 +217,7 @@ class ScoreTest:
             gain=self._reference - total.at(best),
             by_levels=self._away - self._far(best),
             least=float(np.min(np.subtract(self._lacking, lacking))),
-            held_out=self._without - _held_out(alone, own_prior, self._starts),
+            held_out=self._without - _held_out(alone, own_prior),
             phases=phases,
         )
 
@@ -244,28 +243,19 @@ def _without_each(total: Quadratic, stops: Sequence[Quadratic]) -> list[Quadrati
     ]
 
 
-def _held_out(stops: Sequence[Quadratic], prior: Quadratic, starts: Sequence[int]) -> Vector:
-    """Chi-squared of each stop at the optimum of the others, (K,).
+def _held_out(stops: Sequence[Quadratic], prior: Quadratic) -> Vector:
+    """-2 log of the density of each stop as all others predict it, (K,), up to a constant.
 
-    Parameters
-    ----------
-    starts : unknowns that are states at the start of a single recording, of which these are parts.
-        The first is predicted with those that suit it: later parts may not tell how it began.
+    It counts how sure the others are: what one stop alone tells is no failure of these.
+    Source: S. Geisser, W. F. Eddy (1979), J. Am. Stat. Assoc. 74, 153-160.
     """
-    others = _without_each(add([*stops, prior]), stops)
-    squares = []
-    for part, (stop, rest) in enumerate(zip(stops, others, strict=True)):
-        z = minimum(rest)
-        if part == 0 and starts:
-            own = add([stop, prior])
-            at_z = Quadratic(own.N, own.g + own.N @ z, 0.0, own.rows)
-            z[starts] += minimum(at_z.columns(_only(z, starts)))
-        squares.append(stop.at(z))
-    return np.array(squares)
+    total = add([*stops, prior])
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(total.N), 1e-100))
+    unseen = _UNSEEN * np.eye(scale.size)
 
+    def evidence(form: Quadratic) -> float:
+        information = form.N * scale[:, None] * scale[None, :] + unseen
+        return form.at(minimum(form)) + float(np.linalg.slogdet(information)[1])
 
-def _only(z: Vector, at: Sequence[int]) -> Matrix:
-    """Transform to some of the unknowns, (p, s)."""
-    transform = np.zeros((z.size, len(at)))
-    transform[at, range(len(at))] = 1.0
-    return transform
+    whole = evidence(total)
+    return np.array([whole - evidence(rest) for rest in _without_each(total, stops)])
