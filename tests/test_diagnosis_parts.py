@@ -34,7 +34,7 @@ from workbench.diagnosis.inference.quadratic import (
     minimum_within,
 )
 from workbench.diagnosis.inference.rivals import Rival
-from workbench.diagnosis.inference.score_test import CandidateScore
+from workbench.diagnosis.inference.score_test import CandidateScore, predictive_deviance
 from workbench.diagnosis.inference.search import extended, joined
 from workbench.diagnosis.inference.selection import anew
 from workbench.diagnosis.inference.thresholds import SOUND
@@ -743,3 +743,17 @@ def test_information_is_that_of_all_recordings_and_of_what_was_known():
     # Of all unknowns that new recordings have too, nothing is eliminated.
     held = known.so_far(keys, 3.0).eliminated().N + known.prior.N
     assert_allclose(held, known.information, rtol=1e-9, atol=1e-9)
+
+
+def test_what_one_recording_alone_tells_is_no_failure_of_the_others():
+    """One stop of four tells a size of 8 deviations; of the others each knows it to 100."""
+    sharp, blunt = 1.0, 0.01
+    stops = [
+        Quadratic(np.array([[w * w]]), np.array([-8.0 * w * w]), 64.0 * w * w, 1)
+        for w in (sharp, blunt, blunt, blunt)
+    ]
+    known = predictive_deviance(stops, Quadratic(np.array([[1e-12]]), np.zeros(1), 0.0, 0))
+    without = np.array([stop.c for stop in stops])
+    # Predicted by the blunt ones the sharp stop has the variance of both, 1 + 1e4/3.
+    assert (without - known)[0] == pytest.approx(64.0 - np.log(1.0 + 1e4 / 3.0), rel=1e-6)
+    assert (without - known)[1:] == pytest.approx(0.0, abs=0.01)

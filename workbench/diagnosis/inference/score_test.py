@@ -118,7 +118,7 @@ class ScoreTest:
             name: form for name, form in middle.items() if share[form[0]] > 2.0 * fit.decides.twin
         }
         alone = self._select({}, alone=True)
-        self._without, self._prior = _held_out(*alone), alone[1]
+        self._without, self._prior = predictive_deviance(*alone), alone[1]
         base = self._select({})
         total = add([*base[0], base[1]])
         best = minimum(total)
@@ -217,7 +217,7 @@ class ScoreTest:
             gain=self._reference - total.at(best),
             by_levels=self._away - self._far(best),
             least=float(np.min(np.subtract(self._lacking, lacking))),
-            held_out=self._without - _held_out(alone, own_prior),
+            held_out=self._without - predictive_deviance(alone, own_prior),
             phases=phases,
         )
 
@@ -243,7 +243,7 @@ def _without_each(total: Quadratic, stops: Sequence[Quadratic]) -> list[Quadrati
     ]
 
 
-def _held_out(stops: Sequence[Quadratic], prior: Quadratic) -> Vector:
+def predictive_deviance(stops: Sequence[Quadratic], prior: Quadratic) -> Vector:
     """-2 log of the density of each stop as all others predict it, (K,), up to a constant.
 
     It counts how sure the others are: what one stop alone tells is no failure of these.
