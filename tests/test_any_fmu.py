@@ -782,6 +782,26 @@ def test_a_new_system_file_quotes_names_with_other_letters(build, tmp_path):
     assert [output.name for output in load_system(path.parent / "new").outputs] == ["Fühler_T"]
 
 
+@pytest.mark.parametrize(
+    ("header", "asked"),
+    [
+        ("T rel [Pa]", "is a pressure above that of the air"),
+        ("T [Paa]", "is a pressure above a vacuum"),
+        ("T [0.1 Pa]", "may be a unit of 0.1 Pa"),
+        ("T [Pa]", ""),
+    ],
+)
+def test_a_new_system_asks_what_a_channel_leaves_open(header, asked, build, tmp_path, capsys):
+    pressure = VARIABLES.replace('<Real start="291"/>', '<Real start="291" unit="Pa"/>')
+    path, log = build("RELAYS", variables=pressure), recorded(tmp_path) / "measured.csv"
+    log.write_text(log.read_text().replace("T [K]", header))
+    options = ["new", path.parent / "new", "--fmu", path, "--recordings", log, "--yes", "--quiet"]
+    assert main([*map(str, options)]) == 0
+    text = (path.parent / "new" / "system.toml").read_text()
+    questions = re.findall("QUESTION: T: (.*)", text)
+    assert [asked in question for question in questions] == [True] * bool(asked)
+
+
 def test_what_needs_modelica_asks_for_the_class(build):
     system = load_system(renamed_system(build("RELAYS")))
     with pytest.raises(InputError, match=r"found the FMU Room.fmu, and no 'class'"):

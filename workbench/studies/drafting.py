@@ -27,7 +27,7 @@ from workbench.recordings.channels import (
     merge,
     propose_recordings,
 )
-from workbench.recordings.channels.matching import USUAL_UNITS, PlacedChannel
+from workbench.recordings.channels.matching import USUAL_UNITS, PlacedChannel, meaning_doubt
 from workbench.recordings.channels.names import (
     EXACT,
     WITHIN,
@@ -307,6 +307,15 @@ def _candidate(
             f"{name}: its largest sample, {size:.4g}, is {size / typical:.3g} times the model's "
             f"{of} value {typical:g} [{unit}]"
         )
+    if meant := meaning_doubt(
+        place.channel.name,
+        read_in,
+        values,
+        (name, variable.name, variable.text),
+        unit,
+        f"{name}={place.channel.name}",
+    ):
+        doubt = doubt or f"{name}: {meant}"
     channel = NamedChannel(place.channel.name, read_in)
     return DraftSignal(name, variable, role, unit, channel, why, doubt), ""
 

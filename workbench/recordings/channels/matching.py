@@ -194,33 +194,37 @@ def size_doubt(values: Vector, unit: str, signal: Signal, column: str) -> str:
     return ""
 
 
-def meaning_doubt(name: str, unit: str, values: Vector, signal: Signal, column: str) -> str:
+def meaning_doubt(
+    channel: str, unit: str, values: Vector, names: Sequence[str], si: str, column: str
+) -> str:
     """What a channel's name, unit or values leave open of its zero or its size; empty: nothing.
 
     Parameters
     ----------
-    name, unit : of the channel.
-    values : (n,) SI.
+    channel, unit : as the file has them.
+    values : (n,) in the unit of the signal.
+    names, si : of the signal, and its unit.
     column : how the user names the channel, SIGNAL=CHANNEL.
     """
-    base, zero = pressure_zero(unit)
-    if signal.unit == "Pa":
-        zero = zero or _zero_in(name)
-        said = next(filter(None, map(_zero_in, signal.names)), "")
+    if conversion(si, "Pa") is not None:
+        base, zero = pressure_zero(unit)
+        zero = zero or _zero_in(channel)
+        said = next(filter(None, map(_zero_in, names)), "")
         if zero and zero != said:
             means = "above that of the air" if zero == "gauge" else "above a vacuum"
             return (
-                f"'{name}' [{unit}] is a pressure {means}, and {signal.name} is "
+                f"'{channel}' [{unit}] is a pressure {means}, and {names[0]} is "
                 f"{said or 'not said to be one'}; add or take off the pressure of the air where "
                 f"they differ, --column '{column} [{base}]' takes the values as they are"
             )
-    if counted := multiple(unit, signal.unit):
+    if counted := multiple(unit, si):
         own, size = counted
         return (
-            f"[{unit}] may be a unit of {size.factor:.4g} {signal.unit}, or [{own}] with the range "
-            f"of a sensor; --column '{column} [{unit}]' takes the one, [{own}] the other"
+            f"[{unit}] may be a unit of {size.factor:.4g} {si}, or [{own}] with the range of a "
+            f"sensor; --column '{column} [{unit}]' takes the one, [{own}] the other"
         )
-    if signal.unit == "rad" and (rounds := _rounds(values)):
+    turn = conversion(si, "rad")
+    if turn is not None and (rounds := _rounds(turn.factor * values)):
         return (
             f"its values go round, by one turn back {rounds} times; have the turns counted before "
             f"the import, or --column '{column} [{unit}]' keeps the jumps"
@@ -315,7 +319,7 @@ def _candidate(
     own_doubts = (
         marked,
         size_doubt(values, unit, signal, column),
-        meaning_doubt(channel.name, unit, values, signal, column),
+        meaning_doubt(channel.name, unit, values, signal.names, signal.unit, column),
     )
     doubt = "; ".join(filter(None, (doubt, *own_doubts)))
     return Assignment(

@@ -205,7 +205,8 @@ def _as_named(
     doubts = [marked]
     if not channel.unit:
         doubts.append(size_doubt(values, unit, signal, column))
-        doubts.append(meaning_doubt(place.channel.name, unit, values, signal, column))
+        called = signal.names, signal.unit
+        doubts.append(meaning_doubt(place.channel.name, unit, values, *called, column))
     doubt = unit_doubt(signal.name, place.label, unit) if concluded else ""
     return Assignment(
         file=place.file,
