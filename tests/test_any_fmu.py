@@ -705,6 +705,15 @@ def test_a_name_that_the_fmu_has_not_or_that_is_taken_is_refused(line, match, bu
         load_system(file)
 
 
+def test_a_variable_with_a_name_of_its_own_is_not_called_as_the_fmu_calls_it_too(build):
+    """The FMU was said to have no such variable."""
+    file = renamed_system(build("RELAYS"))
+    again = 'outputs.T = { unit = "K", noise = "0.05 K", scale = "10 K" }\noutputs.inside = {'
+    file.write_text(file.read_text().replace("outputs.inside = {", again))
+    with pytest.raises(InputError, match=r"'T', a variable .* called 'inside' there as well"):
+        open_model(load_system(file)).__enter__()
+
+
 def test_names_of_a_system_file_may_come_from_the_command_line(build, capsys):
     """The file has none of the FMU's names: they are known before its variables are looked up."""
     file = renamed_system(build("RELAYS"))

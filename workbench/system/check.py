@@ -52,6 +52,13 @@ def check_model(system: System, model: Description) -> None:
         theirs = system.names.get(ours, ours)
         where = f"{model.path}, variable '{theirs}'"
         if ours not in variables:
+            if other := next((n for n, own in system.names.items() if own == theirs), ""):
+                raise InputError(
+                    where=str(system.source),
+                    found=f"'{ours}', a variable of the FMU that is called '{other}' there as well",
+                    expected="one name of yours for one variable of the FMU",
+                    remedy=f"write '{other}' in its place, or remove one of the two",
+                )
             raise unknown_name(
                 ours,
                 variables,
