@@ -1,6 +1,7 @@
 """What several test files share: the repository's own FMUs, cases and sources."""
 
 import fcntl
+import gc
 import json
 import multiprocessing.util
 import os
@@ -50,6 +51,11 @@ Result = TypeVar("Result")
 # Its sockets stay where the first of them was, which may be no folder of one test: that has a long
 # name, and goes.
 multiprocessing.util.get_temp_dir()
+
+
+def pytest_collection_finish() -> None:
+    """Modules and tests are no garbage: to look through them now and then took a tenth of all."""
+    gc.freeze()
 
 
 # What workers of pools import most. Else the first pool of a session, which may need nothing,
