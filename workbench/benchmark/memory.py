@@ -30,13 +30,7 @@ def peak_memory(process: int | str = "self") -> int:
 
 
 def watch_command(command: Sequence[str]) -> list[int]:
-    """Run a command; returns the peaks of its process, first, and of those it started [bytes].
-
-    Raises
-    ------
-    CalledProcessError
-        If the command fails.
-    """
+    """Run a command; returns the peaks of its process, first, and of those it started [bytes]."""
     peaks: dict[int, int] = {}
     with subprocess.Popen(command, stdout=subprocess.DEVNULL) as master:
         while master.poll() is None:

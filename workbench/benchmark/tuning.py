@@ -243,12 +243,7 @@ def _rates(pools: Sequence[Workers], candidates: Sequence[Candidate]) -> list[fl
 
 
 def observe_memory(folders: Sequence[Path], system: System) -> TuningMemory:
-    """Tune an estimator with the command, as briefly as it goes.
-
-    Parameters
-    ----------
-    folders : of cases.
-    """
+    """Tune an estimator with the command, as briefly as it goes."""
     command = [sys.executable, "-m", "workbench", "tune", first_tuned(system)]
     brief = ["--workers", str(WORKERS), "--budget", "1", "--population", "1"]
     with tempfile.TemporaryDirectory() as out:

@@ -40,11 +40,6 @@ def confirm(
     ----------
     stored : channels that were confirmed before.
     yes : take what is proposed without a question.
-
-    Raises
-    ------
-    InputError
-        If they are not confirmed, or something is missing.
     """
     proposed = propose_recordings(files, system, stored, known)
     output.result(_format(files, proposed, system))

@@ -149,13 +149,7 @@ def model_names(
 
 
 def split_held_out(cases: Sequence[Case], patterns: Sequence[str]) -> tuple[list[Case], list[Case]]:
-    """Recordings that are fitted, and those that are held out: by name, * is any letters.
-
-    Raises
-    ------
-    InputError
-        If a pattern fits no recording.
-    """
+    """Recordings that are fitted, and those that are held out: by name, * is any letters."""
     names = [case.name for case in cases]
     for pattern in patterns:
         if not any(fnmatchcase(name, pattern) for name in names):

@@ -733,7 +733,7 @@ def draw_dependences(dependences: Sequence[Mapping[str, Any]], paths: Iterable[P
                     channels.index(dependence["channel"]),
                 )
                 share[at] = 100.0 * dependence[key]
-            draw_heat(axes, share, 100.0)
+            draw_heat(axes, share)
             axes.set_xticks(range(len(channels)), channels)
             axes.set_yticks(range(len(influences)), influences)
             axes.set_title({"before": "nominal model", "after": "with what was added"}[key])
@@ -747,7 +747,7 @@ def draw_confusability(
     """Draw the similarity of the signatures of effects; those found are marked."""
     with styled(9.0, 9.0, axes_grid=False, font_size=7) as sheet:
         axes = sheet.subplots()
-        draw_heat(axes, 100.0 * cosines, 100.0, least=50.0)
+        draw_heat(axes, 100.0 * cosines, least=50.0)
         marked = [f"▸ {name}" if name in found else name for name in names]
         axes.set_xticks(range(len(names)), names, rotation=90)
         axes.set_yticks(range(len(names)), marked)
@@ -874,9 +874,9 @@ def _finding(
     )
 
 
-def draw_heat(axes: "Axes", percents: Matrix, most: float, least: float = 0.5) -> None:
+def draw_heat(axes: "Axes", percents: Matrix, least: float = 0.5) -> None:
     """A matrix of whole percents, written into their cells from `least` on."""
-    axes.imshow(percents, cmap="Blues", vmin=0.0, vmax=1.6 * most, aspect="auto")
+    axes.imshow(percents, cmap="Blues", vmin=0.0, vmax=160.0, aspect="auto")
     for (row, column), value in np.ndenumerate(percents):
         if value >= least:
             axes.text(column, row, f"{value:.0f}", ha="center", va="center", fontsize=7)

@@ -74,11 +74,6 @@ def write_extended(
     ----------
     coefficients : start values of terms by name, 0 for others; and of speeds, NAME.speed.
     parameters : values of the inner FMU's own, by its names.
-
-    Raises
-    ------
-    InputError
-        If the FMU is none of FMI 2.0 with Model Exchange for this machine.
     """
     # An extra: what extended FMUs are compiled with; running them needs none.
     from workbench.models.compiler.assembly import (

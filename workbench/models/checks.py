@@ -543,11 +543,6 @@ def check(
     limits : of what the FMU may use; the usual ones unless others are given.
     begin : takes the name of what is tried next.
     report : takes each finding as it comes.
-
-    Raises
-    ------
-    InputError
-        If the file is no FMU, or has no Model Exchange for this machine.
     """
     description = read_description(path)
     description.require(MODEL_EXCHANGE)

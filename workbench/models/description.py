@@ -34,7 +34,6 @@ class Interface:
     saves_state: bool
     serialises_state: bool
     directional_derivatives: bool
-    needs_execution_tool: bool
     one_instance_per_process: bool
     completed_steps: bool
     variable_steps: bool
@@ -423,7 +422,6 @@ def _interface(element: ElementTree.Element, version: str) -> Interface:
         directional_derivatives=has(
             "providesDirectionalDerivative", "providesDirectionalDerivatives"
         ),
-        needs_execution_tool=has("needsExecutionTool"),
         one_instance_per_process=has("canBeInstantiatedOnlyOncePerProcess"),
         completed_steps=has("needsCompletedIntegratorStep")
         if version == "3.0"

@@ -163,11 +163,6 @@ _LOGGER = fmi2.fmi2CallbackLoggerTYPE(_log_formatted)
 class FMUInstance:
     """An FMU that is unpacked and loaded, with one instance.
 
-    Parameters
-    ----------
-    description : of the FMU.
-    interface : MODEL_EXCHANGE or CO_SIMULATION.
-
     Attributes
     ----------
     version : of FMI.
@@ -380,13 +375,7 @@ class FMUInstance:
         )
 
     def complete_step(self) -> bool:
-        """Say that a step of integration is over; returns whether it ends at a step event.
-
-        Raises
-        ------
-        FMUError
-            If the FMU refuses the call, or asks to end.
-        """
+        """Say that a step of integration is over; returns whether it ends at a step event."""
         try:
             event, end = self._instance.completedIntegratorStep()
         except FMICallException as error:
@@ -844,13 +833,7 @@ class FMU:
         return bool(self.event_signs.size or np.isfinite(self.next_event[0]))
 
     def check_event(self) -> None:
-        """Refuse to go on if the FMU has passed an event since its start.
-
-        Raises
-        ------
-        FMUError
-            Where an event indicator has another sign than at the start, or a time event is over.
-        """
+        """Refuse to go on if the FMU has passed an event since its start."""
         signs = self.event_signs
         if (
             self.time[0] > self.next_event[0]
@@ -922,13 +905,7 @@ class FMU:
         return self._x.copy()
 
     def derivatives(self) -> Vector:
-        """Derivatives of the states, (n,).
-
-        Raises
-        ------
-        FMUError
-            If the FMU refuses the call; with the time that it was set to.
-        """
+        """Derivatives of the states, (n,)."""
         try:
             self._states("derivatives", self._dx)
         except FMUError as error:

@@ -102,11 +102,6 @@ class HybridSimulation:
         ----------
         time : (n,) of the FMU at the samples [s].
         u : (n, m) inputs at the samples.
-
-        Raises
-        ------
-        FMUError
-            See `advance`.
         """
         self.begin(u[0])
         rows = np.empty((time.size, len(outputs.names)))

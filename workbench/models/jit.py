@@ -99,13 +99,7 @@ class _CodeCache(caching.CompileResultCacheImpl):  # type: ignore[misc]
 
 
 class _CodeFile:
-    """The code of one function, by signature.
-
-    Parameters
-    ----------
-    path : of the file.
-    state : of all that the code depends on besides the signature.
-    """
+    """The code of one function, by signature."""
 
     def __init__(self, path: Path, state: str) -> None:
         self._path, self._state = path, state.encode()
@@ -215,12 +209,7 @@ class CodeCache(caching.FunctionCache):  # type: ignore[misc]
 
 
 class TupleReference(types.Type):  # type: ignore[misc]
-    """Address of a tuple.
-
-    Parameters
-    ----------
-    content : type of the tuple.
-    """
+    """Address of a tuple."""
 
     def __init__(self, content: types.BaseTuple) -> None:
         self.content = content

@@ -309,13 +309,7 @@ def _is_wrong(
 
 
 def _require_function(call: _Calls, task: dict[str, Any]) -> None:
-    """Refuse rates and outputs that change where time, states and inputs are set off and back.
-
-    Raises
-    ------
-    _RefusedError
-        If one is off by more than a share of itself and of what it was moved by.
-    """
+    """Refuse rates and outputs that change where time, states and inputs are set off and back."""
     n, inputs, outputs = task["states"], task["inputs"], task["outputs"]
     states, rates = (_DOUBLE * n)(), (_DOUBLE * n)()
     held, shown = (_DOUBLE * len(inputs))(), (_DOUBLE * len(outputs))()

@@ -85,7 +85,6 @@ class Estimator(ABC):
     meaning : of the gains, with units, for whoever reads their file.
     offline : whether it needs a whole recording, and has no `init`, `step` and `advance`.
     tuned_as : estimator whose gains it takes; empty: its own.
-    sticks : whether a follower rolls where a step would take it past its leader near standstill.
     co_simulates : whether it runs on a model that has Co-Simulation alone.
     modes : what it weighs models by, in columns and figures; none if it runs on one model.
     finds : conditions that it finds out by itself.
@@ -110,7 +109,6 @@ class Estimator(ABC):
     meaning: ClassVar[str] = ""
     offline: ClassVar[bool] = False
     tuned_as: ClassVar[str] = ""
-    sticks: ClassVar[bool] = False
     co_simulates: ClassVar[bool] = False
     coarse_steps: ClassVar[bool] = False
     passes_events: ClassVar[bool] = False
@@ -317,11 +315,6 @@ class Estimator(ABC):
         ----------
         time : (n,) [s].
         u, y : (n, m) and (n, l) measured inputs and outputs; y of a case holds aids, too.
-
-        Raises
-        ------
-        FMUError
-            If the FMU refuses a call.
         """
         self._check_shapes(time.size, u, self._measured(y))
         self.start(u[0], y[0])
@@ -334,11 +327,6 @@ class Estimator(ABC):
         ----------
         steps : (n,) from the sample before [s].
         u, y : (n, m) and (n, l) measured inputs and outputs; y of a case holds aids, too.
-
-        Raises
-        ------
-        FMUError
-            If the FMU refuses a call.
         """
         return self._split(self._run(steps, u, y))
 

@@ -24,11 +24,6 @@ class LiveWindow:
     """Judged signal and estimated quantities, one case at a time.
 
     Closing it ends the show, not the run.
-
-    Raises
-    ------
-    InputError
-        If there is no display, or nothing to open a window with.
     """
 
     def __init__(self, system: System) -> None:

@@ -354,11 +354,6 @@ def case_observability(
     Parameters
     ----------
     scales : by role of the model, see LinearTest.
-
-    Raises
-    ------
-    FMUError
-        If the observer fails.
     """
     with open_model(system, OBSERVER) as fmu:
         whole = information(fmu, system, case)

@@ -22,13 +22,7 @@ SURE = 0.95  # probability, that of a band
 def run_on_model(
     case: Case, system: System, estimator: type[Estimator], gains: Gains | None = None
 ) -> Run:
-    """Feed a recording to an estimator on the system's model, with its usual gains unless given.
-
-    Raises
-    ------
-    InputError
-        If the model is not fit for it.
-    """
+    """Feed a recording to an estimator on the system's model, with its usual gains unless given."""
     with open_model(system, estimator.role) as fmu:
         return replay(case, estimator(fmu, system, gains or usual_gains(estimator, fmu, system)))
 

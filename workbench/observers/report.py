@@ -137,12 +137,7 @@ class Standing:
 
 
 def standings(summary: Mapping[str, Any], reference: str) -> list[Standing]:
-    """Estimators, the one with the least worst case first; those never judged last.
-
-    Parameters
-    ----------
-    judged : name of the judged signal.
-    """
+    """Estimators, the one with the least worst case first; those never judged last."""
     cases: Mapping[str, Any] = summary["cases"]
     names = list(next(iter(cases.values()))["estimators"])
     table = []

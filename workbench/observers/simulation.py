@@ -422,11 +422,6 @@ def prepare(
     ----------
     file : of tuned gains, for the estimator that it names.
     tuned : whether the others have the gains that were tuned for the system, where there are any.
-
-    Raises
-    ------
-    InputError
-        If an estimator cannot run on the system's models, or the file cannot be read.
     """
     with ExitStack() as stack:
         models = _models(stack, system, kinds)
@@ -510,10 +505,6 @@ def case_figure(result: CaseResult, styles: Sequence[str] = ESTIMATORS) -> CaseF
     """Describe the figure of a case.
 
     Residuals are shown as they are judged: below the bandwidth. Bands hold 95 %.
-
-    Parameters
-    ----------
-    styles : of the estimators, in turn.
     """
     system, case = result.system, result.case
     chosen = dict(zip(result.runs, cycle(styles), strict=False))

@@ -242,12 +242,7 @@ def residual_tests(
 
 
 def contradiction_lines(tested: Mapping[str, Mapping[str, Iterable[Contradiction]]]) -> list[str]:
-    """What is said of bands that innovations contradict: by estimator, a sentence for each side.
-
-    Parameters
-    ----------
-    tested : contradictions by recording and estimator.
-    """
+    """What is said of bands that innovations contradict: by estimator, a sentence for each side."""
     cases: dict[tuple[str, bool], dict[str, Contradiction]] = {}
     for case, estimators in tested.items():
         for name, tests in estimators.items():

@@ -44,13 +44,7 @@ def pack_estimates(table: pd.DataFrame, path: Path) -> None:
 
 
 def read_estimates(path: Path) -> pd.DataFrame:
-    """Read the table that `pack_estimates` wrote: (n,) numbers in each column, six digits of them.
-
-    Raises
-    ------
-    InputError
-        If the file is missing, damaged, or another one.
-    """
+    """Read the table that `pack_estimates` wrote: (n,) numbers in each column, of six digits."""
     try:
         with np.load(path, allow_pickle=False) as archive:
             *names, last = archive.files

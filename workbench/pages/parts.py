@@ -351,7 +351,7 @@ class Page:
 
     def write(self, summary: Mapping[str, Any], path: Path) -> Path:
         """Write the page of a summary; returns its path."""
-        write_whole(path, rendered("page.html", summary, page=self))
+        write_whole(path, rendered(summary, self))
         return path
 
 
@@ -369,7 +369,6 @@ def tabulated(
     caption: str,
     records: Iterable[Mapping[Any, Any]],
     columns: Sequence[tuple[object, str | Callable[[Any], object], str]],
-    marked: Sequence[str] = (),
 ) -> Table:
     """A table with a row for each record.
 
@@ -386,7 +385,7 @@ def tabulated(
         return number(value, digits) if digits else value
 
     rows = [tuple(cell(record, *column[1:]) for column in columns) for record in records]
-    return Table(id, caption, [heading for heading, _, _ in columns], rows, marked)
+    return Table(id, caption, [heading for heading, _, _ in columns], rows)
 
 
 def joined(separator: str, texts: Sequence[str]) -> Markup:

@@ -89,11 +89,6 @@ def read_runs(folder: Path, warn: Callable[[InputError], None] | None = None) ->
     Parameters
     ----------
     warn : told of a summary that cannot be read, where others can; by default that is an error.
-
-    Raises
-    ------
-    InputError
-        If there is none, or a summary cannot be read.
     """
     if not folder.is_dir():
         raise InputError(

@@ -13,16 +13,11 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from workbench.pages.figures import DARK, LIGHT
 
 
-def rendered(template: str, summary: Mapping[str, Any], **content: object) -> str:
-    """A page of a summary.
-
-    Parameters
-    ----------
-    content : what the template asks for beside the summary.
-    """
+def rendered(summary: Mapping[str, Any], page: object) -> str:
+    """A page of a summary."""
     run = summary["provenance"]["run"]
-    page = _environment().get_template(template)
-    return page.render(summary=summary, run=run, report=number_of(summary), **content)
+    template = _environment().get_template("page.html")
+    return template.render(summary=summary, run=run, report=number_of(summary), page=page)
 
 
 def number_of(summary: Mapping[str, Any]) -> str:

@@ -219,11 +219,6 @@ def make_case(
     ----------
     measured : time (n,) s, and signals (n,) each, SI.
     origin : where they stand, for what is doubted; None: nothing is, as it was simulated.
-
-    Raises
-    ------
-    InputError
-        If the recording cannot be what it says it is.
     """
     time, signals = measured
     return Case(
@@ -260,11 +255,6 @@ def read_cases(
     Parameters
     ----------
     options : conditions and channels of files that have no `case.toml`.
-
-    Raises
-    ------
-    InputError
-        If a path holds no case, two cases have one name, or a case cannot be read.
     """
     folders: dict[str, Path] = {}
     for folder in (folder for path in paths for folder in _case_folders(path)):

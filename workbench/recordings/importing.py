@@ -224,10 +224,6 @@ def import_recording(
 def case_name(path: Path, part: str = "") -> str:
     """Name of a case: letters, figures and signs that every file system takes.
 
-    Parameters
-    ----------
-    part : name of a sheet or group that holds a recording of its own.
-
     Examples
     --------
     >>> case_name(Path("monday.xlsx")), case_name(Path("monday.xlsx"), "120 % load, warm")
@@ -408,11 +404,6 @@ def imported(out: Path) -> list[dict[str, Any]]:
 
 
 def write_record(out: Path, system: System, imports: Sequence[Mapping[str, Any]]) -> None:
-    """Write what was read, converted, dropped and cut, as `import.json`.
-
-    Parameters
-    ----------
-    imports : of `describe`, and those before.
-    """
+    """Write what was read, converted, dropped and cut, as `import.json`."""
     content = {"system": system.name, "workbench": commit(), "imports": list(imports)}
     write_json(out / IMPORTED, content)

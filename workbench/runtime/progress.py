@@ -48,13 +48,7 @@ class ProgressReporter:
 
 
 class StepReporter:
-    """Says after each of a known number of steps what came of it, and the time left.
-
-    Parameters
-    ----------
-    report : takes a line.
-    total : number of steps.
-    """
+    """Says after each of a known number of steps what came of it, and the time left."""
 
     def __init__(self, report: Callable[[str], None], total: int) -> None:
         self._report, self._total, self._done = report, total, 0

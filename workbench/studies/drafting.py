@@ -397,12 +397,7 @@ def _key(name: str) -> str:
 
 
 def system_text(draft: Draft, fmu: str) -> str:
-    """The system file, with the reason of each value that was concluded.
-
-    Parameters
-    ----------
-    fmu : file of the FMU beside it.
-    """
+    """The system file, with the reason of each value that was concluded."""
     model, times = draft.description, [recording.time for recording in draft.recordings]
     step = float(np.median(np.concatenate([np.diff(time) for time in times])))
     lines = [

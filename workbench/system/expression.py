@@ -107,11 +107,6 @@ class Expression:
         Parameters
         ----------
         values : of the other names.
-
-        Raises
-        ------
-        InputError
-            If it is not.
         """
         count = len(names)
         points = np.vstack([np.eye(count), -np.arange(2.0, 2.0 + count), np.zeros(count)])

@@ -150,12 +150,7 @@ class Table:
         return InputError(where=self.place(key), found=found, expected=expected, remedy=remedy)
 
     def refuse_unknown(self, keys: str | Iterable[str]) -> None:
-        """Refuse what nobody reads, which is a mistake in writing.
-
-        Parameters
-        ----------
-        keys : that are read; a text holds several, with spaces between them.
-        """
+        """Refuse what nobody reads, which is a mistake in writing."""
         known = tuple(keys.split()) if isinstance(keys, str) else tuple(keys)
         for key in self.content:
             if key not in known:

@@ -322,12 +322,7 @@ def evaluators(job: Job, workers: int, limit: float = LIMIT) -> Pool[Evaluator]:
 
 
 def evaluate_all(pool: Workers, candidates: Sequence[Candidate], cases: int) -> list[Evaluation]:
-    """Evaluate candidates; one that kills its workers, or takes too long, is infinitely bad.
-
-    Parameters
-    ----------
-    cases : number of cases of the job.
-    """
+    """Evaluate candidates; one that kills its workers, or takes too long, is infinitely bad."""
     tasks: list[Future[Evaluation]] = []
     evaluations = []
     try:

@@ -205,17 +205,19 @@ def pose(
 
 def tunable(system: System, estimator: str) -> type[Estimator]:
     """An estimator that has gains."""
-    known = {
-        name: estimator_class
-        for name, estimator_class in estimators_of(system).items()
-        if estimator_class.tunable
-    }
+    tunable = {name: cls for name, cls in estimators_of(system).items() if cls.tunable}
+    return _known(estimator, tunable, "", "none with gains of this name")
+
+
+def _known(
+    estimator: str, known: Mapping[str, type[Estimator]], use: str, found: str
+) -> type[Estimator]:
     if estimator not in known:
         raise unknown_name(
             estimator,
             known,
-            where=f"estimator '{estimator}'",
-            found="none with gains of this name",
+            where=f"estimator '{estimator}'{use}",
+            found=found,
             expected=f"one of {', '.join(known)}",
         )
     return known[estimator]
@@ -447,28 +449,13 @@ def with_reference(cases: Sequence[Case], system: System, estimator: str) -> lis
     Parameters
     ----------
     estimator : name of one that knows whole recordings; any other would be judged by its like.
-
-    Raises
-    ------
-    InputError
-        If there is no such estimator, or it fails.
     """
-    known = {
-        name: estimator_class
-        for name, estimator_class in estimators_of(system).items()
-        if estimator_class.offline
-    }
-    if estimator not in known:
-        raise unknown_name(
-            estimator,
-            known,
-            where=f"estimator '{estimator}' to score by",
-            found="none of this name that knows whole recordings",
-            expected=f"one of {', '.join(known)}",
-        )
+    offline = {name: cls for name, cls in estimators_of(system).items() if cls.offline}
+    found = "none of this name that knows whole recordings"
+    smoother = _known(estimator, offline, " to score by", found)
     referenced = []
     for case in cases:
-        run = run_on_model(case, system, known[estimator])
+        run = run_on_model(case, system, smoother)
         if run.ending is not Ending.OK:
             raise InputError(
                 where=str(case.source),

@@ -504,12 +504,7 @@ def format_tuned(summary: Mapping[str, Any]) -> str:
 
 
 def tuning_answer(sentence: str, summary: Mapping[str, Any]) -> Answer:
-    """The answer of `tune`.
-
-    Parameters
-    ----------
-    sentence : that its page begins with.
-    """
+    """The answer of `tune`."""
     headline = {
         "z, tuned": Measure(summary["z"], "1", "lower"),
         "z, model-based": Measure(summary["z_reasoned"], "1", "lower"),

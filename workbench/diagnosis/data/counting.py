@@ -80,11 +80,6 @@ def count(
     Parameters
     ----------
     restarting : whether samples count where states can be restarted.
-
-    Raises
-    ------
-    InputError
-        If too few do.
     """
     system = system.under(case.conditions)
     compare, time, h = system.comparison, case.time, float(np.median(np.diff(case.time)))
@@ -148,10 +143,6 @@ def refuse_too_short(
     case: Case, system: System, seconds: float, excluded: Mapping[str, Mask]
 ) -> None:
     """Refuse a recording with too little that counts.
-
-    Parameters
-    ----------
-    seconds : that count.
 
     Raises
     ------

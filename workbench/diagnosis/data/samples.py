@@ -228,11 +228,6 @@ def prepare(
     signals : that are compared, see `compared`.
     sound : which samples count.
     restarting : whether samples count where states can be restarted.
-
-    Raises
-    ------
-    InputError
-        If the recording has too little that counts.
     """
     time, h = case.time, float(np.median(np.diff(case.time)))
     own = tuple(name for name in signals if name in case)

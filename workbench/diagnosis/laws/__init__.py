@@ -109,11 +109,6 @@ def propose(before: Outcome, problem: Problem, engine: Engine) -> Proposal:
         cause, a law is sought beside that.
     problem : as it was asked of that.
     engine : whose folder takes the extended model and the generated classes.
-
-    Raises
-    ------
-    InputError
-        If the library cannot be compiled, or the model is none of this library.
     """
     about = before.diagnosis.best if _more(before.diagnosis) else before.diagnosis.base
     scan = Scan(problem, about, engine)

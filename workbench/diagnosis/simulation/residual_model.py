@@ -183,13 +183,7 @@ class ResidualModel:
         self.simulated = self.simulated._replace(recordings=tuple(self.recordings))
 
     def count_restarted(self, numbers: Collection[int], *, counting: bool) -> None:
-        """Let samples of some recordings count, or not, where states can be restarted.
-
-        Raises
-        ------
-        InputError
-            If a recording has too little else.
-        """
+        """Let samples of some recordings count, or not, where states can be restarted."""
         at = list(self._at)
         for k in numbers:
             form = k if counting else self._without[k]

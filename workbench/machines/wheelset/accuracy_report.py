@@ -213,12 +213,7 @@ def cell(row: Row, worst_stop: Worst | None) -> str:
 def write_accuracy_page(
     system: System, summary: Mapping[str, Any], stops: Sequence[StopAccuracy], out: Path
 ) -> Path:
-    """Write the page into the folder; returns its path.
-
-    Parameters
-    ----------
-    summary : as written to accuracy.json.
-    """
+    """Write the page into the folder; returns its path."""
     names = {name: label(name, system) for name in stops[0].estimators}
     shown = "Each dot is a stop: error of the estimated force, rms over the mean of the truth."
     terms = {

@@ -20,10 +20,6 @@ def balances(
     """Balances and slip law from smoothed signals.
 
     Balances and the slip law need Fx: without it, what the contact explains is not known.
-
-    Parameters
-    ----------
-    values : parameters of the model in this stop.
     """
     h = float(np.median(np.diff(case.time)))
     width = max(5, round(_WINDOW / h) | 1)

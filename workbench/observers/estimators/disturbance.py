@@ -218,7 +218,6 @@ class DisturbanceObserver(Estimator):
         "L: rows states, then corrections of quantities; columns dy, integral of dy. T [1/s]: "
         "rate at which a deviation decays"
     )
-    sticks = True
     _step = staticmethod(disturbance_step)
     _loop = staticmethod(_loop)
 

@@ -547,7 +547,6 @@ class ExtendedKalmanFilter(Estimator):
     passes_events = True
     aided = True
     meaning = "standard deviations of samples, and random walks"
-    sticks = True
     _step = staticmethod(ekf_step)
     _loop = staticmethod(_loop)
 

@@ -55,16 +55,6 @@ def next_stop(system: System, rivals: Rivals, engine: Engine) -> NextStop:
 
     Of several rivals, by how many pairs a diagnosis would tell apart, then by the least distance
     that is left between two; of a single one, by how sure its sizes would be.
-
-    Parameters
-    ----------
-    system : that was diagnosed.
-    rivals : what its recordings leave undecided.
-
-    Raises
-    ------
-    InputError
-        If the system does not say what may be varied, or no recording of it would count.
     """
     with _open(system, rivals, engine) as (experiments, pool):
         grid, plan = all_settings(experiments), settings_fraction(experiments)

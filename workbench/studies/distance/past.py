@@ -71,13 +71,7 @@ class PastFit:
 
 
 def fit_past_stops(system: System, cases: Sequence[Case], engine: Engine) -> PastFit:
-    """Fit levels, and what differs between recordings, to past stops.
-
-    Raises
-    ------
-    InputError
-        If a recording has too little that counts.
-    """
+    """Fit levels, and what differs between recordings, to past stops."""
     path = system.model(OBSERVER).path
     assert path is not None
     source = ModelSource(path, system, system.given)
@@ -97,13 +91,7 @@ def fit_past_stops(system: System, cases: Sequence[Case], engine: Engine) -> Pas
 
 
 def places(keys: Sequence[Key], system: System, conditions: Mapping[str, Value]) -> dict[str, int]:
-    """Which of the levels each parameter has under some conditions.
-
-    Raises
-    ------
-    InputError
-        If no past stop was made under them.
-    """
+    """Which of the levels each parameter has under some conditions."""
     columns = {}
     for name, level in system.comparison.levels.items():
         key = name, choice_of(system, name, conditions)

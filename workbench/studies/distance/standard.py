@@ -10,33 +10,24 @@ from dataclasses import dataclass
 G = 9.81  # [m/s2]
 
 
-def response_time(delay: float, rise: float) -> float:
-    """Equivalent response te = ta + tab/2 [s], of a delay and a rise in a line.
-
-    >>> response_time(0.2, 4.0)
-    2.2
-    """
-    return delay + 0.5 * rise
-
-
-def stopping_distance(speed: float, response: float, rate: float, end: float = 0.0) -> float:
-    """Distance s = v0 te + (v0^2 - v^2)/(2 ae) [m].
+def stopping_distance(speed: float, response: float, rate: float) -> float:
+    """Distance s = v0 te + v0^2/(2 ae) [m].
 
     Parameters
     ----------
-    speed, end : at the command, and after the distance [m/s].
-    response : equivalent [s].
+    speed : at the command [m/s].
+    response : equivalent, a delay and half of a rise in a line [s].
     rate : equivalent deceleration [m/s2].
 
     >>> round(stopping_distance(200.0 / 3.6, 1.598264, 0.899829), 2)
     1803.8
     """
-    return speed * response + (speed**2 - end**2) / (2.0 * rate)
+    return speed * response + speed**2 / (2.0 * rate)
 
 
-def equivalent_rate(speed: float, response: float, distance: float, end: float = 0.0) -> float:
+def equivalent_rate(speed: float, response: float, distance: float) -> float:
     """Equivalent deceleration ae [m/s2], the inverse of `stopping_distance`."""
-    return (speed**2 - end**2) / (2.0 * (distance - speed * response))
+    return speed**2 / (2.0 * (distance - speed * response))
 
 
 @dataclass(frozen=True)

@@ -57,11 +57,6 @@ def monitor(
     engine : whose folder takes the state, from which a run goes on.
     rate : alarms per recording that a sound machine may raise.
     read : makes a case of a folder; a function of a module.
-
-    Raises
-    ------
-    InputError
-        If there is no recording that can be used, or the state is of another model.
     """
     if not watched(system):
         raise InputError(

@@ -59,12 +59,7 @@ class Check:
 
 
 def thresholds_check(results: Sequence[ThresholdSensitivity], usual: Mapping[str, float]) -> Check:
-    """Report which verdicts half and twice of each threshold change.
-
-    Parameters
-    ----------
-    usual : value of each threshold.
-    """
+    """Report which verdicts half and twice of each threshold change."""
     sets = [
         {
             "rig": result.planting.options,
@@ -250,7 +245,7 @@ def _heat(
 ) -> "Axes":
     axes = sheet.subplots()
     axes.grid(visible=False)
-    draw_heat(axes, table, 100.0)
+    draw_heat(axes, table)
     axes.set_xticks(range(len(columns)), columns, rotation=turned)
     axes.set_yticks(range(len(rows)), rows)
     return axes

@@ -161,10 +161,6 @@ def vary_sets(
 ) -> tuple[list[ThresholdSensitivity], bool]:
     """Diagnose sets of recordings by half and twice of each threshold.
 
-    Parameters
-    ----------
-    plantings : what each set hides.
-
     Returns
     -------
     results : of the sets that were diagnosed; one that failed is reported and left out.

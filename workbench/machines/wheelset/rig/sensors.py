@@ -113,12 +113,7 @@ def _least_disc(stop: StopTruth, time: Vector) -> Vector:
 
 
 def received(stop: StopTruth, effects: Effects, time: Vector) -> NDArray[np.bool_]:
-    """Which samples reach the file, (n,).
-
-    Parameters
-    ----------
-    time : as in `sample`.
-    """
+    """Which samples reach the file, (n,)."""
     return ~_struck(effects.dropouts, time, _rng(stop, _DROPOUTS))
 
 

@@ -24,12 +24,7 @@ _LARGEST_INT = 2**31 - 1
 
 
 class Data:
-    """The structs of one translated law.
-
-    Parameters
-    ----------
-    where : what the data are of, for messages.
-    """
+    """The structs of one translated law."""
 
     def __init__(self, where: str) -> None:
         self._where = where
