@@ -125,8 +125,9 @@ def _step(
         for start in simulated:
             if start.effect in ranked:
                 rivals[ranked.index(start.effect)].insert(0, start)
-            else:
-                rivals.append([start])
+            else:  # of a sensor, or a run that nothing corrects, it is a guess to begin with
+                guess = fit.free or start.effect.sensor
+                rivals.append(_starts([start]) if guess else [start])
     if not rivals:
         return None
     report(f"fitting {', '.join(variants[0].effect.name for variants in rivals)}")
