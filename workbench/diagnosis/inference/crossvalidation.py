@@ -45,7 +45,7 @@ class CrossValidation:
         """
         before, after = (self._of_means(model, fast=fast) for model in (less, best))
         weights = self._of_means(best, fast=fast, beside=less)
-        total = sum(weight.sum() for weight in weights)
+        total = max(sum(weight.sum() for weight in weights), 1e-9)
         left, without = (
             sum((weight * (own - 1.0)).sum() for weight, own in zip(weights, squares, strict=True))
             for squares in (after, before)
