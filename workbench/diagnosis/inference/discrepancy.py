@@ -22,7 +22,7 @@ from scipy.stats import t
 from workbench.arrays import Vector
 from workbench.diagnosis.effects.catalogue import Effect
 from workbench.diagnosis.inference.fit import Fit
-from workbench.diagnosis.inference.quadratic import Key, covariance
+from workbench.diagnosis.inference.quadratic import Joint, Key, covariance
 from workbench.diagnosis.inference.search import FittedModel
 from workbench.system.units import BAND
 
@@ -61,6 +61,7 @@ def hidden_by_noise(fit: Fit, best: FittedModel, effect: Effect) -> dict[Key, fl
     size = best.point.sizes[effect.name, effect.label]
     coupling = size * total.N[:known, known:]  # (p, q)
     moved = covariance(total.N[:known, :known]) @ coupling
+    place = joint.shared.index((effect.name, effect.label))
     shown = np.maximum(size**2 * np.diag(total.N)[known:] - (coupling * moved).sum(axis=0), 0.0)
     gradient = size * total.g[known:] - moved.T @ total.g[:known]
     # Of s by each q and each standard deviation beforehand, (q, 20).
@@ -69,8 +70,19 @@ def hidden_by_noise(fit: Fit, best: FittedModel, effect: Effect) -> dict[Key, fl
     evidence = 0.5 * (mean * gradient[:, None] - np.log(precision * _SHARES**2))
     weights = np.exp(evidence - evidence.max())
     squares = (weights / weights.sum() * (mean**2 + 1.0 / precision)).sum(axis=1)
+    # A size is the mean where its effect acts, by how far it moves errors there.
+    moved[place] -= size * _means(joint, place)
     deviations = np.sqrt(moved**2 @ squares)
     return dict(zip(joint.known, map(float, deviations), strict=True))
+
+
+def _means(joint: Joint, place: int) -> Vector:
+    """(q,) Mean of what a size goes with, by the squares of the derivatives by that size."""
+    known = len(joint.known)
+    products = sum(system.J[:, place] @ system.J[:, known:] for system in joint.systems)
+    squares = sum(system.J[:, place] @ system.J[:, place] for system in joint.systems)
+    means: Vector = np.asarray(products / squares, np.float64)
+    return means
 
 
 def correlated_deviations(fit: Fit, best: FittedModel) -> dict[Key, float]:
