@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -22,6 +23,7 @@ from workbench.diagnosis.effects.extension import (
     sizes_by_component,
     variables,
 )
+from workbench.diagnosis.inference.crossvalidation import CrossValidation
 from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.linearized import LinearizedPoint, Point, slowness
 from workbench.diagnosis.inference.quadratic import (
@@ -35,7 +37,7 @@ from workbench.diagnosis.inference.quadratic import (
 )
 from workbench.diagnosis.inference.rivals import Rival
 from workbench.diagnosis.inference.score_test import CandidateScore, predictive_deviance
-from workbench.diagnosis.inference.search import extended, joined
+from workbench.diagnosis.inference.search import FittedModel, extended, joined
 from workbench.diagnosis.inference.selection import anew
 from workbench.diagnosis.inference.thresholds import SOUND
 from workbench.diagnosis.simulation.prediction import Predictor, Variation
@@ -757,3 +759,26 @@ def test_what_one_recording_alone_tells_is_no_failure_of_the_others():
     # Predicted by the blunt ones the sharp stop has the variance of both, 1 + 1e4/3.
     assert (without - known)[0] == pytest.approx(64.0 - np.log(1.0 + 1e4 / 3.0), rel=1e-6)
     assert (without - known)[1:] == pytest.approx(0.0, abs=0.01)
+
+
+def test_what_remains_where_an_effect_does_nothing_says_nothing_of_its_form():
+    """Of two stops of ten blocks, the effect takes 4 of 5 in the first, and nothing of 9 after."""
+    still, none = Point({}, {}, np.zeros((2, 0)), {}), np.zeros(0)
+
+    def model(*errors: float) -> FittedModel:
+        stops = tuple(
+            WhitenedResiduals(np.full((10, 1), error), none, np.ones((2, 1)), np.zeros((10, 0)))
+            for error in errors
+        )
+        return FittedModel((), still, LinearizedPoint(still, (), stops, 1, np.ones(1), 0.0), 0.0)
+
+    class Recorded(CrossValidation):
+        """Fits in which nothing is fitted, so that each stop is held out as it is."""
+
+        def _errors(self, fitted: FittedModel) -> list[np.ndarray]:
+            return [recording.errors for recording in fitted.linearised.residuals]
+
+    validation = Recorded(SimpleNamespace(unknowns=SimpleNamespace(count=2)))
+    left, without = validation.where_acting(model(5.0, 9.0), model(1.0, 9.0), fast=True)
+    assert (left, without) == (pytest.approx(0.0), pytest.approx(24.0))
+    assert validation.squares(model(1.0, 9.0), fast=True).mean() == pytest.approx(41.0)
