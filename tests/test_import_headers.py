@@ -4,9 +4,10 @@ import datetime
 import struct
 import tomllib
 import zipfile
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import openpyxl
@@ -176,30 +177,6 @@ def test_merged_cells_of_a_workbook_name_all_columns_below(tmp_path):
     assert names == ["Zeit", "Zulauf roh", "Zulauf gefiltert", "Pegel roh", "Pegel gefiltert"]
 
 
-@pytest.mark.parametrize("header", ["valve [%]", "valve"])
-@pytest.mark.parametrize("old", [False, True], ids=["xlsx", "xls"])
-def test_cells_that_are_shown_in_percent_are_percent(tmp_path, header, old):
-    """The number below 42 % is 0.42; under a header with % it was taken for 0.42 %."""
-    rows = [["time [s]", header], *([k, (40 + k % 9) / 100] for k in range(60))]
-    path = tmp_path / ("a.xls" if old else "a.xlsx")
-    if old:
-        book = xlwt.Workbook()
-        sheet, percent = book.add_sheet("one"), xlwt.easyxf(num_format_str="0.0%")
-        for i, (t, share) in enumerate(rows):
-            sheet.write(i, 0, t)
-            sheet.write(i, 1, share, percent if i else xlwt.XFStyle())
-    else:
-        book = openpyxl.Workbook()
-        for row in rows:
-            book.active.append(row)
-        for row in book.active.iter_rows(min_row=2, min_col=2):
-            row[0].number_format = "0.0%"
-    book.save(path)
-    valve = read_recorded_file(path).groups[0].channels[1]
-    assert valve.unit == "%"
-    assert_allclose(valve.values, 40.0 + np.arange(60) % 9)
-
-
 def test_a_number_in_brackets_is_that_of_a_channel():
     assert name_and_unit("log(1)") == ("log(1)", "")
     assert name_and_unit("log(1)[s]") == ("log(1)", "s")
@@ -289,15 +266,16 @@ def test_a_workbook_of_excel_97_has_sheets_dates_and_gaps(tmp_path):
     assert np.flatnonzero(np.isnan(level.values)).tolist() == [30]
 
 
-def open_document(rows: Sequence[Sequence[float | str]]) -> dict[str, bytes]:
-    """Parts of a workbook of OpenDocument, with one sheet."""
+def open_document(rows: Sequence[Sequence[float | str]], percent: int = -1) -> dict[str, bytes]:
+    """Parts of a workbook of OpenDocument, with one sheet, and a column in percent."""
     cells = [
         [
-            f'<table:table-cell office:value-type="float" office:value="{cell}"/>'
+            f'<table:table-cell office:value-type="{"percentage" if j == percent else "float"}" '
+            f'office:value="{cell}"/>'
             if isinstance(cell, float)
             else f'<table:table-cell office:value-type="string"><text:p>{cell}</text:p>'
             "</table:table-cell>"
-            for cell in row
+            for j, cell in enumerate(row)
         ]
         for row in rows
     ]
@@ -315,8 +293,11 @@ def open_document(rows: Sequence[Sequence[float | str]]) -> dict[str, bytes]:
     return {name: part.encode() for name, part in parts.items()}
 
 
-def binary_excel(rows: Sequence[Sequence[float | str]]) -> dict[str, bytes]:
-    """Parts of a binary workbook of Excel, with one sheet ([MS-XLSB], section 2.1)."""
+def binary_excel(rows: Sequence[Sequence[float | str]], percent: int = -1) -> dict[str, bytes]:
+    """Parts of a binary workbook of Excel, with one sheet ([MS-XLSB], section 2.1).
+
+    Every other number of a column in percent is a short one, of whole hundredths.
+    """
 
     def record(number: int, content: bytes = b"") -> bytes:
         parts = [number] if number < 128 else [number & 127 | 128, number >> 7]
@@ -329,18 +310,82 @@ def binary_excel(rows: Sequence[Sequence[float | str]]) -> dict[str, bytes]:
     for i, row in enumerate(rows):
         sheet += record(0, struct.pack("<I", i) + bytes(21))
         for j, cell in enumerate(row):
-            place = struct.pack("<2I", j, 0)
+            place = struct.pack("<2I", j, int(j == percent))
+            if isinstance(cell, float) and j == percent and i % 2:
+                sheet += record(2, place + struct.pack("<I", round(100 * cell) << 2 | 3))
+                continue
             value = struct.pack("<d", cell) if isinstance(cell, float) else text(cell)
             sheet += record(5 if isinstance(cell, float) else 6, place + value)
     bundle = record(156, struct.pack("<2I", 0, 1) + text("r1") + text("Rig"))
     relation = "http://schemas.openxmlformats.org/officeDocument/2006/relationships/worksheet"
     listed = f'<Relationship Id="r1" Type="{relation}" Target="worksheets/sheet1.bin"/>'
+    form = record(615, bytes([1, 0, 0, 0])) + record(44, b"\xb0\0" + text("0.0%")) + record(616)
+    style = [record(47, struct.pack("<2H", 0, code) + bytes(12)) for code in (0, 0xB0)]
     return {
         "[Content_Types].xml": b"<Types/>",
+        "xl/styles.bin": form + record(617, b"\2\0\0\0") + b"".join(style) + record(618),
         "xl/_rels/workbook.bin.rels": f"<Relationships>{listed}</Relationships>".encode(),
         "xl/workbook.bin": record(131) + record(143) + bundle + record(144) + record(132),
         "xl/worksheets/sheet1.bin": sheet + record(146) + record(130),
     }
+
+
+def percent_of_excel_97(rows: Sequence[Sequence[Any]], path: Path) -> None:
+    book = xlwt.Workbook()
+    sheet, percent = book.add_sheet("one"), xlwt.easyxf(num_format_str="0.0%")
+    for i, row in enumerate(rows):
+        for j, cell in enumerate(row):
+            sheet.write(i, j, cell, percent if i and j else xlwt.XFStyle())
+    book.save(path)
+
+
+def percent_of_excel(rows: Sequence[Sequence[Any]], path: Path, form: str = "0.0%") -> None:
+    book = openpyxl.Workbook()
+    for row in rows:
+        book.active.append(row)
+    for row in book.active.iter_rows(min_row=2, min_col=2):
+        row[0].number_format = form
+    book.save(path)
+
+
+def percent_of_others(make: Callable[..., dict[str, bytes]]) -> Callable[..., None]:
+    def write(rows: Sequence[Sequence[Any]], path: Path) -> None:
+        with zipfile.ZipFile(path, "w") as archive:
+            for name, content in make(rows, percent=1).items():
+                archive.writestr(name, content)
+
+    return write
+
+
+@pytest.mark.parametrize("header", ["valve [%]", "valve"])
+@pytest.mark.parametrize(
+    "write",
+    [
+        percent_of_excel,
+        percent_of_excel_97,
+        percent_of_others(open_document),
+        percent_of_others(binary_excel),
+    ],
+    ids=["xlsx", "xls", "ods", "xlsb"],
+)
+def test_cells_that_are_shown_in_percent_are_percent(tmp_path, header, write):
+    """The number below 42 % is 0.42; under a header with % it was taken for 0.42 %."""
+    write(
+        [["time [s]", header], *([float(k), (40 + k % 9) / 100] for k in range(60))], tmp_path / "a"
+    )
+    valve = read_recorded_file(tmp_path / "a").groups[0].channels[1]
+    assert valve.unit == "%"
+    assert_allclose(valve.values, 40.0 + np.arange(60) % 9)
+
+
+def test_a_sign_of_percent_behind_a_number_changes_nothing(tmp_path):
+    """A format such as 0.0" %" shows 42 as 42 %."""
+    percent_of_excel(
+        [["time [s]", "valve"], *([k, 40.0 + k] for k in range(9))], tmp_path / "a", '0.0" %"'
+    )
+    valve = read_recorded_file(tmp_path / "a").groups[0].channels[1]
+    assert valve.unit == "%"
+    assert_allclose(valve.values, 40.0 + np.arange(9))
 
 
 @pytest.mark.parametrize("made", [open_document, binary_excel])

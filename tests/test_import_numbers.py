@@ -17,7 +17,7 @@ from workbench.recordings.channels import NamedChannel, ProposedMapping, merge, 
 from workbench.recordings.channels.clock import Clock
 from workbench.recordings.formats import read_recorded_file
 from workbench.recordings.formats.numbers import markers
-from workbench.recordings.formats.spelling import conversion, spell_unit
+from workbench.recordings.formats.spelling import conversion, is_unit, spell_unit
 from workbench.recordings.formats.stamps import iso
 from workbench.system.registry import load_system
 from workbench.system.system import System
@@ -251,7 +251,7 @@ def test_a_channel_that_judges_is_named_and_not_dropped_in_silence(tmp_path, sys
     names = "t [s];Bremsdruck [bar];Antriebsmoment [kNm];v_Rad [m/s];v_Rolle [m/s]"
     rows = [f"{0.01 * i:.2f};1.5;1.5;20.5;20.5;1.5" for i in range(60)]
     told = {}
-    for force in ("F_long [kN]", "Längskraft [kp2]", "Temperatur [degC]"):
+    for force in ("F_long [kN]", "Längskraft [kq]", "Temperatur [degC]"):
         path = table(tmp_path / "a.csv", [f"{names};{force}", *rows])
         proposal = propose([read_recorded_file(path)], system, {})
         assert not proposal.problems
@@ -262,7 +262,7 @@ def test_a_channel_that_judges_is_named_and_not_dropped_in_silence(tmp_path, sys
             "Fx: it may be 'F_long'; nothing but its unit speaks for it, "
             "--column 'Fx=F_long' confirms it",
         ),
-        "Längskraft [kp2]": ("Fx: 'Längskraft' is in [kp2], a unit that is not known",),
+        "Längskraft [kq]": ("Fx: 'Längskraft' is in [kq], a unit that is not known",),
         "Temperatur [degC]": (),
     }
 
@@ -281,12 +281,54 @@ def test_a_channel_that_judges_is_named_and_not_dropped_in_silence(tmp_path, sys
         ("lbf.ft", "N.m", 1.3558179483314004),  # NIST SP 811, appendix B.8
         ("ft·lb", "N.m", 1.3558179483314004),
         ("ft-lbf", "N.m", 1.3558179483314004),
+        ("IN-LBS", "N.m", 1.3558179483314004 / 12),
+        ("N-m", "N.m", 1.0),
+        ("Ncm", "N.m", 0.01),
+        ("gal/min", "m3/s", 6.30901964e-5),
+        ("GPM", "m3/s", 6.30901964e-5),
+        ("ft³/min", "m3/s", 4.719474432e-4),
+        ("cfm", "m3/s", 4.719474432e-4),
+        ("PSIG", "Pa", 6894.757293168361),
+        ("in Hg", "Pa", 3386.388640341),
+        ("mmH2O", "Pa", 9.80665),
+        ("kn", "m/s", 1852 / 3600),
+        ("MPH", "m/s", 0.44704),
+        ("ft/sec", "m/s", 0.3048),
+        ("lb/hr", "kg/s", 0.45359237 / 3600),
+        ("lbs", "N", 4.4482216152605),  # of a mass it is none
+        ("g", "m/s2", 9.80665),
+        ("deg/sec", "rad/s", np.pi / 180),
+        ("mAh", "A.s", 3.6),
+        ("mPas", "Pa.s", 1e-3),  # and no plural of mPa
     ],
 )
 def test_units_of_workshops_are_known(unit, si, factor):
     converted = conversion(spell_unit(f"[{unit}]"), si)
-    assert converted.factor == pytest.approx(factor, rel=1e-15)
+    assert converted.factor == pytest.approx(factor, rel=1e-9)
     assert converted.zero == 0.0
+
+
+def test_words_and_other_quantities_are_no_units():
+    """Min is no million inches, GPS no horse power; a minimum in a name is none of a level."""
+    assert not any(map(is_unit, ("Min", "GPS", "Uhr", "hh")))
+    assert conversion("Pas", "Pa") is conversion("g", "N") is conversion("Nl/min", "m3/s") is None
+
+
+def test_names_that_end_in_words_state_no_unit(tmp_path, tank):
+    path = table(tmp_path / "a.csv", ["t [s];inflow [l/s];h_in", *ROWS])
+    assert (
+        "no unit in the file" in propose([read_recorded_file(path)], tank, {}).assigned["h"].doubt
+    )
+
+
+def test_a_gallon_is_asked_about(tmp_path, tank):
+    path = table(tmp_path / "a.csv", ["t [s];inflow [gal/min];h [mm]", *ROWS])
+    inflow = propose([read_recorded_file(path)], tank, {}).assigned["inflow"]
+    assert inflow.factor == pytest.approx(6.30901964e-5)
+    assert "[gal/min]' confirms it, [igal/min] takes the other" in inflow.doubt
+    said = {"inflow": NamedChannel("inflow", "igal/min")}
+    inflow = propose([read_recorded_file(path)], tank, said).assigned["inflow"]
+    assert inflow.factor == pytest.approx(4.54609e-3 / 60)
 
 
 def test_a_torque_without_a_unit_may_be_in_that_of_another_country(tmp_path, system):

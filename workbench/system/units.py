@@ -114,8 +114,15 @@ def _parse(unit: str) -> "pint.Unit | None":
         return _units().Unit("")
     if len(unit) > _LONGEST or not _UNIT.fullmatch(unit):
         return None
+    spelled = _pint_spelling(unit)
     try:
-        return _units().parse_units(_pint_spelling(unit))
+        if any(
+            prefix and name in _without_prefix()
+            for part in re.findall(r"[^\W\d_]+", spelled)
+            for prefix, name, _ in _units().parse_unit_name(part)[:1]
+        ):
+            return None
+        return _units().parse_units(spelled)
     except (pint.PintError, ValueError, TokenError):  # ValueError: "nan", a number to pint
         return None
 
@@ -131,9 +138,18 @@ def _pint_spelling(unit: str) -> str:
 @cache
 def _units() -> pint.UnitRegistry[float]:
     registry: pint.UnitRegistry[float] = pint.UnitRegistry(None)
-    definitions = Path(__file__).with_name("units.txt").read_text(encoding="utf-8")
-    registry.load_definitions(definitions.splitlines())
+    registry.load_definitions(_definitions().splitlines())
     return registry
+
+
+@cache
+def _without_prefix() -> frozenset[str]:
+    """Names of units that no prefix goes before."""
+    return frozenset(re.findall(r"(?m)^(\w+) =", _definitions().partition("# Without prefixes")[2]))
+
+
+def _definitions() -> str:
+    return Path(__file__).with_name("units.txt").read_text(encoding="utf-8")
 
 
 def quantity(text: str, si: str, where: str) -> float:

@@ -217,6 +217,12 @@ def meaning_doubt(
                 f"{said or 'not said to be one'}; add or take off the pressure of the air where "
                 f"they differ, --column '{column} [{base}]' takes the values as they are"
             )
+    if match := _GALLON.search(unit):
+        other = unit.replace(match[0], f"i{match[0]}")
+        return (
+            f"[{unit}] is taken as of US gallons, 3.785 l, and not of imperial ones, 4.546 l; "
+            f"--column '{column} [{unit}]' confirms it, [{other}] takes the other"
+        )
     if counted := multiple(unit, si):
         own, size = counted
         return (
@@ -294,8 +300,8 @@ def _candidate(
     concluded = not stated and unit != "1"
     way = conversion_to(unit, signal, system)
     if way is None:
-        known = "" if is_unit(unit) else ", a unit that is not known"
-        return None, f"'{channel.name}' is in [{unit}]{known}"
+        known = "of another dimension" if is_unit(unit) else "that is not known"
+        return None, f"'{channel.name}' is in [{unit}], a unit {known}"
     scale, formula = way
     with np.errstate(over="ignore", invalid="ignore"):  # what no machine reads
         values = scale.factor * samples + scale.zero
@@ -421,6 +427,8 @@ _DIFFERENCE = re.compile(
     r"differen[cz]|delta|\u0394|\bd[ _]?T\b|spreizung|spread|superheat|subcool|\b(rise|lift)\b",
     re.IGNORECASE,
 )
+_GALLON = re.compile(r"\b(gal|gallon|gpm)\b")
+_WORDS = frozenset(("in", "atm"))  # units that mean something else in a name: h_in, p_atm
 _HUGE = 1e100  # no sample, and its square would be no number
 _COLD = 100.0  # K, below which no machine's temperature is
 _THOUSANDFOLD = 300.0  # times the typical size of a signal: a unit is another one
@@ -469,4 +477,5 @@ def unit_in_name(name: str, signal: Signal, system: System) -> str:
     """A unit at the end of a name, as in `p_bar`; one letter may mean anything."""
     _, _, last = name.replace(" ", "_").rpartition("_")
     unit = spell_unit(last)
-    return unit if len(last) > 1 and last != name and conversion_to(unit, signal, system) else ""
+    told = len(last) > 1 and last != name and last.lower() not in _WORDS
+    return unit if told and conversion_to(unit, signal, system) else ""

@@ -10,31 +10,40 @@ from workbench.system.units import check_unit, si_factor
 # Spellings that mean one unit alone. Case matters elsewhere: mN is no MN.
 _SPELLINGS = {
     "-": "1", "--": "1", "[-]": "1", "none": "1", "ohne": "1",
-    "sec": "s", "secs": "s", "second": "s", "seconds": "s", "Sek": "s", "Sek.": "s", "sek": "s",
+    "secs": "s", "second": "s", "seconds": "s", "Sek": "s", "Sek.": "s", "sek": "s",
     "Sekunden": "s", "msec": "ms", "millisecond": "ms", "milliseconds": "ms",
-    "usec": "us", "hr": "h", "hours": "h", "minutes": "min", "days": "d",
-    "kmh": "km/h", "km/std": "km/h", "kph": "km/h", "KM/H": "km/h", "Km/h": "km/h",
-    "kPA": "kPa", "KPa": "kPa", "Bar": "bar", "BAR": "bar", "mBar": "mbar", "pa": "Pa",
-    "RPM": "rpm", "Rpm": "rpm", "r/min": "rpm", "U/Min": "rpm", "1/Min": "rpm", "upm": "rpm",
-    "Upm": "rpm", "rev/min": "rpm", "/min": "1/min",
+    "usec": "us", "hours": "h", "hrs": "h", "Std.": "h", "Stunden": "h", "minutes": "min",
+    "Minuten": "min", "days": "d", "Tage": "d",
+    "km/std": "km/h", "KM/H": "km/h", "Km/h": "km/h",
+    "kPA": "kPa", "KPa": "kPa", "KPA": "kPa", "hpa": "hPa", "HPA": "hPa",
+    "Bar": "bar", "BAR": "bar", "mBar": "mbar", "pa": "Pa",
+    "Rpm": "rpm", "r/min": "rpm", "U/Min": "rpm", "1/Min": "rpm", "upm": "rpm",
+    "Upm": "rpm", "rev/min": "rpm", "/min": "1/min", "tr/min": "rpm",
     "Umdr/min": "rpm", "U/s": "rev/s",
-    "NM": "N.m", "N m": "N.m", "N*m": "N.m", "kN m": "kN.m", "kNM": "kN.m", "KN": "kN",
-    "KNm": "kNm",
-    "DegC": "degC", "°C": "degC", "deg C": "degC", "degC": "degC", "C": "degC", "Grad C": "degC",
-    "Deg C": "degC", "Deg_C": "degC", "deg_C": "degC", "DEG C": "degC", "degrees C": "degC",
-    "Celsius": "degC", "celsius": "degC", "°c": "degC", "Deg F": "degF", "deg_F": "degF",
+    "NM": "N.m", "N m": "N.m", "kN m": "kN.m", "kNM": "kN.m", "KN": "kN", "KNm": "kNm",
+    "C": "degC", "Grad C": "degC", "Celsius": "degC", "celsius": "degC", "Cel": "degC",
     "meters/second": "m/s", "Meters/Second": "m/s", "Watts": "W", "Watt": "W", "Amps": "A",
-    "℃": "degC", "°F": "degF", "degF": "degF", "deg F": "degF", "Kelvin": "K",
-    "Grad": "deg", "Grad/s": "deg/s", "degrees": "deg", "radians": "rad", "rad/sec": "rad/s",
-    "m/sec": "m/s", "m/s/s": "m/s2", "Volt": "V", "Volts": "V", "Newton": "N", "metre": "m",
-    "ft.lb": "lbf.ft", "ft*lb": "lbf.ft", "ft-lb": "lbf.ft", "ft lb": "lbf.ft", "ftlb": "lbf.ft",
-    "ft.lbf": "lbf.ft", "ft*lbf": "lbf.ft", "ft-lbf": "lbf.ft", "ft lbf": "lbf.ft",
-    "lb.ft": "lbf.ft", "lb*ft": "lbf.ft", "lb-ft": "lbf.ft", "lb ft": "lbf.ft", "lbft": "lbf.ft",
-    "lbf*ft": "lbf.ft", "lbf-ft": "lbf.ft", "lbf ft": "lbf.ft", "lbfft": "lbf.ft",
-    "kp": "kgf", "kp/cm2": "kgf/cm2", "kg/cm2": "kgf/cm2", "kgf/cm^2": "kgf/cm2",
-    "kp/cm^2": "kgf/cm2", "kg/cm^2": "kgf/cm2",
-    "meter": "m", "Meter": "m", "Prozent": "%", "percent": "%", "‰": "permille",
+    "℃": "degC", "℉": "degF", "Kelvin": "K", "kelvin": "K",
+    "Grad": "deg", "Grad/s": "deg/s", "degrees": "deg", "Deg": "deg", "º": "deg",
+    "radians": "rad", "m/s/s": "m/s2", "Volt": "V", "Volts": "V", "VDC": "V", "Vdc": "V",
+    "V DC": "V", "ADC": "A", "Adc": "A", "A DC": "A", "Newton": "N", "metre": "m",
+    "meter": "m", "Meter": "m", "inches": "in", "feet": "ft", "micron": "um", "microns": "um",
+    "kp/cm2": "kgf/cm2", "kg/cm2": "kgf/cm2", "kgf/cm^2": "kgf/cm2",
+    "kp/cm^2": "kgf/cm2", "kg/cm^2": "kgf/cm2", "in Hg": "inHg", "mm Hg": "mmHg", "psid": "psi",
+    "%RH": "%", "% RH": "%", "%rH": "%", "% rH": "%", "%rF": "%", "% rF": "%", "% r.F.": "%",
+    "Prozent": "%", "percent": "%", "pct": "%", "‰": "permille", "µε": "um/m",
 }  # fmt: skip
+# Units that mean the same in capitals: PSI, MPH.
+_IN_CAPITALS = re.compile(
+    "psid?|ksi|mph|kph|fps|fpm|gpm|cfm|lpm|kts|ft|lb[sf]?|rpm|deg", re.IGNORECASE
+)
+_FORCE = r"(lb|oz)f?s?"
+_TORQUE = re.compile(rf"({_FORCE})[ .*-]?(ft|in)|(ft|in)[ .*-]?({_FORCE})", re.IGNORECASE)
+_DEGREES = re.compile(
+    r"([\u00b0\u00ba]|deg(rees?)?\.?)[ _]?(?P<scale>[CF])(elsius|ahrenheit)?", re.IGNORECASE
+)
+_AROUND = re.compile(r" ?([/*.]) ?|(?<=[A-Za-z])-(?=[A-Za-z])")
+_OF_WATER = re.compile(r"(?<=[mn]) ?(H2O|w\.?c\.?|WG)", re.IGNORECASE)
 # A unit with a factor: 1/10 s, 0.1 s, 10 ms, 10^-3 l/s, 1e-6 s.
 _MULTIPLE = re.compile(
     r"[x*]?\s*(?P<number>\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?)(?:\s*/\s*(?P<parts>\d+)"
@@ -44,23 +53,15 @@ _MULTIPLE = re.compile(
 _FROM_ZERO = re.compile(
     r"(?P<unit>\w*(?:bar|psi|Pa))\s*\(?(?:(?P<gauge>g|gauge|rel|ü)|a|abs)\.?\)?", re.IGNORECASE
 )
-_POWERS = str.maketrans({"²": "2", "³": "3", "⁻": "-", "¹": "1", "·": ".", "⋅": "."})
-# Value in SI of one, and of zero, where a factor alone is not enough: temperatures; and units of
-# trade that the workbench's own files do not have.
-_OTHER = {
-    "degC": ("K", 1.0, 273.15),
-    "degF": ("K", 5.0 / 9.0, 459.67 * 5.0 / 9.0),
-    "psi": ("Pa", 6894.757293168361, 0.0),  # 0.45359237 kg * 9.80665 m/s2 / (25.4 mm)^2
-    "mph": ("m/s", 0.44704, 0.0),
-    "lbf": ("N", 4.4482216152605, 0.0),
-    "lbf.ft": ("N.m", 4.4482216152605 * 0.3048, 0.0),
-    "kgf": ("N", 9.80665, 0.0),
-    "kgf/cm2": ("Pa", 98066.5, 0.0),
-    "in": ("m", 0.0254, 0.0),
-    "ft": ("m", 0.3048, 0.0),
-    "gon": ("rad", math.pi / 200.0, 0.0),
-    "ns": ("s", 1e-9, 0.0),
-    "d": ("s", 86400.0, 0.0),
+_SIGNS = str.maketrans(
+    {"²": "2", "³": "3", "⁻": "-", "¹": "1", "·": ".", "⋅": ".", "\u03a9": "Ohm", "\u2126": "Ohm"}
+)
+# Temperatures have a zero of their own in SI; and what a unit is for a quantity that has no other.
+_SCALES = {"degC": (1.0, 273.15), "degF": (5.0 / 9.0, 459.67 * 5.0 / 9.0)}
+_FOR = {
+    "m/s2": {"g": "gn", "G": "gn", "mg": "mgn"},
+    "N": {"lb": "lbf", "lbs": "lbf"},
+    "K": {"F": "degF"},
 }
 
 
@@ -82,7 +83,16 @@ def spell_unit(text: str) -> str:
     for marks in ("[]", "()", "{}", "<>"):
         if bare[:1] == marks[0] and bare[-1:] == marks[1]:
             bare = bare[1:-1].strip()
-    bare = bare.strip("'\"").strip().translate(_POWERS).replace("**", "^")
+    bare = bare.strip("'\"").strip().translate(_SIGNS).replace("**", "^")
+    if bare.isupper() and _IN_CAPITALS.fullmatch(bare):
+        bare = bare.lower()
+    if match := _TORQUE.fullmatch(bare):
+        force, arm = (match[1], match[3]) if match[1] else (match[5], match[4])
+        return f"{force[:2]}f.{arm}".lower()
+    if match := _DEGREES.fullmatch(bare):
+        return f"deg{match['scale'].upper()}"
+    if bare not in _SPELLINGS:
+        bare = _OF_WATER.sub("WC", _AROUND.sub(lambda sign: sign[1] or ".", bare))
     return _SPELLINGS.get(bare, bare)
 
 
@@ -94,9 +104,10 @@ def conversion(unit: str, si: str) -> Conversion | None:
     unit : as `spell_unit`.
     """
     unit, _ = pressure_zero(unit) if si == "Pa" else (unit, "")
-    base, factor, zero = _OTHER.get(unit, (unit, 1.0, 0.0))
+    unit = _FOR.get(si, {}).get(unit, unit)
+    factor, zero = _SCALES.get(unit, (1.0, 0.0))
     try:
-        return Conversion(factor * si_factor(base, si, ""), zero)
+        return Conversion(factor * si_factor("K" if zero else unit, si, ""), zero)
     except InputError:
         counted = multiple(unit, si)
         return counted[1] if counted else None
@@ -140,7 +151,7 @@ def is_unit(text: str) -> bool:
     try:
         check_unit(unit, "")
     except InputError:
-        return unit in _OTHER
+        return unit in _SCALES
     return True
 
 

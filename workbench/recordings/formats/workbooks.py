@@ -4,7 +4,10 @@ Formulas are as their program last computed them. Each reader imports the packag
 """
 
 import io
-from collections.abc import Collection, Mapping, Sequence
+import re
+import struct
+import zipfile
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from datetime import date, datetime, time, timedelta
 from pathlib import Path
 from typing import Any
@@ -18,6 +21,12 @@ _LOOKED = 200  # rows that tell whether a sheet shows percent
 _HOUR = timedelta(hours=1)
 _MOST = 1_048_576  # rows of a sheet of Excel
 _WHOLE = 2.0**53  # below which doubles hold whole numbers
+_LITERAL = re.compile(r'"[^"]*"|[\\_*].')  # of a number format: shown as it stands, or not at all
+_PERCENT_CELL = re.compile(rb"<[^<>]*\boffice:value-type=[\"']percentage[\"'][^<>]*>")
+_VALUE = re.compile(rb"\boffice:value=[\"']([^\"']*)[\"']")
+# Records of a binary workbook of Excel ([MS-XLSB], section 2.3): cells with a short number, one
+# that is stored or computed, and a text; formats, styles of cells, begin and end of these.
+_SHORT, _NUMBERS, _TEXT, _FORMAT, _STYLE, _STYLES = 2, (5, 9), 6, 44, 47, (617, 618)
 
 
 def read_excel(path: Path, raw: bytes) -> Contents:
@@ -81,7 +90,9 @@ def read_others(path: Path, raw: bytes) -> Contents:
 
     try:
         with quiet_panics():
-            book = CalamineWorkbook.from_filelike(io.BytesIO(raw))
+            is_document = b"opendocument.spreadsheet" in raw[:200]
+            with_percent = _document_with_percent if is_document else _binary_with_percent
+            book = CalamineWorkbook.from_filelike(io.BytesIO(with_percent(raw)))
             kept = [sheet for sheet in book.sheets_metadata if sheet.typ == SheetTypeEnum.WorkSheet]
             sheets = {
                 sheet.name: book.get_sheet_by_name(sheet.name).to_python(skip_empty_area=False)
@@ -90,8 +101,84 @@ def read_others(path: Path, raw: bytes) -> Contents:
     except BaseException as error:
         raise error if isinstance(error, Exception) else ValueError(str(error)) from None
     hidden = {sheet.name for sheet in kept if sheet.visible != SheetVisibleEnum.Visible}
-    called = "OpenDocument" if b"opendocument.spreadsheet" in raw[:200] else "binary Excel"
-    return _read_sheets(path, called, sheets, hidden)
+    return _read_sheets(path, "OpenDocument" if is_document else "binary Excel", sheets, hidden)
+
+
+def _document_with_percent(raw: bytes) -> bytes:
+    """A workbook of OpenDocument whose cells in percent are texts: its library tells no formats."""
+
+    def text(value: re.Match[bytes]) -> bytes:
+        return f'office:string-value="{_as_shown(float(value[1]), "%")}"'.encode()
+
+    def shown(part: bytes) -> bytes:
+        return _PERCENT_CELL.sub(
+            lambda cell: _VALUE.sub(text, cell[0]).replace(b"percentage", b"string"), part
+        )
+
+    return _changed(raw, r"content\.xml", shown)
+
+
+def _binary_with_percent(raw: bytes) -> bytes:
+    """The same of a binary workbook of Excel."""
+    with zipfile.ZipFile(io.BytesIO(raw)) as parts:
+        listing = parts.read("xl/styles.bin") if "xl/styles.bin" in parts.namelist() else b""
+    forms, styles, listed = {9: "0%", 10: "0.00%"}, list[str](), False
+    for kind, content, _ in _records(listing):
+        listed = kind == _STYLES[0] or (listed and kind != _STYLES[1])
+        if kind == _FORMAT:
+            forms[int.from_bytes(content[:2], "little")] = content[6:].decode("utf-16-le")
+        elif kind == _STYLE and listed:
+            styles.append(forms.get(int.from_bytes(content[2:4], "little"), ""))
+
+    def shown(part: bytes) -> bytes:
+        records: list[bytes] = []
+        for kind, content, record in _records(part):
+            place, number = content[:8], content[8:]
+            if kind in (_SHORT, *_NUMBERS) and "%" in (form := styles[place[4] + 256 * place[5]]):
+                value = _short(number) if kind == _SHORT else struct.unpack_from("<d", number)[0]
+                text = str(_as_shown(value, form)).encode("utf-16-le")
+                length = struct.pack("<I", len(text) // 2)
+                record = bytes([_TEXT, 12 + len(text)]) + place + length + text
+            records.append(record)
+        return b"".join(records)
+
+    return (
+        _changed(raw, r"xl/worksheets/[^/]*\.bin", shown) if any("%" in f for f in styles) else raw
+    )
+
+
+def _short(number: bytes) -> float:
+    """A number of 30 bits: whole, or the upper half of a double; perhaps in hundredths."""
+    (bits,) = struct.unpack_from("<i", number)
+    (value,) = struct.unpack("<d", struct.pack("<2i", 0, bits & ~3))
+    return float(bits >> 2 if bits & 2 else value) / (100.0 if bits & 1 else 1.0)
+
+
+def _records(part: bytes) -> Iterator[tuple[int, bytes, bytes]]:
+    """Records of a part of a binary workbook: kind, content, and all bytes ([MS-XLSB], 2.1.4)."""
+    at = 0
+    while at < len(part):
+        begin, kind = at, part[at]
+        if kind & 128:
+            at += 1
+            kind = kind & 127 | part[at] << 7
+        size, shift, more = 0, 0, True
+        while more:
+            at += 1
+            size |= (part[at] & 127) << shift
+            shift, more = shift + 7, part[at] & 128 != 0 and shift < 21
+        at += 1 + size
+        yield kind, part[at - size : at], part[begin:at]
+
+
+def _changed(raw: bytes, parts: str, change: Callable[[bytes], bytes]) -> bytes:
+    """A workbook with other content in some parts, of which a pattern has the names."""
+    packed = io.BytesIO()
+    with zipfile.ZipFile(io.BytesIO(raw)) as old, zipfile.ZipFile(packed, "w") as new:
+        for name in old.namelist():
+            part = old.read(name)
+            new.writestr(name, change(part) if re.fullmatch(parts, name) else part)
+    return packed.getvalue()
 
 
 def _read_sheets(
@@ -127,9 +214,13 @@ def _read_sheets(
 
 
 def _as_shown(value: Any, form: str) -> Any:
-    """A value as its cell shows it, if that is in percent: the number itself is a hundredth."""
-    shown = "%" in form and isinstance(value, int | float)
-    return f"{100.0 * value!r}%" if shown else value
+    """A value as its cell shows it, if that is in percent: the number itself is a hundredth.
+
+    A literal % of the format stands behind the number itself.
+    """
+    if "%" not in form or not isinstance(value, int | float):
+        return value
+    return f"{100.0 * value if '%' in _LITERAL.sub('', form) else value!r}%"
 
 
 def _text(cell: Any) -> str:
