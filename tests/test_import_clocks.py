@@ -300,6 +300,7 @@ UNIX = 1709281000  # s, of 2024-03-01T08:16:40
         ("Time", every(lambda k: 3792125800 + 900 * k), "2024-03-01T08:16:40"),
         ("Time", every(lambda k: 133537546000000000 + 9 * 10**9 * k), "2024-03-01"),
         ("ticks", every(lambda k: 638448778000000000 + 9 * 10**9 * k), "2024-03-01"),
+        ("Time_ms", every(lambda k: f"{45352e6 + k / 96e-6:.3f}"), "2024-03-01"),  # of WinCC
         ("GPS time", every(lambda k: 1393316218 + 900 * k), "2024-03-01T08:16:40"),
         ("Time", local(datetime(2024, 3, 1, tzinfo=UTC), 300, "%H%M"), ""),
         ("Time", local(datetime(2024, 3, 1, tzinfo=UTC), 300, "%H%M%S"), ""),
@@ -528,3 +529,26 @@ def test_rows_with_the_newest_first_are_turned_and_told(tmp_path, tank, begin, f
     assert any("newest first" in note for note in recorded.notes)
     assert_allclose(clock(path, tank).times, QUARTER * np.arange(300))
     assert recorded.groups[0].channels[-1].values[0] == 20.0  # of the earliest row
+
+
+def test_segments_are_not_joined_by_a_stated_rate(tmp_path, tank):
+    """Nobody knows what lies between them; samples were counted through."""
+    rows = [f"{k % 30};4.5;95{k % 7}" for k in range(60)]
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join(["Sample rate: 1 Hz", "time [s];inflow [l/s];h [mm]", *rows]))
+    with pytest.raises(InputError, match=r"times begin anew.*part the file before sample 31"):
+        clock(path, tank)
+
+
+@pytest.mark.parametrize(
+    ("steps", "segments", "match"),
+    [("0.5\t1.0", 1, "states 'dt 0.5 s' and 'dt 1.0 s'"), ("0.5\t0.5", 2, "2 segments without")],
+)
+def test_steps_that_only_headers_say_hold_for_one_segment(tmp_path, tank, steps, segments, match):
+    end = "***End_of_Header***"
+    rows = "\n".join(f"\t4.{k}\t95{k % 7}" for k in range(30))
+    head = f"Channels\t2\nY_Unit_Label\tl/s\tmm\nDelta_X\t{steps}\n{end}\nX_Value\tinflow\th\n"
+    path = tmp_path / "a.lvm"
+    path.write_text("\n".join([f"LabVIEW Measurement\n{end}", *[head + rows] * segments]))
+    with pytest.raises(InputError, match=match):
+        clock(path, tank)

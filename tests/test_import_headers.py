@@ -118,6 +118,57 @@ def test_a_row_for_each_value_is_read_by_tags(tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("head", "clocks"),
+    [
+        (["t1 [s];inflow [l/s];t2 [s];h [mm]"], ["t1", "t2"]),
+        (["Time [s];inflow [l/s];Time [s];h [mm]"], ["Time", "Time"]),
+        (["inflow X;inflow Y;h X;h Y", "s;l/s;s;mm"], ["inflow X", "h X"]),
+        (  # as scopes of controllers write them
+            ["Name;inflow;Name;h", "SampleTime[s];1;SampleTime[s];2", "Unit;l/s;Unit;mm"],
+            ["inflow time", "h time"],
+        ),
+    ],
+)
+def test_columns_with_times_of_their_own_keep_them(tmp_path, head, clocks):
+    """All had the times of the first; a column at half the rate was twice as fast."""
+    rows = [f"{k};4.{k:02d};" + (f"{2 * k};{900 + 2 * k}.5" if k < 30 else ";") for k in range(60)]
+    groups = read_recorded_file(table(tmp_path / "a.csv", [*head, *rows])).groups
+    assert [group.channels[0].name for group in groups] == clocks
+    assert [group.channels[1].unit for group in groups] == ["l/s", "mm"]
+    assert_allclose(groups[1].channels[0].values, np.arange(0.0, 60.0, 2.0))
+    assert_allclose(groups[1].channels[1].values, np.arange(900.5, 960.5, 2.0))
+
+
+def test_a_time_of_something_else_is_none_of_the_columns_behind_it(tmp_path):
+    rows = [f"{k};4.5;{k % 7};950.5" for k in range(60)]
+    head = "Time [s];inflow [l/s];Lap time [s];h [mm]"
+    (group,) = read_recorded_file(table(tmp_path / "a.csv", [head, *rows])).groups
+    assert len(group.channels) == 4
+
+
+@pytest.mark.parametrize(
+    ("names", "good", "bad"),
+    [
+        ("inflow [l/s];inflow_Q;h [mm];h_Q", "192", "0"),
+        ("inflow [l/s];Quality;h [mm];Quality", "Good", "Bad"),
+        ("inflow [l/s];x;h [mm];Validity", "1", "2"),
+    ],
+)
+def test_samples_that_a_column_calls_bad_are_gaps(tmp_path, names, good, bad):
+    """Three in a row are taken for no marker."""
+    gone = (30, 31, 32)
+    rows = [
+        f"{k};4.5;{good};{0 if k in gone else 950}.5;{bad if k in gone else good}"
+        for k in range(60)
+    ]
+    recorded = read_recorded_file(table(tmp_path / "a.csv", [f"time [s];{names}", *rows]))
+    channels = {channel.name: channel.values for channel in recorded.groups[0].channels}
+    assert np.flatnonzero(np.isnan(channels["h"])).tolist() == list(gone)
+    assert np.isfinite(channels["time"]).all()
+    assert any("'h': 3 samples that" in note for note in recorded.notes)
+
+
+@pytest.mark.parametrize(
     ("content", "words"),
     [
         (b"<html><table></table></html>", "text of HTML or XML"),

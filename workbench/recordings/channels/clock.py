@@ -35,6 +35,7 @@ _EPOCHS = {
     "s since 1904, as LabVIEW counts": (2082844800.0, 1.0),
     "100 ns since 1601, as Windows counts": (11644473600.0, 1e-7),
     "100 ns since the year 1, as .NET counts": (62135596800.0, 1e-7),
+    "millionths of days since 1899, as WinCC counts": (2209161600.0, 0.0864),
 }
 _GPS = 315964800.0 - 18.0  # [s] from 1970 to the zero of GPS, less leap seconds since 2017
 _WEEK = re.compile("(gps)?(week|wk|wn|weeknumber|weekno)|gwk")
@@ -157,6 +158,9 @@ def _read_clock(
             expected="one time between samples",
             remedy="say it, --sample-rate '200 Hz'",
         )
+    back = [c for c in clocks if c.certain and is_time(c.channel) and _goes_back(c.times)]
+    if back:  # segments, between which a stated rate knows no gap
+        return _going_on(back[0], where)
     if math.isfinite(group.step):
         said = f"every {group.step:g} s, as the file says"
         return Clock("", count * group.step, said, certain=False, counted=True)
@@ -293,7 +297,8 @@ def _candidate(channel: FileChannel, group: Group, system: System) -> Clock | No
     if not channel.unit and is_time(channel.name):
         last = spell_unit(words(channel.name)[-1])  # elapsed_ms
         scale = conversion(last, "s") if len(words(channel.name)) > 1 else None
-        if scale is not None:
+        since = None if last in _likely_units(channel.values, system) else _since(channel, system)
+        if scale is not None and since is None:
             return _count_clock(channel, last, scale.factor, "name and unit")
         if (since := _since(channel, system)) is not None:
             return since
@@ -497,6 +502,10 @@ def _increases(times: Vector) -> bool:
     return held.size > 1 and bool((np.diff(held) > 0).all())
 
 
+def _goes_back(times: Vector) -> bool:
+    return bool((np.diff(times[np.isfinite(times)]) < 0).any())
+
+
 def _going_on(clock: Clock, where: str) -> Clock:
     """The clock, if it goes on from sample to sample."""
     if _increases(clock.times):
@@ -510,7 +519,7 @@ def _going_on(clock: Clock, where: str) -> Clock:
     if held.size > 1 and (np.diff(held) < 0).all():
         fault += ": the newest sample stands first"
         remedy = "sort the rows by their time"
-    elif held.size > 1 and count == 1 and held[late + 1] <= held[0] < held[-1]:
+    elif held.size > 1 and (held[1:][np.diff(held) <= 0] <= held[0]).all() and held[0] < held[-1]:
         fault += ": times begin anew"
         remedy = f"part the file before sample {late + 2}, where another recording begins"
     elif held.size > 1 and count >= 0.3 * held.size and not (np.diff(held) < 0).any():

@@ -3,7 +3,7 @@
 import math
 import re
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 from itertools import pairwise, zip_longest
@@ -22,7 +22,7 @@ from workbench.recordings.formats.numbers import (
     reading_of,
     values_of,
 )
-from workbench.recordings.formats.spelling import is_unit, name_and_unit, spell_unit
+from workbench.recordings.formats.spelling import conversion, is_unit, name_and_unit, spell_unit
 from workbench.recordings.formats.stamps import (
     goes_on,
     has_day,
@@ -43,13 +43,15 @@ _QUANTITY = re.compile(
 )
 _UNIT_BEFORE = re.compile(  # Abtastrate [Hz]: 200
     rf"[\[(](?P<unit>{'|'.join((*_PER_SECOND, *_SECONDS))})[\])]\W{{1,4}}"
-    r"(?P<value>\d[\d.,]{0,20}([eE][+-]?\d+)?)\s*$",
+    r"(?P<value>\d[\d.,]{0,20}([eE][+-]?\d+)?)(?=\s|$)",
     re.IGNORECASE,
 )
 _SCALES = re.compile(
-    r"\b(scale|scaling|gain|factor|multiplier|slope|faktor|skalierung|steigung|(?P<offset>offset))\b",
+    r"\b(scale[ _]?factor|scale|scaling|gain|factor|multiplier|slope|faktor|skalierung|steigung"
+    r"|(?P<offset>offset))\b",
     re.IGNORECASE,
 )
+_OF_A_SCREEN = re.compile("horizontal|vertical", re.IGNORECASE)  # of an oscilloscope
 _ONE, _NOTHING = re.compile(r"\+?1([.,]0*)?([eE][+-]?0+)?"), re.compile(r"[+-]?0([.,]0*)?([eE].*)?")
 _ABOUT = 100  # characters before a quantity that may say of what it is
 # Words for samples, for their rate and for the time between two; and of what else there are such.
@@ -72,13 +74,24 @@ _NAME_ROW = re.compile(
 )
 _UNIT_ROW = re.compile(r"(y[ _]|v)?(units?|unit[ _]label|einheit(en)?)\W*", re.IGNORECASE)
 _TIME_NAME = re.compile(r"(time|zeit|date|datum)", re.IGNORECASE)
+_RULE = re.compile(r"[-=_+]+")  # of a table that is drawn
 _REMARK = re.compile(r"comments?|remarks?|notes?|kommentar|bemerkung", re.IGNORECASE)
 _WITH_UNIT = re.compile(
     r"\s*(?P<number>[+-]?\s?[\d.,]*\d([eE][+-]?\d+)?)\s*(?P<unit>[^\W\d][^\s;,|]{0,9}|%|°\S)\s*"
 )
 _QUOTIENT = re.compile(r"\s*(?P<name>[^/\s][^/]*?)\s*/\s*(?P<unit>[^\s/].*?)\s*")
 _FORTRAN = re.compile(r"(\d\.?)[dD]([+-]?\d+)")
+# A column that says which samples of another one, or of the one beside it, are good; words that
+# say so, and the code of OPC from which on samples are.
+_VALID = ("validity", "valid", "g\u00fcltig", "gueltig")
+_VERDICT = re.compile(
+    rf"((?P<own>.+?)[ _.])?(?P<word>quality|qual|qualit\u00e4t|{'|'.join(_VALID)}|(?<=_)q)",
+    re.IGNORECASE,
+)
+_GOOD, _OPC_GOOD = frozenset(("good", "ok", "valid", "gut", "true", "g")), 192
 _STATES = {"true": "1", "false": "0", "on": "1", "off": "0"}
+_WORDS = re.compile(r"[^\W\d_]+")
+_LETTERS = frozenset("abcdefghijklmnopqrstuvwxyz")  # that count columns: Time A, Time B; t1 has one
 # What recorders write into a row of units above record numbers, dates and times.
 _NO_UNIT = re.compile(
     r"(ts|rn|no|nr|num|number|#|date|time|datum|zeit|date ?& ?time|id|index|text|sequence)\.?"
@@ -88,8 +101,10 @@ _NO_UNIT = re.compile(
 # Columns of a table with a row for each value: whose it is, the value, its unit.
 _PARTS_OF_TAGS = {
     **dict.fromkeys(("tag", "tagname", "tag name", "signal", "variable", "channel", "name"), "tag"),
-    **dict.fromkeys(("kanal", "sensor", "point", "measurement", "_field", "messstelle"), "tag"),
-    **dict.fromkeys(("value", "wert", "_value", "messwert", "val"), "value"),
+    **dict.fromkeys(
+        ("kanal", "sensor", "point", "measurement", "_field", "messstelle", "varname"), "tag"
+    ),
+    **dict.fromkeys(("value", "wert", "_value", "messwert", "val", "varvalue"), "value"),
     **dict.fromkeys(("unit", "units", "einheit", "uom"), "unit"),
 }
 # Columns that hold parts of a second beside time stamps, and digits of these.
@@ -198,7 +213,7 @@ def _refuse_scales(
     """Refuse a row of factors or offsets above samples: nobody says whether they are applied."""
     for row, line in zip(rows, lines, strict=False):
         label, *cells = row or [""]
-        match = _SCALES.search(label)
+        match = None if _OF_A_SCREEN.search(label) else _SCALES.search(label)
         numbers = [cell for cell in cells if is_number(cell)]
         if match is None or 2 * len(numbers) < width - 1:
             continue
@@ -331,13 +346,15 @@ def _header(above: Sequence[Sequence[str]], width: int) -> tuple[list[str], list
         cells = [cell.strip() for cell in row]
         if len(cells) == width + 1 and _REMARK.fullmatch(cells[-1]):
             cells = cells[:width]
-        if not _trim(cells):
+        if not _trim(cells) or all(_RULE.fullmatch(cell) for cell in cells):
             continue
         if len(_trim(cells)) > width or len(_trim(cells)) < max(2, width // 2):
             break
         rows.insert(0, cells)
         if len(rows) == _HEADER_ROWS:
             break
+    if pairs := _header_of_pairs(above, width):
+        return pairs
     at = next((i for i in range(1, len(rows)) if _are_units(rows[i])), None)
     if at is None and len(rows) > 1 and _are_units(rows[0]):
         rows = [*rows[1:2], rows[0], *rows[2:]]
@@ -378,6 +395,23 @@ def _header_below(
     if labelled and _TIME_NAME.match(names[0]):
         return names, [spell_unit(cell) if is_unit(cell) else "" for cell in units]
     return None
+
+
+def _header_of_pairs(
+    above: Sequence[Sequence[str]], width: int
+) -> tuple[list[str], list[str]] | None:
+    """Names and units, where rows repeat their label before each value, over times; else None."""
+    rows = [[cell.strip() for cell in row] for row in above if len(row) >= width > 2]
+    paired = [row[:width] for row in rows if len(set(row[:width:2])) == 1]
+    names = next((row for row in paired if _NAME_ROW.fullmatch(row[0])), None)
+    units = next((row for row in paired if _UNIT_ROW.fullmatch(row[0])), None)
+    if names is None or units is None or width % 2:
+        return None
+    clock = next((name_and_unit(row[0])[1] for row in paired if _INTERVAL.search(row[0])), "")
+    return (
+        [cell if i % 2 else f"{names[i + 1]} time" for i, cell in enumerate(names)],
+        [spell_unit(cell) if i % 2 else clock for i, cell in enumerate(units)],
+    )
 
 
 def _units_within(row: Sequence[str]) -> int:
@@ -421,17 +455,17 @@ def _are_units(cells: Sequence[str]) -> bool:
     return bool(held) and sum(map(is_unit, held)) >= 0.75 * len(held)
 
 
-def by_tag(table: Cells) -> list[tuple[str, Cells]]:
-    """A table for each signal, where rows hold one value of one signal that a column names.
+def parted(table: Cells) -> list[tuple[str, Cells]]:
+    """Tables with times of their own, by name, where one holds several; else one without a name.
 
-    So historians of plants export: a tag, a time and a value, perhaps with its unit. A table of any
-    other kind is one, without a name.
+    Rows may hold one value of one signal that a column names, as historians of plants export: a
+    tag, a time and a value, perhaps with its unit. Or columns of times stand before others each.
     """
     columns = [[cell.strip() for cell in column] for column in zip(*table.rows, strict=True)]
     labels = [name_and_unit(name)[0].casefold() for name in table.names]
     at = {part: i for i, name in enumerate(labels) if (part := _PARTS_OF_TAGS.get(name))}
     if not at.keys() >= {"tag", "value"}:
-        return [("", table)]
+        return _by_clock(table)
     tags = list(dict.fromkeys(columns[at["tag"]]))
     if not 1 < len(tags) <= len(table.rows) / _FEWEST or any(map(is_number, tags)):
         return [("", table)]
@@ -452,6 +486,49 @@ def by_tag(table: Cells) -> list[tuple[str, Cells]]:
         )
         tables.append((tag, own_table))
     return tables
+
+
+def _by_clock(table: Cells) -> list[tuple[str, Cells]]:
+    """A table for each column of times, with the columns behind it, where these differ."""
+    labels = [_label(table, i) for i in range(len(table.names))]
+    columns = list(zip(*table.rows, strict=True))
+    at = [i for i, cells in enumerate(columns) if _is_clock(*labels[i], cells)]
+    if len(at) < 2:
+        return [("", table)]
+    ends = [*at[1:], len(columns)]
+    behind = [
+        [name for name, _ in labels[a + 1 : b] if name] for a, b in zip(at, ends, strict=True)
+    ]
+    alike = {
+        tuple(sorted({*_WORDS.findall(labels[a][0].casefold())} - _words(own) - _LETTERS))
+        for a, own in zip(at, behind, strict=True)
+    }
+    if not all(behind) or len(alike) > 1 or len({columns[a] for a in at}) == 1:
+        return [("", table)]
+    tables = []
+    for a, b, own in zip([0, *at[1:]], ends, behind, strict=True):
+        clock = max(a, at[0])
+        kept = [k for k, cell in enumerate(columns[clock]) if not is_missing(cell)]
+        part = replace(
+            table,
+            rows=[table.rows[k][a:b] for k in kept],
+            lines=[table.lines[k] for k in kept],
+            names=table.names[a:b],
+            units=table.units[a:b],
+            about=table.about[a:b],
+        )
+        tables.append((own[0], part))
+    return tables
+
+
+def _is_clock(name: str, unit: str, cells: Sequence[str]) -> bool:
+    """Whether a column may be one of times: it says so, and holds times or numbers."""
+    said = _TIME_NAME.match(name) is not None or (unit and conversion(unit, "s") is not None)
+    return bool(said) and _mostly(cells, lambda cell: is_number(cell) or is_stamp(cell))
+
+
+def _words(names: Sequence[str]) -> set[str]:
+    return {word for name in names for word in _WORDS.findall(name.casefold())}
 
 
 def read_group(
@@ -494,6 +571,7 @@ def read_group(
             notes.append(f"'{labels[i][0]}' holds texts")
             none = np.full(len(cells), math.nan)
             left.append(FileChannel(labels[i][0], "", none, texts=tuple(cells)))
+    notes += _leave_out_bad(labels, columns, numbers)
     reading = reading_of(list(numbers.values()), where, commas=commas)
     channels: list[FileChannel] = []
     for i, cells in numbers.items():
@@ -529,6 +607,46 @@ def read_group(
         begun=stated_begin(table.head),
     )
     return group, reading, notes
+
+
+def _leave_out_bad(
+    labels: Sequence[tuple[str, str]],
+    columns: Sequence[Sequence[str]],
+    numbers: dict[int, list[str]],
+) -> Iterator[str]:
+    """Empty the cells that another column calls bad, as servers of plants do; say which."""
+    verdicts = {
+        i: match for i, (name, _) in enumerate(labels) if (match := _VERDICT.fullmatch(name))
+    }
+    values = [k for k in numbers if k not in verdicts and not _is_clock(*labels[k], columns[k])]
+    for i, match in verdicts.items():
+        own = (match["own"] or "").casefold()
+        judged = [
+            k
+            for k in values
+            if (labels[k][0].casefold() == own if own else len(verdicts) == 1 or k == i - 1)
+        ]
+        states = [cell.strip().casefold() for cell in columns[i]]
+        good = {state for state in states if _is_good(state, match["word"])}
+        bad = [k for k, state in enumerate(states) if state and state not in good]
+        if not judged or not bad:
+            continue
+        if not good:
+            yield f"'{labels[i][0]}' may tell good samples from bad ones; all were taken"
+            continue
+        left = set(bad)
+        for k in judged:
+            numbers[k] = ["" if n in left else cell for n, cell in enumerate(numbers[k])]
+        yield (
+            f"{', '.join(repr(labels[k][0]) for k in judged)}: {len(bad)} samples that "
+            f"'{labels[i][0]}' calls {columns[i][bad[0]]!r} are gaps"
+        )
+
+
+def _is_good(state: str, word: str) -> bool:
+    """Whether a state, in a column of some name, says that a sample is good."""
+    said = state in _GOOD or (state == "1" and word.casefold() in _VALID)
+    return said or (state.isdecimal() and int(state) >= _OPC_GOOD)
 
 
 def _newest_first(columns: Sequence[Sequence[str]]) -> str:
@@ -699,7 +817,7 @@ def _join_parts(moments: list[str], parts: list[str], digits: int) -> list[str] 
             joined.append("")
             continue
         match = _WHOLE_SECONDS.fullmatch(moment)
-        seconds = float(part) * 0.1**digits if _FIGURES.fullmatch(part) else 1.0
+        seconds = float(part.replace(",", ".")) * 0.1**digits if _FIGURES.fullmatch(part) else 1.0
         if match is None or not 0.0 <= seconds < 1.0:
             return None
         joined.append(f"{match['whole']}.{round(seconds * 1e9):09d}{match['half']}")

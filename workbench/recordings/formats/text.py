@@ -11,7 +11,7 @@ import numpy as np
 
 from workbench.errors import InputError
 from workbench.recordings.csv import is_cut
-from workbench.recordings.formats.cells import Cells, by_tag, find_table, is_quantity, read_group
+from workbench.recordings.formats.cells import Cells, find_table, is_quantity, parted, read_group
 from workbench.recordings.formats.contents import Contents
 from workbench.recordings.formats.numbers import is_missing, is_number
 from workbench.recordings.formats.stamps import is_stamp
@@ -40,6 +40,14 @@ def read(path: Path, raw: bytes) -> Contents:
     table = find_table(rows, numbers, str(path))
     if lines[0].startswith("LabVIEW Measurement"):
         table = _of_labview(table)
+        ends = [line for line in lines if line.startswith("***End_of_Header***")]
+        if len(ends) > 2 and not any(row[0].strip() for row in table.rows):
+            raise InputError(
+                where=str(path),
+                found=f"{len(ends) - 1} segments without a column of times",
+                expected="times, as nobody knows what lies between two segments",
+                remedy="export it with X values, or part the file before each header",
+            )
     cut = (
         _cut_line(table)
         if table.lines[-1] == len(lines) and text[-1:] in "0123456789.,eE+-"
@@ -49,7 +57,7 @@ def read(path: Path, raw: bytes) -> Contents:
         table = replace(table, rows=table.rows[:-1], lines=table.lines[:-1])
     # Between commas, a number has a comma only in quotation marks.
     commas = separator != "," or any("," in cell for row in table.rows for cell in row)
-    parts = [read_group(own, tag, str(path), commas=commas) for tag, own in by_tag(table)]
+    parts = [read_group(own, tag, str(path), commas=commas) for tag, own in parted(table)]
     groups, reading = [group for group, *_ in parts], parts[0][1]
     notes = list(dict.fromkeys(note for *_, own in parts for note in own))
     words = ["CSV", _SEPARATORS[separator], reading, encoding]
@@ -170,7 +178,9 @@ def _split_quoted(line: str, below: Sequence[str], separator: str) -> tuple[list
     while line.count('"') % 2 and count < len(below):
         line = f"{line} {below[count]}"
         count += 1
-    (cells,) = csv.reader([line], delimiter=separator, strict=True)
+    # A quoted part of a name is none of a cell: "PLC_1".flow
+    strict = line.count('"') % 2 > 0 or re.search(r'"\.\w', line) is None
+    (cells,) = csv.reader([line], delimiter=separator, strict=strict)
     return cells, count
 
 
@@ -207,7 +217,9 @@ def _of_labview(table: Cells) -> Cells:
     units = tuple(
         "s" if name == "time" else unit for name, unit in zip(names, table.units, strict=True)
     )
-    steps = [line.split()[1] for line in table.head if line.startswith("Delta_X ")]
+    steps = dict.fromkeys(
+        step for line in table.head if line.startswith("Delta_X ") for step in line.split()[1:]
+    )
     return replace(
         table, names=names, units=units, head=(*table.head, *(f"dt {s} s" for s in steps))
     )

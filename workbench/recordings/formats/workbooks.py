@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from workbench.errors import InputError
-from workbench.recordings.formats.cells import by_tag, find_table, read_group
+from workbench.recordings.formats.cells import find_table, parted, read_group
 from workbench.recordings.formats.contents import Contents, Group
 from workbench.runtime.supervision import quiet_panics
 
@@ -194,7 +194,7 @@ def _read_sheets(
         filled = [i for i, row in enumerate(rows) if any(row)]
         try:
             table = find_table([rows[i] for i in filled], [i + 1 for i in filled], where)
-            parts = [read_group(part, tag or title, where) for tag, part in by_tag(table)]
+            parts = [read_group(part, tag or title, where) for tag, part in parted(table)]
         except InputError as error:
             refusal = error
             if filled:
