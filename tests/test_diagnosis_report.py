@@ -41,10 +41,8 @@ def diagnose(root: Path, stops: Path, out: Path) -> Path:
     """Through the command line, with few effects to be quick."""
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(root)
-        assert (
-            main(["diagnose", str(stops), "--certainty", "--effects", *EFFECTS, "--out", str(out)])
-            == 0
-        )
+        flags = ["--certainty", "--figures", "--out", str(out)]
+        assert main(["diagnose", str(stops), "--effects", *EFFECTS, *flags]) == 0
     return out
 
 

@@ -187,7 +187,7 @@ def test_mistakes_in_what_a_sensor_reads_are_refused(sensor, match, tmp_path):
 
 def test_page_tells_errors_of_fitted_and_of_held_out_recordings(half):
     provenance, folder = {"run": run_of("diagnose", half.system, {})}, half.extension.fmu.parents[1]
-    page = lxml.html.fromstring(write_diagnosis(half, provenance, folder, 1).read_bytes())
+    page = lxml.html.fromstring(write_diagnosis(half, provenance, folder).read_bytes())
     rows = page.xpath("//table[@id='error-table']/tbody/tr")
     assert [row.xpath("string(td[1])") for row in rows] == ["yes", "yes", "held out", "held out"]
     table = pd.read_csv(folder / "errors.csv", dtype={"recording": str})

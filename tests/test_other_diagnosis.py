@@ -196,7 +196,7 @@ def test_a_cause_beyond_its_bound_is_told_with_it(bounded):
     assert friction.high == np.inf
     # As sure as a size within its bounds is, in the test of a bearing that rubs.
     assert friction.beyond == pytest.approx(FRICTION, rel=0.15)
-    page = write_diagnosis(outcome, {"run": run_of("diagnose", outcome.system, {})}, out, 1)
+    page = write_diagnosis(outcome, {"run": run_of("diagnose", outcome.system, {})}, out)
     doubt, *others = json.loads((out / "summary.json").read_text())["warnings"]
     warnings = lxml.html.fromstring(page.read_bytes()).find_class("warning")
     assert doubt in [" ".join(warning.text_content().split()) for warning in warnings]
@@ -243,7 +243,7 @@ def test_a_part_is_told_with_its_size_and_what_remains(diagnosed):
     assert "This is a part" in outcome.sentence
     assert outcome.rivals is not None
     assert "a part of what is missing" in outcome.extension.modelica.read_text()
-    write_diagnosis(outcome, {"run": run_of("diagnose", outcome.system, {})}, out, 1)
+    write_diagnosis(outcome, {"run": run_of("diagnose", outcome.system, {})}, out)
     summary = json.loads((out / "summary.json").read_text())
     assert summary["partial"] == [cause.effect.name]
     assert summary["model"]["partial"] is True
@@ -267,7 +267,10 @@ def test_an_interval_is_widened_where_a_law_is_wrong_in_form(diagnosed):
     # The mean over the range, which the fit misses by more than noise would let it.
     assert friction.low <= FRICTION <= friction.high
     assert any("wrong in form" in warning for warning in alone.warnings)
-    page = write_diagnosis(alone, {"run": run_of("diagnose", system, {})}, out, 1).read_text()
+    (out / "gain.png").touch()  # of an earlier diagnosis
+    page = write_diagnosis(alone, {"run": run_of("diagnose", system, {})}, out).read_text()
+    assert not [*out.glob("*.png"), *out.glob("*.svg")]  # nobody asked for pictures
+    assert '.svg">' not in page
     assert "95 of 100" not in page
     assert "widened because what remains is no noise" in page
 
@@ -324,7 +327,7 @@ def test_a_diagnosis_is_text_table_numbers_and_figure(diagnosed):
 @pytest.mark.parametrize("load", [rubbing, nothing, gusts])
 def test_page_and_files_speak_of_the_fan(load, diagnosed):
     outcome, out = diagnosed(load)
-    page = write_diagnosis(outcome, {"run": run_of("diagnose", outcome.system, {})}, out, 1)
+    page = write_diagnosis(outcome, {"run": run_of("diagnose", outcome.system, {})}, out)
     tree = lxml.html.fromstring(page.read_bytes())
     lxml.etree.strip_elements(tree, "script", "style", with_tail=False)
     text = tree.text_content()

@@ -28,9 +28,9 @@ def add(commands: arguments.Commands, text: str) -> argparse.ArgumentParser:
         description="Compare recordings with the observer model and name the missing effects. "
         "Show where the simulation is wrong, list indistinguishable effects, extend "
         "the model, and measure the gain in cross-validation. Writes a page to read "
-        "(index.html), summary.json, data (CSV), figures (PNG, SVG) and the extended model. Needs "
-        "the extra [compiler]. Ctrl-C ends the search for more causes and keeps those that were "
-        "found. Exit status 0 for any verdict.",
+        "(index.html), summary.json, data (CSV) and the extended model. Needs the extra "
+        "[compiler]. Ctrl-C ends the search for more causes and keeps those that were found. "
+        "Exit status 0 for any verdict.",
         epilog="examples:\n"
         "  workbench diagnose my_recordings --out results/mine\n"
         "  workbench diagnose --system my_machine --effects Seepage\n"
@@ -59,6 +59,7 @@ def add(commands: arguments.Commands, text: str) -> argparse.ArgumentParser:
     flags = {
         "--certainty": "also fit profile intervals of the sizes, correlations of their errors, and "
         "a multi-start",
+        "--figures": "write figures of the page as NAME.png and NAME.svg",
         "--propose": "if something is missing that no effect explains, infer a law for it: where "
         "it acts, on what it depends, its form (into OUT/proposed)",
     }
@@ -112,9 +113,9 @@ def _propose(
         return
     engine = Engine(options.workers, output.stage, options.out / PROPOSED)
     proposal = propose(outcome, problem, engine)
-    page = write_proposal(proposal, outcome, provenance, options.out, options.workers)
+    page = write_proposal(proposal, outcome, provenance, options.out)
     output.result(f"\n{proposal.summary()}")
-    output.result(f"to read: {page}, data and figures beside it")
+    output.result(f"to read: {page}, data beside it")
 
 
 def _run(options: argparse.Namespace, output: Output, problem: Problem) -> CommandResult:
@@ -143,10 +144,10 @@ def _run(options: argparse.Namespace, output: Output, problem: Problem) -> Comma
             "effects": [effect.name for effect in problem.effects],
         }
     output.result(outcome.summary())
-    page = write_diagnosis(outcome, provenance, options.out, options.workers)
+    page = write_diagnosis(outcome, provenance, options.out, pictures=options.figures)
     if options.propose:
         _propose(options, output, outcome, problem, provenance)
     output.stage("done")
-    output.result(f"to read: {page}, data and figures beside it")
+    output.result(f"to read: {page}, data beside it")
     status = 130 if outcome.diagnosis.interrupted else 0
     return CommandResult(read_result(options.out / "summary.json"), {}, status, page)

@@ -125,7 +125,7 @@ def _diagnose_change(
     cases = [read_recorded(Path(options.history) / name, system) for name in names]
     engine = Engine(options.workers, output.stage, out)
     outcome = diagnose(Problem(system, cases, library, effects), engine)
-    page = write_diagnosis(outcome, provenance, out, options.workers)
+    page = write_diagnosis(outcome, provenance, out)
     output.result(outcome.summary())
     output.result(f"to read: {page}")
     return read_result(out / "summary.json")

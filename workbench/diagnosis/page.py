@@ -22,7 +22,7 @@ from workbench.diagnosis.outcome import (
 from workbench.observers import label
 from workbench.observers.simulation import CaseResult
 from workbench.pages.answer import recordings, unit_suffix
-from workbench.pages.figures import CaseFigure
+from workbench.pages.figures import PICTURES, CaseFigure
 from workbench.pages.parts import (
     Article,
     Block,
@@ -65,7 +65,7 @@ def write_diagnosis_page(
     folder: Path,
     related: Mapping[str, str] | None = None,
 ) -> Path:
-    """Write the page into the folder, beside the files of each figure; returns its path.
+    """Write the page into the folder, with links to data and pictures there; returns its path.
 
     Parameters
     ----------
@@ -75,18 +75,17 @@ def write_diagnosis_page(
     related : what a file says that belongs to this diagnosis, by its path from the folder.
     """
     more = [] if best is None else [estimate_figure(best)]
-    first, *others = zoomable(
-        [figures[0], *more, *figures[1:]], summary, folder, files=("csv", "png", "svg")
-    )
+    suffixes = ("csv", *PICTURES) if (folder / "confusability.svg").is_file() else ("csv",)
+    first, *others = zoomable([figures[0], *more, *figures[1:]], summary, folder, files=suffixes)
     estimate = replace(others.pop(0), files=(), headed=False) if more else None
     explained = bool(summary["causes"])
     title = "recording that shows it best" if explained else "recording with the largest errors"
     parts = [
         Part("shown", f"The {title}", [*_shown(system, summary, figures, others, first)]),
-        Part("dependences", "What the errors go with", _dependences(summary)),
+        Part("dependences", "What the errors go with", _dependences(summary, suffixes)),
         Part("causes", "Causes, strongest first", [*_causes(summary)], printed=True),
-        Part("confusability", "Indistinguishable effects", _confusable(summary)),
-        Part("gain", "Gain in cross-validation", [*_gain(system, summary)]),
+        Part("confusability", "Indistinguishable effects", _confusable(summary, suffixes)),
+        Part("gain", "Gain in cross-validation", [*_gain(system, summary, suffixes)]),
     ]
     if estimate is not None:
         title = f"The best estimate of {summary['smoothed']['recording']}"
@@ -192,13 +191,13 @@ def _shown(
     return [text, first, Markup("The other recordings: {}.").format(links)]
 
 
-def _files(name: str, text: str) -> Markup:
+def _files(name: str, suffixes: Sequence[str], text: str = "Data of the figure") -> Markup:
     """Links to the data and pictures of a figure."""
-    links = (f'<a href="{name}.{kind.lower()}">{kind}</a>' for kind in ("CSV", "PNG", "SVG"))
+    links = (f'<a href="{name}.{suffix}">{suffix.upper()}</a>' for suffix in suffixes)
     return Markup("{}: ").format(text) + Markup(", ").join(map(Markup, links))
 
 
-def _dependences(summary: Mapping[str, Any]) -> list[Block]:
+def _dependences(summary: Mapping[str, Any], suffixes: Sequence[str]) -> list[Block]:
     """Shares by influence and channel, the strongest influence first, and their reading."""
     table, added = summary["dependences"], " and ".join(_extended(summary))
     shares: dict[str, dict[str, Mapping[str, Any]]] = {}
@@ -236,7 +235,7 @@ def _dependences(summary: Mapping[str, Any]) -> list[Block]:
     return [
         text,
         Table("dependence-table", caption, ["influence", *columns], rows),
-        _files("dependences", "Data and figure"),
+        _files("dependences", suffixes),
     ]
 
 
@@ -470,7 +469,7 @@ def _candidates(summary: Mapping[str, Any]) -> Table:
     return Table("candidate-table", caption, columns, rows, marked=causes)
 
 
-def _confusable(summary: Mapping[str, Any]) -> list[Block]:
+def _confusable(summary: Mapping[str, Any], suffixes: Sequence[str]) -> list[Block]:
     names, cosines = summary["confusability"]["effects"], summary["confusability"]["cosines"]
     if not names:
         return ["No effect of the catalogue was compared."]
@@ -487,7 +486,7 @@ def _confusable(summary: Mapping[str, Any]) -> list[Block]:
     caption = (
         "Cosine of the angle between what two effects leave in the errors, levels and tolerances "
         "apart, in percent; 100 is indistinguishable, numbers are given from 70 on"
-        f"{', the effect that was found is framed' if causes else ''}. Data and figure"
+        f"{', the effect that was found is framed' if causes else ''}. Data of the figure"
     )
     text = "No two effects of the catalogue leave similar traces in these recordings and signals."
     if pairs:
@@ -504,12 +503,12 @@ def _confusable(summary: Mapping[str, Any]) -> list[Block]:
             shares=cosines,
             least=_SIMILAR,
             marked=causes,
-            caption=_files("confusability", caption),
+            caption=_files("confusability", suffixes, caption),
         ),
     ]
 
 
-def _gain(system: System, summary: Mapping[str, Any]) -> list[Block]:
+def _gain(system: System, summary: Mapping[str, Any], suffixes: Sequence[str]) -> list[Block]:
     blocks: list[Block] = []
     if (gain := summary["gain"]) is None:
         blocks.append("Nothing was extended, so that there is no gain to measure.")
@@ -520,14 +519,14 @@ def _gain(system: System, summary: Mapping[str, Any]) -> list[Block]:
             "{:.2f}). Measured is the {}."
         )
         ends = (gain[key] for key in ("before", "after", "low", "high"))
-        blocks += [text.format(*ends, gain["measure"]), _dots(gain)]
+        blocks += [text.format(*ends, gain["measure"]), _dots(gain, suffixes)]
     blocks.append(_errors(system, summary))
     if observers := summary.get("observers"):
         blocks.append(_observers(system, summary["cases"], observers))
     return blocks
 
 
-def _dots(gain: Mapping[str, Any]) -> Dots:
+def _dots(gain: Mapping[str, Any], suffixes: Sequence[str]) -> Dots:
     """Errors of both models, the worst recording first, then all."""
     ranked = sorted(gain["recordings"].items(), key=lambda item: -item[1]["before"])
     values = [1.0, *(gain[key] for key in ("low", "high", "before", "after"))]
@@ -550,7 +549,7 @@ def _dots(gain: Mapping[str, Any]) -> Dots:
         logarithmic=True,
         paired=True,
         total=total,
-        caption=_files("gain", "Data and figure"),
+        caption=_files("gain", suffixes),
         legend=(
             (NOMINAL, "nominal model (circle)"),
             (EXTENDED, "extended model (diamond); the line is the 95 % interval"),

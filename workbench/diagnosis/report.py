@@ -1,9 +1,8 @@
-"""Files of a diagnosis: summary.json, data and figures, beside the page."""
+"""Files of a diagnosis: summary.json, data and, where asked for, pictures, beside the page."""
 
 import json
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Future
-from contextlib import nullcontext
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -24,59 +23,66 @@ from workbench.diagnosis.outcome import (
 from workbench.diagnosis.page import write_diagnosis_page
 from workbench.observers.report import write_estimates, write_numbers
 from workbench.pages.answer import Answer, Measure, percentage, with_answer
-from workbench.pages.figures import draw_case
+from workbench.pages.figures import PICTURES, CaseFigure, draw_case
 from workbench.recordings.csv import csv_text
 from workbench.runtime.files import write_json, write_whole
-from workbench.runtime.pool import Pool
 
 
 def write_diagnosis(
     outcome: Outcome,
     provenance: Mapping[str, Any],
     out: Path,
-    workers: int,
     related: Mapping[str, str] | None = None,
+    *,
+    pictures: bool = False,
 ) -> Path:
-    """Write summary.json, data and figures, and the page that shows them; returns the page.
+    """Write summary.json and data, and the page that shows them; returns the page.
 
     Parameters
     ----------
     provenance : what was run.
-    workers : processes that draw.
     related : see `write_diagnosis_page`.
+    pictures : whether figures of the page are written as files, too; those of an earlier
+        diagnosis in the folder go.
     """
     figures = recording_figures(outcome)
-    with Pool(workers, nullcontext, None) as pool:
+    best = best_estimate(outcome, figures[0].name)
+    content = {
+        **outcome.to_dict(),
+        "smoothed": best and {"recording": best.case.name, "models": bands(best)},
+        "provenance": provenance,
+    }
+    summary = with_answer(diagnosed(content), content)
+    write_json(out / "summary.json", summary)
+    for residual in outcome.residuals:
+        _write_recording(residual, lasting_blocks(outcome.system), out / f"{residual.name}.csv")
+    _write_tables(summary, out)
+    if best is not None:
+        write_estimates(best, out / "smoothed.csv")
+    for name, draw in _drawings(outcome, summary, figures).items():
+        paths = [out / f"{name}.{suffix}" for suffix in PICTURES]
+        if pictures:
+            draw(paths)
+        else:
+            for path in paths:
+                path.unlink(missing_ok=True)
+    return write_diagnosis_page(outcome.system, summary, figures, best, out, related)
 
-        def draw(drawing: Callable[..., None], *shown: Any, name: str) -> Future[None]:
-            return pool.submit(_drawn, drawing, shown, [out / f"{name}.png", out / f"{name}.svg"])
 
-        drawn = [draw(draw_case, figure, name=figure.name) for figure in figures]
-        best = best_estimate(outcome, figures[0].name)
-        content = {
-            **outcome.to_dict(),
-            "smoothed": best and {"recording": best.case.name, "models": bands(best)},
-            "provenance": provenance,
-        }
-        summary = with_answer(diagnosed(content), content)
-        write_json(out / "summary.json", summary)
-        names, cosines = outcome.diagnosis.names, outcome.diagnosis.cosines
-        effects = [cause["effect"] for cause in summary["causes"]]
-        drawn += [
-            draw(draw_confusability, names, cosines, effects, name="confusability"),
-            draw(draw_dependences, summary["dependences"], name="dependences"),
-        ]
-        if summary["gain"] is not None:
-            drawn.append(draw(draw_gain, summary["gain"], name="gain"))
-        for residual in outcome.residuals:
-            _write_recording(residual, lasting_blocks(outcome.system), out / f"{residual.name}.csv")
-        _write_tables(summary, out)
-        if best is not None:
-            write_estimates(best, out / "smoothed.csv")
-        page = write_diagnosis_page(outcome.system, summary, figures, best, out, related)
-        for picture in drawn:
-            picture.result()
-    return page
+def _drawings(
+    outcome: Outcome, summary: Mapping[str, Any], figures: Sequence[CaseFigure]
+) -> dict[str, Callable[[Sequence[Path]], None]]:
+    """What draws each figure to some files, by its name."""
+    names, cosines = outcome.diagnosis.names, outcome.diagnosis.cosines
+    effects = [cause["effect"] for cause in summary["causes"]]
+    drawings: dict[str, Callable[[Sequence[Path]], None]] = {
+        **{figure.name: partial(draw_case, figure) for figure in figures},
+        "confusability": partial(draw_confusability, names, cosines, effects),
+        "dependences": partial(draw_dependences, summary["dependences"]),
+    }
+    if summary["gain"] is not None:
+        drawings["gain"] = partial(draw_gain, summary["gain"])
+    return drawings
 
 
 def relate_diagnosis(outcome: Outcome, out: Path, related: Mapping[str, str]) -> None:
@@ -85,12 +91,6 @@ def relate_diagnosis(outcome: Outcome, out: Path, related: Mapping[str, str]) ->
     figures = recording_figures(outcome)
     best = best_estimate(outcome, figures[0].name)
     write_diagnosis_page(outcome.system, summary, figures, best, out, related)
-
-
-def _drawn(
-    _: None, drawing: Callable[..., None], shown: Sequence[Any], pictures: Sequence[Path]
-) -> None:
-    drawing(*shown, pictures)
 
 
 def _write_recording(residuals: Residuals, span: int, path: Path) -> None:

@@ -16,6 +16,8 @@ from workbench.runtime.files import replacing, warning_if_unwritable
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+PICTURES = ("png", "svg")  # of figures as files
+
 # On white and near black: 3:1 to the ground or more, as WCAG 2.2 asks of graphics, differing in
 # lightness or in the blue-yellow axis, which colour-blind readers keep.
 LIGHT = {

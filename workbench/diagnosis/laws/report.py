@@ -23,7 +23,6 @@ def write_proposal(
     outcome: Outcome,
     provenance: Mapping[str, Any],
     diagnosis: Path,
-    workers: int,
 ) -> Path:
     """Write what was proposed; returns the page of the diagnosis with it, or proposal.json.
 
@@ -46,7 +45,7 @@ def write_proposal(
         written, text = out / "proposal.json", "No law that was proposed holds: what was tried"
     else:
         back = {"../index.html": "The diagnosis without what is proposed here"}
-        written = write_diagnosis(proposal.outcome, provenance, out, workers, back)
+        written = write_diagnosis(proposal.outcome, provenance, out, back)
         text = "Proposed, not known physics: the diagnosis with a law for what is missing"
     relate_diagnosis(outcome, diagnosis, {written.relative_to(diagnosis).as_posix(): text})
     return written
