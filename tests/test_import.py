@@ -11,6 +11,8 @@ import numpy as np
 import openpyxl
 import pandas as pd
 import pytest
+from asammdf import MDF
+from asammdf import Signal as Logged
 from nptdms import ChannelObject, TdmsWriter
 from numpy.testing import assert_allclose
 from openpyxl.chart import LineChart
@@ -19,7 +21,7 @@ import workbench as wb
 from workbench.__main__ import main
 from workbench.errors import InputError
 from workbench.recordings.case import Case, read_cases
-from workbench.recordings.channels import RecordingOptions, propose_recordings
+from workbench.recordings.channels import RecordingOptions, propose, propose_recordings
 from workbench.recordings.formats import read_recorded_file
 from workbench.recordings.plausibility import Origin, doubts
 from workbench.system.registry import load_system
@@ -113,6 +115,19 @@ def test_a_file_that_ends_the_process_of_its_library_is_refused(tmp_path, stop, 
         read_recorded_file(path)
 
 
+@pytest.mark.parametrize("version", ["3.30", "4.10"])
+def test_a_formula_that_the_library_cannot_compute_is_told(tmp_path, tank, version):
+    """Its channel was taken as recorded: counts in place of millimetres."""
+    with MDF(version=version) as file:
+        counts, times = np.arange(9000, 9060), np.arange(60.0)
+        flow = Logged(np.full(60, 4.0), times, name="inflow", unit="l/s")
+        level = Logged(counts, times, name="h", unit="mm", conversion={"formula": "pow(X,2)/1e5"})
+        file.append([flow, level])
+        path = file.save(tmp_path / "a", overwrite=True)
+    (problem,) = propose([read_recorded_file(path)], tank, {}).problems
+    assert problem.startswith("h: 'h' has a formula that is not understood, 'pow(X")
+
+
 def test_the_end_that_a_tdms_file_lacks_is_told(tmp_path, stop, system, capsys):
     path = tmp_path / "stop.tdms"
     FORMATS["labview.tdms"](path, recorded(stop, system))
@@ -165,7 +180,7 @@ def test_a_missing_reader_names_the_extra(tmp_path, monkeypatch, package, begins
     [
         (b"", "found an empty file"),
         (b"PK\x03\x04" + b"x" * 99, "an Excel workbook that cannot be read"),
-        (b"PAR1" + b"x" * 99, "a Parquet file that cannot be read"),
+        (b"PAR1" + b"x" * 99, "a Parquet or Arrow file that cannot be read"),
         (b"MDF     4.10" + b"x" * 99, "an MDF file that cannot be read"),
         (b"MATLAB 7.3 MAT-file" + b"x" * 999, "a MAT 7.3 or HDF5 file that cannot be read"),
         (b"MATLAB 5.0 MAT-file" + b"x" * 999, "a MAT file that cannot be read"),

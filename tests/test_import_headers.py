@@ -17,6 +17,7 @@ import pytest
 import xlwt
 from nptdms import ChannelObject, TdmsWriter
 from numpy.testing import assert_allclose
+from pyarrow import feather
 
 from workbench.errors import InputError
 from workbench.recordings.formats import read_recorded_file
@@ -123,6 +124,7 @@ def test_a_row_for_each_value_is_read_by_tags(tmp_path):
         (["t1 [s];inflow [l/s];t2 [s];h [mm]"], ["t1", "t2"]),
         (["Time [s];inflow [l/s];Time [s];h [mm]"], ["Time", "Time"]),
         (["inflow X;inflow Y;h X;h Y", "s;l/s;s;mm"], ["inflow X", "h X"]),
+        (["Zeit normal [s];inflow [l/s];Zeit langsam [s];h [mm]"], ["Zeit normal", "Zeit langsam"]),
         (  # as scopes of controllers write them
             ["Name;inflow;Name;h", "SampleTime[s];1;SampleTime[s];2", "Unit;l/s;Unit;mm"],
             ["inflow time", "h time"],
@@ -192,14 +194,15 @@ def test_a_format_that_nobody_reads_is_called_by_its_name(tmp_path, content, wor
         read_recorded_file(path)
 
 
-def test_texts_of_parquet_are_dates_times_and_numbers(tmp_path):
+@pytest.mark.parametrize("write", [pq.write_table, feather.write_feather])
+def test_texts_of_parquet_and_arrow_are_dates_times_and_numbers(tmp_path, write):
     moments = [datetime.datetime(2024, 3, 5, 10) + datetime.timedelta(seconds=k) for k in range(60)]
     content = {
         "date": [moment.date() for moment in moments],
         "time": [moment.time() for moment in moments],
         "h [mm]": [f"{k},5" for k in range(60)],
     }
-    pq.write_table(pa.table(content), tmp_path / "a.parquet")
+    write(pa.table(content), tmp_path / "a.parquet")
     clock, level = read_recorded_file(tmp_path / "a.parquet").groups[0].channels
     assert iso(clock.start) == "2024-03-05T10:00:00.000000"
     assert_allclose(clock.values, np.arange(60.0))

@@ -1,6 +1,7 @@
 """Recorders' files that can be read in two ways: no number of them is taken in silence."""
 
 import datetime
+from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
@@ -85,6 +86,46 @@ def test_steps_of_a_waveform_are_in_its_own_unit(tmp_path, tank, unit, step):
     with TdmsWriter(tmp_path / "a.tdms") as file:
         file.write_segment([ChannelObject("G", "h", MINUTE, {**stated, "wf_xunit_string": unit})])
     assert_allclose(clock(tmp_path / "a.tdms", tank).times, 1.0 + MINUTE, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "match"),
+    [
+        ({"wf_start_time": np.datetime64("2024-03-05T10:00")}, {}, ""),
+        (
+            {"wf_start_time": np.datetime64("2024-03-05T10:00")},
+            {"wf_start_time": np.datetime64("2024-03-05T11:00")},
+            "each has its own 'wf_start_time'",
+        ),
+        ({}, {"wf_increment": 1.0}, "each has its own 'wf_increment'"),
+    ],
+)
+def test_segments_of_a_waveform_are_one_only_if_they_go_on(tmp_path, tank, first, second, match):
+    """The library joins them, at the step and from the begin of the last one."""
+    stated = {"unit_string": "mm", "wf_increment": 0.5}
+    with TdmsWriter(tmp_path / "a.tdms") as file:
+        file.write_segment([ChannelObject("G", "h", MINUTE[:60], {**stated, **first})])
+        file.write_segment([ChannelObject("G", "h", MINUTE[60:], {**stated, **second})])
+    with pytest.raises(InputError, match=match) if match else nullcontext():
+        assert_allclose(clock(tmp_path / "a.tdms", tank).times, MINUTE, rtol=1e-12)
+
+
+def test_a_channel_of_times_that_contradicts_the_file_is_told(tmp_path, tank):
+    """LabVIEW writes a step of 1 where nobody set one."""
+    with TdmsWriter(tmp_path / "a.tdms") as file:
+        columns = {"Time": "s", "h": "mm"}.items()
+        file.write_segment(
+            [
+                ChannelObject("G", name, MINUTE, {"unit_string": unit, "wf_increment": 1.0})
+                for name, unit in columns
+            ]
+        )
+    with pytest.raises(
+        InputError, match=r"times of the file in \[s\] over .* and 'Time'.* 2 times"
+    ):
+        clock(tmp_path / "a.tdms", tank)
+    said = clock(tmp_path / "a.tdms", tank, time=NamedChannel("Time"))
+    assert_allclose(said.times, MINUTE)
 
 
 def test_a_waveform_over_no_time_has_no_times(tmp_path, tank):

@@ -14,6 +14,7 @@ from numpy.testing import assert_allclose
 from scipy.io import savemat
 
 from workbench.errors import InputError
+from workbench.recordings.channels import propose
 from workbench.recordings.formats import Group, read_recorded_file
 from workbench.recordings.formats.stamps import iso
 
@@ -206,6 +207,35 @@ def test_arrays_of_another_length_than_times_say_so(tmp_path):
     savemat(tmp_path / "a.mat", {"t": TIME[:-1], "u": FLOW, "y": LEVEL})
     doubts = [held.step_doubt for held in read_recorded_file(tmp_path / "a.mat").groups]
     assert "no times for 120 samples of u, y: 't' has 119" in doubts
+
+
+@pytest.mark.parametrize(
+    ("stated", "match"),
+    [
+        ({"scale_factor": 0.1, "add_offset": 850.0, "_FillValue": 77}, ""),
+        ({"gain": 0.1}, "gain = 0.1"),
+    ],
+)
+def test_counts_of_hdf5_are_scaled_as_is_usual_or_told(tmp_path, tank, stated, match):
+    """As files of weather and climate are packed; they were taken as counts."""
+    counts = np.round(10.0 * (LEVEL - 850.0)).astype(np.int16)
+    counts[3] = 77
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        for name, values, unit in (
+            ("time", TIME, "s"),
+            ("inflow", FLOW, "l/s"),
+            ("h", counts, "mm"),
+        ):
+            file[name] = values
+            file[name].attrs["UNITS"] = [unit.encode()]
+        file["h"].attrs.update(stated)
+    proposed = propose([read_recorded_file(tmp_path / "a.h5")], tank, {})
+    if match:
+        assert match in proposed.problems[0]
+    else:
+        known = np.arange(TIME.size) != 3
+        assert_allclose(proposed.assigned["h"].values[known], 1e-3 * LEVEL[known], atol=5e-5)
+        assert np.isnan(proposed.assigned["h"].values[3])
 
 
 def test_hdf5_is_read_with_what_its_attributes_say(tmp_path):

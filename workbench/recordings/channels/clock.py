@@ -133,7 +133,10 @@ def _read_clock(
     if group.time is not None:
         time, said = group.time, "the file says it"
         own_clock = Clock("", time.values, said, start=time.start, zoned=time.zoned)
-        return _going_on(own_clock, where)
+        beside = [c for channel in group.channels if (c := _candidate(channel, group, system))]
+        going = [clock for clock in beside if clock.certain and _increases(clock.times)]
+        _refuse_contradiction([_going_on(own_clock, where), *going], where)
+        return own_clock
     if (weeks := _weeks_of_gps(group)) is not None:
         return _going_on(weeks, where)
     # Stamps are often coarser than a counted time beside them.
@@ -174,15 +177,16 @@ def _refuse_contradiction(clocks: Sequence[Clock], where: str) -> None:
     for clock, other in combinations(clocks, 2):
         spans = [float(np.nanmax(c.times) - np.nanmin(c.times)) for c in (clock, other)]
         ratio = max(spans) / min(spans)
+        names = [f"'{c.channel}'" if c.channel else "times of the file" for c in (clock, other)]
+        rate = f"or --sample-rate '{(clock.times.size - 1) / spans[0]:.6g} Hz'"
         if ratio > _FACTOR:
             raise InputError(
                 where=where,
-                found=f"'{clock.channel}' in [{clock.unit}] over {spans[0]:.6g} s, and "
-                f"'{other.channel}' in [{other.unit}] over {spans[1]:.6g} s, {ratio:.4g} times "
-                "apart",
+                found=f"{names[0]} in [{clock.unit}] over {spans[0]:.6g} s, and {names[1]} in "
+                f"[{other.unit}] over {spans[1]:.6g} s, {ratio:.4g} times apart",
                 expected="clocks of one recording that agree",
                 remedy=f"say which is right and in which unit, --column '{TIME}={other.channel}' "
-                f"or --column '{TIME}={clock.channel} [UNIT]'",
+                + (f"or --column '{TIME}={clock.channel} [UNIT]'" if clock.channel else rate),
             )
 
 

@@ -1,5 +1,6 @@
 """Channels are proposed for signals, as the user names them, then as names and units tell."""
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -32,6 +33,8 @@ from workbench.recordings.formats.spelling import conversion, is_unit
 from workbench.recordings.formats.stamps import is_said
 from workbench.system.parts import Signal
 from workbench.system.system import System
+
+_LEFT_OUT = re.compile(r"'(?P<name>[^']+)' (has|is|holds|states) ")
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,6 +117,7 @@ def propose(
     }
     _refuse_shared(assigned, where)
     texts = [channel for file in files for group in file.groups for channel in group.left]
+    notes = [note for file in files for note in file.notes]
     if TIME in given and given[TIME].channel not in {channel.name for channel in texts}:
         _find(given[TIME], TIME, places, where)
     times = {given[TIME].channel} if TIME in given else set()
@@ -126,7 +130,7 @@ def propose(
     ]
     assigned, doubts = match(assigned, free, system)
     problems = tuple(
-        f"{signal.name}: {doubts.get(signal.name) or _text_of(signal, texts)}"
+        f"{signal.name}: {doubts.get(signal.name) or _text_of(signal, texts, notes)}"
         for signal in (*system.inputs, *system.outputs)
         if signal.name not in assigned
     )
@@ -144,12 +148,15 @@ def propose(
     return ProposedMapping(assigned, clocks, shown, problems, unmatched, contradictions)
 
 
-def _text_of(signal: Signal, texts: Sequence[FileChannel]) -> str:
-    """Why a signal has no channel: one of its name may hold texts."""
+def _text_of(signal: Signal, texts: Sequence[FileChannel], notes: Sequence[str]) -> str:
+    """Why a signal has no channel: one of its name may hold texts, or was left out."""
     for channel in texts:
         if likeness_to(channel.name, channel.about, signal.names):
             example = next(filter(None, channel.texts), "")
             return f"'{channel.name}' holds texts such as '{example}', no numbers"
+    for note in notes:  # '...' has a formula that is not understood
+        if (match := _LEFT_OUT.match(note)) and likeness_to(match["name"], "", signal.names):
+            return note
     return "no channel whose name or unit tells"
 
 

@@ -36,7 +36,7 @@ _PACKAGES = {
     "workbooks.read_excel": ("openpyxl", "an Excel workbook"),
     "workbooks.read_excel_97": ("xlrd", "a workbook of Excel 97 to 2003 (.xls)"),
     "workbooks.read_others": ("python_calamine", "a workbook (.ods, .xlsb)"),
-    "parquet": ("pyarrow", "a Parquet file"),
+    "parquet": ("pyarrow", "a Parquet or Arrow file"),
     "matlab5": ("scipy", "a MAT file"),
     "hdf5": ("h5py", "a MAT 7.3 or HDF5 file"),
     "mdf": ("asammdf", "an MDF file"),
@@ -47,7 +47,6 @@ _NATIVE = frozenset({"hdf5", "matlab5", "mdf", "parquet", "workbooks.read_others
 _MAT_4 = struct.Struct("<5i")  # type, rows, columns, imaginary, length of the name
 _START, _RATE = 60.0, 1e6  # [s] and [byte/s], a twentieth of what they read on a busy machine
 _UNREAD = {  # how files begin that are told, and not read
-    b"ARROW1": "a table of Arrow or Feather",
     b"\x93NUMPY": "an array of NumPy (.npy)",
     b"\x80\x04\x95": "an object of Python (pickle)",
     b"SQLite format 3": "a database of SQLite",
@@ -64,6 +63,7 @@ _UNREAD_WITHIN = {  # what stands near the begin of others
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 _BEGINS = {  # how files begin, whatever their ending
     b"PAR1": "parquet",
+    b"ARROW1": "parquet",
     b"MDF     ": "mdf",
     b"UnFinMF ": "mdf",
     b"TDSm": "tdms",
@@ -171,7 +171,7 @@ def _refuse_unread(path: Path, raw: bytes, *, is_workbook: bool) -> None:
             where=str(path),
             found=format_name,
             expected="a recording as CSV, JSON, .xlsx, .xls, .xlsb, .ods, .mat, .h5, .parquet, "
-            ".tdms or .mf4",
+            ".feather, .tdms or .mf4",
             remedy="unpack it, or save or export the recording in one of these formats",
         )
 

@@ -495,19 +495,21 @@ def _by_clock(table: Cells) -> list[tuple[str, Cells]]:
     at = [i for i, cells in enumerate(columns) if _is_clock(*labels[i], cells)]
     if len(at) < 2:
         return [("", table)]
-    ends = [*at[1:], len(columns)]
-    behind = [
-        [name for name, _ in labels[a + 1 : b] if name] for a, b in zip(at, ends, strict=True)
-    ]
+    blocks = list(pairwise([*at, len(columns)]))
+    behind = [[name for name, _ in labels[a + 1 : b] if name] for a, b in blocks]
     alike = {
         tuple(sorted({*_WORDS.findall(labels[a][0].casefold())} - _words(own) - _LETTERS))
         for a, own in zip(at, behind, strict=True)
     }
-    if not all(behind) or len(alike) > 1 or len({columns[a] for a in at}) == 1:
+    # Or each column ends where its times do, and these elsewhere than others.
+    lengths = [{_length(columns[i]) for i in range(a, b) if any(columns[i])} for a, b in blocks]
+    apart = max(map(len, lengths)) == 1 and len(set().union(*lengths)) > 1
+    same = len({columns[a] for a in at}) == 1
+    if not all(behind) or same or not (apart or len(alike) == 1):
         return [("", table)]
     tables = []
-    for a, b, own in zip([0, *at[1:]], ends, behind, strict=True):
-        clock = max(a, at[0])
+    for (clock, b), own in zip(blocks, behind, strict=True):
+        a = clock if clock != at[0] else 0
         kept = [k for k, cell in enumerate(columns[clock]) if not is_missing(cell)]
         part = replace(
             table,
@@ -525,6 +527,11 @@ def _is_clock(name: str, unit: str, cells: Sequence[str]) -> bool:
     """Whether a column may be one of times: it says so, and holds times or numbers."""
     said = _TIME_NAME.match(name) is not None or (unit and conversion(unit, "s") is not None)
     return bool(said) and _mostly(cells, lambda cell: is_number(cell) or is_stamp(cell))
+
+
+def _length(cells: Sequence[str]) -> int:
+    """Cells up to the last one that holds anything."""
+    return max((k + 1 for k, cell in enumerate(cells) if not is_missing(cell)), default=0)
 
 
 def _words(names: Sequence[str]) -> set[str]:

@@ -16,7 +16,13 @@ _CLASS = "MATLAB_class"
 _DECODED = "MATLAB_object_decode"
 _RATES = ("fs", "sample_rate", "samplerate", "sampling_rate", "dt", "sample_time")
 _NAMES = ("columns", "column_names", "names", "channels", "channel_names", "labels", "fields")
-_UNITS = ("unit", "units", "Unit", "Units")
+_UNITS = ("unit", "units")
+_SCALING = ("scale_factor", "add_offset")  # of the conventions for climate and forecast (CF)
+_UNSAID = {  # others, and what they are where they change nothing
+    **dict.fromkeys(("scale", "gain", "factor", "slope", "multiplier"), 1.0),
+    **dict.fromkeys(("offset", "intercept"), 0.0),
+}
+_NONE = ("_fillvalue", "missing_value")
 
 
 def read(path: Path, raw: bytes) -> Contents:
@@ -65,17 +71,41 @@ def _entries(items: Mapping[str, Any], file: h5py.File) -> dict[str, Any]:
         value = _value(item, file)
         if value is None:
             continue
-        members[name] = value
-        members |= _attributes(item, _RATES)
+        members[name] = _scaled(value, item)
+        for key, rate in _attributes(item, _RATES).items():
+            # Of channels with rates of their own, no one is that of all.
+            members[key] = rate if members.get(key, rate) == rate else np.nan
         for key in _NAMES:
             labels = item.attrs.get(key)
             if isinstance(labels, np.ndarray | list) and len(labels) > 1:
                 texts = [text.decode() if isinstance(text, bytes) else str(text) for text in labels]
                 members[f"{name}_{key}"] = texts
-        unit = next((item.attrs[key] for key in _UNITS if key in item.attrs), None)
-        if unit is not None:
-            members[f"{name}_unit"] = unit.decode() if isinstance(unit, bytes) else str(unit)
+        unit = next((text for key, text in item.attrs.items() if key.lower() in _UNITS), None)
+        if unit is not None and np.size(unit):
+            text = np.ravel(unit)[0]
+            members[f"{name}_unit"] = text.decode() if isinstance(text, bytes) else str(text)
     return members
+
+
+def _scaled(value: Any, item: h5py.Dataset) -> Any:
+    """Values in the unit of their entry, NaN where they are those that stand for none."""
+    stated = {key.lower(): text for key, text in item.attrs.items() if np.size(text) == 1}
+    if not isinstance(value, np.ndarray) or value.dtype.kind not in "fiu":
+        return value
+    numbers = {
+        key: float(np.ravel(x)[0]) for key, x in stated.items() if np.asarray(x).dtype.kind in "fiu"
+    }
+    if said := next((f"{k} = {x:g}" for k, x in numbers.items() if _UNSAID.get(k, x) != x), ""):
+        return Opaque(f"stated with {said}, and nobody says whether that is applied")
+    if not numbers.keys() & {*_SCALING, *_NONE}:
+        return value
+    kept = np.where(
+        np.isin(value, [numbers[key] for key in _NONE if key in numbers]), np.nan, value
+    )
+    factor, zero = (
+        numbers.get(key, neutral) for key, neutral in zip(_SCALING, (1.0, 0.0), strict=True)
+    )
+    return factor * kept + zero
 
 
 def _structures(group: h5py.Group, file: h5py.File) -> list[dict[str, Any]]:

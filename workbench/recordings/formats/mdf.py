@@ -4,6 +4,7 @@ import io
 import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from asammdf import MDF
 from workbench.recordings.formats.contents import Contents, FileChannel, Group
 from workbench.recordings.formats.spelling import name_and_unit, spell_unit
 
+_DEFAULT_YEAR = 1980  # of files whose recorder had no date
 _TIME = 1  # what a group counts its samples by: 0 nothing said, 1 time, 2 angle, 3 way, 4 index
 
 
@@ -24,12 +26,18 @@ def read(path: Path, raw: bytes) -> Contents:
     notes: list[str] = []
     doubts: dict[str, None] = {}
     with _take_down(doubts), MDF(io.BytesIO(raw)) as file:
-        version, start = file.version, file.start_time.timestamp()
+        version, start = file.version, _since_1970(file.start_time)
         for index, held in enumerate(file.groups):
             group = _group(file, index, held, start, notes)
             if group is not None:
                 groups.append(group)
     return Contents(f"MDF {version}", groups, notes, tuple(doubts))
+
+
+def _since_1970(moment: datetime) -> float:
+    """Seconds from 1970; local times count as if they were of UTC, the default of 1980 as none."""
+    known = moment if moment.tzinfo else moment.replace(tzinfo=UTC)
+    return known.timestamp() if known.year > _DEFAULT_YEAR else np.nan
 
 
 @contextmanager
@@ -60,6 +68,12 @@ def _group(file: MDF, index: int, held: Any, start: float, notes: list[str]) -> 
         name, unit = name_and_unit(channel.name)
         if signal.samples.dtype.kind not in "fiub" or signal.samples.ndim > 1:
             notes.append(f"'{name}' holds no numbers")
+            continue
+        formula = str(getattr(channel.conversion, "formula", "") or "")
+        if formula.strip("X1x() ") and np.array_equal(
+            signal.samples, file.get(group=index, index=number, raw=True).samples
+        ):  # the library leaves what it cannot compute as it was recorded
+            notes.append(f"'{name}' has a formula that is not understood, {formula[:60]!r}")
             continue
         values = np.asarray(signal.samples, dtype=np.float64)
         if signal.invalidation_bits is not None:

@@ -1,4 +1,4 @@
-"""Parquet: one table, with units in the metadata of its columns or in their names."""
+"""Parquet, Arrow and Feather: one table; units in the metadata of columns or in their names."""
 
 import io
 import math
@@ -17,8 +17,12 @@ _ABOUT = (b"description", b"comment", b"long_name")
 
 
 def read(path: Path, raw: bytes) -> Contents:
-    """Kind, groups and notes of a Parquet file."""
-    table = pq.ParquetFile(io.BytesIO(raw)).read()
+    """Kind, groups and notes of a file of Parquet or Arrow."""
+    called = "Arrow" if raw.startswith(b"ARROW1") else "Parquet"
+    stream = io.BytesIO(raw)
+    table = (
+        pa.ipc.open_file(stream).read_all() if called == "Arrow" else pq.ParquetFile(stream).read()
+    )
     channels: list[FileChannel] = []
     notes: list[str] = []
     texts: dict[str, list[str]] = {}
@@ -48,7 +52,7 @@ def read(path: Path, raw: bytes) -> Contents:
         written, _, own = read_group(cells, "", str(path))
         channels = [*written.channels, *channels]
         left, notes = written.left, [*notes, *own]
-    return Contents("Parquet", [Group("", tuple(channels), left=left)], notes)
+    return Contents(called, [Group("", tuple(channels), left=left)], notes)
 
 
 def _first(known: dict[bytes, bytes], keys: tuple[bytes, ...]) -> str:

@@ -159,7 +159,9 @@ _NAMED = re.compile(
     r"(?P<name>.*?)\s*(?:\[(?P<square>[^\[\]]*)\]|[({<](?P<round>[^(){}<>]*)[)}>])\s*"
 )
 _WITHIN = re.compile(r"(?P<name>.*\S)\s*\[(?P<unit>[^\[\]]+)\]\s*(?P<rest>\S.*)")
-_TRAILING = re.compile(r"(?P<name>.*\S)\s*(?:\s/\s?|\s+in\s+|,\s*)(?P<unit>\S+)")
+_TRAILING = re.compile(
+    r"(?P<name>.*?\S)\s*(?:\s/\s?|\s+in\s+|,\s*)(?P<unit>\S+)(\s+\((LGR|SEN) S/N.*\))?"
+)
 
 
 def name_and_unit(cell: str) -> tuple[str, str]:

@@ -1,8 +1,10 @@
 """TDMS of LabVIEW and DIAdem: groups of channels, with waveforms or channels of times."""
 
 import io
-from collections.abc import Iterator, Mapping
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +16,8 @@ from workbench.recordings.formats.contents import Contents, FileChannel, Group
 from workbench.recordings.formats.spelling import conversion, name_and_unit, spell_unit
 from workbench.recordings.formats.stamps import read_stamps
 
+# Properties of a waveform, and their bytes in the file with four that tell their type.
+_WAVEFORM = {"wf_start_time": 20, "wf_start_offset": 12, "wf_increment": 12}
 _UNITS = ("unit_string", "NI_UnitDescription", "unit", "Unit", "units")
 
 
@@ -23,8 +27,10 @@ def read(path: Path, raw: bytes) -> Contents:
     notes: list[str] = []
     doubts: list[str] = []
     with _take_down(doubts):
-        for held in TdmsFile.read(io.BytesIO(raw)).groups():
-            groups += _groups(held, notes)
+        held = TdmsFile.read(io.BytesIO(raw)).groups()
+        doubt = _doubt(raw, [channel.properties for group in held for channel in group.channels()])
+        for group in held:
+            groups += _groups(group, doubt, notes)
     return Contents("TDMS", groups, notes, tuple(doubts))
 
 
@@ -40,7 +46,19 @@ def _take_down(doubts: list[str]) -> Iterator[None]:
         doubts += dict.fromkeys(line[:200] for line in printed.getvalue().splitlines())
 
 
-def _groups(held: Any, notes: list[str]) -> list[Group]:
+def _doubt(raw: bytes, stated: Sequence[Mapping[str, Any]]) -> str:
+    """That segments begin or step otherwise than those before them, in words; empty: none does.
+
+    The library joins segments, and keeps what the last of them states.
+    """
+    for key, size in _WAVEFORM.items():
+        written = {match[0] for match in re.finditer(key.encode() + b"(?s:.{%d})" % size, raw)}
+        if len(written) > len({str(properties[key]) for properties in stated if key in properties}):
+            return f"waveforms of several segments, of which each has its own '{key}'"
+    return ""
+
+
+def _groups(held: Any, doubt: str, notes: list[str]) -> list[Group]:
     """A group of the file; channels with other times or lengths are groups of their own."""
     by_times: dict[tuple[int, float, float, float], list[FileChannel]] = {}
     for recorded in held.channels():
@@ -73,10 +91,11 @@ def _groups(held: Any, notes: list[str]) -> list[Group]:
         if size < 2:
             continue
         clock = None
-        if step > 0.0:
+        if step > 0.0 and not doubt:
             times = offset + step * np.arange(size, dtype=np.float64)
             clock = FileChannel("time", "s", times, start=start if start >= 0.0 else np.nan)
-        groups.append(Group(held.name, tuple(channels), time=clock, within=(held.name,)))
+        group = Group(held.name, tuple(channels), time=clock, within=(held.name,))
+        groups.append(replace(group, step_doubt=doubt if step > 0.0 else ""))
     return groups
 
 

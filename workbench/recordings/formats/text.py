@@ -17,7 +17,7 @@ from workbench.recordings.formats.numbers import is_missing, is_number
 from workbench.recordings.formats.stamps import is_stamp
 
 _SEPARATORS = {";": "semicolons", "\t": "tabs", "|": "bars", ",": "commas", " ": "spaces"}
-_COMMENT = re.compile(r"\s*\"?(#+|%+|//+|!+|\*+)\s*")
+_COMMENT = re.compile(r"(?!\"#\")\s*\"?(#+|%+|//+|!+|\*+)\s*")
 _BEFORE_UNIT = re.compile(r"(?<=[^\s\])])\s+(?=[\[(])")  # between a name and its unit
 _SAMPLED = 200  # lines from the middle of a file, which tell how it is laid out
 _FOLDED = 5  # lines over which a name in quotation marks may go
