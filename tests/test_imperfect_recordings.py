@@ -223,3 +223,13 @@ def test_a_fast_rise_between_slow_falls_is_no_spike(heater):
     assert not outliers(values, sensor, SOUND).any()
     values[[100, 300, 301, 731]] += [1.0, -2.0, -2.0, 1.5]
     assert list(np.flatnonzero(outliers(values, sensor, SOUND))) == [100, 300, 301, 731]
+
+
+def test_the_ends_of_a_clear_swing_are_no_spikes(heater):
+    sensor, time = heater.signals["T"], np.arange(3000)
+    noise = np.random.default_rng(3).standard_normal(time.size)
+    swing = np.sin(2.0 * np.pi / 24.3 * time)
+    assert not outliers(NOISE * (200.0 * swing + noise), sensor, SOUND).any()
+    values = NOISE * (20.0 * swing + noise)
+    values[[100, 731, 1502]] += NOISE * np.array([60.0, -60.0, 60.0])
+    assert list(np.flatnonzero(outliers(values, sensor, SOUND))) == [100, 731, 1502]

@@ -15,6 +15,9 @@ from workbench.system.parts import Signal
 ALONG = 2.0  # standard deviations, of a line through few samples: noise alone scatters by one
 _ABREAST = 11  # samples of the running median
 _FEW = 6  # samples; three fourth differences have no median to speak of
+# Samples on each side where there are so many, and the order of the curve through them: where up to
+# seven are off the median in a swing of 24 samples a period, it is within a hundredth of its size.
+_BESIDE, _ORDER = 4, 5
 _MOVED = 0.5  # of what second differences say: noise comes below in a thousandth of 20 samples
 # Steps in a row of another length that are another rate. Of samples lost at random, three in ten,
 # steps of three or more have a share of 0.09, so many in a row 5e-7: once in 20 recordings of 1e5.
@@ -72,7 +75,8 @@ def _outliers(values: Vector, signal: Signal, sound: Soundness, *, flat: bool) -
 def _out_and_back(values: Vector, mask: Mask, jump: Vector) -> Mask:
     """Of samples off a running median, those that leave the lines on both sides of them.
 
-    A signal that turns fast is off the median too, but comes or goes along a line.
+    A signal that turns fast is off the median too, but comes or goes along a line; or, at the end
+    of a swing, along a curve through the samples on both sides.
     """
     padded = np.pad(values, 2, constant_values=np.nan)  # at an end, one side has to do
     before = (values - (2.0 * padded[1:-3] - padded[:-4])) / jump
@@ -80,8 +84,22 @@ def _out_and_back(values: Vector, mask: Mask, jump: Vector) -> Mask:
     kept = np.zeros_like(mask)
     for first, end in runs(mask):
         sides = [side for side in (before[first], after[end - 1]) if np.isfinite(side)]
-        kept[first:end] = min(sides, default=0.0) > 1.0 or max(sides, default=0.0) < -1.0
+        leaves = min(sides, default=0.0) > 1.0 or max(sides, default=0.0) < -1.0
+        kept[first:end] = leaves and _off_curve(values, first, end) > jump[first:end].min()
     return kept
+
+
+def _off_curve(values: Vector, first: int, end: int) -> float:
+    """How far samples are off the curve through those beside them; infinite with none on a side."""
+    room = values.size - (end - first) - 2 * _BESIDE
+    if first == 0 or end == values.size or room < 0:
+        return np.inf
+    begin = min(max(first - _BESIDE, 0), room)
+    at = np.arange(begin, begin + end - first + 2 * _BESIDE)
+    beside = (at < first) | (at >= end)
+    middle = at - 0.5 * (first + end - 1)
+    curve = np.polynomial.Polynomial.fit(middle[beside], values[at[beside]], _ORDER)
+    return float(np.abs(values[first:end] - curve(middle[~beside])).max())
 
 
 def bridge(time: Vector, values: Vector, wrong: Mask) -> Vector:
