@@ -38,27 +38,16 @@ class RateTerm:
 
     The rate gains -tanh(x/width), -tanh(x/width)*exp(-abs(x)/speed), -x, -x*abs(x) or 1, times a
     coefficient. The exponent is that of A. Tustin (1947), J. IEE 94(IIA), 143-151.
-
-    Attributes
-    ----------
-    name : of its coefficient, a parameter of the FMU.
-    state : place in the FMU's continuous states.
-    form : COULOMB, STRIBECK, VISCOUS, QUADRATIC or CONSTANT.
-    typical : size of the coefficient, in its unit; bounds are 1000 times that.
-    unit : of the coefficient, empty for none.
-    scale : typical size of the state; the speed of a Stribeck term begins at a third of it.
-    state_unit : of the state and of the speed, empty for none.
-    text : what it is, for people.
     """
 
-    name: str
-    state: int
-    form: str
-    typical: float
-    unit: str
-    scale: float
-    state_unit: str
-    text: str
+    name: str  # of its coefficient, a parameter of the FMU
+    state: int  # place in the FMU's continuous states
+    form: str  # COULOMB, STRIBECK, VISCOUS, QUADRATIC or CONSTANT
+    typical: float  # size of the coefficient, in its unit; bounds are 1000 times that
+    unit: str  # of the coefficient, empty for none
+    scale: float  # typical size of the state; the speed of a Stribeck term begins at a third of it
+    state_unit: str  # of the state and of the speed, empty for none
+    text: str  # what it is, for people
 
 
 def write_extended(

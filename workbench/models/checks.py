@@ -51,23 +51,16 @@ from workbench.runtime.supervision import Limits, usual_limits
 
 @dataclass(frozen=True)
 class CheckResult:
-    """What one check found.
-
-    Attributes
-    ----------
-    passed : None if the check was not made, for the reason given.
-    value, limit : measured, and the largest (of instances: the smallest) that passes, in `unit`.
-    reason : of a failure or of what was not checked, for whom has to act on it.
-    unknown : whether the check was begun and the FMU did not answer.
-    """
+    """What one check found."""
 
     name: str
-    passed: bool | None = None
+    passed: bool | None = None  # None if the check was not made, for the reason given
+    # value, limit: measured, and the largest (of instances: the smallest) that passes, in `unit`
     value: float | None = None
     limit: float | None = None
     unit: str = "1"
-    reason: str = ""
-    unknown: bool = False
+    reason: str = ""  # of a failure or of what was not checked, for whom has to act on it
+    unknown: bool = False  # whether the check was begun and the FMU did not answer
 
 
 def is_fit(findings: Iterable[CheckResult]) -> bool:
@@ -289,19 +282,12 @@ COMMUNICATION_STEPS = 100
 
 @dataclass(frozen=True)
 class Excitation:
-    """Where an FMU is moved.
+    """Where an FMU is moved."""
 
-    Attributes
-    ----------
-    states : (n,) start values, off the FMU's own by up to a tenth of a nominal value.
-    nominal : (n,) typical size of the states.
-    inputs : the real inputs that may change in continuous time.
-    first, second : (m,) inputs, and those after a jump.
-    """
-
-    states: Vector
-    nominal: Vector
-    inputs: Variables
+    states: Vector  # (n,) start values, off the FMU's own by up to a tenth of a nominal value
+    nominal: Vector  # (n,) typical size of the states
+    inputs: Variables  # the real inputs that may change in continuous time
+    # first, second: (m,) inputs, and those after a jump
     first: Vector
     second: Vector
 

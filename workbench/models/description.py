@@ -77,38 +77,28 @@ class Variable:
 
 @dataclass(frozen=True)
 class Description:
-    """The model description of an FMU and what its archive holds.
-
-    Attributes
-    ----------
-    sha256 : hash of the file, its identity in results.
-    version : of FMI, "2.0" or "3.0".
-    token : GUID or instantiation token.
-    interfaces : by name, MODEL_EXCHANGE and CO_SIMULATION.
-    platforms : those with a binary, in FMI's names.
-    binaries : sizes of the files of all platforms [bytes], by name in the archive.
-    states, rates : names of the continuous states and their derivatives, in FMI's order.
-    dependencies : names of what a derivative or an output depends on, by its name; without those of
-        which the model structure does not say it.
-    event_indicators : their number; 0 for a smooth model.
-    start, step, stop : of the default experiment [s], None where there is none.
-    """
+    """The model description of an FMU and what its archive holds."""
 
     path: Path
-    sha256: str
-    version: str
+    sha256: str  # hash of the file, its identity in results
+    version: str  # of FMI, "2.0" or "3.0"
     name: str
     text: str
     tool: str
-    token: str
-    interfaces: Mapping[str, Interface]
-    platforms: tuple[str, ...]
+    token: str  # GUID or instantiation token
+    interfaces: Mapping[str, Interface]  # by name, MODEL_EXCHANGE and CO_SIMULATION
+    platforms: tuple[str, ...]  # those with a binary, in FMI's names
+    # sizes of the files of all platforms [bytes], by name in the archive
     binaries: Mapping[str, int]
     variables: tuple[Variable, ...]
+    # states, rates: names of the continuous states and their derivatives, in FMI's order
     states: tuple[str, ...]
     rates: tuple[str, ...]
+    # names of what a derivative or an output depends on, by its name; without those of which the
+    # model structure does not say it
     dependencies: Mapping[str, tuple[str, ...]]
-    event_indicators: int
+    event_indicators: int  # their number; 0 for a smooth model
+    # start, step, stop: of the default experiment [s], None where there is none
     start: float | None
     step: float | None
     stop: float | None

@@ -62,49 +62,31 @@ _METHOD = _Method(
 
 
 class _Space(NamedTuple):
-    """Space to work in.
+    """Space to work in."""
 
-    Attributes
-    ----------
-    stages : (7, n) derivatives K of the states.
-    begin, before, after : (n,) states at the sample, and at both ends of a step.
-    """
-
-    stages: Matrix
+    stages: Matrix  # (7, n) derivatives K of the states
+    # begin, before, after: (n,) states at the sample, and at both ends of a step
     begin: Vector
     before: Vector
     after: Vector
 
 
 class Samples(NamedTuple):
-    """What acts at and between samples.
+    """What acts at and between samples."""
 
-    Attributes
-    ----------
-    time : (n,) of the FMU at the samples [s].
-    u : (n, m) inputs at the samples.
-    begin, end : (n, m) inputs at both ends of the interval before each sample; straight between.
-    """
-
-    time: Vector
-    u: Matrix
+    time: Vector  # (n,) of the FMU at the samples [s]
+    u: Matrix  # (n, m) inputs at the samples
+    # begin, end: (n, m) inputs at both ends of the interval before each sample; straight between
     begin: Matrix
     end: Matrix
 
 
 class State(NamedTuple):
-    """Where the FMU is.
+    """Where the FMU is."""
 
-    Attributes
-    ----------
-    x : (n,) states, which steps change.
-    nominal : (n,) their typical sizes.
-    signs : (z,) of event indicators: -1, 0, 1.
-    """
-
-    x: Vector
-    nominal: Vector
-    signs: Vector
+    x: Vector  # (n,) states, which steps change
+    nominal: Vector  # (n,) their typical sizes
+    signs: Vector  # (z,) of event indicators: -1, 0, 1
 
 
 def go_on(

@@ -121,15 +121,10 @@ class EventError(FMUError):
 
 
 class EventUpdate(NamedTuple):
-    """What an FMU says after an event.
+    """What an FMU says after an event."""
 
-    Attributes
-    ----------
-    time : of the next time event [s], infinite where there is none.
-    states_changed, nominals_changed : of the continuous states.
-    """
-
-    time: float
+    time: float  # of the next time event [s], infinite where there is none
+    # states_changed, nominals_changed: of the continuous states
     states_changed: bool
     nominals_changed: bool
 

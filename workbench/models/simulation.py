@@ -36,17 +36,11 @@ _SHOWN = 1e-6
 
 
 class Drive(NamedTuple):
-    """What drives a simulation.
+    """What drives a simulation."""
 
-    Attributes
-    ----------
-    time : (n,) of the samples [s], from any begin.
-    u : (n, m) inputs at the samples.
-    model_time : of the model at the first sample [s]; None: where its default experiment begins.
-    """
-
-    time: Vector
-    u: Matrix
+    time: Vector  # (n,) of the samples [s], from any begin
+    u: Matrix  # (n, m) inputs at the samples
+    # of the model at the first sample [s]; None: where its default experiment begins
     model_time: float | None = None
 
 

@@ -26,18 +26,12 @@ SUMMARIES = (
 
 @dataclass(frozen=True)
 class Measure:
-    """One number of a result.
+    """One number of a result."""
 
-    Attributes
-    ----------
-    value : None where it could not be had.
-    better : which way is better; empty where neither is.
-    low, high : ends of its 95 % interval; None without.
-    """
-
-    value: float | None
+    value: float | None  # None where it could not be had
     unit: str
-    better: Better = ""
+    better: Better = ""  # which way is better; empty where neither is
+    # low, high: ends of its 95 % interval; None without
     low: float | None = None
     high: float | None = None
 

@@ -60,20 +60,13 @@ _ENTRIES = 3  # of a legend side by side
 
 @dataclass(frozen=True)
 class Curve:
-    """One line of a panel.
+    """One line of a panel."""
 
-    Attributes
-    ----------
-    style : key of LIGHT and DARK, which ties it to an entry of the legend.
-    values : (n,) in the panel's unit, NaN where there is none.
-    reach : (n,) half of its band in the same unit, NaN where there is none; or None.
-    dashed : set apart from another curve of the same style.
-    """
-
-    style: str
-    values: Vector
+    style: str  # key of LIGHT and DARK, which ties it to an entry of the legend
+    values: Vector  # (n,) in the panel's unit, NaN where there is none
+    # (n,) half of its band in the same unit, NaN where there is none; or None
     reach: Vector | None = None
-    dashed: bool = False
+    dashed: bool = False  # set apart from another curve of the same style
 
 
 @dataclass(frozen=True)

@@ -32,17 +32,11 @@ class Text:
 
 @dataclass(frozen=True)
 class Cell:
-    """One entry of a table; a plain text is one too.
-
-    Attributes
-    ----------
-    value : by which it is sorted; None where there is none, and for words.
-    heat : 0 to 1, shade of the cell; None without.
-    """
+    """One entry of a table; a plain text is one too."""
 
     text: str
-    value: float | None = None
-    heat: float | None = None
+    value: float | None = None  # by which it is sorted; None where there is none, and for words
+    heat: float | None = None  # 0 to 1, shade of the cell; None without
     warning: bool = False
 
     @property
@@ -55,37 +49,23 @@ class Cell:
 
 @dataclass(frozen=True)
 class Numbers:
-    """Heading of a column of numbers; that of a column of words is a plain text.
-
-    Attributes
-    ----------
-    meaning : shown where the pointer is on the heading.
-    sorted : how the rows are ordered by this column, "ascending" or "descending".
-    """
+    """Heading of a column of numbers; that of a column of words is a plain text."""
 
     title: str
-    meaning: str = ""
-    sorted: str = ""
+    meaning: str = ""  # shown where the pointer is on the heading
+    sorted: str = ""  # how the rows are ordered by this column, "ascending" or "descending"
 
 
 @dataclass(frozen=True)
 class Table:
-    """Rows of cells; the first column holds what a row is of.
-
-    Attributes
-    ----------
-    columns : headings, texts and `Numbers`.
-    rows : texts and `Cell`s.
-    marked : first cells of rows that stand out.
-    sortable : whether a click on a heading sorts the rows.
-    """
+    """Rows of cells; the first column holds what a row is of."""
 
     id: str
     caption: str
-    columns: Sequence[object]
-    rows: Sequence[Sequence[object]]
-    marked: Sequence[str] = ()
-    sortable: bool = True
+    columns: Sequence[object]  # headings, texts and `Numbers`
+    rows: Sequence[Sequence[object]]  # texts and `Cell`s
+    marked: Sequence[str] = ()  # first cells of rows that stand out
+    sortable: bool = True  # whether a click on a heading sorts the rows
 
 
 @dataclass(frozen=True)
@@ -145,31 +125,20 @@ class Dot:
 
 @dataclass(frozen=True)
 class Dots:
-    """Rows of dots on one axis, from zero, from `low`, or logarithmic.
+    """Rows of dots on one axis, from zero, from `low`, or logarithmic."""
 
-    Attributes
-    ----------
-    finding : what it shows, for those who do not see it.
-    axis : what the numbers are, with unit.
-    mark : value and name of a line across all rows; None without.
-    low, high : ends of the axis; None: zero, and that of the data.
-    paired : whether a line joins the two dots of a row.
-    total : row that stands for all others.
-    caption : the finding unless given.
-    legend : (style, text) of each entry.
-    """
-
-    finding: str
-    axis: str
+    finding: str  # what it shows, for those who do not see it
+    axis: str  # what the numbers are, with unit
     rows: Sequence[tuple[str, Sequence[Dot]]]
-    mark: tuple[float, str] | None = None
+    mark: tuple[float, str] | None = None  # value and name of a line across all rows; None without
+    # low, high: ends of the axis; None: zero, and that of the data
     low: float | None = None
     high: float | None = None
     logarithmic: bool = False
-    paired: bool = False
-    total: str = ""
-    caption: str = ""
-    legend: Sequence[tuple[str, str]] = ()
+    paired: bool = False  # whether a line joins the two dots of a row
+    total: str = ""  # row that stands for all others
+    caption: str = ""  # the finding unless given
+    legend: Sequence[tuple[str, str]] = ()  # (style, text) of each entry
 
     def drawn(self) -> dict[str, Any]:
         """Geometry for the template, in pixels."""
@@ -205,19 +174,13 @@ class Dots:
 
 @dataclass(frozen=True)
 class Steps:
-    """A number that changes from step to step, as the best of a search does.
-
-    Attributes
-    ----------
-    values : after each step, the first before any.
-    mark : value and name of a line across.
-    """
+    """A number that changes from step to step, as the best of a search does."""
 
     finding: str
     axis: str
-    values: Sequence[float]
+    values: Sequence[float]  # after each step, the first before any
     style: str
-    mark: tuple[float, str]
+    mark: tuple[float, str]  # value and name of a line across
     caption: str
 
     def drawn(self) -> dict[str, Any]:
@@ -249,19 +212,13 @@ class Steps:
 
 @dataclass(frozen=True)
 class Matrix:
-    """Shares of 0 to 1 between things, by row and column.
-
-    Attributes
-    ----------
-    least : share from which on it is written.
-    marked : names that stand out.
-    """
+    """Shares of 0 to 1 between things, by row and column."""
 
     finding: str
     names: Sequence[str]
     shares: Sequence[Sequence[float]]
-    least: float
-    marked: Sequence[str]
+    least: float  # share from which on it is written
+    marked: Sequence[str]  # names that stand out
     caption: str
 
     def drawn(self) -> dict[str, Any]:
@@ -277,20 +234,12 @@ class Matrix:
 
 @dataclass(frozen=True)
 class Recording:
-    """The figure of a recording, which can be zoomed; see `zoomable`.
+    """The figure of a recording, which can be zoomed; see `zoomable`."""
 
-    Attributes
-    ----------
-    drawing : its geometry.
-    elsewhere : page of its own; empty where it is on this one.
-    files : suffixes of its data and pictures beside the page.
-    headed : whether its name and what it says stand above it.
-    """
-
-    drawing: Mapping[str, Any]
-    elsewhere: str = ""
-    files: Sequence[str] = ()
-    headed: bool = True
+    drawing: Mapping[str, Any]  # its geometry
+    elsewhere: str = ""  # page of its own; empty where it is on this one
+    files: Sequence[str] = ()  # suffixes of its data and pictures beside the page
+    headed: bool = True  # whether its name and what it says stand above it
 
 
 @dataclass(frozen=True)
@@ -316,38 +265,25 @@ Block = (
 
 @dataclass(frozen=True)
 class Part:
-    """A part of a page; the first is open, the others are folded.
-
-    Attributes
-    ----------
-    printed : whether it is in the printed report though it is folded on the page.
-    """
+    """A part of a page; the first is open, the others are folded."""
 
     id: str
     title: str
     content: Sequence[Block]
-    printed: bool = False
+    printed: bool = False  # whether it is in the printed report though it is folded on the page
 
 
 @dataclass(frozen=True)
 class Page:
-    """All of a page but the summary.
-
-    Attributes
-    ----------
-    file : of the summary, beside the page.
-    headline : the answer of the summary unless given.
-    related : text of a link by its address.
-    run : what was run.
-    """
+    """All of a page but the summary."""
 
     title: str
     parts: Sequence[Part]
-    file: str = "summary.json"
-    headline: str = ""
+    file: str = "summary.json"  # of the summary, beside the page
+    headline: str = ""  # the answer of the summary unless given
     warnings: Sequence[str] = ()
-    related: Mapping[str, str] = field(default_factory=dict)
-    run: Sequence[Block] = (Provenance(),)
+    related: Mapping[str, str] = field(default_factory=dict)  # text of a link by its address
+    run: Sequence[Block] = (Provenance(),)  # what was run
 
     def write(self, summary: Mapping[str, Any], path: Path) -> Path:
         """Write the page of a summary; returns its path."""

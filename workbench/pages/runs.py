@@ -16,26 +16,18 @@ _ANEW = "make the results anew with this version"
 
 @dataclass(frozen=True)
 class RunRecord:
-    """One run, as its summary tells it.
-
-    Attributes
-    ----------
-    place : of its folder in the one that was asked for.
-    run : see `provenance.run_of`.
-    headline, details : numbers by what they are.
-    files : beside the summary and below, by suffix: how many.
-    provenance : all that made it.
-    """
+    """One run, as its summary tells it."""
 
     folder: Path
-    place: str
+    place: str  # of its folder in the one that was asked for
     summary: str
-    run: Mapping[str, Any]
+    run: Mapping[str, Any]  # see `provenance.run_of`
     sentence: str
+    # headline, details: numbers by what they are
     headline: Mapping[str, Measure]
     details: Mapping[str, Measure]
-    files: Mapping[str, int]
-    provenance: Mapping[str, Any]
+    files: Mapping[str, int]  # beside the summary and below, by suffix: how many
+    provenance: Mapping[str, Any]  # all that made it
 
     @property
     def commit(self) -> str:

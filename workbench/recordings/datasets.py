@@ -36,33 +36,22 @@ _CASE = "case.toml"
 
 @dataclass(frozen=True, eq=False)
 class PublishedRecording:
-    """One recording of a published set, or a piece of one.
+    """One recording of a published set, or a piece of one."""
 
-    Attributes
-    ----------
-    name : of the case folder.
-    title : one line for reports.
-    columns : (n,) each, by `name [unit]` as the case's CSV has it; the first is `time [s]`.
-    file : that it was read from, of those of the layout.
-    rows : first and last row of that file's samples, from 0.
-    changed : what was converted, chosen or cut, for people.
-    conditions : of the case, as `case.toml` has them.
-    held_out : it is there to judge a fit to the others by.
-    machine : that it was recorded on, where a set has several; each is diagnosed for itself.
-    date : when it was recorded, ISO 8601; empty: unknown.
-    counts_from : time before which samples only lead to those that count [s]; None: all count.
-    """
-
-    name: str
-    title: str
+    name: str  # of the case folder
+    title: str  # one line for reports
+    # (n,) each, by `name [unit]` as the case's CSV has it; the first is `time [s]`
     columns: Mapping[str, Vector]
-    file: str
-    rows: tuple[int, int]
-    changed: tuple[str, ...] = ()
+    file: str  # that it was read from, of those of the layout
+    rows: tuple[int, int]  # first and last row of that file's samples, from 0
+    changed: tuple[str, ...] = ()  # what was converted, chosen or cut, for people
+    # of the case, as `case.toml` has them
     conditions: Mapping[str, Any] = field(default_factory=dict)
-    held_out: bool = False
+    held_out: bool = False  # it is there to judge a fit to the others by
+    # that it was recorded on, where a set has several; each is diagnosed for itself
     machine: str = ""
-    date: str = ""
+    date: str = ""  # when it was recorded, ISO 8601; empty: unknown
+    # time before which samples only lead to those that count [s]; None: all count
     counts_from: float | None = None
 
 
@@ -98,22 +87,13 @@ class FolderLayout:
 
 @dataclass(frozen=True)
 class PublishedSet:
-    """A set of recordings that somebody published.
+    """A set of recordings that somebody published."""
 
-    Attributes
-    ----------
-    title : what was measured on which machine.
-    source : authors, year, where it is to be had.
-    licence : under which it was published.
-    recordings : what they are, which are fitted and which are held out.
-    layouts : in which it is read, the publisher's own first.
-    """
-
-    title: str
-    source: str
-    licence: str
-    recordings: str
-    layouts: tuple[FolderLayout, ...]
+    title: str  # what was measured on which machine
+    source: str  # authors, year, where it is to be had
+    licence: str  # under which it was published
+    recordings: str  # what they are, which are fitted and which are held out
+    layouts: tuple[FolderLayout, ...]  # in which it is read, the publisher's own first
 
     def __str__(self) -> str:
         parts = [f"{self.title}\n\n{self.recordings}\n", f"source:  {self.source}"]

@@ -35,17 +35,12 @@ from workbench.system.tables import Table
 
 @dataclass(frozen=True)
 class Cut:
-    """Samples that are kept as one recording, or left out.
+    """Samples that are kept as one recording, or left out."""
 
-    Attributes
-    ----------
-    first, end : sample, and the one after the last.
-    reason : why they are left out; empty: they are kept.
-    """
-
+    # first, end: sample, and the one after the last
     first: int
     end: int
-    reason: str = ""
+    reason: str = ""  # why they are left out; empty: they are kept
 
 
 def cut(time: Vector, signals: Mapping[str, Vector], system: System) -> list[Cut]:
@@ -137,44 +132,25 @@ IMPORTED = "import.json"
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """One recording of an import.
+    """One recording of an import."""
 
-    Attributes
-    ----------
-    name : of its case folder.
-    samples : first, and the one after the last, of those that were read.
-    time : (n,) s from its first sample.
-    signals : (n,) each, SI.
-    conditions : as `case.toml` has them.
-    sources : where each condition is from: given, shown by the record, unknown.
-    doubts : what is unlikely in it, in words.
-    """
-
-    name: str
-    samples: tuple[int, int]
-    time: Vector
-    signals: Mapping[str, Vector]
-    conditions: Mapping[str, Any]
-    sources: Mapping[str, str]
-    doubts: tuple[str, ...]
+    name: str  # of its case folder
+    samples: tuple[int, int]  # first, and the one after the last, of those that were read
+    time: Vector  # (n,) s from its first sample
+    signals: Mapping[str, Vector]  # (n,) each, SI
+    conditions: Mapping[str, Any]  # as `case.toml` has them
+    sources: Mapping[str, str]  # where each condition is from: given, shown by the record, unknown
+    doubts: tuple[str, ...]  # what is unlikely in it, in words
 
 
 @dataclass(frozen=True, eq=False)
 class Import:
-    """What becomes of one recording, or one long one.
+    """What becomes of one recording, or one long one."""
 
-    Attributes
-    ----------
-    recording : files that hold it, and its channels.
-    measured : all of it, in SI units.
-    parts : in which it was cut.
-    pieces : those that become cases.
-    """
-
-    recording: ProposedRecording
-    measured: MergedRecording
-    parts: tuple[Cut, ...]
-    pieces: tuple[Piece, ...] = field(default_factory=tuple)
+    recording: ProposedRecording  # files that hold it, and its channels
+    measured: MergedRecording  # all of it, in SI units
+    parts: tuple[Cut, ...]  # in which it was cut
+    pieces: tuple[Piece, ...] = field(default_factory=tuple)  # those that become cases
 
 
 def import_recording(

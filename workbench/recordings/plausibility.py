@@ -40,22 +40,13 @@ _ROUNDED = 1.0 + 1e-6  # times are written with some digits
 
 @dataclass(frozen=True)
 class Origin:
-    """Where a recording stands.
+    """Where a recording stands."""
 
-    Attributes
-    ----------
-    name : of the file or the table.
-    first_line : of the first sample in a file, None without one.
-    columns : name of each signal's column, and of "time".
-    conditions : where the conditions stand.
-    doubts : what its reader doubts already, in words.
-    """
-
-    name: str
-    first_line: int | None
-    columns: Mapping[str, str]
-    conditions: str
-    doubts: tuple[str, ...] = ()
+    name: str  # of the file or the table
+    first_line: int | None  # of the first sample in a file, None without one
+    columns: Mapping[str, str]  # name of each signal's column, and of "time"
+    conditions: str  # where the conditions stand
+    doubts: tuple[str, ...] = ()  # what its reader doubts already, in words
 
     def at(self, sample: int, signal: str) -> str:
         """Place of a sample."""

@@ -60,22 +60,14 @@ class _Ready(NamedTuple):
 
 @dataclass(eq=False)
 class _Task:
-    """What was asked for, and where it may be done.
-
-    Attributes
-    ----------
-    calls : arguments of the function, once for each answer.
-    workers : that may do it, by address.
-    done : what the cluster makes of it.
-    tried : how often all of its workers went away.
-    """
+    """What was asked for, and where it may be done."""
 
     function: Callable[..., Any]
-    calls: Sequence[tuple[Any, ...]]
+    calls: Sequence[tuple[Any, ...]]  # arguments of the function, once for each answer
     answers: "Sequence[Future[Any]]"
-    workers: Set[str]
-    done: Any = None
-    tried: int = 0
+    workers: Set[str]  # that may do it, by address
+    done: Any = None  # what the cluster makes of it
+    tried: int = 0  # how often all of its workers went away
 
 
 class DaskPool(Generic[State]):

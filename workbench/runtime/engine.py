@@ -13,18 +13,11 @@ def silent(line: str) -> None:
 
 @dataclass(frozen=True)
 class Engine:
-    """With what something is worked out.
+    """With what something is worked out."""
 
-    Attributes
-    ----------
-    workers : processes.
-    report : takes a line on what is being done.
-    out : folder of what is written on the way.
-    """
-
-    workers: int = 1
-    report: Reporter = silent
-    out: Path = Path()
+    workers: int = 1  # processes
+    report: Reporter = silent  # takes a line on what is being done
+    out: Path = Path()  # folder of what is written on the way
 
 
 ALONE = Engine()

@@ -28,23 +28,15 @@ REQUIRED = object()
 
 @dataclass
 class Scope:
-    """What is known while a table is read: units, defaults and checks may depend on it.
+    """What is known while a table is read: units, defaults and checks may depend on it."""
 
-    Attributes
-    ----------
-    file : that is read.
-    units : of all variables of the model, None before there is one.
-    own : fields of this table that were read so far.
-    above : scope of the table that this one is in.
-    references : names of things that are looked up when all is read: place, name, what it names.
-    problems : found on the way; they are said when the model itself is found to be right.
-    """
-
-    file: Path
-    units: Mapping[str, str] | None
-    own: dict[str, Any] = field(default_factory=dict)
-    above: "Scope | None" = None
+    file: Path  # that is read
+    units: Mapping[str, str] | None  # of all variables of the model, None before there is one
+    own: dict[str, Any] = field(default_factory=dict)  # fields of this table that were read so far
+    above: "Scope | None" = None  # scope of the table that this one is in
+    # names of things that are looked up when all is read: place, name, what it names
     references: list[tuple[str, str, str]] = field(default_factory=list)
+    # found on the way; they are said when the model itself is found to be right
     problems: list[InputError] = field(default_factory=list)
 
     @property
@@ -59,55 +51,40 @@ class Scope:
 
 @dataclass(frozen=True)
 class Key:
-    """How a field stands in a file.
+    """How a field stands in a file."""
 
-    Attributes
-    ----------
-    meaning : for people.
-    name : of the key, where it is not the field's; `table.key` stands in a table of its own.
-    aliases : further names, as files of an older version have them.
-    unit : SI, of numbers. `{field}` is the unit that another field of the table says; a function
-        tells it of the scope and the name of the entry, None where that is unknown, a NaN then.
-    absent : what the field is where there is no key, or a function of the scope that tells it.
-        A text such as `{name}` is another field.
-    otherwise : what that is in words, where `absent` does not show it.
-    above, least, below : bounds of numbers.
-    ordered : whether the first of two numbers must be the smaller one; `equal`: or the same.
-    expected : the bounds in words, for the message of an error.
-    choices : texts that it may be.
-    like : field whose unit a unit must be convertible to.
-    of : what a text, or the names of a formula, refer to.
-    keys : what the keys of a mapping refer to; or a function that tells which there are.
-    every : whether all of these keys must be there.
-    inline : whether the keys of its table stand among those of this one.
-    check : refuses what no other option does; takes the value, the table, the key, and the scope.
-    read : reads what no type says; takes the table, the key, and the scope.
-    schema : more of its JSON Schema.
-    of_model : whether it is left out while there is no model.
-    """
-
-    meaning: str = ""
+    meaning: str = ""  # for people
+    # of the key, where it is not the field's; `table.key` stands in a table of its own
     name: str = ""
-    aliases: tuple[str, ...] = ()
+    aliases: tuple[str, ...] = ()  # further names, as files of an older version have them
+    # SI, of numbers. `{field}` is the unit that another field of the table says; a function tells
+    # it of the scope and the name of the entry, None where that is unknown, a NaN then.
     unit: "str | Callable[[Scope, str], str | None]" = "1"
+    # what the field is where there is no key, or a function of the scope that tells it. A text such
+    # as `{name}` is another field.
     absent: Any = REQUIRED
-    otherwise: str = ""
+    otherwise: str = ""  # what that is in words, where `absent` does not show it
+    # above, least, below: bounds of numbers
     above: float = -math.inf
     least: float = -math.inf
     below: float = math.inf
+    # whether the first of two numbers must be the smaller one; `equal`: or the same
     ordered: bool = False
     equal: bool = False
-    expected: str = ""
-    choices: tuple[str, ...] = ()
-    like: str = ""
-    of: str = ""
+    expected: str = ""  # the bounds in words, for the message of an error
+    choices: tuple[str, ...] = ()  # texts that it may be
+    like: str = ""  # field whose unit a unit must be convertible to
+    of: str = ""  # what a text, or the names of a formula, refer to
+    # what the keys of a mapping refer to; or a function that tells which there are
     keys: "str | Callable[[Scope], Iterable[str]]" = ""
-    every: bool = False
-    inline: bool = False
+    every: bool = False  # whether all of these keys must be there
+    inline: bool = False  # whether the keys of its table stand among those of this one
+    # refuses what no other option does; takes the value, the table, the key, and the scope
     check: "Callable[[Any, Table, str, Scope], None] | None" = None
+    # reads what no type says; takes the table, the key, and the scope
     read: "Callable[[Table, str, Scope], Any] | None" = None
-    schema: Mapping[str, Any] = field(default_factory=dict)
-    of_model: bool = False
+    schema: Mapping[str, Any] = field(default_factory=dict)  # more of its JSON Schema
+    of_model: bool = False  # whether it is left out while there is no model
 
     def bounded(self, values: Iterable[float]) -> bool:
         """Whether numbers are within the bounds, and in order."""
@@ -145,18 +122,13 @@ class Either:
 
 
 class Entry(NamedTuple):
-    """A key of a table: the field, its type, how it stands in the file, and its name there.
-
-    Attributes
-    ----------
-    optional : whether it is one of several that only stand there together.
-    """
+    """A key of a table: the field, its type, how it stands in the file, and its name there."""
 
     field: str
     hint: Any
     key: Key
     name: str
-    optional: bool = False
+    optional: bool = False  # whether it is one of several that only stand there together
 
 
 @cache

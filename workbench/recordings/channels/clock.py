@@ -62,32 +62,19 @@ _FACTOR = 1.5  # by which two clocks of one recording do not differ
 
 @dataclass(frozen=True, eq=False)
 class Clock:
-    """Times of a group's samples.
+    """Times of a group's samples."""
 
-    Attributes
-    ----------
-    channel : name of the channel that holds them; empty: the file itself says them.
-    times : (n,) s, NaN where there is none.
-    reason : why these are the times, for people; `certain`: nothing was concluded.
-    start : of their zero [s since 1970], NaN where that is not known.
-    unit : that the channel was read in.
-    counted : whether samples are counted at a rate, and have no times of their own.
-    corrections : how they were made to go on, in words.
-    stated : how the user says that dates are to be read.
-    zoned : whether `start` is in UTC; else in some local time.
-    dated : when the recording began, where the times do not tell it but the file [s since 1970].
-    """
-
-    channel: str
-    times: Vector
-    reason: str
-    start: float = math.nan
-    unit: str = "s"
+    channel: str  # name of the channel that holds them; empty: the file itself says them
+    times: Vector  # (n,) s, NaN where there is none
+    reason: str  # why these are the times, for people; `certain`: nothing was concluded
+    start: float = math.nan  # of their zero [s since 1970], NaN where that is not known
+    unit: str = "s"  # that the channel was read in
     certain: bool = True
-    counted: bool = False
-    corrections: tuple[str, ...] = ()
-    stated: str = ""
-    zoned: bool = False
+    counted: bool = False  # whether samples are counted at a rate, and have no times of their own
+    corrections: tuple[str, ...] = ()  # how they were made to go on, in words
+    stated: str = ""  # how the user says that dates are to be read
+    zoned: bool = False  # whether `start` is in UTC; else in some local time
+    # when the recording began, where the times do not tell it but the file [s since 1970]
     dated: float = math.nan
 
 

@@ -33,37 +33,23 @@ from workbench.system.system import System
 
 @dataclass(frozen=True, eq=False)
 class Assignment:
-    """A channel that is taken for a signal.
+    """A channel that is taken for a signal."""
 
-    Attributes
-    ----------
-    file : it stands in, counted from 0.
-    group : in that file, counted from 0.
-    label : the channel's name, with its group where several have it.
-    unit : that its values are in.
-    factor, zero : SI value is `factor*value + zero`.
-    formula : what the recorder has in place of the signal; empty: the signal itself.
-    reason : why this one, for people.
-    certain : whether name and unit are the system's own, so that nobody need be asked.
-    concluded : whether the file does not say the unit.
-    doubt : what somebody must confirm before it is taken, in words; empty: nothing.
-    missing : values of the channel that stand for no sample.
-    declared : those of them that the user declares; None: nothing is said of them.
-    """
-
-    file: int
-    group: int
+    file: int  # it stands in, counted from 0
+    group: int  # in that file, counted from 0
     channel: FileChannel
-    label: str
-    unit: str
+    label: str  # the channel's name, with its group where several have it
+    unit: str  # that its values are in
+    # factor, zero: SI value is `factor*value + zero`
     factor: float
     zero: float
-    formula: str
-    reason: str
-    certain: bool
-    concluded: bool = False
-    doubt: str = ""
-    missing: tuple[float, ...] = ()
+    formula: str  # what the recorder has in place of the signal; empty: the signal itself
+    reason: str  # why this one, for people
+    certain: bool  # whether name and unit are the system's own, so that nobody need be asked
+    concluded: bool = False  # whether the file does not say the unit
+    doubt: str = ""  # what somebody must confirm before it is taken, in words; empty: nothing
+    missing: tuple[float, ...] = ()  # values of the channel that stand for no sample
+    # those of them that the user declares; None: nothing is said of them
     declared: tuple[float, ...] | None = None
 
     @property

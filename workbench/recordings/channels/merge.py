@@ -21,24 +21,14 @@ _LATE = 1.5  # steps of a channel, from which on it has a gap
 
 @dataclass(frozen=True, eq=False)
 class MergedRecording:
-    """A recording in SI units.
+    """A recording in SI units."""
 
-    Attributes
-    ----------
-    time : (n,) s, as the recorder counts them.
-    signals : (n,) each, by name.
-    start : of time zero [s since 1970], NaN where that is not known.
-    zoned : whether that is in UTC; else in some local time.
-    notes : what was interpolated and left out, in words.
-    doubts : why its files may be damaged, or units wrong, in words.
-    """
-
-    time: Vector
-    signals: Mapping[str, Vector]
-    start: float
-    notes: tuple[str, ...]
-    doubts: tuple[str, ...]
-    zoned: bool = False
+    time: Vector  # (n,) s, as the recorder counts them
+    signals: Mapping[str, Vector]  # (n,) each, by name
+    start: float  # of time zero [s since 1970], NaN where that is not known
+    notes: tuple[str, ...]  # what was interpolated and left out, in words
+    doubts: tuple[str, ...]  # why its files may be damaged, or units wrong, in words
+    zoned: bool = False  # whether that is in UTC; else in some local time
 
     def date(self, sample: int) -> str:
         """When a sample was taken, ISO 8601; empty where that is not known."""

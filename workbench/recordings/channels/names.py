@@ -34,19 +34,12 @@ EXACT, WORDS, WITHIN = 4, 3, 2  # how alike names are
 
 @dataclass(frozen=True)
 class NamedChannel:
-    """A channel that a user names.
+    """A channel that a user names."""
 
-    Attributes
-    ----------
-    channel : its name, or "GROUP/NAME" where several groups have it.
-    unit : what its values are in, whatever the file says; empty: as the file says.
-    reversed : whether its sign is the other one.
-    missing : values that stand for no sample; None: as is usual, and asked where one may be.
-    """
-
-    channel: str
-    unit: str = ""
-    reversed: bool = False
+    channel: str  # its name, or "GROUP/NAME" where several groups have it
+    unit: str = ""  # what its values are in, whatever the file says; empty: as the file says
+    reversed: bool = False  # whether its sign is the other one
+    # values that stand for no sample; None: as is usual, and asked where one may be
     missing: tuple[float, ...] | None = None
 
     def to_dict(self) -> dict[str, str | bool | list[float]]:
@@ -150,20 +143,13 @@ COLUMNS = "columns.toml"  # which channels are which signals, in all files of a 
 
 @dataclass(frozen=True)
 class RecordingOptions:
-    """What a user says of a recording that its file does not say.
+    """What a user says of a recording that its file does not say."""
 
-    Attributes
-    ----------
-    conditions : as `case.toml` has them.
-    columns : channels by signal.
-    step : between two samples [s].
-    apart : whether sheets or groups with the same channels are recordings of their own, whatever
-        their times; None: if their times tell; False: they are one recording.
-    """
-
-    conditions: Mapping[str, Any] = field(default_factory=dict)
-    columns: Mapping[str, NamedChannel] = field(default_factory=dict)
-    step: float | None = None
+    conditions: Mapping[str, Any] = field(default_factory=dict)  # as `case.toml` has them
+    columns: Mapping[str, NamedChannel] = field(default_factory=dict)  # channels by signal
+    step: float | None = None  # between two samples [s]
+    # whether sheets or groups with the same channels are recordings of their own, whatever their
+    # times; None: if their times tell; False: they are one recording
     apart: bool | None = None
 
 

@@ -39,23 +39,16 @@ _LEFT_OUT = re.compile(r"'(?P<name>[^']+)' (has|is|holds|states) ")
 
 @dataclass(frozen=True, eq=False)
 class ProposedMapping:
-    """Which channels of some files are which signals of a system.
+    """Which channels of some files are which signals of a system."""
 
-    Attributes
-    ----------
-    assigned : channels by signal.
-    clocks : of each group with an assigned channel, by file and group.
-    left : channels that nobody takes.
-    problems : why a signal that is needed has no channel, in words.
-    unmatched : why a channel is not taken for a signal that a recording may be without, in words.
-    contradictions : units that were named and that files contradict, in words.
-    """
-
-    assigned: Mapping[str, Assignment]
+    assigned: Mapping[str, Assignment]  # channels by signal
+    # of each group with an assigned channel, by file and group
     clocks: Mapping[tuple[int, int], Clock]
-    left: tuple[str, ...]
-    problems: tuple[str, ...]
+    left: tuple[str, ...]  # channels that nobody takes
+    problems: tuple[str, ...]  # why a signal that is needed has no channel, in words
+    # why a channel is not taken for a signal that a recording may be without, in words
     unmatched: tuple[str, ...] = ()
+    # units that were named and that files contradict, in words
     contradictions: tuple[str, ...] = ()
 
     @property

@@ -29,16 +29,10 @@ _CHOICE = ": they are two recordings, --apart, or one, of which channels are nam
 
 @dataclass(frozen=True, eq=False)
 class ProposedRecording:
-    """One recording, with the channels that are proposed for it.
+    """One recording, with the channels that are proposed for it."""
 
-    Attributes
-    ----------
-    name : of the sheet, group or structure that holds it; empty: the files hold it alone.
-    files : that hold it, without what other recordings hold.
-    """
-
-    name: str
-    files: tuple[RecordedFile, ...]
+    name: str  # of the sheet, group or structure that holds it; empty: the files hold it alone
+    files: tuple[RecordedFile, ...]  # that hold it, without what other recordings hold
     proposal: ProposedMapping
 
     @property
@@ -49,18 +43,11 @@ class ProposedRecording:
 
 @dataclass(frozen=True, eq=False)
 class ProposedRecordings:
-    """All recordings of some files.
+    """All recordings of some files."""
 
-    Attributes
-    ----------
-    held : those that can be imported, in the order of the file.
-    refused : why others cannot.
-    beside : what else the file holds, in words.
-    """
-
-    held: tuple[ProposedRecording, ...]
-    refused: tuple[InputError, ...] = ()
-    beside: tuple[str, ...] = ()
+    held: tuple[ProposedRecording, ...]  # those that can be imported, in the order of the file
+    refused: tuple[InputError, ...] = ()  # why others cannot
+    beside: tuple[str, ...] = ()  # what else the file holds, in words
 
     @property
     def certain(self) -> bool:

@@ -141,22 +141,15 @@ _LAST_WORD = re.compile(r"(.*?)([^\W_]*)$")  # header.stamp.nsec, tv_usec
 
 @dataclass(frozen=True)
 class Cells:
-    """Rows of cells, and where the samples among them begin.
+    """Rows of cells, and where the samples among them begin."""
 
-    Attributes
-    ----------
-    rows : of one width.
-    lines : of the file, from 1, on which they stand.
-    head : lines above the samples, as text.
-    names, units : cells of the header; empty where there is none.
-    about : what a row of the preamble says of each column, which begins with its name.
-    """
-
-    rows: list[list[str]]
-    lines: list[int]
-    head: tuple[str, ...]
+    rows: list[list[str]]  # of one width
+    lines: list[int]  # of the file, from 1, on which they stand
+    head: tuple[str, ...]  # lines above the samples, as text
+    # names, units: cells of the header; empty where there is none
     names: tuple[str, ...]
     units: tuple[str, ...]
+    # what a row of the preamble says of each column, which begins with its name
     about: tuple[str, ...] = ()
 
 

@@ -80,22 +80,14 @@ class Group:
 
 @dataclass(frozen=True, eq=False)
 class RecordedFile:
-    """A file as it was read.
-
-    Attributes
-    ----------
-    kind : format, and what was found of it, in words.
-    notes : what was left out or understood, in words.
-    sha256 : of the file.
-    doubts : why it may be damaged, in words.
-    """
+    """A file as it was read."""
 
     path: Path
-    kind: str
+    kind: str  # format, and what was found of it, in words
     groups: tuple[Group, ...]
-    notes: tuple[str, ...]
-    sha256: str
-    doubts: tuple[str, ...] = ()
+    notes: tuple[str, ...]  # what was left out or understood, in words
+    sha256: str  # of the file
+    doubts: tuple[str, ...] = ()  # why it may be damaged, in words
 
 
 class Contents(NamedTuple):
