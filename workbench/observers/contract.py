@@ -25,40 +25,26 @@ _RENAMED = {"reasoned": "default_gains", "tell": "set_conditions", "_law": "_ste
 
 @dataclass(frozen=True)
 class Estimate:
-    """Estimates at one time, (w,), or at all times, (n, w).
+    """Estimates at one time, (w,), or at all times, (n, w)."""
 
-    Attributes
-    ----------
-    values : columns as in `System.columns`.
-    sigma : standard deviations, NaN where the method has none.
-    nis : normalised innovation squared, () or (n,), NaN where the method has none.
-    probability : of each of the estimator's modes, (k,) or (n, k).
-    """
-
-    values: Vector | Matrix
-    sigma: Vector | Matrix
-    nis: Vector | float
-    probability: Vector | Matrix
+    values: Vector | Matrix  # columns as in `System.columns`
+    sigma: Vector | Matrix  # standard deviations, NaN where the method has none
+    nis: Vector | float  # normalised innovation squared, () or (n,), NaN where the method has none
+    probability: Vector | Matrix  # of each of the estimator's modes, (k,) or (n, k)
 
 
 @dataclass(frozen=True)
 class Parts:
-    """A compiled step and what it takes, for who writes it in another language.
+    """A compiled step and what it takes, for who writes it in another language."""
 
-    Attributes
-    ----------
-    step : compiled; advances by one sample.
-    models : that it steps; `several`: it takes the tuple of them, else the only one.
-    settings, state : named tuples, whose arrays are those of the estimator.
-    width : entries of an estimate.
-    """
-
-    step: Any
+    step: Any  # compiled; advances by one sample
+    # that it steps; `several`: it takes the tuple of them, else the only one
     models: tuple[Instance, ...]
     several: bool
+    # settings, state: named tuples, whose arrays are those of the estimator
     settings: Any
     state: Any
-    width: int
+    width: int  # entries of an estimate
 
 
 class Estimator(ABC):

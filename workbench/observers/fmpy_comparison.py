@@ -39,24 +39,17 @@ RIGHT, OFF, REFUSED, NO_REFERENCE = "right", "OFF", "refused", "no reference"
 
 @dataclass(frozen=True)
 class FMUComparison:
-    """What a comparison found.
+    """What a comparison found."""
 
-    Attributes
-    ----------
-    file : name of the FMU's file.
-    fmi : version; empty where the file is no FMU.
-    verdict : RIGHT, OFF, REFUSED or NO_REFERENCE, where FMPy does not run the FMU.
-    difference : the largest, over the range of its signal; None where nothing was compared.
-    signal, time : where it is, [s].
-    reason : of what was not compared, or how sure the reference is where that is less than usual.
-    """
-
-    file: str
-    fmi: str
-    verdict: str
+    file: str  # name of the FMU's file
+    fmi: str  # version; empty where the file is no FMU
+    verdict: str  # RIGHT, OFF, REFUSED or NO_REFERENCE, where FMPy does not run the FMU
+    # the largest, over the range of its signal; None where nothing was compared
     difference: float | None = None
+    # signal, time: where it is, [s]
     signal: str = ""
     time: float | None = None
+    # of what was not compared, or how sure the reference is where that is less than usual
     reason: str = ""
 
 

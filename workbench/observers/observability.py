@@ -33,22 +33,14 @@ from workbench.system.system import OBSERVER, System
 
 @dataclass(frozen=True)
 class SampledModel:
-    """A linearised model: x[i+1] = Phi[i] x[i] + Gamma[i] v[i], y[i] = C[i] x[i].
+    """A linearised model: x[i+1] = Phi[i] x[i] + Gamma[i] v[i], y[i] = C[i] x[i]."""
 
-    Attributes
-    ----------
-    names : (k,) states, then corrections of the estimated quantities, which are constant.
-    Phi : (n, k, k) from one sample to the next.
-    Gamma : (n, k, m) effect of one standard deviation of the noise of each input.
-    C : (n, l, k) of the measured outputs.
-    R : (n, l) variance of the outputs [their unit squared].
-    """
-
+    # (k,) states, then corrections of the estimated quantities, which are constant
     names: tuple[str, ...]
-    Phi: Matrix
-    Gamma: Matrix
-    C: Matrix
-    R: Matrix
+    Phi: Matrix  # (n, k, k) from one sample to the next
+    Gamma: Matrix  # (n, k, m) effect of one standard deviation of the noise of each input
+    C: Matrix  # (n, l, k) of the measured outputs
+    R: Matrix  # (n, l) variance of the outputs [their unit squared]
 
 
 def exponentials(matrices: Matrix) -> Matrix:
@@ -209,27 +201,17 @@ class LinearTest:
 
 @dataclass(frozen=True)
 class WindowTest:
-    """Observability along a recording, window by window.
+    """Observability along a recording, window by window."""
 
-    Attributes
-    ----------
-    model : name of the model, without its library.
-    states : (k,) names.
-    time : (m,) end of the window [s].
-    span : length of a window [s].
-    remaining : (m, k) standard deviation left of each state at the window's begin, over its scale,
-        with all estimated quantities unknown [1].
-    bound : (m, q) Cramer-Rao bound of the estimated quantities [their unit].
-    serving : (q,) bounds from which on an estimate serves [its unit].
-    """
-
-    model: str
-    states: tuple[str, ...]
-    time: Vector
-    span: float
+    model: str  # name of the model, without its library
+    states: tuple[str, ...]  # (k,) names
+    time: Vector  # (m,) end of the window [s]
+    span: float  # length of a window [s]
+    # (m, k) standard deviation left of each state at the window's begin, over its scale, with all
+    # estimated quantities unknown [1]
     remaining: Matrix
-    bound: Matrix
-    serving: Vector
+    bound: Matrix  # (m, q) Cramer-Rao bound of the estimated quantities [their unit]
+    serving: Vector  # (q,) bounds from which on an estimate serves [its unit]
 
     def states_observable(self) -> NDArray[np.bool_]:
         """(m, k) whether a window says more about a state than its scale does."""
@@ -309,38 +291,24 @@ class Information:
 
 @dataclass(frozen=True)
 class Trajectory:
-    """Where a recording leads a model: measured states, and others as the model has them.
+    """Where a recording leads a model: measured states, and others as the model has them."""
 
-    Attributes
-    ----------
-    samples : (k,) places in the recording, some of many.
-    x : (k, n) states.
-    u : (k, m + q) measured inputs, and corrections, which are zero.
-    """
-
-    samples: NDArray[np.int_]
-    x: Matrix
-    u: Matrix
+    samples: NDArray[np.int_]  # (k,) places in the recording, some of many
+    x: Matrix  # (k, n) states
+    u: Matrix  # (k, m + q) measured inputs, and corrections, which are zero
 
 
 @dataclass(frozen=True)
 class CaseObservability:
-    """Tests of several models along one recording.
+    """Tests of several models along one recording."""
 
-    Attributes
-    ----------
-    system, case : the recording, and what it is of.
-    run : the estimate that makes the trajectory.
-    judged : (m,) windows that end in the time that is judged.
-    tests : one per model, with the same windows.
-    information : of the whole recording, by the observer's model; None where there is none.
-    """
-
+    # system, case: the recording, and what it is of
     system: System
     case: Case
-    run: Run
-    judged: NDArray[np.bool_]
-    tests: tuple[WindowTest, ...]
+    run: Run  # the estimate that makes the trajectory
+    judged: NDArray[np.bool_]  # (m,) windows that end in the time that is judged
+    tests: tuple[WindowTest, ...]  # one per model, with the same windows
+    # of the whole recording, by the observer's model; None where there is none
     information: Information | None
 
 

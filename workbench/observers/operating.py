@@ -19,21 +19,15 @@ _NEGLIGIBLE = 1e-6  # share of an output that differences of an FMU leave of wha
 
 @dataclass(frozen=True, eq=False)
 class LinearModel:
-    """A model about an operating point.
+    """A model about an operating point."""
 
-    Attributes
-    ----------
-    states : names, (n,).
-    A, B, C, D : by states (n), corrections (q) and outputs (l): dx/dt = A x + B c, y = C x + D c.
-    nominal : (n,) typical size of the states.
-    """
-
-    states: tuple[str, ...]
+    states: tuple[str, ...]  # names, (n,)
+    # A, B, C, D: by states (n), corrections (q) and outputs (l): dx/dt = A x + B c, y = C x + D c
     A: Matrix
     B: Matrix
     C: Matrix
     D: Matrix
-    nominal: Vector
+    nominal: Vector  # (n,) typical size of the states
 
     def of(self, states: tuple[str, ...]) -> "LinearModel":
         """The same for some of the states, the others held."""

@@ -114,26 +114,16 @@ def _percent(share: float | None) -> str:
 
 @dataclass(frozen=True)
 class Standing:
-    """How one estimator did on all cases; None where no case could be judged.
+    """How one estimator did on all cases; None where no case could be judged."""
 
-    Attributes
-    ----------
-    name : key in the summary.
-    worst : error of the judged signal, rms over mean [1].
-    case : where it was worst.
-    usual : error in a recording like these, with its 95 % interval if there are several [1].
-    z : largest objective z_k [1].
-    judged : number of cases with an error.
-    seconds : wall time of all its runs.
-    """
-
-    name: str
-    worst: float | None
-    case: str
+    name: str  # key in the summary
+    worst: float | None  # error of the judged signal, rms over mean [1]
+    case: str  # where it was worst
+    # error in a recording like these, with its 95 % interval if there are several [1]
     usual: tuple[float | None, float | None, float | None]
-    z: float | None
-    judged: int
-    seconds: float
+    z: float | None  # largest objective z_k [1]
+    judged: int  # number of cases with an error
+    seconds: float  # wall time of all its runs
 
 
 def standings(summary: Mapping[str, Any], reference: str) -> list[Standing]:

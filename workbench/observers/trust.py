@@ -50,24 +50,16 @@ _NOTED, MOSTLY = 0.1, 0.5
 
 @dataclass(frozen=True)
 class Contradiction:
-    """A test of innovations that contradicts the bands of an estimator.
+    """A test of innovations that contradicts the bands of an estimator."""
 
-    Attributes
-    ----------
-    test : "variance", "mean" or "whiteness".
-    signal : output whose innovations say so; empty for all together.
-    value : variance of innovations over what the method says [1]; error of the output that stays,
-        in standard deviations of its estimate [1]; covariance of its errors in samples that follow
-        each other, over the variance that the method says [1].
-    narrow : whether bands are too narrow by it, else too wide.
-    reason : the likely one.
-    """
-
-    test: str
-    signal: str
+    test: str  # "variance", "mean" or "whiteness"
+    signal: str  # output whose innovations say so; empty for all together
+    # variance of innovations over what the method says [1]; error of the output that stays, in
+    # standard deviations of its estimate [1]; covariance of its errors in samples that follow each
+    # other, over the variance that the method says [1]
     value: float
-    narrow: bool
-    reason: str = ""
+    narrow: bool  # whether bands are too narrow by it, else too wide
+    reason: str = ""  # the likely one
 
     @property
     def excess(self) -> float:

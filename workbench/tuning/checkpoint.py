@@ -20,30 +20,19 @@ from workbench.runtime.files import (
 
 @dataclass(frozen=True)
 class Generation:
-    """What one generation came to.
+    """What one generation came to."""
 
-    Attributes
-    ----------
-    z : objective of the best candidate.
-    worst, second : cases that decide it: the worst, and the next one.
-    margin : by how much the worst exceeds the next, as a share of z.
-    candidates : evaluated in this generation.
-    samples : evaluated for them; `of` would have been needed for the full evaluation.
-    unstable : candidates that diverged or failed, by case.
-    crashed : candidates that killed their workers or took too long.
-    seconds : wall time.
-    """
-
-    z: float
+    z: float  # objective of the best candidate
+    # worst, second: cases that decide it: the worst, and the next one
     worst: str
     second: str
-    margin: float
-    candidates: int
-    samples: int
+    margin: float  # by how much the worst exceeds the next, as a share of z
+    candidates: int  # evaluated in this generation
+    samples: int  # evaluated for them; `of` would have been needed for the full evaluation
     of: int
-    unstable: dict[str, int]
-    crashed: int
-    seconds: float
+    unstable: dict[str, int]  # candidates that diverged or failed, by case
+    crashed: int  # candidates that killed their workers or took too long
+    seconds: float  # wall time
 
     @property
     def saved(self) -> float:
@@ -53,36 +42,21 @@ class Generation:
 
 @dataclass(frozen=True, eq=False)
 class Population:
-    """Candidates of one generation; the best is the first.
+    """Candidates of one generation; the best is the first."""
 
-    Attributes
-    ----------
-    members : (s, n) coordinates in 0..1.
-    z : (s,) objective of each.
-    z_k : (s, k) objective of each in each case.
-    """
-
-    members: Matrix
-    z: Vector
-    z_k: Matrix
+    members: Matrix  # (s, n) coordinates in 0..1
+    z: Vector  # (s,) objective of each
+    z_k: Matrix  # (s, k) objective of each in each case
 
 
 @dataclass(frozen=True, eq=False)
 class Checkpoint:
-    """Everything that the next generation depends on.
+    """Everything that the next generation depends on."""
 
-    Attributes
-    ----------
-    identity : hash of what is tuned and how; only the same search may go on from here.
-    population : after the last generation of `history`.
-    converged : whether more generations gain nothing.
-    history : of all generations, the initial one included.
-    """
-
-    identity: str
-    population: Population
-    converged: bool
-    history: tuple[Generation, ...]
+    identity: str  # hash of what is tuned and how; only the same search may go on from here
+    population: Population  # after the last generation of `history`
+    converged: bool  # whether more generations gain nothing
+    history: tuple[Generation, ...]  # of all generations, the initial one included
 
 
 def save(checkpoint: Checkpoint, path: Path) -> None:

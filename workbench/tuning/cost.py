@@ -35,27 +35,17 @@ DIVERGED = 1e3  # z of mean deviations that weigh a thousand times one: no estim
 
 
 class Recording(NamedTuple):
-    """A case as the loop reads it.
+    """A case as the loop reads it."""
 
-    Attributes
-    ----------
-    name : of the case, and how it differs from what was recorded.
-    case : its name.
-    steps : (n,) from the sample before [s].
-    u, y : (n, m) and (n, l) measured inputs and outputs.
-    reference : (n, w) measured signals that the objective weighs.
-    shares : (n,) weight of each sample in the time average (trapezoidal rule) [1].
-    conditions : of the case.
-    """
-
-    name: str
-    case: str
-    steps: Vector
+    name: str  # of the case, and how it differs from what was recorded
+    case: str  # its name
+    steps: Vector  # (n,) from the sample before [s]
+    # u, y: (n, m) and (n, l) measured inputs and outputs
     u: Matrix
     y: Matrix
-    reference: Matrix
-    shares: Vector
-    conditions: Mapping[str, Value]
+    reference: Matrix  # (n, w) measured signals that the objective weighs
+    shares: Vector  # (n,) weight of each sample in the time average (trapezoidal rule) [1]
+    conditions: Mapping[str, Value]  # of the case
 
     @property
     def sampled(self) -> tuple[Vector, Matrix, Matrix, Matrix, Vector]:
@@ -115,23 +105,14 @@ def _rescale(
 
 @dataclass(frozen=True, eq=False)
 class Job:
-    """All that a worker needs to evaluate candidates, on any machine.
+    """All that a worker needs to evaluate candidates, on any machine."""
 
-    Attributes
-    ----------
-    estimator : its name.
-    system : whose signals are judged, as its objective says.
-    fmu : the model file's bytes.
-    gains : reasoned gains; what is not tuned is taken from them.
-    follows : whether gains must find a step of a quantity in time, as the system says.
-    """
-
-    estimator: str
-    system: System
-    fmu: bytes
-    gains: Gains
+    estimator: str  # its name
+    system: System  # whose signals are judged, as its objective says
+    fmu: bytes  # the model file's bytes
+    gains: Gains  # reasoned gains; what is not tuned is taken from them
     recordings: tuple[Recording, ...]
-    follows: bool = True
+    follows: bool = True  # whether gains must find a step of a quantity in time, as the system says
 
 
 def load_model(job: Job) -> FMU:
@@ -187,37 +168,22 @@ class Settling:
 
 
 class Candidate(NamedTuple):
-    """Gains to be evaluated.
+    """Gains to be evaluated."""
 
-    Attributes
-    ----------
-    values : (n,) gains.
-    limit : z beyond which the candidate has lost.
-    order : cases to be evaluated on, the one that decides most often first.
-    """
-
-    values: Vector
-    limit: float
-    order: tuple[int, ...]
+    values: Vector  # (n,) gains
+    limit: float  # z beyond which the candidate has lost
+    order: tuple[int, ...]  # cases to be evaluated on, the one that decides most often first
 
 
 class Evaluation(NamedTuple):
-    """What became of one candidate.
+    """What became of one candidate."""
 
-    Attributes
-    ----------
-    z : worst of z_k; infinite if the candidate has lost, failed or finds a quantity too slowly.
-    z_k : (k,) of all cases of the job; infinite where not known.
-    samples : how many were evaluated.
-    unstable : case in which the estimate diverged or the FMU failed; -1 if none.
-    crashed : whether it killed its worker, or took too long.
-    """
-
+    # worst of z_k; infinite if the candidate has lost, failed or finds a quantity too slowly
     z: float
-    z_k: Vector
-    samples: int
-    unstable: int
-    crashed: bool = False
+    z_k: Vector  # (k,) of all cases of the job; infinite where not known
+    samples: int  # how many were evaluated
+    unstable: int  # case in which the estimate diverged or the FMU failed; -1 if none
+    crashed: bool = False  # whether it killed its worker, or took too long
 
 
 class Evaluator:

@@ -43,20 +43,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """What is tuned, and where it is searched.
-
-    Attributes
-    ----------
-    cases : that the job's recordings were made from.
-    meanings : what each gain does, and its unit, by its name.
-    provenance : what the job was made from, for files of results.
-    """
+    """What is tuned, and where it is searched."""
 
     job: Job
     space: SearchSpace
-    cases: tuple[Case, ...]
-    meanings: Mapping[str, tuple[str, str]]
-    provenance: Mapping[str, Any]
+    cases: tuple[Case, ...]  # that the job's recordings were made from
+    meanings: Mapping[str, tuple[str, str]]  # what each gain does, and its unit, by its name
+    provenance: Mapping[str, Any]  # what the job was made from, for files of results
 
 
 @dataclass(frozen=True, eq=False)

@@ -30,68 +30,41 @@ TOLERANCE = 1e-3  # spread of z in the population below which more generations g
 
 @dataclass(frozen=True)
 class Plan:
-    """How to search.
+    """How to search."""
 
-    Attributes
-    ----------
-    generations : after the initial population.
-    population : candidates per gain.
-    seed : of the random numbers.
-    economy : drop candidates that have lost; the result is the same without, later.
-    folds : how many times to tune without a part of the cases and evaluate on it; 0 for none.
-    """
-
-    generations: int = 100
-    population: int = 15
-    seed: int = 0
-    economy: bool = True
+    generations: int = 100  # after the initial population
+    population: int = 15  # candidates per gain
+    seed: int = 0  # of the random numbers
+    economy: bool = True  # drop candidates that have lost; the result is the same without, later
+    # how many times to tune without a part of the cases and evaluate on it; 0 for none
     folds: int = 0
 
 
 @dataclass(frozen=True)
 class Checkpointing:
-    """Where a search keeps its state, and who hears of it.
+    """Where a search keeps its state, and who hears of it."""
 
-    Attributes
-    ----------
-    file : written after every generation.
-    resume : go on from it, if it is there.
-    report : called with the history after every generation.
-    warn : called where it cannot be written, or is damaged and the one before is read.
-    """
-
-    file: Path
-    resume: bool = False
+    file: Path  # written after every generation
+    resume: bool = False  # go on from it, if it is there
+    # called with the history after every generation
     report: Callable[[Sequence[Generation]], None] = lambda history: None
+    # called where it cannot be written, or is damaged and the one before is read
     warn: Callable[[str], None] = lambda message: None
 
 
 @dataclass(frozen=True, eq=False)
 class Search:
-    """What a search found.
+    """What a search found."""
 
-    Attributes
-    ----------
-    best : (n,) gains.
-    coordinates : (n,) the same in the search space.
-    z : objective.
-    z_k : (k,) objective in each case that was searched on, in their order.
-    cases : numbers of these cases in the job.
-    history : generations, the initial one first.
-    last : candidates of the last one.
-    converged : whether z of these candidates is the same within TOLERANCE.
-    interrupted : whether it was stopped before its end.
-    """
-
-    best: Vector
-    coordinates: Vector
-    z: float
-    z_k: Vector
-    cases: tuple[int, ...]
-    history: tuple[Generation, ...]
-    last: Population
-    converged: bool
-    interrupted: bool
+    best: Vector  # (n,) gains
+    coordinates: Vector  # (n,) the same in the search space
+    z: float  # objective
+    z_k: Vector  # (k,) objective in each case that was searched on, in their order
+    cases: tuple[int, ...]  # numbers of these cases in the job
+    history: tuple[Generation, ...]  # generations, the initial one first
+    last: Population  # candidates of the last one
+    converged: bool  # whether z of these candidates is the same within TOLERANCE
+    interrupted: bool  # whether it was stopped before its end
 
 
 def identity(job: Job, space: SearchSpace, cases: Sequence[int], plan: Plan) -> str:

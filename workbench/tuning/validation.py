@@ -28,43 +28,28 @@ NEGLIGIBLE = 0.01  # relative change of z that does not matter
 
 @dataclass(frozen=True)
 class Fold:
-    """Gains tuned without some cases, judged on these.
+    """Gains tuned without some cases, judged on these."""
 
-    Attributes
-    ----------
-    cases : left out.
-    worst : the recording that is worst among them with tuned gains.
-    tuned : worst z_k over them with gains tuned on the others.
-    reasoned : the same with untuned gains.
-    z : worst z_k over the cases that were tuned on.
-    error, error_reasoned : worst error of the judged signal over the cases left out, rms over mean
-        [1], with tuned and with untuned gains; nan where it cannot be judged.
-    """
-
-    cases: tuple[str, ...]
-    worst: str
-    tuned: float
-    reasoned: float
-    z: float
+    cases: tuple[str, ...]  # left out
+    worst: str  # the recording that is worst among them with tuned gains
+    tuned: float  # worst z_k over them with gains tuned on the others
+    reasoned: float  # the same with untuned gains
+    z: float  # worst z_k over the cases that were tuned on
+    # error, error_reasoned: worst error of the judged signal over the cases left out, rms over mean
+    # [1], with tuned and with untuned gains; nan where it cannot be judged
     error: float
     error_reasoned: float
 
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """What z does when one gain is changed and the others stay.
+    """What z does when one gain is changed and the others stay."""
 
-    Attributes
-    ----------
-    gain : its name.
-    less, more : relative change of z after a step of the gain down and up its search range.
-    without : relative change of z with the gain at zero; infinite if that is no estimator.
-    """
-
-    gain: str
+    gain: str  # its name
+    # less, more: relative change of z after a step of the gain down and up its search range
     less: float
     more: float
-    without: float
+    without: float  # relative change of z with the gain at zero; infinite if that is no estimator
 
     @property
     def matters(self) -> bool:

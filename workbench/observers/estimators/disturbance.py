@@ -58,46 +58,31 @@ from workbench.system.units import quotient
 
 
 class ObserverSettings(NamedTuple):
-    """What the law is given.
+    """What the law is given."""
 
-    Attributes
-    ----------
-    layout : see Layout.
-    states : (s,) indices of the states that are stepped together: corrected ones, and those that
-        swing.
-    places : (n + q,) index of states and corrections among the unknowns, -1 for other states.
-    L : (s + q, 2 l) gains, zero for states that are not corrected.
-    decay : (q,) rates at which deviations decay [1/s], negative.
-    effect : (q,) d(rate)/d(quantity) from which on a quantity has full authority.
-    """
-
-    layout: Layout
+    layout: Layout  # see Layout
+    # (s,) indices of the states that are stepped together: corrected ones, and those that swing
     states: NDArray[np.intp]
+    # (n + q,) index of states and corrections among the unknowns, -1 for other states
     places: NDArray[np.intp]
-    L: Matrix
-    decay: Vector
-    effect: Vector
+    L: Matrix  # (s + q, 2 l) gains, zero for states that are not corrected
+    decay: Vector  # (q,) rates at which deviations decay [1/s], negative
+    effect: Vector  # (q,) d(rate)/d(quantity) from which on a quantity has full authority
 
 
 class ObserverState(NamedTuple):
-    """What the law remembers.
+    """What the law remembers."""
 
-    Attributes
-    ----------
-    z : (q,) deviations of the estimated quantities; integral : (l,) of dy.
-    target, drift : (q,) what deviations decay to, and by how much it moved in this step.
-    system : (s + q, s + q + 1) of the step, with its right-hand side.
-    others, innovation : work space.
-    inputs, acting : (m,) the sample before, and what acts in the step, see `act`.
-    """
-
-    z: Vector
-    integral: Vector
+    z: Vector  # (q,) deviations of the estimated quantities
+    integral: Vector  # (l,) of dy
+    # target, drift: (q,) what deviations decay to, and by how much it moved in this step
     target: Vector
     drift: Vector
-    system: Matrix
+    system: Matrix  # (s + q, s + q + 1) of the step, with its right-hand side
+    # others, innovation: work space
     others: Vector
     innovation: Vector
+    # inputs, acting: (m,) the sample before, and what acts in the step, see `act`
     inputs: Vector
     acting: Vector
 

@@ -31,16 +31,10 @@ from workbench.system.system import System
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """A choice of each condition that means something to the model.
+    """A choice of each condition that means something to the model."""
 
-    Attributes
-    ----------
-    choices : by condition.
-    parameters : of the model, that they set.
-    """
-
-    choices: Mapping[str, str]
-    parameters: Mapping[str, float]
+    choices: Mapping[str, str]  # by condition
+    parameters: Mapping[str, float]  # of the model, that they set
 
     @property
     def name(self) -> str:

@@ -45,42 +45,25 @@ _RATE = 0.3  # change of a level within the filter's memory by its own evidence 
 
 
 class Learning(NamedTuple):
-    """How levels are learnt.
+    """How levels are learnt."""
 
-    Attributes
-    ----------
-    within : time in which the noise of samples is learnt [s], infinite: no level is.
-    surprise : normalised innovation squared that chance makes once an hour.
-    """
-
-    within: float
-    surprise: float
+    within: float  # time in which the noise of samples is learnt [s], infinite: no level is
+    surprise: float  # normalised innovation squared that chance makes once an hour
 
 
 class Levels(NamedTuple):
-    """Variances over those of the settings, and the evidence for them.
+    """Variances over those of the settings, and the evidence for them."""
 
-    Attributes
-    ----------
-    walk : (s,) of random walks, at most 1: what the settings say is the fastest.
-    sample : (l,) of samples.
-    moved, expected : (s,) corrections within the filter's memory, added up, and their variance.
-    noise : (l,) variance of the last sample that the settings say.
-    scatter : (l,) variance that the last sample speaks for.
-    before : (s, s) covariance before the last sample.
-    surprised : (1,) 1 where the last sample was left out.
-    age : (1,) time for which levels were learnt [s].
-    """
-
-    walk: Vector
-    sample: Vector
+    walk: Vector  # (s,) of random walks, at most 1: what the settings say is the fastest
+    sample: Vector  # (l,) of samples
+    # moved, expected: (s,) corrections within the filter's memory, added up, and their variance
     moved: Vector
     expected: Vector
-    noise: Vector
-    scatter: Vector
-    before: Matrix
-    surprised: Vector
-    age: Vector
+    noise: Vector  # (l,) variance of the last sample that the settings say
+    scatter: Vector  # (l,) variance that the last sample speaks for
+    before: Matrix  # (s, s) covariance before the last sample
+    surprised: Vector  # (1,) 1 where the last sample was left out
+    age: Vector  # (1,) time for which levels were learnt [s]
 
 
 def learning(system: System) -> Learning:
@@ -365,24 +348,17 @@ _REACH = 100.0  # a level this far from the sensors' noise means: trust it wholl
 
 
 class FilterSettings(NamedTuple):
-    """What the laws of the filters are given.
+    """What the laws of the filters are given."""
 
-    Attributes
-    ----------
-    layout : see Layout.
-    relative, floor : (l,) standard deviation of a sample: share of its size, and [its unit].
-    walk : (n + q,) random walks of states and quantities [unit/sqrt(s)].
-    spread : (n + q,) standard deviations at the start.
-    driven, driven_relative : (m,) standard deviation of a sample of each input: [its unit], and
-        share of its size; 0 where levels are held, which then say it all.
-    """
-
-    layout: Layout
+    layout: Layout  # see Layout
+    # relative, floor: (l,) standard deviation of a sample: share of its size, and [its unit]
     relative: Vector
     floor: Vector
-    walk: Vector
-    spread: Vector
+    walk: Vector  # (n + q,) random walks of states and quantities [unit/sqrt(s)]
+    spread: Vector  # (n + q,) standard deviations at the start
     learning: Learning
+    # driven, driven_relative: (m,) standard deviation of a sample of each input: [its unit], and
+    # share of its size; 0 where levels are held, which then say it all
     driven: Vector
     driven_relative: Vector
 

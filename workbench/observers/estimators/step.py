@@ -77,80 +77,60 @@ _SMALL = 1e-3  # square of an error over what is allowed, of which a step need n
 
 
 class Step(NamedTuple):
-    """What steps of a model remember, and work space: n states, m inputs, s unknowns.
+    """What steps of a model remember, and work space: n states, m inputs, s unknowns."""
 
-    Attributes
-    ----------
-    walk : (n,) random walks of the states that a filter allows for [unit/sqrt(s)]; 0: it has none.
-    reach : (n,) largest size that a state has had.
-    least : (n,) size of a state below which it counts as nothing.
-    columns : of the Jacobian that is left in the model: n of rates, or those of outputs, too.
-    accurate : (1,) 1 where steps are of order 3, 0 where they are Euler's.
-    system : (n, n + 1) of Euler's step, with its right-hand side; of a model alone one more.
-    spread : (n, n + s + 1) of its derivatives, and its right-hand side.
-    left : (n,) what it leaves out, g above.
-    predicted, error : (s,) what that has added up to, before and after the last sample.
-    seen : (2,) squares of it in the last sample over the innovations' variances; their number.
-    weight : (1,) of the next sample in them.
-    shown, allowed : (1 + s,) sums over samples, of innovations and of each unknown, see `judge`.
-    size : (1,) of the next part of a step [s], 0: not yet known.
-    ends, taken : (k,) shares of the step at which its parts end; (1,) number of them.
-    given : (1,) 1 where parts end where those of the step before did.
-    coarse : (1,) steps that the most parts leave too large an error of.
-    inputs : (m + 1,) the last sample of the inputs, and its time.
-    begin, end, between : (m + 1,) inputs and time at the beginning of a step, its end, within it.
-    ended : (m + 1,) inputs and time at the end of a model's step before, which took `lasted`.
-    lasted : (1,) [s].
-    x : (n,) states that advance, of a law that keeps no others.
-    rates : (n,) f at the beginning.
-    W, pivots : (n, n) and (n,), see `invert`.
-    d, r : (n,) change of the states without what bends it, and by that: 3/2 h psi r; d of
-        Euler's step, too.
-    w1, w2, w3 : (n,) powers of W times a vector.
-    bend : (n,) what the rates have beyond their Jacobian.
-    bent, curved : (n,) error of d by the step of order 2; that of r, of curvature alone.
-    F : (n, s) derivatives of the step by states and quantities.
-    second, third, part : (n, n), (n, n), (n, s) work space of it.
-    """
-
+    # (n,) random walks of the states that a filter allows for [unit/sqrt(s)]; 0: it has none
     walk: Vector
-    reach: Vector
-    least: Vector
-    columns: int
-    accurate: Vector
+    reach: Vector  # (n,) largest size that a state has had
+    least: Vector  # (n,) size of a state below which it counts as nothing
+    columns: int  # of the Jacobian that is left in the model: n of rates, or those of outputs, too
+    accurate: Vector  # (1,) 1 where steps are of order 3, 0 where they are Euler's
+    # (n, n + 1) of Euler's step, with its right-hand side; of a model alone one more
     system: Matrix
-    spread: Matrix
-    left: Vector
+    spread: Matrix  # (n, n + s + 1) of its derivatives, and its right-hand side
+    left: Vector  # (n,) what it leaves out, g above
+    # predicted, error: (s,) what that has added up to, before and after the last sample
     predicted: Vector
     error: Vector
+    # (2,) squares of it in the last sample over the innovations' variances; their number
     seen: Vector
-    weight: Vector
+    weight: Vector  # (1,) of the next sample in them
+    # shown, allowed: (1 + s,) sums over samples, of innovations and of each unknown, see `judge`
     shown: Vector
     allowed: Vector
-    size: Vector
+    size: Vector  # (1,) of the next part of a step [s], 0: not yet known
+    # ends, taken: (k,) shares of the step at which its parts end; (1,) number of them
     ends: Vector
     taken: NDArray[np.intp]
-    given: Vector
-    coarse: Vector
-    inputs: Vector
+    given: Vector  # (1,) 1 where parts end where those of the step before did
+    coarse: Vector  # (1,) steps that the most parts leave too large an error of
+    inputs: Vector  # (m + 1,) the last sample of the inputs, and its time
+    # begin, end, between: (m + 1,) inputs and time at the beginning of a step, its end, within it
     begin: Vector
     end: Vector
     between: Vector
+    # (m + 1,) inputs and time at the end of a model's step before, which took `lasted`
     ended: Vector
-    lasted: Vector
-    x: Vector
-    rates: Vector
+    lasted: Vector  # (1,) [s]
+    x: Vector  # (n,) states that advance, of a law that keeps no others
+    rates: Vector  # (n,) f at the beginning
+    # W, pivots: (n, n) and (n,), see `invert`
     W: Matrix
     pivots: NDArray[np.intp]
+    # d, r: (n,) change of the states without what bends it, and by that: 3/2 h psi r; d of Euler's
+    # step, too
     d: Vector
     r: Vector
+    # w1, w2, w3: (n,) powers of W times a vector
     w1: Vector
     w2: Vector
     w3: Vector
-    bend: Vector
+    bend: Vector  # (n,) what the rates have beyond their Jacobian
+    # bent, curved: (n,) error of d by the step of order 2; that of r, of curvature alone
     bent: Vector
     curved: Vector
-    F: Matrix
+    F: Matrix  # (n, s) derivatives of the step by states and quantities
+    # second, third, part: (n, n), (n, n), (n, s) work space of it
     second: Matrix
     third: Matrix
     part: Matrix

@@ -25,20 +25,15 @@ _TRIALS = (1.0, -1.0, 10.0)  # samples at which what was found is tried, in size
 
 
 class ModelView(NamedTuple):
-    """What a law sees of its model, see `Instance`, and where the model stands.
-
-    Attributes
-    ----------
-    number : of the model, where there are several.
-    at_x, at_u : states and inputs of the model, all of them.
-    """
+    """What a law sees of its model, see `Instance`, and where the model stands."""
 
     x: Vector
     dx: Vector
     u: Vector
     y: Vector
     jacobian: Matrix
-    number: int
+    number: int  # of the model, where there are several
+    # at_x, at_u: states and inputs of the model, all of them
     at_x: Vector
     at_u: Vector
 
@@ -52,14 +47,9 @@ class Remembered(NamedTuple):
 
 @dataclass(frozen=True)
 class FirstValue:
-    """A number that the first sample says: constant + slopes @ [u, y].
+    """A number that the first sample says: constant + slopes @ [u, y]."""
 
-    Attributes
-    ----------
-    place : in C.
-    """
-
-    place: str
+    place: str  # in C
     constant: float
     slopes: Vector
 

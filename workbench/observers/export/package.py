@@ -31,18 +31,13 @@ Connection: TypeAlias = tuple[str, str, str, str]
 
 @dataclass(frozen=True)
 class Wiring:
-    """What is connected to what.
+    """What is connected to what."""
 
-    Attributes
-    ----------
-    machine, observer, whole : connectors of the two components, and of both together.
-    connections : of these.
-    """
-
+    # machine, observer, whole: connectors of the two components, and of both together
     machine: Connectors
     observer: Connectors
     whole: Connectors
-    connections: tuple[Connection, ...]
+    connections: tuple[Connection, ...]  # of these
 
 
 def wiring(system: System) -> Wiring:

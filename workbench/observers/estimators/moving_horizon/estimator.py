@@ -62,29 +62,20 @@ ROUNDING = 1e-9  # share of the cost that is not told apart
 
 
 class HorizonSettings(NamedTuple):
-    """As those of the filters, and what is of the window.
-
-    Attributes
-    ----------
-    learning : see Learning; a window notices what surprises by `largest_nis`.
-    iterations : for each sample.
-    limit : deviation of a sample from which it is an outlier [standard deviations].
-    largest_nis : normalised innovation squared from which a quantity has jumped.
-    fading : share of its noise that the next step keeps.
-    """
+    """As those of the filters, and what is of the window."""
 
     layout: Layout
     relative: Vector
     floor: Vector
     walk: Vector
     spread: Vector
-    learning: Learning
+    learning: Learning  # see Learning; a window notices what surprises by `largest_nis`
     driven: Vector
     driven_relative: Vector
-    iterations: int
-    limit: float
-    largest_nis: float
-    fading: float
+    iterations: int  # for each sample
+    limit: float  # deviation of a sample from which it is an outlier [standard deviations]
+    largest_nis: float  # normalised innovation squared from which a quantity has jumped
+    fading: float  # share of its noise that the next step keeps
 
 
 class HorizonState(NamedTuple):

@@ -16,18 +16,12 @@ from workbench.observers.estimators.kalman import carry
 
 
 class Spread(NamedTuple):
-    """Covariances of what a window estimates.
+    """Covariances of what a window estimates."""
 
-    Attributes
-    ----------
-    information : (s, s) what later samples tell; product : (s, s) work space.
-    covariances : (N, s, s) of where the step from each node leads; first : (s, s) before them all.
-    """
-
-    information: Matrix
-    product: Matrix
-    covariances: NDArray[np.float64]
-    first: Matrix
+    information: Matrix  # (s, s) what later samples tell
+    product: Matrix  # (s, s) work space
+    covariances: NDArray[np.float64]  # (N, s, s) of where the step from each node leads
+    first: Matrix  # (s, s) before them all
 
 
 def spread(N: int, s: int) -> Spread:

@@ -29,16 +29,10 @@ _MOST_PASSES = 9  # a kind widens twice at most, and only some variables depend 
 
 @dataclass(frozen=True)
 class Primitive:
-    """A function that is written in C.
+    """A function that is written in C."""
 
-    Attributes
-    ----------
-    name : in C.
-    arguments : how many it takes.
-    """
-
-    name: str
-    arguments: int
+    name: str  # in C
+    arguments: int  # how many it takes
 
 
 @dataclass(frozen=True)

@@ -20,20 +20,12 @@ class Number:
 
 @dataclass(frozen=True)
 class Array:
-    """Numbers in memory.
+    """Numbers in memory."""
 
-    Attributes
-    ----------
-    kind : of the elements.
-    shape : sizes, None where a size is known only as it runs.
-    strides : elements from one index to the next, of each axis.
-    constant : whether it is only read.
-    """
-
-    kind: str
-    shape: tuple[int | None, ...]
-    strides: tuple[int, ...]
-    constant: bool
+    kind: str  # of the elements
+    shape: tuple[int | None, ...]  # sizes, None where a size is known only as it runs
+    strides: tuple[int, ...]  # elements from one index to the next, of each axis
+    constant: bool  # whether it is only read
 
 
 @dataclass(frozen=True)
@@ -78,27 +70,16 @@ Type: TypeAlias = Number | Array | Record | Several | Results
 
 @dataclass(frozen=True)
 class Value:
-    """An expression of C.
-
-    Attributes
-    ----------
-    text : of it; of an array or record its address.
-    known : the number, if it is known now.
-    offset : of an array, elements from `text` on; empty: none.
-    sizes : of an array, for each axis.
-    natural : a whole number that is never negative.
-    reads : depends on memory, which a call may change.
-    acts : changes memory or the model.
-    """
+    """An expression of C."""
 
     type: Type
-    text: str
-    known: float | None = None
-    offset: str = ""
-    sizes: "tuple[Value, ...]" = ()
-    natural: bool = False
-    reads: bool = False
-    acts: bool = False
+    text: str  # of it; of an array or record its address
+    known: float | None = None  # the number, if it is known now
+    offset: str = ""  # of an array, elements from `text` on; empty: none
+    sizes: "tuple[Value, ...]" = ()  # of an array, for each axis
+    natural: bool = False  # a whole number that is never negative
+    reads: bool = False  # depends on memory, which a call may change
+    acts: bool = False  # changes memory or the model
 
     @property
     def kind(self) -> str:
