@@ -44,17 +44,11 @@ _MEASURE = (
 
 @dataclass(frozen=True)
 class Extension:
-    """The extended model: its source, its FMU, and how far its predictions are from the fit's.
+    """The extended model: its source, its FMU, and how far its predictions are from the fit's."""
 
-    Attributes
-    ----------
-    modelica : None of an FMU alone, around which another FMU is built.
-    difference : largest, in standard deviations of the noise of a sample mean.
-    """
-
-    modelica: Path | None
+    modelica: Path | None  # None of an FMU alone, around which another FMU is built
     fmu: Path
-    difference: float
+    difference: float  # largest, in standard deviations of the noise of a sample mean
 
     @property
     def files(self) -> tuple[Path, ...]:
@@ -585,17 +579,12 @@ _ROOM = 1.1  # of a panel over its largest value
 
 @dataclass(frozen=True, eq=False)
 class LastingErrors:
-    """Prediction errors of a recording that last some blocks, at the middle of each.
+    """Prediction errors of a recording that last some blocks, at the middle of each."""
 
-    Attributes
-    ----------
-    before, after : (b, c) running means, of the nominal and of the last model, by channel.
-    sigma : (b, c) their standard deviation by noise.
-    """
-
+    # before, after: (b, c) running means, of the nominal and of the last model, by channel
     before: Matrix
     after: Matrix
-    sigma: Matrix
+    sigma: Matrix  # (b, c) their standard deviation by noise
 
     def noises(self) -> tuple[Vector, Vector]:
         """Root mean square before and after in units of the noise, (c,); noise leaves 1."""

@@ -30,27 +30,16 @@ _EARLY = 50  # samples at usual rates, before anything is applied
 
 @dataclass(frozen=True, eq=False)
 class CountedSamples:
-    """The signals of a recording made clean, and which samples count.
+    """The signals of a recording made clean, and which samples count."""
 
-    Attributes
-    ----------
-    clean : (n,) by signal, bridged where it is wrong; wrong : (n,) where.
-    deviation : standard deviation of the noise of a sample, by signal.
-    excluded : (n,) samples that do not count, by reason.
-    spans : (n,) samples where states are restarted; if they count, they do for that.
-    applied : sample at which the recording begins.
-    blocks : (b, 2) first sample and end of each block that counts.
-    missing : number of samples.
-    """
-
-    clean: Mapping[str, Vector]
-    wrong: Mapping[str, Mask]
-    deviation: Mapping[str, float]
-    excluded: Mapping[str, Mask]
-    spans: Mask
-    applied: int
-    blocks: NDArray[np.int64]
-    missing: int
+    clean: Mapping[str, Vector]  # (n,) by signal, bridged where it is wrong
+    wrong: Mapping[str, Mask]  # (n,) where
+    deviation: Mapping[str, float]  # standard deviation of the noise of a sample, by signal
+    excluded: Mapping[str, Mask]  # (n,) samples that do not count, by reason
+    spans: Mask  # (n,) samples where states are restarted; if they count, they do for that
+    applied: int  # sample at which the recording begins
+    blocks: NDArray[np.int64]  # (b, 2) first sample and end of each block that counts
+    missing: int  # number of samples
 
     @property
     def usable(self) -> Mask:

@@ -32,39 +32,25 @@ _LEAST = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """A model about its design point.
+    """A model about its design point."""
 
-    Attributes
-    ----------
-    states : that outputs lead; a model may have none.
-    A, B, C, D : by states, measured inputs and measured outputs.
-    nominal : (p,) typical size of the states.
-    ratio : of a state that rolls along over the one that leads it, 0 where none does.
-    """
-
-    states: tuple[str, ...]
+    states: tuple[str, ...]  # that outputs lead; a model may have none
+    # A, B, C, D: by states, measured inputs and measured outputs
     A: Matrix
     B: Matrix
     C: Matrix
     D: Matrix
-    nominal: Vector
-    ratio: float
+    nominal: Vector  # (p,) typical size of the states
+    ratio: float  # of a state that rolls along over the one that leads it, 0 where none does
 
 
 class ModelSource(NamedTuple):
-    """A model that can be opened.
+    """A model that can be opened."""
 
-    Attributes
-    ----------
-    path : of its FMU.
-    given : values of its variables instead of the defaults.
-    free : whether nothing is to correct its simulations.
-    """
-
-    path: Path
+    path: Path  # of its FMU
     system: System
-    given: Mapping[str, float]
-    free: bool = False
+    given: Mapping[str, float]  # values of its variables instead of the defaults
+    free: bool = False  # whether nothing is to correct its simulations
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,21 +88,14 @@ def opened(source: ModelSource) -> Iterator[OpenModel]:
 
 @dataclass(frozen=True, eq=False)
 class Lead:
-    """How prediction errors of the outputs correct the states, sample by sample.
+    """How prediction errors of the outputs correct the states, sample by sample."""
 
-    Attributes
-    ----------
-    states : that are corrected.
-    gain : (p, l) constant gain.
-    ahead : (l, l) covariance of predicted outputs, by what led the states and by inputs that
-        outputs show at once.
-    noisy : whether an input has noise; else a gain only keeps the equation solvable.
-    """
-
-    states: tuple[str, ...]
-    gain: Matrix
+    states: tuple[str, ...]  # that are corrected
+    gain: Matrix  # (p, l) constant gain
+    # (l, l) covariance of predicted outputs, by what led the states and by inputs that outputs show
+    # at once
     ahead: Matrix
-    noisy: bool
+    noisy: bool  # whether an input has noise; else a gain only keeps the equation solvable
 
 
 def motion(fmu: FMU, system: System) -> Motion:

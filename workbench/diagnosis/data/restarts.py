@@ -19,18 +19,11 @@ from workbench.system.system import System
 
 @dataclass(frozen=True, eq=False)
 class Restarts:
-    """Of one recording.
+    """Of one recording."""
 
-    Attributes
-    ----------
-    at : (n,) whether states are set before a sample, by what the one before it reads.
-    noise : (n,) standard deviation of a reading, by output; these are states.
-    uncertain : relative standard deviation of parameters, by name.
-    """
-
-    at: Mask
-    noise: Mapping[str, Vector]
-    uncertain: Mapping[str, float]
+    at: Mask  # (n,) whether states are set before a sample, by what the one before it reads
+    noise: Mapping[str, Vector]  # (n,) standard deviation of a reading, by output; these are states
+    uncertain: Mapping[str, float]  # relative standard deviation of parameters, by name
 
 
 def restarts_of(system: System, counted: CountedSamples) -> Restarts | None:

@@ -44,57 +44,36 @@ _WEIGHTLESS = 1e6  # times its size, by which a silent channel may be wrong: 1e-
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """One recording, sampled.
+    """One recording, sampled."""
 
-    Attributes
-    ----------
-    name : of the case.
-    time : (n,) [s].
-    inputs : names of the columns of u.
-    u : (n, m) measured inputs, without noise that the model would not feel.
-    signals : names of the columns of y: outputs, and what is judged if some recording has it.
-    y, read : (n, c) measured, without and with what is wrong; zero of what this one has not.
-    silent : (c,) channels of signals that this one has not: their errors have no weight.
-    told : (n,) samples whose errors are told: those that are not wrong and that no reason excludes.
-    limits : (2, c) of what the sensors read.
-    gain : (n,) [1] of the correction of the led output, 0 where that was not measured.
-    lead : how all outputs correct the states, or None where one leads alone.
-    restarts : where states are set as measured, or None if nowhere.
-    holds : (m,) when samples of inputs act, see `Signal.hold`.
-    begin : outputs, what rolls along, and states that outputs show under other names, at the start.
-    rest : (q,) means of inputs at rest, before they are applied, or held; rest_noise : (q,)
-        standard deviations, infinite of one that is never so.
-    blocks : (b, 2) first sample and end of each block that counts.
-    slopes : (c, c) of the channels by the signals.
-    whitening : (b, c, c) makes the errors of a block, by channel, white with variance one.
-    modes : by column of y, of the structure before its sensor.
-    set_aside : number of samples by reason.
-    model_time : see `Case`.
-    """
-
-    name: str
-    time: Vector
-    inputs: tuple[str, ...]
-    u: Matrix
+    name: str  # of the case
+    time: Vector  # (n,) [s]
+    inputs: tuple[str, ...]  # names of the columns of u
+    u: Matrix  # (n, m) measured inputs, without noise that the model would not feel
+    # names of the columns of y: outputs, and what is judged if some recording has it
     signals: tuple[str, ...]
+    # y, read: (n, c) measured, without and with what is wrong; zero of what this one has not
     y: Matrix
     read: Matrix
-    silent: Mask
+    silent: Mask  # (c,) channels of signals that this one has not: their errors have no weight
+    # (n,) samples whose errors are told: those that are not wrong and that no reason excludes
     told: Mask
-    limits: Matrix
-    gain: Vector
-    lead: Lead | None
-    restarts: Restarts | None
-    holds: Vector
+    limits: Matrix  # (2, c) of what the sensors read
+    gain: Vector  # (n,) [1] of the correction of the led output, 0 where that was not measured
+    lead: Lead | None  # how all outputs correct the states, or None where one leads alone
+    restarts: Restarts | None  # where states are set as measured, or None if nowhere
+    holds: Vector  # (m,) when samples of inputs act, see `Signal.hold`
+    # outputs, what rolls along, and states that outputs show under other names, at the start
     begin: Mapping[str, float]
-    rest: Vector
-    rest_noise: Vector
-    blocks: NDArray[np.int64]
-    slopes: Matrix
+    rest: Vector  # (q,) means of inputs at rest, before they are applied, or held
+    rest_noise: Vector  # (q,) standard deviations, infinite of one that is never so
+    blocks: NDArray[np.int64]  # (b, 2) first sample and end of each block that counts
+    slopes: Matrix  # (c, c) of the channels by the signals
+    # (b, c, c) makes the errors of a block, by channel, white with variance one
     whitening: NDArray[np.float64]
-    modes: Mapping[int, Mode]
-    set_aside: dict[str, int]
-    model_time: float | None = None
+    modes: Mapping[int, Mode]  # by column of y, of the structure before its sensor
+    set_aside: dict[str, int]  # number of samples by reason
+    model_time: float | None = None  # see `Case`
 
     def falls(self, signal: str) -> bool:
         """Whether an input falls, by more than its sensor's noise and a valve's overshoot."""

@@ -23,16 +23,10 @@ from workbench.models.modelica import Class, Library
 
 @dataclass(frozen=True)
 class AnnotationReader:
-    """Part of an annotation, whose keys are asked for by type.
+    """Part of an annotation, whose keys are asked for by type."""
 
-    Attributes
-    ----------
-    where : it stands.
-    content : by key.
-    """
-
-    where: str
-    content: Mapping[str, Any]
+    where: str  # it stands
+    content: Mapping[str, Any]  # by key
 
     def only(self, *known: str) -> None:
         """Refuse other keys."""
@@ -105,92 +99,62 @@ _ARRAY = re.compile(r"zeros\((\w+)\)")
 
 @dataclass(frozen=True)
 class Where:
-    """An effect is only in stops whose conditions say so, if those of any stop do.
+    """An effect is only in stops whose conditions say so, if those of any stop do."""
 
-    Attributes
-    ----------
-    condition : of the stops: a state, or several.
-    state : that the effect needs.
-    share : parameter that is the share of those which have this state; empty if there is none.
-    """
-
-    condition: str
-    state: str
-    share: str
+    condition: str  # of the stops: a state, or several
+    state: str  # that the effect needs
+    share: str  # parameter that is the share of those which have this state; empty if there is none
 
 
 @dataclass(frozen=True)
 class Unless:
-    """An effect is not looked for if the conditions of any stop say something.
+    """An effect is not looked for if the conditions of any stop say something."""
 
-    Attributes
-    ----------
-    condition, state : as of `Where`.
-    because : why, for people.
-    """
-
+    # condition, state: as of `Where`
     condition: str
     state: str
-    because: str
+    because: str  # why, for people
 
 
 @dataclass(frozen=True)
 class Falling:
-    """An effect shows only where an input falls, by more than a tenth of its greatest value.
+    """An effect shows only where an input falls, by more than a tenth of its greatest value."""
 
-    Attributes
-    ----------
-    signal : input of the base model.
-    because : why the effect cannot be seen where it does not, for people.
-    """
-
-    signal: str
-    because: str
+    signal: str  # input of the base model
+    because: str  # why the effect cannot be seen where it does not, for people
 
 
 @dataclass(frozen=True)
 class Effect:
-    """One effect of the library.
+    """One effect of the library."""
 
-    Attributes
-    ----------
-    name : of the Modelica class, also used in results; with its place where there are several.
-    model : dotted name of the class.
-    slots : of the base model that the class is plugged into.
-    size : parameter that is zero in the nominal model; of an order-locked effect, which has the
-        pair `cosine` and `sine`, "cosine".
-    matters : least size worth a finding, in its SI unit: what tolerances, or differences between
-        an observer model and a real machine, may fake.
-    shapes : other parameters that are fitted once the effect is found, each with values to try.
-    hidden : why recorded stops cannot show the effect; empty if they can.
-    text : what it is, for people.
-    separation : the experiment that tells it from its likely twins.
-    where, unless, falling : which stops can show it; None if all can.
-    restarted : why stops in which no state is restarted cannot show it; empty if they can.
-    place, places : which of how many elements of `size`, from 1; 0 where it is no array.
-    late : measured signals of the logger that is late; the effect is then none of a model.
-    sensor : measured signal whose sensor is wrong; the effect is then none of a model.
-    parameter : of the model itself, whose value is another one by the size.
-    """
-
-    name: str
-    model: str
-    slots: tuple[str, ...]
+    name: str  # of the Modelica class, also used in results; with its place where there are several
+    model: str  # dotted name of the class
+    slots: tuple[str, ...]  # of the base model that the class is plugged into
+    # parameter that is zero in the nominal model; of an order-locked effect, which has the pair
+    # `cosine` and `sine`, "cosine"
     size: str
+    # least size worth a finding, in its SI unit: what tolerances, or differences between an
+    # observer model and a real machine, may fake
     matters: float
-    text: str
-    separation: str
+    text: str  # what it is, for people
+    separation: str  # the experiment that tells it from its likely twins
+    # other parameters that are fitted once the effect is found, each with values to try
     shapes: tuple[tuple[str, tuple[float, ...]], ...] = ()
-    hidden: str = ""
+    hidden: str = ""  # why recorded stops cannot show the effect; empty if they can
+    # where, unless, falling: which stops can show it; None if all can
     where: Where | None = None
     unless: Unless | None = None
     falling: Falling | None = None
+    # why stops in which no state is restarted cannot show it; empty if they can
     restarted: str = ""
+    # place, places: which of how many elements of `size`, from 1; 0 where it is no array
     place: int = 0
     places: int = 0
+    # measured signals of the logger that is late; the effect is then none of a model
     late: tuple[str, ...] = ()
-    sensor: str = ""
-    parameter: str = ""
+    sensor: str = ""  # measured signal whose sensor is wrong; the effect is then none of a model
+    parameter: str = ""  # of the model itself, whose value is another one by the size
 
     @property
     def of_library(self) -> bool:

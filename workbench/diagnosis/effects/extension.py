@@ -59,24 +59,16 @@ def parameter_of(effect: Effect, variable: str) -> str:
 
 @dataclass(frozen=True, eq=False)
 class ExtendedModel:
-    """A model of a library with effects plugged in.
-
-    Attributes
-    ----------
-    base : name of the model that is extended.
-    name : of the extended model.
-    effects : to plug in, in this order within a slot.
-    about : one line, for the documentation.
-    values : by effect and parameter, SI; parameters that are not named keep their defaults.
-    parameters : of the base model itself, that differ from its defaults; of an array, all entries.
-    """
+    """A model of a library with effects plugged in."""
 
     library: Library
-    base: str
-    name: str
-    effects: Sequence[Effect]
-    about: str
+    base: str  # name of the model that is extended
+    name: str  # of the extended model
+    effects: Sequence[Effect]  # to plug in, in this order within a slot
+    about: str  # one line, for the documentation
+    # by effect and parameter, SI; parameters that are not named keep their defaults
     values: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    # of the base model itself, that differ from its defaults; of an array, all entries
     parameters: Mapping[str, float] = field(default_factory=dict)
 
     def source(self) -> str:

@@ -16,30 +16,19 @@ from workbench.models.modelica import Library
 
 @dataclass(frozen=True)
 class Slot:
-    """A place that effects fill.
+    """A place that effects fill."""
 
-    Attributes
-    ----------
-    name : of the base model's component.
-    partial : dotted name of the class that each effect in it extends.
-    counts : numbers of places, Integer parameters of the partial class.
-    inputs, outputs : of the partial class, in its order; outputs that it has an equation for are
-        left out.
-    chained : whether outputs continue inputs; else changes add up.
-    nominal : dotted name of the class in the base model.
-    settled : whether the base model gives that class its inputs and counts and nothing else.
-    handed : outputs that are handed on, and the input that each is.
-    """
-
-    name: str
-    partial: str
-    counts: tuple[str, ...]
+    name: str  # of the base model's component
+    partial: str  # dotted name of the class that each effect in it extends
+    counts: tuple[str, ...]  # numbers of places, Integer parameters of the partial class
+    # inputs, outputs: of the partial class, in its order; outputs that it has an equation for are
+    # left out
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
-    chained: bool
-    nominal: str
-    settled: bool
-    handed: Mapping[str, str]
+    chained: bool  # whether outputs continue inputs; else changes add up
+    nominal: str  # dotted name of the class in the base model
+    settled: bool  # whether the base model gives that class its inputs and counts and nothing else
+    handed: Mapping[str, str]  # outputs that are handed on, and the input that each is
 
 
 def read_slots(library: Library, base: str) -> tuple[Slot, ...]:

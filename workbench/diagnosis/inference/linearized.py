@@ -14,20 +14,13 @@ from workbench.diagnosis.simulation.simulator import WhitenedResiduals
 
 @dataclass(frozen=True)
 class Point:
-    """Values of all unknowns.
+    """Values of all unknowns."""
 
-    Attributes
-    ----------
-    sizes : by effect and parameter, SI; an order-locked effect has its "amplitude" here.
-    levels : common level by parameter and choice of a condition, or by delay.
-    deviations : of each recording from the common values, in standard deviations, (K, d).
-    phases : [rad] of order-locked effects, (K,) by effect.
-    """
-
+    # by effect and parameter, SI; an order-locked effect has its "amplitude" here
     sizes: Mapping[Key, float]
-    levels: Mapping[Key, float]
-    deviations: Matrix
-    phases: Mapping[str, Vector]
+    levels: Mapping[Key, float]  # common level by parameter and choice of a condition, or by delay
+    deviations: Matrix  # of each recording from the common values, in standard deviations, (K, d)
+    phases: Mapping[str, Vector]  # [rad] of order-locked effects, (K,) by effect
 
 
 @dataclass(frozen=True, eq=False)

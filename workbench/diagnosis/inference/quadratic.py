@@ -252,18 +252,11 @@ def _cut(system: RecordingSystem, parts: int) -> tuple[RecordingSystem, ...]:
 
 @dataclass(frozen=True, eq=False)
 class Joint:
-    """All stops over the common unknowns.
+    """All stops over the common unknowns."""
 
-    Attributes
-    ----------
-    shared : names of the unknowns.
-    known : those that the point has; the others are candidates.
-    levels : those that differ by nature, in no need of a cause.
-    """
-
-    shared: tuple[Key, ...]
-    known: tuple[Key, ...]
-    levels: tuple[Key, ...]
+    shared: tuple[Key, ...]  # names of the unknowns
+    known: tuple[Key, ...]  # those that the point has; the others are candidates
+    levels: tuple[Key, ...]  # those that differ by nature, in no need of a cause
     systems: tuple[RecordingSystem, ...]
     prior: Quadratic
 

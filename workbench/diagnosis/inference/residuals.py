@@ -29,21 +29,14 @@ _BINS = 12
 
 @dataclass(frozen=True, eq=False)
 class Balance:
-    """What a measurement has beyond the model in one equation of the machine.
+    """What a measurement has beyond the model in one equation of the machine."""
 
-    Attributes
-    ----------
-    name : in files.
-    title : for people.
-    unit, shown : SI, and the one of figures.
-    values : (n,) NaN where the recording does not count.
-    """
-
-    name: str
-    title: str
+    name: str  # in files
+    title: str  # for people
+    # unit, shown: SI, and the one of figures
     unit: str
     shown: str
-    values: Vector
+    values: Vector  # (n,) NaN where the recording does not count
 
 
 class Balances(Protocol):
@@ -57,27 +50,17 @@ class Balances(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Residuals:
-    """Balances of one recording, and the prediction errors of two models.
+    """Balances of one recording, and the prediction errors of two models."""
 
-    Attributes
-    ----------
-    name : of the recording.
-    time : (n,) [s] of the balances.
-    balances : that the system's plugin knows.
-    channels : that are compared, and that it has.
-    block_time : (b,) [s].
-    before, after : (b, c) prediction errors of the nominal and of the last model, by channel.
-    sigma : (b, c) their standard deviation by noise.
-    """
-
-    name: str
-    time: Vector
-    balances: tuple[Balance, ...]
-    channels: tuple[Channel, ...]
-    block_time: Vector
+    name: str  # of the recording
+    time: Vector  # (n,) [s] of the balances
+    balances: tuple[Balance, ...]  # that the system's plugin knows
+    channels: tuple[Channel, ...]  # that are compared, and that it has
+    block_time: Vector  # (b,) [s]
+    # before, after: (b, c) prediction errors of the nominal and of the last model, by channel
     before: Matrix
     after: Matrix
-    sigma: Matrix
+    sigma: Matrix  # (b, c) their standard deviation by noise
 
 
 @dataclass(frozen=True)

@@ -19,24 +19,17 @@ from workbench.diagnosis.simulation.residual_model import ResidualModel
 
 @dataclass(frozen=True, eq=False)
 class Rival:
-    """A model that explains the recordings as well as any.
+    """A model that explains the recordings as well as any."""
 
-    Attributes
-    ----------
-    effects : names of its causes.
-    sizes, levels : common unknowns as fitted, by key, SI.
-    recordings : errors and derivatives there, each in as few rows as tell the same; common unknowns
-        in this order.
-    prior : what is known of these beforehand.
-    explained : chi-squared that it explains beyond the nominal model.
-    """
-
-    effects: tuple[str, ...]
+    effects: tuple[str, ...]  # names of its causes
+    # sizes, levels: common unknowns as fitted, by key, SI
     sizes: Mapping[Key, float]
     levels: Mapping[Key, float]
+    # errors and derivatives there, each in as few rows as tell the same; common unknowns in this
+    # order
     recordings: tuple[RecordingSystem, ...]
-    prior: Quadratic
-    explained: float
+    prior: Quadratic  # what is known of these beforehand
+    explained: float  # chi-squared that it explains beyond the nominal model
 
     @property
     def chi_squared(self) -> float:
@@ -107,21 +100,14 @@ class Rival:
 
 @dataclass(frozen=True, eq=False)
 class Rivals:
-    """Models between which recordings do not decide; the first is the one that was named.
-
-    Attributes
-    ----------
-    effects : names of all that were considered.
-    given : parameters of the diagnosed model that differ from the library's defaults, SI.
-    signals : that were compared.
-    variance_factors : (m,) variance of slow errors over that of white noise, by channel.
-    """
+    """Models between which recordings do not decide; the first is the one that was named."""
 
     models: tuple[Rival, ...]
-    effects: tuple[str, ...]
+    effects: tuple[str, ...]  # names of all that were considered
+    # parameters of the diagnosed model that differ from the library's defaults, SI
     given: Mapping[str, float]
-    signals: tuple[str, ...]
-    variance_factors: Vector
+    signals: tuple[str, ...]  # that were compared
+    variance_factors: Vector  # (m,) variance of slow errors over that of white noise, by channel
 
     def to_dict(self) -> dict[str, Any]:
         """All of it as plain numbers and texts; `read_rivals` reads it again."""

@@ -35,17 +35,12 @@ ROUNDS = 12  # of Gauss-Newton, most
 
 @dataclass(frozen=True, eq=False)
 class FittedModel:
-    """A set of effects, fitted in full.
-
-    Attributes
-    ----------
-    misfit : chi-squared of all stops at the point, in units of the noise.
-    """
+    """A set of effects, fitted in full."""
 
     active: tuple[Effect, ...]
     point: Point
     linearised: LinearizedPoint
-    misfit: float
+    misfit: float  # chi-squared of all stops at the point, in units of the noise
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -55,17 +50,11 @@ class FittedModel:
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """One step of the search: what was tried, and what came out.
-
-    Attributes
-    ----------
-    scores : of all candidates, linearised, best first.
-    rivals : fitted in full; the first was taken, the others best first.
-    """
+    """One step of the search: what was tried, and what came out."""
 
     before: FittedModel
-    scores: tuple[CandidateScore, ...]
-    rivals: tuple[FittedModel, ...]
+    scores: tuple[CandidateScore, ...]  # of all candidates, linearised, best first
+    rivals: tuple[FittedModel, ...]  # fitted in full; the first was taken, the others best first
 
 
 def forward_selection(

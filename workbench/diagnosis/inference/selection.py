@@ -32,47 +32,33 @@ from workbench.runtime.engine import Reporter
 
 @dataclass(frozen=True, eq=False)
 class Selection:
-    """The effects that are needed, and how they were found.
+    """The effects that are needed, and how they were found."""
 
-    Attributes
-    ----------
-    base, best : the nominal model and the last one, fitted.
-    less : the best fit without each of the effects.
-    steps : how they were found.
-    trial : of all other effects about the best point.
-    twins : fits of effects that explain the data as well as each of them, by name, best first.
-    names, cosines : effects, and the similarity of their signatures in these data, (e, e).
-    interrupted : whether the search was ended before its end.
-    validation : of the fits.
-    """
-
+    # base, best: the nominal model and the last one, fitted
     base: FittedModel
     best: FittedModel
-    less: Mapping[Effect, FittedModel]
-    steps: tuple[Step, ...]
-    trial: ScoreTest
+    less: Mapping[Effect, FittedModel]  # the best fit without each of the effects
+    steps: tuple[Step, ...]  # how they were found
+    trial: ScoreTest  # of all other effects about the best point
+    # fits of effects that explain the data as well as each of them, by name, best first
     twins: Mapping[Effect, Mapping[str, FittedModel]]
+    # names, cosines: effects, and the similarity of their signatures in these data, (e, e)
     names: tuple[str, ...]
     cosines: Matrix
-    interrupted: bool
-    validation: CrossValidation
+    interrupted: bool  # whether the search was ended before its end
+    validation: CrossValidation  # of the fits
 
 
 @dataclass(frozen=True, eq=False)
 class ForwardSelection:
-    """What a search has come to, before anything is dropped or exchanged.
+    """What a search has come to, before anything is dropped or exchanged."""
 
-    Attributes
-    ----------
-    best, steps, trial, interrupted : as of `Selection`.
-    begun : where it went on, when other samples counted.
-    """
-
+    # best, steps, trial, interrupted: as of `Selection`
     best: FittedModel
     steps: list[Step]
     trial: ScoreTest
     interrupted: bool
-    begun: Selection | None
+    begun: Selection | None  # where it went on, when other samples counted
 
 
 def search(

@@ -56,26 +56,19 @@ _NEAREST = 3  # candidates that are told where none is accepted
 
 @dataclass(frozen=True)
 class Interval:
-    """An estimate with its 95 % interval, in `unit`.
-
-    Attributes
-    ----------
-    low, high : ends; infinite to the side of a bound at which the fit stopped, but for a bound that
-        nature sets.
-    limit : that bound, "least" or "greatest": then the value is no estimate.
-    beyond : where a fit ends that may pass the bound and leaves clearly less; NaN if none does.
-    alone : whether that fit needs no other cause.
-    plain : whether it is a number in a unit that nobody states, and no share.
-    """
+    """An estimate with its 95 % interval, in `unit`."""
 
     value: float
+    # low, high: ends; infinite to the side of a bound at which the fit stopped, but for a bound
+    # that nature sets
     low: float
     high: float
     unit: str
-    limit: str = ""
+    limit: str = ""  # that bound, "least" or "greatest": then the value is no estimate
+    # where a fit ends that may pass the bound and leaves clearly less; NaN if none does
     beyond: float = np.nan
-    alone: bool = False
-    plain: bool = False
+    alone: bool = False  # whether that fit needs no other cause
+    plain: bool = False  # whether it is a number in a unit that nobody states, and no share
 
     @property
     def text(self) -> str:
@@ -112,21 +105,13 @@ class Interval:
 
 @dataclass(frozen=True, eq=False)
 class Cause:
-    """One effect that was found.
-
-    Attributes
-    ----------
-    parameters : by name.
-    confusable_with : names of effects that explain these data as well.
-    explained : share of the explainable that this effect explains on held-out stops.
-    phases : (K,) [rad] in each stop, of an order-locked effect, else None.
-    """
+    """One effect that was found."""
 
     effect: Effect
-    parameters: Mapping[str, Interval]
-    confusable_with: tuple[str, ...]
-    explained: float
-    phases: Vector | None
+    parameters: Mapping[str, Interval]  # by name
+    confusable_with: tuple[str, ...]  # names of effects that explain these data as well
+    explained: float  # share of the explainable that this effect explains on held-out stops
+    phases: Vector | None  # (K,) [rad] in each stop, of an order-locked effect, else None
 
 
 @dataclass(frozen=True)
@@ -152,18 +137,11 @@ class Gain:
 
 @dataclass(frozen=True)
 class NearestCandidate:
-    """Effects that come nearest to what is missing, and why they are not accepted.
+    """Effects that come nearest to what is missing, and why they are not accepted."""
 
-    Attributes
-    ----------
-    effects : their names.
-    removed : share of the explainable that they remove on held-out recordings.
-    reasons : why they are no answer, in words.
-    """
-
-    effects: tuple[str, ...]
-    removed: float
-    reasons: tuple[str, ...]
+    effects: tuple[str, ...]  # their names
+    removed: float  # share of the explainable that they remove on held-out recordings
+    reasons: tuple[str, ...]  # why they are no answer, in words
 
     @property
     def text(self) -> str:

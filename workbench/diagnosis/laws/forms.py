@@ -25,22 +25,14 @@ _WIDER = 10.0  # times bounds that bind are widened
 
 @dataclass(frozen=True)
 class Form:
-    """A function of a quantity q, at most about 1 over its range.
-
-    Attributes
-    ----------
-    text : for people, of `{q}`.
-    expression : in Modelica, of {q}, {Q} the largest, {w} what is rounded, and the shape.
-    shape : name of its parameter; empty if it has none.
-    unit : of the shape, {unit} of the quantity.
-    values : of the shape to begin with, over the range of the quantity; of a power the exponents.
-    """
+    """A function of a quantity q, at most about 1 over its range."""
 
     name: str
-    text: str
-    expression: str
-    shape: str = ""
-    unit: str = "{unit}"
+    text: str  # for people, of `{q}`
+    expression: str  # in Modelica, of {q}, {Q} the largest, {w} what is rounded, and the shape
+    shape: str = ""  # name of its parameter; empty if it has none
+    unit: str = "{unit}"  # of the shape, {unit} of the quantity
+    # of the shape to begin with, over the range of the quantity; of a power the exponents
     values: tuple[float, ...] = ()
 
 
@@ -106,22 +98,14 @@ CONSTANT = Form("Constant", "always alike", "1.0")
 
 @dataclass(frozen=True)
 class ClosedForm:
-    """A closed form of a law.
-
-    Attributes
-    ----------
-    knots : range of what it depends on; None of a constant, and of what turns.
-    scale : of the output, where the law is added to it.
-    largest : of the law itself, as a free function; bounds of sizes follow from it.
-    room : times bounds are wider than usual.
-    """
+    """A closed form of a law."""
 
     law: Law
     form: Form
-    knots: Knots | None
-    scale: float
-    largest: float
-    room: float = 1.0
+    knots: Knots | None  # range of what it depends on; None of a constant, and of what turns
+    scale: float  # of the output, where the law is added to it
+    largest: float  # of the law itself, as a free function; bounds of sizes follow from it
+    room: float = 1.0  # times bounds are wider than usual
 
     @property
     def text(self) -> str:

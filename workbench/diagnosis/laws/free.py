@@ -35,15 +35,10 @@ _POINTS = 101  # of a function that is drawn
 
 @dataclass(frozen=True)
 class FreeFunction(Effect):
-    """An effect that is a free function.
+    """An effect that is a free function."""
 
-    Attributes
-    ----------
-    count : of its coefficients.
-    inverse : covariance of its coefficients beforehand, inverted.
-    """
-
-    count: int = COEFFICIENTS
+    count: int = COEFFICIENTS  # of its coefficients
+    # covariance of its coefficients beforehand, inverted
     inverse: Matrix = field(default_factory=lambda: np.zeros((0, 0)), compare=False)
 
     @property

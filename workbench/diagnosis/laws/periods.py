@@ -16,16 +16,10 @@ _AT_ONCE = 256  # frequencies: some hundred megabytes
 
 @dataclass(frozen=True)
 class Period:
-    """The strongest period.
+    """The strongest period."""
 
-    Attributes
-    ----------
-    length : in the unit of the clock.
-    tried : frequencies that recordings tell apart, among which it is the strongest.
-    """
-
-    length: float
-    tried: float
+    length: float  # in the unit of the clock
+    tried: float  # frequencies that recordings tell apart, among which it is the strongest
 
 
 def strongest_period(

@@ -22,32 +22,21 @@ _VARIES = 1e-3  # share of its size by which a quantity has to vary, to be an in
 
 @dataclass(frozen=True)
 class Quantity:
-    """An input or output of a slot.
-
-    Attributes
-    ----------
-    unit : empty where the library does not say.
-    """
+    """An input or output of a slot."""
 
     name: str
-    unit: str
+    unit: str  # empty where the library does not say
     text: str
 
 
 @dataclass(frozen=True)
 class Place:
-    """An output of a slot.
-
-    Attributes
-    ----------
-    text : what the slot is, for people.
-    inputs : of the slot.
-    """
+    """An output of a slot."""
 
     slot: Slot
-    text: str
+    text: str  # what the slot is, for people
     output: Quantity
-    inputs: tuple[Quantity, ...]
+    inputs: tuple[Quantity, ...]  # of the slot
 
     @property
     def name(self) -> str:
@@ -206,18 +195,11 @@ def _followed(course: Vector, time: Vector, span: float) -> Vector:
 
 @dataclass(frozen=True)
 class Carrier:
-    """What a function is multiplied by before it is added to an output.
+    """What a function is multiplied by before it is added to an output."""
 
-    Attributes
-    ----------
-    expression : in a generated class; "1.0" of what is added as it is.
-    unit : of the function.
-    text : for people, as "multiplies flow" or "adds to flow".
-    """
-
-    expression: str
-    unit: str
-    text: str
+    expression: str  # in a generated class; "1.0" of what is added as it is
+    unit: str  # of the function
+    text: str  # for people, as "multiplies flow" or "adds to flow"
 
     def course(self, place: Place, watched: Mapping[str, Vector]) -> Vector:
         """Its values along a recording, (n,)."""
@@ -229,16 +211,11 @@ class Carrier:
 
 @dataclass(frozen=True)
 class Law:
-    """Something that acts at a place and depends on something.
-
-    Attributes
-    ----------
-    influence : None for a constant.
-    """
+    """Something that acts at a place and depends on something."""
 
     place: Place
     carrier: Carrier
-    influence: LawInfluence | None
+    influence: LawInfluence | None  # None for a constant
 
     @property
     def short(self) -> str:

@@ -43,18 +43,12 @@ _SIZE = "d"  # of a probe
 
 @dataclass(frozen=True, eq=False)
 class LawScore:
-    """A law, as a free function about what is known.
-
-    Attributes
-    ----------
-    knots : where its function lives; None for a constant, and for what turns.
-    largest : of the output of its place, without it.
-    """
+    """A law, as a free function about what is known."""
 
     law: Law
-    knots: Knots | None
+    knots: Knots | None  # where its function lives; None for a constant, and for what turns
     smoothness: Smoothness
-    largest: float
+    largest: float  # of the output of its place, without it
 
     @property
     def most(self) -> float:

@@ -51,19 +51,12 @@ class Knots:
 
 @dataclass(frozen=True, eq=False)
 class Smoothness:
-    """What is known of coefficients beforehand, and what the data say of that.
+    """What is known of coefficients beforehand, and what the data say of that."""
 
-    Attributes
-    ----------
-    evidence : log of the marginal likelihood, over that of no function.
-    covariance : (K, K) of the coefficients beforehand.
-    coefficients : (K,) the likeliest; posterior : (K, K) their covariance.
-    """
-
-    evidence: float
-    covariance: Matrix
-    coefficients: Vector
-    posterior: Matrix
+    evidence: float  # log of the marginal likelihood, over that of no function
+    covariance: Matrix  # (K, K) of the coefficients beforehand
+    coefficients: Vector  # (K,) the likeliest
+    posterior: Matrix  # (K, K) their covariance
 
 
 def kernel(length: float, count: int = COEFFICIENTS) -> Matrix:

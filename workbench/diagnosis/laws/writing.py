@@ -14,23 +14,15 @@ PACKAGE = "Proposed"  # of the classes, within the library
 
 @dataclass(frozen=True)
 class LawClass:
-    """A generated class.
-
-    Attributes
-    ----------
-    declarations : lines of its parameters and variables.
-    equations : lines, besides those of its outputs.
-    change : expression of what is added to the output of its place.
-    annotation : content of its `annotation`, empty if it has none.
-    """
+    """A generated class."""
 
     name: str
     about: str
     place: Place
-    declarations: tuple[str, ...]
-    equations: tuple[str, ...]
-    change: str
-    annotation: str = ""
+    declarations: tuple[str, ...]  # lines of its parameters and variables
+    equations: tuple[str, ...]  # lines, besides those of its outputs
+    change: str  # expression of what is added to the output of its place
+    annotation: str = ""  # content of its `annotation`, empty if it has none
 
     def source(self, library: Library) -> str:
         """The class in Modelica."""

@@ -47,21 +47,14 @@ _SWIFT = 1.0  # rate times step from which on a state is stepped implicitly
 
 
 class _Led(NamedTuple):
-    """The motion that is led.
+    """The motion that is led."""
 
-    Attributes
-    ----------
-    states : that a correction scales alike, the leader first; empty: all outputs lead.
-    column : of the output that leads alone.
-    corrected : (p,) states that all outputs lead.
-    gain : (p, l) of these corrections.
-    restarted, seen : (r,) states that restarts set, and the columns of their outputs.
-    """
-
+    # that a correction scales alike, the leader first; empty: all outputs lead
     states: NDArray[np.intp]
-    column: int
-    corrected: NDArray[np.intp]
-    gain: Matrix
+    column: int  # of the output that leads alone
+    corrected: NDArray[np.intp]  # (p,) states that all outputs lead
+    gain: Matrix  # (p, l) of these corrections
+    # restarted, seen: (r,) states that restarts set, and the columns of their outputs
     restarted: NDArray[np.intp]
     seen: NDArray[np.intp]
 
@@ -107,27 +100,17 @@ def _restart(model, led, error, states, errors):  # type: ignore[no-untyped-def]
 
 
 class _Run(NamedTuple):
-    """What a prediction runs along.
+    """What a prediction runs along."""
 
-    Attributes
-    ----------
-    time : (n,) [s] of the samples; u : (n, m) inputs; holds : (m,), see `Signal.hold`.
-    y : (n, c) measured.
-    gain : (n,) of the correction by what leads alone.
-    anew : (n,) whether states are set as measured before a sample.
-    x0 : (s,) states at the start.
-    longest : of a step [s].
-    """
-
-    time: Vector
-    u: Matrix
-    holds: Vector
-    y: Matrix
-    gain: Vector
+    time: Vector  # (n,) [s] of the samples
+    u: Matrix  # (n, m) inputs
+    holds: Vector  # (m,), see `Signal.hold`
+    y: Matrix  # (n, c) measured
+    gain: Vector  # (n,) of the correction by what leads alone
     led: _Led
-    anew: NDArray[np.bool_]
-    x0: Vector
-    longest: float
+    anew: NDArray[np.bool_]  # (n,) whether states are set as measured before a sample
+    x0: Vector  # (s,) states at the start
+    longest: float  # of a step [s]
 
 
 class _State(NamedTuple):

@@ -43,48 +43,33 @@ _GAMMA = 1.0 - 1.0 / math.sqrt(2.0)
 
 
 class Steps(NamedTuple):
-    """What steps remember, and work space.
+    """What steps remember, and work space."""
 
-    Attributes
-    ----------
-    stiff : (p,) states that are stepped implicitly.
-    nominal : (n,) sizes of the states.
-    a : (n, p) columns of the Jacobian by the stiff states.
-    system : (p, 2 p) I - gamma h A for them, and its inverse; step : (1,) that it is for [s].
-    full : (n, n + 1) the same of all states, and Newton's correction.
-    age : (1,) steps that the Jacobian has served.
-    from_, to : (m,) inputs at the beginning and at the end of a step.
-    time : (1,) of the model at the beginning of a step [s].
-    x, f : (n,) states where a step begins, and their rates.
-    moved : (n,) rates where the first stage would lead explicitly; Newton's correction.
-    k1, k2 : (n,) slopes of the two stages.
-    begin, known, scale : (n,) of a step that is solved for: where it begins, the last guess, sizes.
-    coarse : (n,) end of it in half as many parts.
-    most : (1,) parts that it is taken in at most.
-    picked : (p,) solution of a system of the stiff states.
-    """
-
-    stiff: NDArray[np.intp]
-    nominal: Vector
-    a: Matrix
-    system: Matrix
-    step: Vector
-    age: NDArray[np.intp]
-    full: Matrix
+    stiff: NDArray[np.intp]  # (p,) states that are stepped implicitly
+    nominal: Vector  # (n,) sizes of the states
+    a: Matrix  # (n, p) columns of the Jacobian by the stiff states
+    system: Matrix  # (p, 2 p) I - gamma h A for them, and its inverse
+    step: Vector  # (1,) that it is for [s]
+    age: NDArray[np.intp]  # (1,) steps that the Jacobian has served
+    full: Matrix  # (n, n + 1) the same of all states, and Newton's correction
+    # from_, to: (m,) inputs at the beginning and at the end of a step
     from_: Vector
     to: Vector
-    time: Vector
+    time: Vector  # (1,) of the model at the beginning of a step [s]
+    # x, f: (n,) states where a step begins, and their rates
     x: Vector
     f: Vector
-    moved: Vector
+    moved: Vector  # (n,) rates where the first stage would lead explicitly; Newton's correction
+    # k1, k2: (n,) slopes of the two stages
     k1: Vector
     k2: Vector
+    # begin, known, scale: (n,) of a step that is solved for: where it begins, the last guess, sizes
     begin: Vector
     known: Vector
     scale: Vector
-    coarse: Vector
-    most: NDArray[np.intp]
-    picked: Vector
+    coarse: Vector  # (n,) end of it in half as many parts
+    most: NDArray[np.intp]  # (1,) parts that it is taken in at most
+    picked: Vector  # (p,) solution of a system of the stiff states
 
 
 def steps(fmu: FMU, stiff: NDArray[np.intp], inputs: int) -> Steps:
