@@ -27,19 +27,12 @@ _AGREEMENT = 1e-5
 
 @dataclass(frozen=True)
 class HorizonTimes:
-    """Medians over repeats [s].
+    """Medians over repeats [s]."""
 
-    Attributes
-    ----------
-    unknowns : states and quantities; samples : of the horizon.
-    ours : of one sample, one iteration.
-    ipopt : of the same problem from its solution on, with exact derivatives of the model.
-    """
-
-    unknowns: int
-    samples: int
-    ours: float
-    ipopt: float
+    unknowns: int  # states and quantities
+    samples: int  # of the horizon
+    ours: float  # of one sample, one iteration
+    ipopt: float  # of the same problem from its solution on, with exact derivatives of the model
 
     def ratios(self) -> dict[str, float]:
         """How many times as long IPOPT takes."""

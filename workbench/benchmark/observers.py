@@ -39,43 +39,28 @@ Samples = tuple[Vector, Matrix, Matrix]
 
 @dataclass(frozen=True)
 class ObserverTimes:
-    """Medians over repeats, of whole runs per step [s].
-
-    Attributes
-    ----------
-    states : of the model.
-    step : at 1 kHz.
-    times_real_time : 1 ms over `step`.
-    by_rate : as `step` at each of RATES.
-    long : as `step` with a recording LENGTH times as long.
-    fmpy : of the same method written with FMPy's methods; None where it is not measured.
-    c : of the same method in C without FMI; None where there is none.
-    """
+    """Medians over repeats, of whole runs per step [s]."""
 
     observer: str
-    states: int
-    step: float
-    times_real_time: float
-    by_rate: dict[float, float]
-    long: float
+    states: int  # of the model
+    step: float  # at 1 kHz
+    times_real_time: float  # 1 ms over `step`
+    by_rate: dict[float, float]  # as `step` at each of RATES
+    long: float  # as `step` with a recording LENGTH times as long
+    # of the same method written with FMPy's methods; None where it is not measured
     fmpy: float | None
-    c: float | None
+    c: float | None  # of the same method in C without FMI; None where there is none
 
 
 @dataclass(frozen=True)
 class ProcessTimes:
-    """All observers over all cases at 1 kHz, in workers that have loaded their FMUs.
-
-    Attributes
-    ----------
-    one, two : medians with one worker and with two [s].
-    peak_memory : of one worker [bytes].
-    """
+    """All observers over all cases at 1 kHz, in workers that have loaded their FMUs."""
 
     cases: int
+    # one, two: medians with one worker and with two [s]
     one: float
     two: float
-    peak_memory: int
+    peak_memory: int  # of one worker [bytes]
 
 
 def resample(case: Case, rate: float, stretch: float = 1.0) -> Samples:

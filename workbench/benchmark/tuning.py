@@ -46,21 +46,13 @@ _AGREEMENT = 1e-9
 
 @dataclass(frozen=True)
 class EvaluationTimes:
-    """One candidate over one recording, from its gains to z; medians over repeats.
-
-    Attributes
-    ----------
-    steps : of the recording.
-    ours : by the tuning [s].
-    fmpy : by the same method written with FMPy's methods and numpy [s].
-    z : objective that both find.
-    """
+    """One candidate over one recording, from its gains to z; medians over repeats."""
 
     estimator: str
-    steps: int
-    ours: float
-    fmpy: float
-    z: float
+    steps: int  # of the recording
+    ours: float  # by the tuning [s]
+    fmpy: float  # by the same method written with FMPy's methods and numpy [s]
+    z: float  # objective that both find
 
     def ratios(self) -> Mapping[str, float]:
         """How many times as long FMPy's methods take."""
@@ -69,19 +61,14 @@ class EvaluationTimes:
 
 @dataclass(frozen=True)
 class WorkerRates:
-    """Candidates per second over all cases in full, by workers that are ready; medians.
-
-    Attributes
-    ----------
-    one, two : by so many processes.
-    dask : by two processes of a local Dask cluster; None without the extra [cluster].
-    """
+    """Candidates per second over all cases in full, by workers that are ready; medians."""
 
     cases: int
     candidates: int
+    # one, two: by so many processes
     one: float
     two: float
-    dask: float | None
+    dask: float | None  # by two processes of a local Dask cluster; None without the extra [cluster]
 
     def ratios(self) -> Mapping[str, float]:
         """Two processes over one, and Dask's two over these."""
@@ -91,18 +78,11 @@ class WorkerRates:
 
 @dataclass(frozen=True)
 class TuningMemory:
-    """Peaks of resident memory in a run of the command with two workers [bytes].
+    """Peaks of resident memory in a run of the command with two workers [bytes]."""
 
-    Attributes
-    ----------
-    master : of the process that searches.
-    worker : of the largest process that it starts.
-    total : of all processes.
-    """
-
-    master: int
-    worker: int
-    total: int
+    master: int  # of the process that searches
+    worker: int  # of the largest process that it starts
+    total: int  # of all processes
 
 
 def time_evaluations(case: Case, system: System) -> list[EvaluationTimes]:

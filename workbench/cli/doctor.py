@@ -56,18 +56,13 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
 
 @dataclass(frozen=True)
 class Inspection:
-    """State of one part of the installation.
-
-    Attributes
-    ----------
-    state : "missing" is an extra that is not installed; "wrong" does not work as it is.
-    remedy : what to do, empty where nothing is needed.
-    """
+    """State of one part of the installation."""
 
     name: str
+    # "missing" is an extra that is not installed; "wrong" does not work as it is
     state: Literal["ok", "missing", "wrong"]
     found: str
-    remedy: str = ""
+    remedy: str = ""  # what to do, empty where nothing is needed
 
 
 def run(options: argparse.Namespace, output: Output) -> CommandResult:

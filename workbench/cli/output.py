@@ -17,35 +17,23 @@ from workbench.runtime.files import end_copy
 
 @dataclass(frozen=True)
 class CommandResult:
-    """How a command ended.
+    """How a command ended."""
 
-    Attributes
-    ----------
-    result : that --json prints; also the values that stand in its files.
-    units : by key of `result`, at any depth; of keys without one it is 1.
-    status : of the process.
-    page : that shows it; None without.
-    """
-
+    # that --json prints; also the values that stand in its files
     result: Mapping[str, Any] = field(default_factory=dict)
+    # by key of `result`, at any depth; of keys without one it is 1
     units: Mapping[str, str] = field(default_factory=dict)
-    status: int = 0
-    page: Path | None = None
+    status: int = 0  # of the process
+    page: Path | None = None  # that shows it; None without
 
 
 @dataclass(frozen=True)
 class Output:
-    """Standard output for results, standard error for progress.
+    """Standard output for results, standard error for progress."""
 
-    Attributes
-    ----------
-    json : whether standard output takes one JSON document, and nothing else.
-    quiet : whether progress is not printed.
-    begin : of the command, by `time.perf_counter` [s].
-    """
-
-    json: bool
-    quiet: bool
+    json: bool  # whether standard output takes one JSON document, and nothing else
+    quiet: bool  # whether progress is not printed
+    # of the command, by `time.perf_counter` [s]
     begin: float = field(default_factory=time.perf_counter)
 
     def result(self, text: str) -> None:

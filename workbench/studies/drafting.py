@@ -50,47 +50,28 @@ _REACH = 5.0  # times a parameter, and a fifth, where the model states no range
 
 @dataclass(frozen=True, eq=False)
 class DraftSignal:
-    """A variable of the FMU that was recorded.
+    """A variable of the FMU that was recorded."""
 
-    Attributes
-    ----------
-    name : in the system file; that of the variable where it is one word.
-    role : of the table in the system file.
-    unit : in which the model has it, 1 where the workbench does not know it.
-    channel : that holds it.
-    reason : why, for people.
-    doubt : what somebody must confirm, in words; empty: nothing.
-    """
-
-    name: str
+    name: str  # in the system file; that of the variable where it is one word
     variable: Variable
-    role: str
-    unit: str
-    channel: NamedChannel
-    reason: str
-    doubt: str = ""
+    role: str  # of the table in the system file
+    unit: str  # in which the model has it, 1 where the workbench does not know it
+    channel: NamedChannel  # that holds it
+    reason: str  # why, for people
+    doubt: str = ""  # what somebody must confirm, in words; empty: nothing
 
 
 @dataclass(frozen=True, eq=False)
 class Draft:
-    """What is known of a system before its file is written.
-
-    Attributes
-    ----------
-    recordings : of all files, in the units of the signals.
-    time : channel of the times, None where the file itself says them.
-    questions : what somebody must confirm, in words.
-    unmatched : variables of the FMU without a channel, and why, in words.
-    left : channels that nobody takes.
-    """
+    """What is known of a system before its file is written."""
 
     description: Description
     signals: tuple[DraftSignal, ...]
-    recordings: tuple[MergedRecording, ...]
-    time: NamedChannel | None
-    questions: tuple[str, ...]
-    unmatched: Mapping[str, str]
-    left: tuple[str, ...]
+    recordings: tuple[MergedRecording, ...]  # of all files, in the units of the signals
+    time: NamedChannel | None  # channel of the times, None where the file itself says them
+    questions: tuple[str, ...]  # what somebody must confirm, in words
+    unmatched: Mapping[str, str]  # variables of the FMU without a channel, and why, in words
+    left: tuple[str, ...]  # channels that nobody takes
 
     @property
     def columns(self) -> dict[str, NamedChannel]:

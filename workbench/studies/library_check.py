@@ -39,53 +39,32 @@ _SAME = 1e-9  # of the noise, below which rounding may be all that moves a signa
 
 @dataclass(frozen=True)
 class ClaimResult:
-    """What came of a claim.
+    """What came of a claim."""
 
-    Attributes
-    ----------
-    name : of its model.
-    failures : what its asserts, or the solver, said; none if it holds.
-    """
-
-    name: str
-    failures: tuple[str, ...]
+    name: str  # of its model
+    failures: tuple[str, ...]  # what its asserts, or the solver, said; none if it holds
 
 
 @dataclass(frozen=True)
 class EffectResult:
-    """What came of an effect, alone in the model.
+    """What came of an effect, alone in the model."""
 
-    Attributes
-    ----------
-    name : of the effect.
-    size : that was tried [`unit`], the one that matters.
-    signal : signal that shows it best, in the recording `case`; both empty if none does.
-    change : of this signal, its largest, over the standard deviation of its noise.
-    failure : why a diagnosis cannot use it; empty if it can.
-    doubt : what a reader should know; empty if nothing.
-    """
-
-    name: str
-    size: float
+    name: str  # of the effect
+    size: float  # that was tried [`unit`], the one that matters
     unit: str
     case: str = ""
-    signal: str = ""
-    change: float = 0.0
-    failure: str = ""
-    doubt: str = ""
+    signal: str = ""  # signal that shows it best, in the recording `case`; both empty if none does
+    change: float = 0.0  # of this signal, its largest, over the standard deviation of its noise
+    failure: str = ""  # why a diagnosis cannot use it; empty if it can
+    doubt: str = ""  # what a reader should know; empty if nothing
 
 
 @dataclass(frozen=True)
 class LibraryCheck:
-    """A library, checked.
+    """A library, checked."""
 
-    Attributes
-    ----------
-    library : its name.
-    claims, effects : in the order of the library.
-    """
-
-    library: str
+    library: str  # its name
+    # claims, effects: in the order of the library
     claims: tuple[ClaimResult, ...]
     effects: tuple[EffectResult, ...]
 

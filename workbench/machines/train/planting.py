@@ -69,14 +69,9 @@ SHEET_ERRORS = (SheetError("noise", 2.0), SheetError("tolerances", 1.0))
 
 @dataclass(frozen=True)
 class PlantedTrain:
-    """Sets of stops of one train each, a `VirtualRig`.
+    """Sets of stops of one train each, a `VirtualRig`."""
 
-    Attributes
-    ----------
-    stops : of a set.
-    """
-
-    stops: tuple[AskedStop, ...]
+    stops: tuple[AskedStop, ...]  # of a set
 
     plantables = PLANTABLE
     sheet_errors = SHEET_ERRORS

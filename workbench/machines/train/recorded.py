@@ -28,14 +28,9 @@ _KNOWN = {  # what a truth calls a fault: as it is here, and the size of one of 
 
 @dataclass(frozen=True)
 class RecordedTrain:
-    """Sets of recorded stops, a `VirtualRig` that makes none: a set's seed is its number.
+    """Sets of recorded stops, a `VirtualRig` that makes none: a set's seed is its number."""
 
-    Attributes
-    ----------
-    folders : of the sets.
-    """
-
-    folders: tuple[Path, ...]
+    folders: tuple[Path, ...]  # of the sets
 
     plantables = PLANTABLE
     sheet_errors: ClassVar[tuple[SheetError, ...]] = ()  # none: what was recorded is as it is

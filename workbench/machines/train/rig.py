@@ -31,20 +31,12 @@ _STANDSTILL = 0.05  # [m/s]
 
 @dataclass(frozen=True)
 class AskedStop:
-    """A stop as it is asked for.
+    """A stop as it is asked for."""
 
-    Attributes
-    ----------
-    name : of its folder, NN_noun.
-    speed : at the command [m/s].
-    pressure : that is asked for in a full vehicle [Pa].
-    rail : what the crew says, dry or wet.
-    """
-
-    name: str
-    speed: float
-    pressure: float
-    rail: str
+    name: str  # of its folder, NN_noun
+    speed: float  # at the command [m/s]
+    pressure: float  # that is asked for in a full vehicle [Pa]
+    rail: str  # what the crew says, dry or wet
 
     @property
     def number(self) -> int:
@@ -83,43 +75,30 @@ class Train(NamedTuple):
 
 
 class Way(NamedTuple):
-    """The rail and the line, every 5 m from 100 m before the start.
+    """The rail and the line, every 5 m from 100 m before the start."""
 
-    Attributes
-    ----------
-    mu0 : (w,) friction at zero slip, which wheels change as they clean it.
-    gradient, curve : (w,) [1] true gradient, resistance of curves over weight.
-    rolling : (w,) deviation of the rolling radius [m].
-    """
-
-    mu0: Vector
+    mu0: Vector  # (w,) friction at zero slip, which wheels change as they clean it
+    # gradient, curve: (w,) [1] true gradient, resistance of curves over weight
     gradient: Vector
     curve: Vector
-    rolling: Vector
+    rolling: Vector  # (w,) deviation of the rolling radius [m]
 
 
 @dataclass(frozen=True, eq=False)
 class StopResult:
-    """A stop, every STEP.
+    """A stop, every STEP."""
 
-    Attributes
-    ----------
-    time, v, s, a : (n,) [s], [m/s], [m] of the first axle, [m/s2] as an accelerometer feels it.
-    omega : (n, 8) [rad/s].
-    pressure : (n, 4) behind the relay valves [Pa].
-    force, load : (n, 8) creep force of an axle, and load of its two wheels [N].
-    standstill : [s].
-    """
-
+    # time, v, s, a: (n,) [s], [m/s], [m] of the first axle, [m/s2] as an accelerometer feels it
     time: Vector
     v: Vector
     s: Vector
     a: Vector
-    omega: Matrix
-    pressure: Matrix
+    omega: Matrix  # (n, 8) [rad/s]
+    pressure: Matrix  # (n, 4) behind the relay valves [Pa]
+    # force, load: (n, 8) creep force of an axle, and load of its two wheels [N]
     force: Matrix
     load: Matrix
-    standstill: float
+    standstill: float  # [s]
 
 
 class _State(NamedTuple):

@@ -42,105 +42,76 @@ USUAL = (
 
 @dataclass(frozen=True)
 class Faults:
-    """Faults of a train, SI.
+    """Faults of a train, SI."""
 
-    Attributes
-    ----------
-    pads : (8,) share of the friction of an axle's pads that is lost.
-    units : (8,) brake units of an axle that are isolated.
-    drag : (8,) torque of a brake that does not release.
-    radius : (8,) true minus sheet.
-    poles : (8,) relative error of a speed by the poles that are counted.
-    late : (8,) delay of a speed sensor.
-    lag : (4,) time constant of a bogie's cylinders behind their valve.
-    reading : (4,) relative error of a pressure sensor.
-    zero : (4,) offset of a pressure sensor.
-    mass : (2,) true mass of a vehicle over the reported one, less one.
-    gradient : true less that of the track file, everywhere [1].
-    all_pads : share of the friction of all pads that is lost.
-    glazing : share of the friction that is lost on a disc far above 110 degrees C.
-    water : film on every disc at the start of each stop, 1 where it is wet.
-    drying : friction energy of a disc that leaves 1/e of a whole film [J]; 0 where there is none.
-    adhesion : share of the friction wheel-rail that is lost.
-    accelerometer_bias, accelerometer_gain : of its reading beyond the acceleration, [m/s2], [1].
-    noise, tolerances : of all sensors and draws, relative to the sheet's, less one.
-    """
-
+    # (8,) share of the friction of an axle's pads that is lost
     pads: Vector = field(default_factory=_no_axles)
+    # (8,) brake units of an axle that are isolated
     units: Vector = field(default_factory=_no_axles)
-    drag: Vector = field(default_factory=_no_axles)
-    radius: Vector = field(default_factory=_no_axles)
+    drag: Vector = field(default_factory=_no_axles)  # (8,) torque of a brake that does not release
+    radius: Vector = field(default_factory=_no_axles)  # (8,) true minus sheet
+    # (8,) relative error of a speed by the poles that are counted
     poles: Vector = field(default_factory=_no_axles)
-    late: Vector = field(default_factory=_no_axles)
+    late: Vector = field(default_factory=_no_axles)  # (8,) delay of a speed sensor
+    # (4,) time constant of a bogie's cylinders behind their valve
     lag: Vector = field(default_factory=_no_bogies)
-    reading: Vector = field(default_factory=_no_bogies)
-    zero: Vector = field(default_factory=_no_bogies)
+    reading: Vector = field(default_factory=_no_bogies)  # (4,) relative error of a pressure sensor
+    zero: Vector = field(default_factory=_no_bogies)  # (4,) offset of a pressure sensor
+    # (2,) true mass of a vehicle over the reported one, less one
     mass: Vector = field(default_factory=_no_vehicles)
-    gradient: float = 0.0
-    all_pads: float = 0.0
-    glazing: float = 0.0
-    water: float = 0.0
+    gradient: float = 0.0  # true less that of the track file, everywhere [1]
+    all_pads: float = 0.0  # share of the friction of all pads that is lost
+    glazing: float = 0.0  # share of the friction that is lost on a disc far above 110 degrees C
+    water: float = 0.0  # film on every disc at the start of each stop, 1 where it is wet
+    # friction energy of a disc that leaves 1/e of a whole film [J]; 0 where there is none
     drying: float = 0.0
-    adhesion: float = 0.0
+    adhesion: float = 0.0  # share of the friction wheel-rail that is lost
+    # accelerometer_bias, accelerometer_gain: of its reading beyond the acceleration, [m/s2], [1]
     accelerometer_bias: float = 0.0
     accelerometer_gain: float = 0.0
+    # noise, tolerances: of all sensors and draws, relative to the sheet's, less one
     noise: float = 0.0
     tolerances: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
 class TrainTolerances:
-    """How a train differs from its sheet, relative where no unit stands.
+    """How a train differs from its sheet, relative where no unit stands."""
 
-    Attributes
-    ----------
-    radius : (8,) true minus sheet [m].
-    pads, stiffness, share, inertia : (8,).
-    regulation : (4,); zero : (4,) of the pressure sensors [Pa].
-    weighed : (2,).
-    A, C, fade : each alone.
-    speed_law, exponent : added [1].
-    gain, bias : of the accelerometer, bias [m/s2].
-    """
-
-    radius: Vector
+    radius: Vector  # (8,) true minus sheet [m]
+    # pads, stiffness, share, inertia: (8,)
     pads: Vector
     stiffness: Vector
     share: Vector
     inertia: Vector
-    regulation: Vector
-    zero: Vector
-    weighed: Vector
+    regulation: Vector  # (4,)
+    zero: Vector  # (4,) of the pressure sensors [Pa]
+    weighed: Vector  # (2,)
+    # A, C, fade: each alone
     A: float
     C: float
     fade: float
+    # speed_law, exponent: added [1]
     speed_law: float
     exponent: float
+    # gain, bias: of the accelerometer, bias [m/s2]
     gain: float
     bias: float
 
 
 @dataclass(frozen=True, eq=False)
 class SimulatedStop:
-    """A stop of the virtual train.
-
-    Attributes
-    ----------
-    command : when the brake was commanded [s].
-    mass, weighed : (2,) of the vehicles, true and as reported [kg].
-    track : (k, 3) rows of the file: position [m], gradient [permille], radius [m].
-    gradient : (w,) true one, at the `points` of the way [1].
-    tolerances : of the train.
-    """
+    """A stop of the virtual train."""
 
     stop: AskedStop
     result: StopResult
-    command: float
+    command: float  # when the brake was commanded [s]
+    # mass, weighed: (2,) of the vehicles, true and as reported [kg]
     mass: Vector
     weighed: Vector
-    track: Matrix
-    gradient: Vector
-    tolerances: TrainTolerances
+    track: Matrix  # (k, 3) rows of the file: position [m], gradient [permille], radius [m]
+    gradient: Vector  # (w,) true one, at the `points` of the way [1]
+    tolerances: TrainTolerances  # of the train
 
 
 def draw_train(seed: int, tolerances: float) -> TrainTolerances:

@@ -38,16 +38,10 @@ _RANKS = np.linspace(0.0, 1.0, 1001)  # a share of 95 % to a twentieth of it
 
 @dataclass(frozen=True, eq=False)
 class BandCoverage:
-    """Coverage of the band of a quantity in a stop.
+    """Coverage of the band of a quantity in a stop."""
 
-    Attributes
-    ----------
-    share : of samples in which it holds the truth.
-    errors : (r,) quantiles of the errors over the reach of the band, from least to largest.
-    """
-
-    share: float
-    errors: Vector
+    share: float  # of samples in which it holds the truth
+    errors: Vector  # (r,) quantiles of the errors over the reach of the band, from least to largest
 
 
 def held_by_bands(stop: "KnownStop", name: str) -> dict[str, BandCoverage]:
@@ -110,18 +104,12 @@ def _of_stops(stops: Sequence["StopAccuracy"], name: str, quantity: str) -> list
 
 @dataclass(frozen=True, eq=False)
 class KnownStop:
-    """A stop whose truth is known, and the runs of estimators on it.
-
-    Attributes
-    ----------
-    runs : by the name of the estimator.
-    system : whose estimators they are.
-    """
+    """A stop whose truth is known, and the runs of estimators on it."""
 
     case: Case
     truth: Truth
-    runs: Mapping[str, Run]
-    system: System
+    runs: Mapping[str, Run]  # by the name of the estimator
+    system: System  # whose estimators they are
 
     def between(self, begin: float, end: float) -> NDArray[np.bool_]:
         """Samples between two times [s] after the first contact, (n,)."""
@@ -220,21 +208,14 @@ class Accuracy:
 
 @dataclass(frozen=True)
 class StopAccuracy:
-    """Errors of all estimators in one stop.
+    """Errors of all estimators in one stop."""
 
-    Attributes
-    ----------
-    name, title : of the case.
-    wet : whether a disc was wet.
-    slides : whether the truth has a slide.
-    estimators : by name.
-    """
-
+    # name, title: of the case
     name: str
     title: str
-    wet: bool
-    slides: bool
-    estimators: Mapping[str, Accuracy]
+    wet: bool  # whether a disc was wet
+    slides: bool  # whether the truth has a slide
+    estimators: Mapping[str, Accuracy]  # by name
 
 
 @dataclass(frozen=True)

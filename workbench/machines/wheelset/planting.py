@@ -86,16 +86,10 @@ SHEET_ERRORS = (
 
 @dataclass(frozen=True)
 class PlantedStops:
-    """Sets of stops on constant pads, a `VirtualRig`.
+    """Sets of stops on constant pads, a `VirtualRig`."""
 
-    Attributes
-    ----------
-    scenarios : the stops of a set.
-    reference : multibody model, a Co-Simulation FMU.
-    """
-
-    scenarios: tuple[Scenario, ...]
-    reference: Path
+    scenarios: tuple[Scenario, ...]  # the stops of a set
+    reference: Path  # multibody model, a Co-Simulation FMU
 
     plantables = PLANTABLE
     sheet_errors = SHEET_ERRORS

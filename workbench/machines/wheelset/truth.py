@@ -21,26 +21,18 @@ BUILT_UP = (3.0, 6.0)  # [s] after the first contact
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """True signals at the times of a recording.
+    """True signals at the times of a recording."""
 
-    Attributes
-    ----------
-    Fx : (n,) contact force [N].
-    slip : (n,) velocity [m/s].
-    omegaW, omegaR : (n,) speeds of the wheelset and of the roller [rad/s].
-    muWR : (n,) friction of the contact at zero slip velocity [1].
-    muDC : (n,) friction of the pads [1]. The mean of the discs is what an axle can show; they are
-        pressed with the same force.
-    contact : [s] when the pads first touch the discs.
-    """
-
-    Fx: Vector
-    slip: Vector
+    Fx: Vector  # (n,) contact force [N]
+    slip: Vector  # (n,) velocity [m/s]
+    # omegaW, omegaR: (n,) speeds of the wheelset and of the roller [rad/s]
     omegaW: Vector
     omegaR: Vector
-    muWR: Vector
+    muWR: Vector  # (n,) friction of the contact at zero slip velocity [1]
+    # (n,) friction of the pads [1]. The mean of the discs is what an axle can show; they are
+    # pressed with the same force.
     muDC: Vector
-    contact: float
+    contact: float  # [s] when the pads first touch the discs
 
 
 def rolling_speed(system: System, omegaR: Vector) -> Vector:

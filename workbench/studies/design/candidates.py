@@ -77,16 +77,10 @@ class Profile:
 
 @dataclass(frozen=True)
 class Experiment:
-    """One recording that could be made.
+    """One recording that could be made."""
 
-    Attributes
-    ----------
-    settings : of conditions and of what is set besides, by name.
-    profiles : of the inputs that are varied.
-    """
-
-    settings: Mapping[str, Setting]
-    profiles: tuple[Profile, ...]
+    settings: Mapping[str, Setting]  # of conditions and of what is set besides, by name
+    profiles: tuple[Profile, ...]  # of the inputs that are varied
 
     @property
     def numbers(self) -> dict[str, float]:

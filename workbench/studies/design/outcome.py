@@ -23,16 +23,10 @@ _LEAST = 0.05  # standard deviations, which are told as 0.0
 
 @dataclass(frozen=True, eq=False)
 class RankedExperiment:
-    """An experiment, and what it would tell.
+    """An experiment, and what it would tell."""
 
-    Attributes
-    ----------
-    text : what to do, for people.
-    cost : of it, in `unit`.
-    """
-
-    text: str
-    cost: float
+    text: str  # what to do, for people
+    cost: float  # of it, in `unit`
     unit: str
     prediction: Prediction
 

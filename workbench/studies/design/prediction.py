@@ -190,19 +190,12 @@ class Prediction:
 
 @dataclass(frozen=True)
 class DesignProblem:
-    """What experiments are predicted with.
+    """What experiments are predicted with."""
 
-    Attributes
-    ----------
-    everything : FMU with all effects.
-    rivals : that they are to tell apart.
-    effects : of the FMU, by name.
-    """
-
-    everything: Path
+    everything: Path  # FMU with all effects
     system: System
-    rivals: Rivals
-    effects: Mapping[str, Effect]
+    rivals: Rivals  # that they are to tell apart
+    effects: Mapping[str, Effect]  # of the FMU, by name
 
     @property
     def source(self) -> ModelSource:
@@ -248,22 +241,13 @@ def predict(
 
 @dataclass(frozen=True, eq=False)
 class _RivalPoint:
-    """A rival about its point, along an experiment.
+    """A rival about its point, along an experiment."""
 
-    Attributes
-    ----------
-    active : its causes.
-    lin : errors and derivatives there.
-    joint : over its common unknowns.
-    so_far : the recordings so far over these.
-    bare : its responses without its causes, beside the derivatives of `joint`.
-    """
-
-    active: tuple[Effect, ...]
-    lin: LinearizedPoint
-    joint: Joint
-    so_far: RecordingSystem
-    bare: RecordingSystem
+    active: tuple[Effect, ...]  # its causes
+    lin: LinearizedPoint  # errors and derivatives there
+    joint: Joint  # over its common unknowns
+    so_far: RecordingSystem  # the recordings so far over these
+    bare: RecordingSystem  # its responses without its causes, beside the derivatives of `joint`
 
     @property
     def own(self) -> RecordingSystem:

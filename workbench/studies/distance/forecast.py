@@ -30,20 +30,12 @@ _SAME = 1e-4  # of a distance: what it is measured to, ten centimetres in a kilo
 
 @dataclass(frozen=True, eq=False)
 class Question:
-    """What is drawn.
+    """What is drawn."""
 
-    Attributes
-    ----------
-    stop : what is asked.
-    known : levels of the machine.
-    left : root mean square of the logarithms of past distances over the model's.
-    freedom : number of these, whose scatter is as unsure as so few are (Student's t).
-    """
-
-    stop: Stop
-    known: MachineLevels
-    left: float
-    freedom: int
+    stop: Stop  # what is asked
+    known: MachineLevels  # levels of the machine
+    left: float  # root mean square of the logarithms of past distances over the model's
+    freedom: int  # number of these, whose scatter is as unsure as so few are (Student's t)
 
     def addend(self, x: Vector) -> Vector:
         """Cumulative distribution of what the model leaves of a logarithm, (n,) of (n,)."""

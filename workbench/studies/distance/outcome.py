@@ -38,18 +38,11 @@ _SEEN = 0.1  # share of the range of past stops by which one may be beyond it, a
 
 @dataclass(frozen=True, eq=False)
 class Forecast:
-    """Distribution of a distance.
+    """Distribution of a distance."""
 
-    Attributes
-    ----------
-    distances : (n,) drawn, least first [m].
-    certain : (n,) the same if the machine and its model were known [m].
-    outside : share outside the validity range of the model.
-    """
-
-    distances: Vector
-    certain: Vector
-    outside: float
+    distances: Vector  # (n,) drawn, least first [m]
+    certain: Vector  # (n,) the same if the machine and its model were known [m]
+    outside: float  # share outside the validity range of the model
 
     def quantile(self, share: float) -> float:
         """Distance that so many stops do not exceed [m]."""
@@ -69,33 +62,21 @@ class Forecast:
 
 @dataclass(frozen=True)
 class NominalStop:
-    """A stop as it would be under nominal conditions.
+    """A stop as it would be under nominal conditions."""
 
-    Attributes
-    ----------
-    speed : nominal [m/s]; rate : equivalent deceleration [m/s2]; distance [m].
-    rating : percentage, None where the system has no constants for this speed.
-    """
-
-    speed: float
-    rate: float
+    speed: float  # nominal [m/s]
+    rate: float  # equivalent deceleration [m/s2]; distance [m]
     distance: float
-    rating: float | None
+    rating: float | None  # percentage, None where the system has no constants for this speed
 
 
 @dataclass(frozen=True, eq=False)
 class PastStop:
-    """A stop that was made, and what the others predict of it.
-
-    Attributes
-    ----------
-    model : distance that the model says, as fitted to it [m].
-    forecast : by the other stops.
-    """
+    """A stop that was made, and what the others predict of it."""
 
     recorded: RecordedStop
-    model: float
-    forecast: Forecast
+    model: float  # distance that the model says, as fitted to it [m]
+    forecast: Forecast  # by the other stops
 
     @property
     def held(self) -> bool:
@@ -106,40 +87,26 @@ class PastStop:
 
 @dataclass(frozen=True)
 class SafetyLevel:
-    """A deceleration that all but one stop in so many reach.
+    """A deceleration that all but one stop in so many reach."""
 
-    Attributes
-    ----------
-    decade : of that number.
-    ratio : of it to the nominal one; low, high : between which it is, 95 %.
-    variation : coefficient of variation of the probability.
-    plain_stops : of plain sampling that tell as much; plain_hours : processor time.
-    """
-
-    decade: int
-    ratio: float
+    decade: int  # of that number
+    ratio: float  # of it to the nominal one
+    # low, high: between which it is, 95 %
     low: float
     high: float
-    variation: float
-    plain_stops: float
-    plain_hours: float
+    variation: float  # coefficient of variation of the probability
+    plain_stops: float  # of plain sampling that tell as much
+    plain_hours: float  # processor time
 
 
 @dataclass(frozen=True)
 class Safety:
-    """Decelerations that are reached with all but a small probability.
+    """Decelerations that are reached with all but a small probability."""
 
-    Attributes
-    ----------
-    levels : by decade.
-    nominal : equivalent deceleration of the model of the data sheet it [m/s2].
-    stops : that were drawn; spent : processor time of each [s].
-    """
-
-    levels: tuple[SafetyLevel, ...]
-    nominal: float
-    stops: int
-    spent: float
+    levels: tuple[SafetyLevel, ...]  # by decade
+    nominal: float  # equivalent deceleration of the model of the data sheet it [m/s2]
+    stops: int  # that were drawn
+    spent: float  # processor time of each [s]
 
     @classmethod
     def of(cls, tail: Tail, decades: int, nominal: NominalRate, spent: float) -> Self:

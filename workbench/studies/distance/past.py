@@ -24,17 +24,11 @@ from workbench.system.system import OBSERVER, System
 
 @dataclass(frozen=True, eq=False)
 class MachineLevels:
-    """Levels of a machine, as past stops know them.
+    """Levels of a machine, as past stops know them."""
 
-    Attributes
-    ----------
-    keys : parameter, and choice of a condition.
-    mean : (p,) SI; covariance : (p, p).
-    """
-
-    keys: tuple[Key, ...]
-    mean: Vector
-    covariance: Matrix
+    keys: tuple[Key, ...]  # parameter, and choice of a condition
+    mean: Vector  # (p,) SI
+    covariance: Matrix  # (p, p)
 
     def root(self) -> Matrix:
         """(p, p) whose square is the covariance, of unknowns in any unit."""
@@ -46,20 +40,12 @@ class MachineLevels:
 
 @dataclass(frozen=True, eq=False)
 class PastFit:
-    """A fit to past stops.
+    """A fit to past stops."""
 
-    Attributes
-    ----------
-    names : of the recordings.
-    joint : of the fit, about its best point.
-    mean : (p,) levels there.
-    own : by recording, tolerances as fitted, by parameter, SI.
-    """
-
-    names: tuple[str, ...]
-    joint: Joint
-    mean: Vector
-    own: tuple[Mapping[str, float], ...]
+    names: tuple[str, ...]  # of the recordings
+    joint: Joint  # of the fit, about its best point
+    mean: Vector  # (p,) levels there
+    own: tuple[Mapping[str, float], ...]  # by recording, tolerances as fitted, by parameter, SI
 
     def known(self, without: int | None = None) -> MachineLevels:
         """Levels by all recordings, or by all but one, by one step from the fit to all."""

@@ -27,34 +27,23 @@ _STEP = 0.6  # of a chain at first, over the spread of the samples
 
 @dataclass(frozen=True, eq=False)
 class Descent:
-    """One run: samples of a distribution, of which the lower tail has as many as the middle.
+    """One run: samples of a distribution, of which the lower tail has as many as the middle."""
 
-    Attributes
-    ----------
-    values : (n,) least first; weights : (n,) probability that each stands for.
-    evaluations : of the function.
-    """
-
-    values: Vector
-    weights: Vector
-    evaluations: int
+    values: Vector  # (n,) least first
+    weights: Vector  # (n,) probability that each stands for
+    evaluations: int  # of the function
 
 
 @dataclass(frozen=True)
 class Quantile:
-    """A value that is not reached with a probability.
-
-    Attributes
-    ----------
-    low, high : between which it is, 95 %.
-    variation : coefficient of variation of the probability of `value`.
-    """
+    """A value that is not reached with a probability."""
 
     probability: float
     value: float
+    # low, high: between which it is, 95 %
     low: float
     high: float
-    variation: float
+    variation: float  # coefficient of variation of the probability of `value`
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,32 +182,21 @@ def _chains(
 
 @dataclass(frozen=True)
 class PlainLevel:
-    """A deceleration that all but one stop in so many reach, as that many stops show it.
+    """A deceleration that all but one stop in so many reach, as that many stops show it."""
 
-    Attributes
-    ----------
-    decade : of that number.
-    ratio : of it to the nominal one; low, high : between which it is, 95 %.
-    """
-
-    decade: int
-    ratio: float
+    decade: int  # of that number
+    ratio: float  # of it to the nominal one
+    # low, high: between which it is, 95 %
     low: float
     high: float
 
 
 @dataclass(frozen=True)
 class PlainSampling:
-    """What plain samples show of a safety level.
+    """What plain samples show of a safety level."""
 
-    Attributes
-    ----------
-    samples : that were drawn.
-    levels : by decade, as far as they reach.
-    """
-
-    samples: int
-    levels: tuple[PlainLevel, ...]
+    samples: int  # that were drawn
+    levels: tuple[PlainLevel, ...]  # by decade, as far as they reach
 
     @classmethod
     def of(cls, shortness: Vector, decades: int, nominal: NominalRate) -> Self:

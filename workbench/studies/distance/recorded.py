@@ -24,38 +24,24 @@ _HALF = math.log(2.0)  # lags in which the half is reached
 
 @dataclass(frozen=True, eq=False)
 class Stop:
-    """A stop, recorded or asked for.
-
-    Attributes
-    ----------
-    asked : by name, SI.
-    conditions : as of a case.
-    along : by input, (g,) what it is by the place, every GRID from the command on.
-    """
+    """A stop, recorded or asked for."""
 
     name: str
-    asked: Mapping[str, float]
-    conditions: Mapping[str, Value]
+    asked: Mapping[str, float]  # by name, SI
+    conditions: Mapping[str, Value]  # as of a case
+    # by input, (g,) what it is by the place, every GRID from the command on
     along: Mapping[str, Vector]
 
 
 @dataclass(frozen=True, eq=False)
 class RecordedStop:
-    """A stop that was made.
-
-    Attributes
-    ----------
-    command : in the recording [s].
-    distance : from the command to standstill, by its own sensors [m].
-    resistance : of gradients and curves over weight, after the response, mean [1].
-    outside : reasons why it is outside the validity range of the model.
-    """
+    """A stop that was made."""
 
     stop: Stop
-    command: float
-    distance: float
-    resistance: float
-    outside: tuple[str, ...]
+    command: float  # in the recording [s]
+    distance: float  # from the command to standstill, by its own sensors [m]
+    resistance: float  # of gradients and curves over weight, after the response, mean [1]
+    outside: tuple[str, ...]  # reasons why it is outside the validity range of the model
 
 
 def read_stop(case: Case, system: System, stopping: Stopping) -> RecordedStop:

@@ -33,37 +33,23 @@ _MOVING = EVENT + 1  # status: not at rest when the time was over
 
 @dataclass(frozen=True, eq=False)
 class DrivingInputs:
-    """What drives a model in a stop: each input rises in time to a value, or goes along the way.
+    """What drives a model in a stop: each input rises in time to a value, or goes along the way."""
 
-    Attributes
-    ----------
-    to : (m,) values that inputs rise to [unit].
-    delay, lag : (m,) [s] after the command, of first order; both 0 of what is constant.
-    along : (m, g) what is added at the places of the way, every GRID [unit].
-    """
-
-    to: Vector
+    to: Vector  # (m,) values that inputs rise to [unit]
+    # delay, lag: (m,) [s] after the command, of first order; both 0 of what is constant
     delay: Vector
     lag: Vector
-    along: Matrix
+    along: Matrix  # (m, g) what is added at the places of the way, every GRID [unit]
 
 
 @dataclass(frozen=True, eq=False)
 class StopResult:
-    """One stop.
+    """One stop."""
 
-    Attributes
-    ----------
-    distance : from the command to standstill [m].
-    time : until then [s].
-    outputs : (n, l) readings of the outputs, by samples; none where steps are longer.
-    warned : what the FMU warned of; empty: nothing.
-    """
-
-    distance: float
-    time: float
-    outputs: Matrix
-    warned: str
+    distance: float  # from the command to standstill [m]
+    time: float  # until then [s]
+    outputs: Matrix  # (n, l) readings of the outputs, by samples; none where steps are longer
+    warned: str  # what the FMU warned of; empty: nothing
 
 
 @compiled

@@ -32,18 +32,11 @@ def equivalent_rate(speed: float, response: float, distance: float) -> float:
 
 @dataclass(frozen=True)
 class NominalRate:
-    """Deceleration of a stop as its sheet says it, which others are compared with.
+    """Deceleration of a stop as its sheet says it, which others are compared with."""
 
-    Attributes
-    ----------
-    speed : at the command [m/s].
-    response : equivalent [s].
-    distance : nominal [m].
-    """
-
-    speed: float
-    response: float
-    distance: float
+    speed: float  # at the command [m/s]
+    response: float  # equivalent [s]
+    distance: float  # nominal [m]
 
     @property
     def rate(self) -> float:
@@ -57,17 +50,11 @@ class NominalRate:
 
 @dataclass(frozen=True)
 class StopConditions:
-    """Under which a stop was made.
+    """Under which a stop was made."""
 
-    Attributes
-    ----------
-    mass : weighed; rotating : what turns adds [kg].
-    resistance : of gradients and curves over weight, uphill positive [1].
-    """
-
-    mass: float
-    rotating: float
-    resistance: float
+    mass: float  # weighed
+    rotating: float  # what turns adds [kg]
+    resistance: float  # of gradients and curves over weight, uphill positive [1]
 
 
 def nominal_rate(rate: float, conditions: StopConditions, mass: float) -> float:

@@ -75,43 +75,29 @@ class FitSettings:
 
 @dataclass(frozen=True)
 class _Unknown:
-    """What is fitted: a parameter or a start, in all recordings or in one.
-
-    Attributes
-    ----------
-    size : a change that matters, by which it is scaled.
-    recording : that it belongs to, None for all.
-    """
+    """What is fitted: a parameter or a start, in all recordings or in one."""
 
     name: str
     unit: str
     nominal: float
     low: float
     high: float
-    size: float
+    size: float  # a change that matters, by which it is scaled
     prior: tuple[float, float] | tuple[()]
-    recording: int | None
+    recording: int | None  # that it belongs to, None for all
     is_state: bool
 
 
 class _Run(NamedTuple):
-    """A recording to simulate.
-
-    Attributes
-    ----------
-    counted : (n, l) samples that are compared.
-    sigma : (n, l) standard deviations of their noise.
-    given : parameters that its conditions set.
-    starts : of states that outputs show, at the first sample.
-    """
+    """A recording to simulate."""
 
     case: Case
     drive: Drive
     y: Matrix
-    sigma: Matrix
-    counted: np.ndarray
-    given: Mapping[str, float]
-    starts: Mapping[str, ShownStart]
+    sigma: Matrix  # (n, l) standard deviations of their noise
+    counted: np.ndarray  # (n, l) samples that are compared
+    given: Mapping[str, float]  # parameters that its conditions set
+    starts: Mapping[str, ShownStart]  # of states that outputs show, at the first sample
 
     @property
     def begin(self) -> dict[str, float]:

@@ -18,31 +18,21 @@ _SAME = 0.1  # by which exponents of a direction differ that are called a produc
 
 @dataclass(frozen=True)
 class FittedValue:
-    """A fitted parameter, or the start of a state.
-
-    Attributes
-    ----------
-    recording : that it belongs to; empty: all.
-    nominal : of the model, or of what the first samples show.
-    low, high : of the 95 % interval; None where there is none.
-    deviation : standard deviation; None where there is none.
-    method : of the interval, "profile" or "covariance"; empty without.
-    identified : whether the recordings tell it.
-    at_bound : whether it is at its bound, where it would go on.
-    """
+    """A fitted parameter, or the start of a state."""
 
     name: str
-    recording: str
+    recording: str  # that it belongs to; empty: all
     unit: str
     is_state: bool
-    nominal: float
+    nominal: float  # of the model, or of what the first samples show
     value: float
+    # low, high: of the 95 % interval; None where there is none
     low: float | None = None
     high: float | None = None
-    deviation: float | None = None
-    method: str = ""
-    identified: bool = True
-    at_bound: bool = False
+    deviation: float | None = None  # standard deviation; None where there is none
+    method: str = ""  # of the interval, "profile" or "covariance"; empty without
+    identified: bool = True  # whether the recordings tell it
+    at_bound: bool = False  # whether it is at its bound, where it would go on
 
     @property
     def label(self) -> str:
@@ -53,15 +43,10 @@ class FittedValue:
 
 @dataclass(frozen=True)
 class Direction:
-    """Unknowns that change together without an effect on the outputs.
+    """Unknowns that change together without an effect on the outputs."""
 
-    Attributes
-    ----------
-    parts : relative change of each, by its label; 1 of the leading one.
-    spread : of the leading one, 1 is all of its size: standard deviation that the data leave.
-    """
-
-    parts: Mapping[str, float]
+    parts: Mapping[str, float]  # relative change of each, by its label; 1 of the leading one
+    # of the leading one, 1 is all of its size: standard deviation that the data leave
     spread: float
 
     def __str__(self) -> str:
@@ -80,18 +65,12 @@ class Direction:
 
 @dataclass(frozen=True, eq=False)
 class RecordingFit:
-    """A recording beside the model with its own and with fitted values.
-
-    Attributes
-    ----------
-    counted : (n, l) samples that are compared.
-    sigma : (n, l) standard deviations of their noise.
-    nominal, fitted : (n, l) simulated outputs; NaN where the model could not be simulated.
-    """
+    """A recording beside the model with its own and with fitted values."""
 
     case: Case
-    counted: np.ndarray
-    sigma: Matrix
+    counted: np.ndarray  # (n, l) samples that are compared
+    sigma: Matrix  # (n, l) standard deviations of their noise
+    # nominal, fitted: (n, l) simulated outputs; NaN where the model could not be simulated
     nominal: Matrix
     fitted: Matrix
     held_out: bool = False

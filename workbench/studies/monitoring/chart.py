@@ -119,22 +119,16 @@ class Scatter:
 
 @dataclass(frozen=True)
 class LevelChange:
-    """A change of level.
+    """A change of level."""
 
-    Attributes
-    ----------
-    raised : number of the recording at which it was told.
-    last : number of the last recording before it.
-    earliest, latest : likewise, of the 95 % range.
-    returns : whether it leads back to the level before the last change, and so takes that back.
-    before, after : levels, and their standard deviations.
-    """
-
-    raised: int
-    last: int
+    raised: int  # number of the recording at which it was told
+    last: int  # number of the last recording before it
+    # earliest, latest: likewise, of the 95 % range
     earliest: int
     latest: int
+    # whether it leads back to the level before the last change, and so takes that back
     returns: bool
+    # before, after: levels, and their standard deviations
     before: tuple[float, float]
     after: tuple[float, float]
 
@@ -146,25 +140,19 @@ class LevelChange:
 
 @dataclass
 class Chart:
-    """The past of one quantity since its last change.
+    """The past of one quantity since its last change."""
 
-    Attributes
-    ----------
-    scatter : of it, and of those like it.
-    numbers, values, variances : of recordings, their estimates, and stated variances.
-    kept : estimates as they count in the level: a wild one no more than chance makes.
-    up, down : sums.
-    changes : in their order.
-    """
-
-    scatter: Scatter
+    scatter: Scatter  # of it, and of those like it
+    # numbers, values, variances: of recordings, their estimates, and stated variances
     numbers: list[int] = field(default_factory=list)
     values: list[float] = field(default_factory=list)
     variances: list[float] = field(default_factory=list)
+    # estimates as they count in the level: a wild one no more than chance makes
     kept: list[float] = field(default_factory=list)
+    # up, down: sums
     up: float = 0.0
     down: float = 0.0
-    changes: list[LevelChange] = field(default_factory=list)
+    changes: list[LevelChange] = field(default_factory=list)  # in their order
 
     @property
     def level(self) -> tuple[float, float]:

@@ -24,19 +24,12 @@ from workbench.system.system import System
 
 @dataclass(frozen=True, eq=False)
 class RecordingEstimate:
-    """What one recording says.
+    """What one recording says."""
 
-    Attributes
-    ----------
-    values : (q,) of the watched quantities, SI; covariance : (q, q), by the noise of sensors alone.
-    work : (w,) of friction along the whole recording, by the powers of the system [J].
-    counted : time that the values rest on [s].
-    """
-
-    values: Vector
-    covariance: Matrix
-    work: Vector
-    counted: float
+    values: Vector  # (q,) of the watched quantities, SI
+    covariance: Matrix  # (q, q), by the noise of sensors alone
+    work: Vector  # (w,) of friction along the whole recording, by the powers of the system [J]
+    counted: float  # time that the values rest on [s]
 
 
 def watched(system: System) -> tuple[EstimatedQuantity, ...]:

@@ -22,19 +22,13 @@ from workbench.system.system import System
 
 @dataclass(frozen=True)
 class Fleet:
-    """Machines that are watched, and how; workers are sent it.
-
-    Attributes
-    ----------
-    location : folder that holds one for each machine, or its URL, which fsspec reads.
-    rate : alarms per recording that a sound machine may raise.
-    read : makes a case of a folder; write : writes a result into a folder. Functions of modules.
-    """
+    """Machines that are watched, and how; workers are sent it."""
 
     system: System
-    location: str
-    rate: float
-    read: Reader
+    location: str  # folder that holds one for each machine, or its URL, which fsspec reads
+    rate: float  # alarms per recording that a sound machine may raise
+    read: Reader  # makes a case of a folder
+    # writes a result into a folder. Functions of modules.
     write: Callable[[MonitoringResult, Path], object]
 
     @property
@@ -83,20 +77,13 @@ class Fleet:
 
 @dataclass(frozen=True)
 class MachineResult:
-    """What became of one machine.
-
-    Attributes
-    ----------
-    recordings : that count; alarms : in all of them.
-    refusal : why there is no result; empty if there is one.
-    files : that were written, by name.
-    """
+    """What became of one machine."""
 
     machine: str
-    recordings: int = 0
-    alarms: int = 0
-    refusal: str = ""
-    files: dict[str, bytes] = field(default_factory=dict)
+    recordings: int = 0  # that count
+    alarms: int = 0  # in all of them
+    refusal: str = ""  # why there is no result; empty if there is one
+    files: dict[str, bytes] = field(default_factory=dict)  # that were written, by name
 
 
 class FleetWorkers(Protocol):

@@ -24,16 +24,10 @@ from workbench.studies.monitoring.estimate import RecordingEstimate
 
 @dataclass(frozen=True)
 class RecordingFolder:
-    """One recording as it lies in a folder.
+    """One recording as it lies in a folder."""
 
-    Attributes
-    ----------
-    name : of its folder.
-    content : SHA-256 of all its files and their names.
-    """
-
-    name: str
-    content: str
+    name: str  # of its folder
+    content: str  # SHA-256 of all its files and their names
     path: Path
 
 

@@ -22,34 +22,21 @@ _OBSERVED = 0.5  # share of the variance before a recording that it must take aw
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """One watched quantity over all recordings.
+    """One watched quantity over all recordings."""
 
-    Attributes
-    ----------
-    name : of the quantity, or of the array for the mean of its entries.
-    unit : SI.
-    label : for people.
-    against : whether it is taken relative to the others of its array.
-    values, deviations : (n,) estimates of the recordings, and standard deviations as stated: by the
-        noise of the sensors and the usual scatter; NaN where a recording does not show it.
-    surprises : (n,) standard deviations off its past, NaN without one.
-    changes : of its level.
-    level : mean since the last change, and its standard deviation.
-    trend : by recording since then, and its standard deviation.
-    scatter : ratio of the variance about the past to the stated one.
-    """
-
-    name: str
-    unit: str
-    label: str
-    against: bool
+    name: str  # of the quantity, or of the array for the mean of its entries
+    unit: str  # SI
+    label: str  # for people
+    against: bool  # whether it is taken relative to the others of its array
+    # values, deviations: (n,) estimates of the recordings, and standard deviations as stated: by
+    # the noise of the sensors and the usual scatter; NaN where a recording does not show it
     values: Vector
     deviations: Vector
-    surprises: Vector
-    changes: tuple[LevelChange, ...]
-    level: tuple[float, float]
-    trend: tuple[float, float]
-    scatter: float
+    surprises: Vector  # (n,) standard deviations off its past, NaN without one
+    changes: tuple[LevelChange, ...]  # of its level
+    level: tuple[float, float]  # mean since the last change, and its standard deviation
+    trend: tuple[float, float]  # by recording since then, and its standard deviation
+    scatter: float  # ratio of the variance about the past to the stated one
 
     @property
     def scale(self) -> float:
@@ -59,24 +46,18 @@ class Track:
 
 @dataclass(eq=False)
 class _Group:
-    """Quantities that are alike, and directions in which they are watched.
-
-    Attributes
-    ----------
-    columns : (m,) of them in an estimate.
-    directions : (k, m) entries against the others, then their mean; of a single quantity, itself.
-    known : (k,) variance before a recording.
-    usual : (m,) variance from recording to recording of a sound machine.
-    moved : (m,) by which entries are off their first level, since they changed.
-    """
+    """Quantities that are alike, and directions in which they are watched."""
 
     name: str
     members: tuple[EstimatedQuantity, ...]
-    columns: list[int]
+    columns: list[int]  # (m,) of them in an estimate
+    # (k, m) entries against the others, then their mean; of a single quantity, itself
     directions: Matrix = field(init=False)
     charts: list[Chart] = field(init=False)
-    known: Vector = field(init=False)
+    known: Vector = field(init=False)  # (k,) variance before a recording
+    # (m,) variance from recording to recording of a sound machine
     usual: Vector = field(init=False)
+    # (m,) by which entries are off their first level, since they changed
     moved: Vector = field(init=False)
     rows: list[tuple[Vector, Vector, Vector]] = field(default_factory=list)
 

@@ -26,22 +26,16 @@ _LACKING = "lacking"  # in place of a parameter, of an effect that the catalogue
 
 @dataclass(frozen=True)
 class EffectChance:
-    """What a campaign would show of one effect.
+    """What a campaign would show of one effect."""
 
-    Attributes
-    ----------
-    effect, unit : of the library, and of its sizes, SI.
-    matters : least size that is worth a finding [unit].
-    sigma : standard deviation of its estimate [unit]; None where the campaign cannot show it.
-    chances : (size, chance that it is named) [unit, 1].
-    least : size from which on it is named with the chance `SURE` [unit]; None as `sigma`.
-    """
-
+    # effect, unit: of the library, and of its sizes, SI
     effect: str
     unit: str
-    matters: float
+    matters: float  # least size that is worth a finding [unit]
+    # standard deviation of its estimate [unit]; None where the campaign cannot show it
     sigma: float | None
-    chances: tuple[tuple[float, float], ...]
+    chances: tuple[tuple[float, float], ...]  # (size, chance that it is named) [unit, 1]
+    # size from which on it is named with the chance `SURE` [unit]; None as `sigma`
     least: float | None
 
 

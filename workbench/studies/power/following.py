@@ -45,20 +45,13 @@ Separation = TypedDict("Separation", {"from": str, "predicted": float, "shown": 
 
 
 class FollowingRecording(TypedDict):
-    """An experiment that was made, and the verdict on all recordings with it.
-
-    Attributes
-    ----------
-    foreseen : whether it was predicted to leave the planted effect alone.
-    named : causes, with those that are as good.
-    parts : whether the planted effect alone is named.
-    """
+    """An experiment that was made, and the verdict on all recordings with it."""
 
     experiment: str
-    foreseen: bool
+    foreseen: bool  # whether it was predicted to leave the planted effect alone
     verdict: str
-    named: list[str]
-    parts: bool
+    named: list[str]  # causes, with those that are as good
+    parts: bool  # whether the planted effect alone is named
     separations: list[Separation]
 
 
@@ -69,28 +62,22 @@ class SensedRecording(FollowingRecording):
 
 
 class FollowingRow(TypedDict):
-    """A set and the recordings that follow it, as followed.json has them.
+    """A set and the recordings that follow it, as followed.json has them."""
 
-    Attributes
-    ----------
-    rig : options that make the set.
-    verdict, group : on the set: causes, with those that are as good.
-    sentence, sensors : of the proposal: its answer, and sensors that it names.
-    proposed, drawn, sensed : recordings as proposed, at random, with a sensor that is named.
-    error : why it failed.
-    """
-
-    rig: str
+    rig: str  # options that make the set
     planted: str
     multiple: float
+    # verdict, group: on the set: causes, with those that are as good
     verdict: str
     group: list[str]
+    # sentence, sensors: of the proposal: its answer, and sensors that it names
     sentence: str
     sensors: list[str]
+    # proposed, drawn, sensed: recordings as proposed, at random, with a sensor that is named
     proposed: FollowingRecording | None
     drawn: list[FollowingRecording]
     sensed: SensedRecording | None
-    error: str
+    error: str  # why it failed
 
 
 def follow_proposals(

@@ -20,15 +20,10 @@ from workbench.studies.power.planting import Planting, Repertoire
 
 @dataclass(frozen=True)
 class NamedCause:
-    """A cause that was named.
-
-    Attributes
-    ----------
-    parameters : (value, low, high) by name, SI.
-    """
+    """A cause that was named."""
 
     effect: str
-    parameters: Mapping[str, tuple[float, float, float]]
+    parameters: Mapping[str, tuple[float, float, float]]  # (value, low, high) by name, SI
     confusable_with: tuple[str, ...]
 
     @property
@@ -39,26 +34,18 @@ class NamedCause:
 
 @dataclass(frozen=True)
 class SetVerdict:
-    """Verdict on one set of recordings.
-
-    Attributes
-    ----------
-    verdict : of the diagnosis, or "failed".
-    causes : strongest first.
-    before, after : held-out error of both models, None if nothing was found.
-    seconds : of computing.
-    error : why it failed.
-    clearness : size that was planted, over the standard deviation of its estimate about the
-        nominal model; None if that was not one effect of the catalogue.
-    """
+    """Verdict on one set of recordings."""
 
     planting: Planting
-    verdict: str
-    causes: tuple[NamedCause, ...]
+    verdict: str  # of the diagnosis, or "failed"
+    causes: tuple[NamedCause, ...]  # strongest first
+    # before, after: held-out error of both models, None if nothing was found
     before: float | None
     after: float | None
-    seconds: float
-    error: str = ""
+    seconds: float  # of computing
+    error: str = ""  # why it failed
+    # size that was planted, over the standard deviation of its estimate about the nominal model;
+    # None if that was not one effect of the catalogue
     clearness: float | None = None
 
     @property

@@ -40,35 +40,25 @@ SHARES = {
 
 
 class LeftOutRow(TypedDict):
-    """A set whose cause is left out of the catalogue, as left_out.json has it.
+    """A set whose cause is left out of the catalogue, as left_out.json has it."""
 
-    Attributes
-    ----------
-    rig : options that make the set.
-    left_out : effects that the catalogue lacks.
-    verdict, named, late : of the diagnosis without them: causes, and signals that are late.
-    asked : whether it asks for a law.
-    laws, slots : that are proposed, and slots of all laws that are as good.
-    slot_right : whether the cause acts in one of them; None without a cause.
-    before, after, after_with_it : held-out errors, without and with the law, with the true cause.
-    function_error : see `function_error`.
-    error : why it failed.
-    """
-
-    rig: str
-    left_out: list[str]
+    rig: str  # options that make the set
+    left_out: list[str]  # effects that the catalogue lacks
+    # verdict, named, late: of the diagnosis without them: causes, and signals that are late
     verdict: str
     named: list[str]
     late: list[str]
-    asked: bool
+    asked: bool  # whether it asks for a law
+    # laws, slots: that are proposed, and slots of all laws that are as good
     laws: list[str]
     slots: list[str]
-    slot_right: bool | None
+    slot_right: bool | None  # whether the cause acts in one of them; None without a cause
+    # before, after, after_with_it: held-out errors, without and with the law, with the true cause
     before: float | None
     after: float | None
     after_with_it: float | None
-    function_error: float | None
-    error: str
+    function_error: float | None  # see `function_error`
+    error: str  # why it failed
 
 
 def summarise_left_out(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:

@@ -39,23 +39,16 @@ Readings = tuple[int, list[dict[str, Vector]]]
 
 @dataclass(frozen=True)
 class OwnModel:
-    """Sets of recordings by the system's own model, a `VirtualRig`.
-
-    Attributes
-    ----------
-    everything : FMU of the observer model with every effect.
-    effects : that it has.
-    templates : recordings of the machine, whose inputs, times and conditions are those of a set.
-    plantables : all effects.
-    form_error : share of its effect by which a law is wrong: its size goes with a quantity that is
-        drawn, see `quantities`.
-    """
+    """Sets of recordings by the system's own model, a `VirtualRig`."""
 
     system: System
-    everything: Path
-    effects: tuple[Effect, ...]
+    everything: Path  # FMU of the observer model with every effect
+    effects: tuple[Effect, ...]  # that it has
+    # recordings of the machine, whose inputs, times and conditions are those of a set
     templates: tuple[Case, ...]
-    plantables: tuple[Plantable, ...]
+    plantables: tuple[Plantable, ...]  # all effects
+    # share of its effect by which a law is wrong: its size goes with a quantity that is drawn, see
+    # `quantities`
     form_error: float = 0.0
 
     sheet_errors: tuple[SheetError, ...] = ()

@@ -35,30 +35,20 @@ class Findable(Protocol):
 
 @dataclass(frozen=True)
 class Plantable:
-    """An effect of the virtual rig, and what the library calls it.
+    """An effect of the virtual rig, and what the library calls it."""
 
-    Attributes
-    ----------
-    name : of the rig's effect.
-    unit : of its gain, SI.
-    effect : of the library's; empty if the library has none.
-    least : smallest gain that makes sense [unit].
-    signed : whether it is planted in both directions.
-    sensed : whether it changes readings only, so that one simulation serves all sizes.
-    shapes : what the rig's law has for other parameters of the library's, SI.
-    unit_size : unit of sizes [unit]; nan: what matters to the library, which has the effect.
-    slot : of the base model where it acts, if the library lacks it.
-    """
-
-    name: str
-    unit: str
-    effect: str = ""
-    least: float = -math.inf
-    signed: bool = True
+    name: str  # of the rig's effect
+    unit: str  # of its gain, SI
+    effect: str = ""  # of the library's; empty if the library has none
+    least: float = -math.inf  # smallest gain that makes sense [unit]
+    signed: bool = True  # whether it is planted in both directions
+    # whether it changes readings only, so that one simulation serves all sizes
     sensed: bool = False
+    # what the rig's law has for other parameters of the library's, SI
     shapes: Mapping[str, float] = field(default_factory=dict)
+    # unit of sizes [unit]; nan: what matters to the library, which has the effect
     unit_size: float = math.nan
-    slot: str = ""
+    slot: str = ""  # of the base model where it acts, if the library lacks it
 
 
 def assigned(assignments: Sequence[str], known: Mapping[str, Plantable]) -> dict[str, float]:
@@ -99,17 +89,12 @@ def assigned(assignments: Sequence[str], known: Mapping[str, Plantable]) -> dict
 
 @dataclass(frozen=True)
 class SheetError:
-    """A way in which the machine differs from its data sheet, which the diagnosis is given.
+    """A way in which the machine differs from its data sheet, which the diagnosis is given."""
 
-    Attributes
-    ----------
-    name, gain : of the rig's effect, and its size, SI.
-    effect : of the library's which is this error; empty if the library has none.
-    """
-
+    # name, gain: of the rig's effect, and its size, SI
     name: str
     gain: float
-    effect: str = ""
+    effect: str = ""  # of the library's which is this error; empty if the library has none
 
 
 @dataclass(frozen=True)
@@ -130,18 +115,11 @@ class Scale:
 
 @dataclass(frozen=True)
 class Repertoire:
-    """What can be planted, and what can be found.
+    """What can be planted, and what can be found."""
 
-    Attributes
-    ----------
-    plantables : of the virtual rig.
-    effects : of the library.
-    scale : of all sizes.
-    """
-
-    plantables: tuple[Plantable, ...]
-    effects: tuple[Findable, ...]
-    scale: Scale = Scale()
+    plantables: tuple[Plantable, ...]  # of the virtual rig
+    effects: tuple[Findable, ...]  # of the library
+    scale: Scale = Scale()  # of all sizes
 
     def plantable(self, name: str) -> Plantable:
         """By the rig's name."""
@@ -171,20 +149,13 @@ class Repertoire:
 
 @dataclass(frozen=True)
 class Planting:
-    """What one set of recordings hides.
-
-    Attributes
-    ----------
-    seed : of the rig, for all that it draws.
-    multiple : size over that which matters, 0 of a clean set.
-    gains : by the rig's names, SI.
-    effects : the library's names of these, empty for one that the library does not have.
-    """
+    """What one set of recordings hides."""
 
     kind: Kind
-    seed: int
-    multiple: float
-    gains: Mapping[str, float]
+    seed: int  # of the rig, for all that it draws
+    multiple: float  # size over that which matters, 0 of a clean set
+    gains: Mapping[str, float]  # by the rig's names, SI
+    # the library's names of these, empty for one that the library does not have
     effects: tuple[str, ...]
 
     @property

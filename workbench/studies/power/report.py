@@ -37,19 +37,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Check:
-    """Result of a check of the diagnosis, for a file and for people.
+    """Result of a check of the diagnosis, for a file and for people."""
 
-    Attributes
-    ----------
-    name : of the file.
-    content : of the file, beside its answer and what was run.
-    text : table for the terminal.
-    """
-
-    name: str
+    name: str  # of the file
     answer: Answer
-    content: Mapping[str, Any]
-    text: str
+    content: Mapping[str, Any]  # of the file, beside its answer and what was run
+    text: str  # table for the terminal
 
     def write(self, provenance: Mapping[str, Any], out: Path) -> Path:
         """Write the file; returns its path."""

@@ -32,19 +32,12 @@ Result = TypeVar("Result")
 
 @dataclass(frozen=True)
 class Setup:
-    """How every set is made and diagnosed.
-
-    Attributes
-    ----------
-    rig : makes the recordings.
-    everything : FMU of the observer model with every effect at zero, which diagnoses them.
-    effects : that it has.
-    """
+    """How every set is made and diagnosed."""
 
     system: System
-    rig: VirtualRig
-    everything: Path
-    effects: tuple[Effect, ...]
+    rig: VirtualRig  # makes the recordings
+    everything: Path  # FMU of the observer model with every effect at zero, which diagnoses them
+    effects: tuple[Effect, ...]  # that it has
 
     def record(self, planting: Planting, simulated: Any) -> list[Case]:
         """Write what the rig's sensors make of a simulation, and read it back."""
@@ -60,17 +53,11 @@ class Setup:
 
 @dataclass(frozen=True, eq=False)
 class PowerStudy:
-    """Whose power is measured: a diagnosis of what a virtual rig records.
-
-    Attributes
-    ----------
-    rig : makes the recordings.
-    effects : of the system's library, which may be found.
-    """
+    """Whose power is measured: a diagnosis of what a virtual rig records."""
 
     system: System
-    rig: VirtualRig
-    effects: Sequence[Effect]
+    rig: VirtualRig  # makes the recordings
+    effects: Sequence[Effect]  # of the system's library, which may be found
 
     @property
     def library(self) -> Library:

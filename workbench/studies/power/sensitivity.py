@@ -31,32 +31,22 @@ _SAMPLES = "samples"
 
 @dataclass(frozen=True)
 class VerdictChange:
-    """What another threshold makes of a set.
+    """What another threshold makes of a set."""
 
-    Attributes
-    ----------
-    threshold, factor, value : which one, times what, and what it is then.
-    said : verdict, and names of causes, strongest first.
-    """
-
+    # threshold, factor, value: which one, times what, and what it is then
     threshold: str
     factor: float
     value: float
-    said: tuple[str, ...]
+    said: tuple[str, ...]  # verdict, and names of causes, strongest first
 
 
 @dataclass(frozen=True)
 class ThresholdSensitivity:
-    """What was said of one set, by the usual thresholds and by others.
-
-    Attributes
-    ----------
-    said : verdict, and names of causes, strongest first.
-    changed : thresholds by which the verdict or the first name is another.
-    """
+    """What was said of one set, by the usual thresholds and by others."""
 
     planting: Planting
-    said: tuple[str, ...]
+    said: tuple[str, ...]  # verdict, and names of causes, strongest first
+    # thresholds by which the verdict or the first name is another
     changed: tuple[VerdictChange, ...]
 
 

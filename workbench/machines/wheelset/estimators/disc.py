@@ -27,26 +27,18 @@ class DiscModel(NamedTuple):
     pads, identified from no recording: 60 to 110 kg and 460 to 540 J/(kg.K) a disc, a share of
     0.90 to 0.98, 15 to 30 + (5 to 10) v^0.8 W/(m2.K) on 0.8 to 1.5 m2, slope 0.1 to 0.4, fade up
     to 1e-3 /K.
-
-    Attributes
-    ----------
-    slope : change of friction over one reference speed, relative to that at the reference [1].
-    fade : loss per warming [1/K].
-    speed, temperature : of nominal friction: rolling velocity [m/s], disc [degC].
-    capacity : heat capacity of all discs on the axle [J/K].
-    share : of friction power that heats the discs; the pads take the rest [1].
-    cooling : of all discs, at medium speed [W/K].
-    ambient : of the air, and of the discs at the start [degC].
     """
 
+    # change of friction over one reference speed, relative to that at the reference [1]
     slope: float = 0.25
-    fade: float = 5e-4
+    fade: float = 5e-4  # loss per warming [1/K]
+    # speed, temperature: of nominal friction: rolling velocity [m/s], disc [degC]
     speed: float = 22.0
     temperature: float = 100.0
-    capacity: float = 3 * 85.0 * 500.0
-    share: float = 0.94
-    cooling: float = 3 * 120.0
-    ambient: float = 20.0
+    capacity: float = 3 * 85.0 * 500.0  # heat capacity of all discs on the axle [J/K]
+    share: float = 0.94  # of friction power that heats the discs; the pads take the rest [1]
+    cooling: float = 3 * 120.0  # of all discs, at medium speed [W/K]
+    ambient: float = 20.0  # of the air, and of the discs at the start [degC]
 
 
 class _DiscSettings(NamedTuple):

@@ -73,20 +73,15 @@ _LONGEST = 300.0  # [s]
 
 @dataclass(frozen=True)
 class Drawn:
-    """What differs from stop to stop, within the tolerances of the rig.
+    """What differs from stop to stop, within the tolerances of the rig."""
 
-    Attributes
-    ----------
-    JW, JR, Fz, muDC, muWR : value over nominal.
-    coasting : [s] from the start of the recording to the brake demand.
-    """
-
+    # JW, JR, Fz, muDC, muWR: value over nominal
     JW: float
     JR: float
     Fz: float
     muDC: float
     muWR: float
-    coasting: float
+    coasting: float  # [s] from the start of the recording to the brake demand
 
 
 @dataclass(frozen=True)
@@ -100,27 +95,17 @@ class Phases:
 
 @dataclass(frozen=True, eq=False)
 class StopTruth:
-    """The truth of one stop.
+    """The truth of one stop."""
 
-    Attributes
-    ----------
-    scenario, seed : what was asked for.
-    drawn : deviations of this stop.
-    phases : of this stop.
-    time : (n,) [s] in steps of 1/RATE, negative before the recording.
-    truth : (n,) each, by the names of TRUTH and FELT.
-    standstill : [s] when wheelset and roller stood, or the recording ended.
-    model : hash of the FMU.
-    """
-
+    # scenario, seed: what was asked for
     scenario: Scenario
     seed: int
-    drawn: Drawn
-    phases: Phases
-    time: Vector
-    truth: Mapping[str, Vector]
-    standstill: float
-    model: str
+    drawn: Drawn  # deviations of this stop
+    phases: Phases  # of this stop
+    time: Vector  # (n,) [s] in steps of 1/RATE, negative before the recording
+    truth: Mapping[str, Vector]  # (n,) each, by the names of TRUTH and FELT
+    standstill: float  # [s] when wheelset and roller stood, or the recording ended
+    model: str  # hash of the FMU
 
     def at(self, time: Vector, name: str) -> Vector:
         """Signal at other times, (m,)."""

@@ -17,26 +17,15 @@ DISC_TEMPERATURE = 333.15  # [K] usually
 
 @dataclass(frozen=True)
 class Conditions:
-    """What is set before a stop, as the system file declares it.
+    """What is set before a stop, as the system file declares it."""
 
-    Attributes
-    ----------
-    initial_speed : [m/s].
-    brake_pressure : [Pa].
-    wheel_rail : surface of the rails.
-    discs : surface of each disc.
-    direction : of travel, 1 or -1.
-    wheel_load : [N] that the vertical cylinders are set to.
-    disc_temperature : [K].
-    """
-
-    initial_speed: float
-    brake_pressure: float
-    wheel_rail: Surface
-    discs: tuple[Surface, ...]
-    direction: Literal[1, -1]
-    wheel_load: float = WHEEL_LOAD
-    disc_temperature: float = DISC_TEMPERATURE
+    initial_speed: float  # [m/s]
+    brake_pressure: float  # [Pa]
+    wheel_rail: Surface  # surface of the rails
+    discs: tuple[Surface, ...]  # surface of each disc
+    direction: Literal[1, -1]  # of travel, 1 or -1
+    wheel_load: float = WHEEL_LOAD  # [N] that the vertical cylinders are set to
+    disc_temperature: float = DISC_TEMPERATURE  # [K]
 
 
 @dataclass(frozen=True)
@@ -50,30 +39,19 @@ class Patch:
 
 @dataclass(frozen=True)
 class Scenario:
-    """One stop to be made.
+    """One stop to be made."""
 
-    Attributes
-    ----------
-    name : of the case, NN_noun.
-    conditions : what is set before the stop.
-    muWR : friction of the contact at zero slip velocity.
-    patch : spell of lower friction, or None.
-    protected : whether the wheel-slide protection is switched on.
-    steps : demands that follow the first, (time after that [s], pressure [Pa]) each.
-    imitated : inertia that the drive lets the roller have, 0 where it is off [kg.m2].
-    lasts : time after which a recording ends that does not end by standstill [s].
-    sensors : that are fitted besides the usual ones, by name.
-    """
-
-    name: str
-    conditions: Conditions
-    muWR: float
-    patch: Patch | None
-    protected: bool
+    name: str  # of the case, NN_noun
+    conditions: Conditions  # what is set before the stop
+    muWR: float  # friction of the contact at zero slip velocity
+    patch: Patch | None  # spell of lower friction, or None
+    protected: bool  # whether the wheel-slide protection is switched on
+    # demands that follow the first, (time after that [s], pressure [Pa]) each
     steps: tuple[tuple[float, float], ...] = ()
+    # inertia that the drive lets the roller have, 0 where it is off [kg.m2]
     imitated: float = TRAIN_INERTIA
-    lasts: float = math.inf
-    sensors: tuple[str, ...] = ()
+    lasts: float = math.inf  # time after which a recording ends that does not end by standstill [s]
+    sensors: tuple[str, ...] = ()  # that are fitted besides the usual ones, by name
 
     def demand(self, braking: float) -> float:
         """Brake pressure that is asked for [Pa], a time [s] after the first demand."""

@@ -13,18 +13,11 @@ from workbench.machines.wheelset.rig.run import StopTruth
 
 @dataclass(frozen=True)
 class Sensor:
-    """One measured channel.
+    """One measured channel."""
 
-    Attributes
-    ----------
-    noise : standard deviation per sample, in SI units.
-    relative : the same as a share of the value, added to `noise`.
-    resolution : smallest step, in SI units.
-    """
-
-    noise: float
-    relative: float
-    resolution: float
+    noise: float  # standard deviation per sample, in SI units
+    relative: float  # the same as a share of the value, added to `noise`
+    resolution: float  # smallest step, in SI units
 
 
 MEASURED = {
