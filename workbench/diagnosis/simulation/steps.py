@@ -7,12 +7,12 @@ method in two halves. A body that sticks then stays where it is, without chatter
 """
 
 import math
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.arrays import Matrix, Vector
+from workbench.arrays import Matrix, Vector, zeros
 from workbench.models.added import TERM
 from workbench.models.fmu import FMU
 from workbench.models.native import (
@@ -47,29 +47,30 @@ class Steps(NamedTuple):
 
     stiff: NDArray[np.intp]  # (p,) states that are stepped implicitly
     nominal: Vector  # (n,) sizes of the states
-    a: Matrix  # (n, p) columns of the Jacobian by the stiff states
-    system: Matrix  # (p, 2 p) I - gamma h A for them, and its inverse
-    step: Vector  # (1,) that it is for [s]
+    a: Annotated[Matrix, "n, p"]  # columns of the Jacobian by the stiff states
+    system: Annotated[Matrix, "p, 2*p"]  # I - gamma h A for them, and its inverse
+    step: Annotated[Vector, "1"]  # that it is for [s]
     age: NDArray[np.intp]  # (1,) steps that the Jacobian has served
-    full: Matrix  # (n, n + 1) the same of all states, and Newton's correction
-    # from_, to: (m,) inputs at the beginning and at the end of a step
-    from_: Vector
-    to: Vector
-    time: Vector  # (1,) of the model at the beginning of a step [s]
-    # x, f: (n,) states where a step begins, and their rates
-    x: Vector
-    f: Vector
-    moved: Vector  # (n,) rates where the first stage would lead explicitly; Newton's correction
-    # k1, k2: (n,) slopes of the two stages
-    k1: Vector
-    k2: Vector
-    # begin, known, scale: (n,) of a step that is solved for: where it begins, the last guess, sizes
-    begin: Vector
-    known: Vector
-    scale: Vector
-    coarse: Vector  # (n,) end of it in half as many parts
+    full: Annotated[Matrix, "n, n + 1"]  # the same of all states, and Newton's correction
+    # from_, to: inputs at the beginning and at the end of a step
+    from_: Annotated[Vector, "m"]
+    to: Annotated[Vector, "m"]
+    time: Annotated[Vector, "1"]  # of the model at the beginning of a step [s]
+    # x, f: states where a step begins, and their rates
+    x: Annotated[Vector, "n"]
+    f: Annotated[Vector, "n"]
+    # rates where the first stage would lead explicitly; Newton's correction
+    moved: Annotated[Vector, "n"]
+    # k1, k2: slopes of the two stages
+    k1: Annotated[Vector, "n"]
+    k2: Annotated[Vector, "n"]
+    # begin, known, scale: of a step that is solved for: where it begins, the last guess, sizes
+    begin: Annotated[Vector, "n"]
+    known: Annotated[Vector, "n"]
+    scale: Annotated[Vector, "n"]
+    coarse: Annotated[Vector, "n"]  # end of it in half as many parts
     most: NDArray[np.intp]  # (1,) parts that it is taken in at most
-    picked: Vector  # (p,) solution of a system of the stiff states
+    picked: Annotated[Vector, "p"]  # solution of a system of the stiff states
 
 
 def steps(fmu: FMU, stiff: NDArray[np.intp], inputs: int) -> Steps:
@@ -83,28 +84,13 @@ def steps(fmu: FMU, stiff: NDArray[np.intp], inputs: int) -> Steps:
     n, p = len(fmu.states), stiff.size
     nominal = {v.name: v.nominal for v in fmu.description.variables}
     sharp = any(name.startswith(TERM) for name in nominal)
-    return Steps(
+    return zeros(
+        Steps,
+        {"n": n, "p": p, "m": inputs},
         stiff=stiff,
         nominal=np.array([abs(nominal.get(name) or 1.0) for name in fmu.states]),
-        a=np.zeros((n, p)),
-        system=np.zeros((p, 2 * p)),
-        step=np.zeros(1),
         age=np.full(1, _KEPT),
-        full=np.zeros((n, n + 1)),
-        from_=np.zeros(inputs),
-        to=np.zeros(inputs),
-        time=np.zeros(1),
-        x=np.zeros(n),
-        f=np.zeros(n),
-        moved=np.zeros(n),
-        k1=np.zeros(n),
-        k2=np.zeros(n),
-        begin=np.zeros(n),
-        known=np.zeros(n),
-        scale=np.zeros(n),
-        coarse=np.zeros(n),
         most=np.array([_MOST_PARTS if sharp else _FEWEST]),
-        picked=np.zeros(p),
     )
 
 

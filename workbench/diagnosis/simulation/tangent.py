@@ -9,12 +9,12 @@ section I.14.
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.arrays import Matrix, Vector
+from workbench.arrays import Matrix, Tensor, Vector, zeros
 from workbench.models.fmu import FMU, References
 from workbench.models.native import Instance, differentiate, direction, inlined, solve
 
@@ -22,51 +22,38 @@ _GAMMA = 1.0 - 1.0 / math.sqrt(2.0)
 
 
 class Tangent(NamedTuple):
-    """Derivatives by p columns, and work space.
+    """Derivatives by p columns, and work space."""
 
-    Attributes
-    ----------
-    knowns, edges, seeds : (r,) parameters of all columns, (p + 1,) where each column's begin, (r,)
-        ones.
-    courses : (k, p) factors by which parameters act at each sample, one row or none: they are 1.
-    shares : (p,) those of the present point.
-    alike : (p,) whether a column is of the same parameters as the one before it.
-    used : states that others depend on, stiff : those of them that are stepped implicitly.
-    told : numbers of the outputs, behind those of the states.
-    states : (n, p) derivatives of the states that are used, zero of the others.
-    errors : (k, c, p) derivatives of the prediction errors of each sample.
-    turn : (1,) which of two points is the present one; the other is where a step begins.
-    by_columns : (2, p, n + c) derivatives of the rates and the predicted outputs by the columns.
-    entries, rows, by, slopes : (2,) and (2, n * (n + c)) those by the states that are not zero: how
-        many, of what, by which.
-    first, second, moved, rates : (n, p) slopes of the two stages, states and rates between them.
-    system : (s, s + p) of the s stiff states and their right sides.
-    along : (n + c,) rates and outputs along one direction.
-    """
-
-    knowns: References
-    edges: NDArray[np.intp]
-    seeds: Vector
+    knowns: References  # (r,) parameters of all columns
+    edges: NDArray[np.intp]  # (p + 1,) where each column's begin
+    seeds: Vector  # (r,) ones
+    # (k, p) factors by which parameters act at each sample, one row or none: they are 1
     courses: Matrix
-    shares: Vector
+    shares: Vector  # (p,) those of the present point
+    # (p,) whether a column is of the same parameters as the one before it
     alike: NDArray[np.bool_]
-    used: NDArray[np.intp]
-    stiff: NDArray[np.intp]
-    told: NDArray[np.intp]
-    states: Matrix
-    errors: NDArray[np.float64]
-    turn: NDArray[np.intp]
-    by_columns: NDArray[np.float64]
-    entries: NDArray[np.intp]
-    rows: NDArray[np.intp]
-    by: NDArray[np.intp]
-    slopes: Matrix
-    first: Matrix
-    second: Matrix
-    moved: Matrix
-    rates: Matrix
-    system: Matrix
-    along: Vector
+    used: NDArray[np.intp]  # states that others depend on
+    stiff: NDArray[np.intp]  # those of them that are stepped implicitly
+    told: NDArray[np.intp]  # numbers of the outputs, behind those of the states
+    states: Matrix  # (n, p) derivatives of the states that are used, zero of the others
+    # derivatives of the prediction errors of each sample
+    errors: Annotated[Tensor, "k, c, p"]
+    # which of two points is the present one; the other is where a step begins
+    turn: Annotated[NDArray[np.intp], "1"]
+    # derivatives of the rates and the predicted outputs by the columns
+    by_columns: Annotated[Tensor, "2, p, n + c"]
+    # entries, rows, by, slopes: those by the states that are not zero: how many, of what, by which
+    entries: Annotated[NDArray[np.intp], "2"]
+    rows: Annotated[NDArray[np.intp], "2, n*n + n*c"]
+    by: Annotated[NDArray[np.intp], "2, n*n + n*c"]
+    slopes: Annotated[Matrix, "2, n*n + n*c"]
+    # first, second, moved, rates: slopes of the two stages, states and rates between them
+    first: Annotated[Matrix, "n, p"]
+    second: Annotated[Matrix, "n, p"]
+    moved: Annotated[Matrix, "n, p"]
+    rates: Annotated[Matrix, "n, p"]
+    system: Annotated[Matrix, "s, s + p"]  # of the s stiff states and their right sides
+    along: Annotated[Vector, "n + c"]  # rates and outputs along one direction
 
 
 def tangent(
@@ -93,7 +80,9 @@ def tangent(
     acting = [[name for name in column if name not in fmu.states] for column in columns]
     names = [name for column in acting for name in column]
     begin = [[float(state in column) for column in columns] for state in fmu.states]
-    return Tangent(
+    return zeros(
+        Tangent,
+        {"n": n, "p": p, "c": c, "k": samples if p else 1, "s": own.size},
         knowns=fmu.variables(names).references,
         edges=np.cumsum([0, *(len(column) for column in acting)]),
         seeds=np.ones(len(names)),
@@ -104,19 +93,6 @@ def tangent(
         stiff=own,
         told=np.arange(n, n + c),
         states=np.reshape(begin, (n, p)),
-        errors=np.zeros((samples if p else 1, c, p)),
-        turn=np.zeros(1, np.intp),
-        by_columns=np.zeros((2, p, n + c)),
-        entries=np.zeros(2, np.intp),
-        rows=np.zeros((2, n * (n + c)), np.intp),
-        by=np.zeros((2, n * (n + c)), np.intp),
-        slopes=np.zeros((2, n * (n + c))),
-        first=np.zeros((n, p)),
-        second=np.zeros((n, p)),
-        moved=np.zeros((n, p)),
-        rates=np.zeros((n, p)),
-        system=np.zeros((own.size, own.size + p)),
-        along=np.zeros(n + c),
     )
 
 

@@ -11,13 +11,13 @@ that has such a model moves it.
 """
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, solve_continuous_are
 
-from workbench.arrays import Matrix, Vector
+from workbench.arrays import Matrix, Vector, zeros
 from workbench.errors import InputError
 from workbench.models.fmu import FMU
 from workbench.models.native import assign, compiled, evaluate, inlined, linearise, solve
@@ -73,18 +73,18 @@ class ObserverSettings(NamedTuple):
 class ObserverState(NamedTuple):
     """What the law remembers."""
 
-    z: Vector  # (q,) deviations of the estimated quantities
-    integral: Vector  # (l,) of dy
-    # target, drift: (q,) what deviations decay to, and by how much it moved in this step
-    target: Vector
-    drift: Vector
-    system: Matrix  # (s + q, s + q + 1) of the step, with its right-hand side
+    z: Annotated[Vector, "q"]  # deviations of the estimated quantities
+    integral: Annotated[Vector, "l"]  # of dy
+    # target, drift: what deviations decay to, and by how much it moved in this step
+    target: Annotated[Vector, "q"]
+    drift: Annotated[Vector, "q"]
+    system: Annotated[Matrix, "s + q, s + q + 1"]  # of the step, with its right-hand side
     # others, innovation: work space
-    others: Vector
-    innovation: Vector
-    # inputs, acting: (m,) the sample before, and what acts in the step, see `act`
-    inputs: Vector
-    acting: Vector
+    others: Annotated[Vector, "n"]
+    innovation: Annotated[Vector, "l"]
+    # inputs, acting: the sample before, and what acts in the step, see `act`
+    inputs: Annotated[Vector, "m"]
+    acting: Annotated[Vector, "m"]
 
 
 @inlined
@@ -228,17 +228,8 @@ class DisturbanceObserver(Estimator):
             decay=np.ascontiguousarray(gains.values[gains.values.size - q :]),
             effect=np.ascontiguousarray(gains.design["effect"]),
         )
-        self._state = ObserverState(
-            z=np.zeros(q),
-            integral=np.zeros(outputs),
-            target=np.zeros(q),
-            drift=np.zeros(q),
-            system=np.zeros((s + q, s + q + 1)),
-            others=np.zeros(len(fmu.states)),
-            innovation=np.zeros(outputs),
-            inputs=np.zeros(len(system.inputs) + 1),
-            acting=np.zeros(len(system.inputs) + 1),
-        )
+        sizes = {"n": len(fmu.states), "m": len(system.inputs) + 1, "l": outputs, "q": q, "s": s}
+        self._state = zeros(ObserverState, sizes)
 
     def _arguments(self) -> tuple[Any, Any]:
         return self._settings, self._state

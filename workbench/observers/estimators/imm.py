@@ -7,11 +7,11 @@ several. Each has an extended Kalman filter; samples tell which of them holds, a
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from workbench.arrays import Matrix, Vector
+from workbench.arrays import Matrix, Tensor, Vector, zeros
 from workbench.models.fmu import FMU
 from workbench.models.native import compiled, solve
 from workbench.observers.estimators.kalman import (
@@ -84,17 +84,18 @@ class BankSettings(NamedTuple):
 
 
 class BankState(NamedTuple):
-    """What the bank remembers: its filters and their probability, (k,); work space."""
+    """What the bank remembers: its filters and their probability; work space."""
 
     members: tuple[FilterState, ...]
-    probability: Vector
-    expected: Vector  # (k,) probability before the sample
-    change: Matrix  # (k, 2 k) on the right transition within a step, on the left shares of mixing
-    z: Matrix  # (k, n + q)
-    errors: Matrix  # (k, n + q) of steps
-    P: Matrix  # (k, n + q, n + q)
-    estimates: Matrix  # (k, 2 w + 1) estimates of the members
-    evidence: Vector  # (k,) logarithm of the likelihood of a sample
+    probability: Annotated[Vector, "k"]
+    expected: Annotated[Vector, "k"]  # probability before the sample
+    # on the right transition within a step, on the left shares of mixing
+    change: Annotated[Matrix, "k, 2*k"]
+    z: Annotated[Matrix, "k, s"]
+    errors: Annotated[Matrix, "k, s"]  # of steps
+    P: Annotated[Tensor, "k, s, s"]
+    estimates: Annotated[Matrix, "k, w"]  # estimates of the members
+    evidence: Annotated[Vector, "k"]  # logarithm of the likelihood of a sample
 
 
 @compiled
@@ -249,20 +250,12 @@ class InteractingMultipleModel(ExtendedKalmanFilter):
             np.array([mode.parameters.get(name, np.nan) for name in names]) - self._layout.nominal
             for mode in modes
         ]
-        k, size = len(modes), len(self._settings.walk)
         self._model = tuple(member._model for member in filters)
         self._bank = BankSettings(tuple(member._settings for member in filters), changes(system))
-        self._state = BankState(
-            members=tuple(member._state for member in filters),
-            probability=np.zeros(k),
-            expected=np.zeros(k),
-            change=np.zeros((k, 2 * k)),
-            z=np.zeros((k, size)),
-            errors=np.zeros((k, size)),
-            P=np.zeros((k, size, size)),
-            estimates=np.zeros((k, 2 * len(self.system.columns) + 1)),
-            evidence=np.zeros(k),
-        )
+        sizes = {"k": len(modes), "s": len(self._settings.walk)}
+        sizes["w"] = 2 * len(self.system.columns) + 1
+        members = tuple(member._state for member in filters)
+        self._state = zeros(BankState, sizes, members=members)
 
     @property
     def steps(self) -> tuple[Step, ...]:

@@ -5,12 +5,12 @@ them as inputs. Both filters predict with the linearly implicit step of the mode
 fades, the measurement noise grows and the model noise fades.
 """
 
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from scipy.stats import chi2
 
-from workbench.arrays import Matrix, Vector
+from workbench.arrays import Matrix, Vector, zeros
 from workbench.errors import FMUError
 from workbench.models.fmu import FMU, EventError
 from workbench.models.native import (
@@ -54,16 +54,16 @@ class Learning(NamedTuple):
 class Levels(NamedTuple):
     """Variances over those of the settings, and the evidence for them."""
 
-    walk: Vector  # (s,) of random walks, at most 1: what the settings say is the fastest
-    sample: Vector  # (l,) of samples
-    # moved, expected: (s,) corrections within the filter's memory, added up, and their variance
-    moved: Vector
-    expected: Vector
-    noise: Vector  # (l,) variance of the last sample that the settings say
-    scatter: Vector  # (l,) variance that the last sample speaks for
-    before: Matrix  # (s, s) covariance before the last sample
-    surprised: Vector  # (1,) 1 where the last sample was left out
-    age: Vector  # (1,) time for which levels were learnt [s]
+    walk: Annotated[Vector, "s"]  # of random walks, at most 1: what the settings say is the fastest
+    sample: Annotated[Vector, "l"]  # of samples
+    # moved, expected: corrections within the filter's memory, added up, and their variance
+    moved: Annotated[Vector, "s"]
+    expected: Annotated[Vector, "s"]
+    noise: Annotated[Vector, "l"]  # variance of the last sample that the settings say
+    scatter: Annotated[Vector, "l"]  # variance that the last sample speaks for
+    before: Annotated[Matrix, "s, s"]  # covariance before the last sample
+    surprised: Annotated[Vector, "1"]  # 1 where the last sample was left out
+    age: Annotated[Vector, "1"]  # time for which levels were learnt [s]
 
 
 def learning(system: System) -> Learning:
@@ -74,11 +74,7 @@ def learning(system: System) -> Learning:
 
 def levels(size: int, outputs: int) -> Levels:
     """Levels of so many states and quantities; see `reset`."""
-    walk, moved, expected = (np.zeros(size) for _ in range(3))
-    sample, noise, scatter = (np.zeros(outputs) for _ in range(3))
-    before = np.zeros((size, size))
-    once = (np.zeros(1) for _ in range(2))
-    return Levels(walk, sample, moved, expected, noise, scatter, before, *once)
+    return zeros(Levels, {"s": size, "l": outputs})
 
 
 @compiled
@@ -364,18 +360,15 @@ class FilterSettings(NamedTuple):
 
 
 class FilterState(NamedTuple):
-    """What the laws remember: z (n + q,) states and deviations, P their covariance; work space.
+    """What the laws remember: z states and deviations, P their covariance; work space."""
 
-    `least` holds the variances of a step of the states, (n,), see `drive`.
-    """
-
-    z: Vector
-    P: Matrix
+    z: Annotated[Vector, "s"]
+    P: Annotated[Matrix, "s, s"]
     step: Step
-    product: Matrix  # (n, n + q), see `carry`
-    least: Vector
-    change: Vector
-    column: Vector
+    product: Annotated[Matrix, "n, s"]  # see `carry`
+    least: Annotated[Vector, "n"]  # variances of a step of the states, see `drive`
+    change: Annotated[Vector, "s"]
+    column: Annotated[Vector, "k"]
     levels: Levels
 
 
@@ -746,13 +739,5 @@ def filter_state(step: Step, outputs: int, column: int) -> FilterState:
     column : size of a work space.
     """
     n, size = step.F.shape
-    return FilterState(
-        z=np.zeros(size),
-        P=np.zeros((size, size)),
-        step=step,
-        product=np.zeros((n, size)),
-        least=np.zeros(n),
-        change=np.zeros(size),
-        column=np.zeros(column),
-        levels=levels(size, outputs),
-    )
+    sizes = {"n": n, "s": size, "k": column}
+    return zeros(FilterState, sizes, step=step, levels=levels(size, outputs))

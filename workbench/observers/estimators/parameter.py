@@ -4,12 +4,12 @@ The estimated quantities of the model follow the measured outputs directly, dmu 
 dy]: a PI controller that drives the model onto the measurement. The states are left alone.
 """
 
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.arrays import Matrix, Vector
+from workbench.arrays import Matrix, Vector, zeros
 from workbench.models.fmu import FMU
 from workbench.models.native import assign, compiled, evaluate, implicit, linearise, solve
 from workbench.observers.contract import Estimator
@@ -49,13 +49,13 @@ class _Settings(NamedTuple):
 
 
 class _State(NamedTuple):
-    integral: Vector  # of the gains times dy: the slow part of the corrections
-    gains: Matrix  # (q, 2 l) with authority
-    z: Vector  # corrections
-    system: Matrix  # (n, n + 1) of the step, with its right-hand side
-    innovation: Vector
-    inputs: Vector  # the sample before, and what acts in the step, see `act`
-    acting: Vector
+    integral: Annotated[Vector, "q"]  # of the gains times dy: the slow part of the corrections
+    gains: Annotated[Matrix, "q, 2*l"]  # with authority
+    z: Annotated[Vector, "q"]  # corrections
+    system: Annotated[Matrix, "n, n + 1"]  # of the step, with its right-hand side
+    innovation: Annotated[Vector, "l"]
+    inputs: Annotated[Vector, "m"]  # the sample before, and what acts in the step, see `act`
+    acting: Annotated[Vector, "m"]
 
 
 @compiled
@@ -153,15 +153,8 @@ class ParameterEstimator(Estimator):
             L=np.ascontiguousarray(gains.values.reshape(q, 2 * outputs)),
             effect=np.ascontiguousarray(gains.design["effect"]),
         )
-        self._state = _State(
-            integral=np.zeros(q),
-            gains=np.zeros((q, 2 * outputs)),
-            z=np.zeros(q),
-            system=np.zeros((n, n + 1)),
-            innovation=np.zeros(outputs),
-            inputs=np.zeros(len(system.inputs) + 1),
-            acting=np.zeros(len(system.inputs) + 1),
-        )
+        sizes = {"n": n, "m": len(system.inputs) + 1, "l": outputs, "q": q}
+        self._state = zeros(_State, sizes)
 
     def _arguments(self) -> tuple[Any, Any]:
         return self._settings, self._state

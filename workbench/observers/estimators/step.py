@@ -24,12 +24,12 @@ Acta Numerica 19, 209-286, section 2.4; E. Hairer, G. Wanner (1996), Solving Ord
 Equations II, sections IV.6 (R, g), IV.7 and IV.8 (choice of parts).
 """
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.arrays import Matrix, Vector
+from workbench.arrays import Matrix, Vector, zeros
 from workbench.models.fmu import FMU
 from workbench.models.native import (
     OK,
@@ -77,63 +77,63 @@ _SMALL = 1e-3  # square of an error over what is allowed, of which a step need n
 
 
 class Step(NamedTuple):
-    """What steps of a model remember, and work space: n states, m inputs, s unknowns."""
+    """What steps of a model remember, and work space: n states, m inputs and time, s unknowns."""
 
     # (n,) random walks of the states that a filter allows for [unit/sqrt(s)]; 0: it has none
     walk: Vector
-    reach: Vector  # (n,) largest size that a state has had
+    reach: Annotated[Vector, "n"]  # largest size that a state has had
     least: Vector  # (n,) size of a state below which it counts as nothing
     columns: int  # of the Jacobian that is left in the model: n of rates, or those of outputs, too
-    accurate: Vector  # (1,) 1 where steps are of order 3, 0 where they are Euler's
-    # (n, n + 1) of Euler's step, with its right-hand side; of a model alone one more
-    system: Matrix
-    spread: Matrix  # (n, n + s + 1) of its derivatives, and its right-hand side
-    left: Vector  # (n,) what it leaves out, g above
-    # predicted, error: (s,) what that has added up to, before and after the last sample
-    predicted: Vector
-    error: Vector
-    # (2,) squares of it in the last sample over the innovations' variances; their number
-    seen: Vector
+    accurate: Annotated[Vector, "1"]  # 1 where steps are of order 3, 0 where they are Euler's
+    # of Euler's step, with its right-hand side; of a model alone one more
+    system: Annotated[Matrix, "n, n + 1"]
+    spread: Annotated[Matrix, "n, n + s + 1"]  # of its derivatives, and its right-hand side
+    left: Annotated[Vector, "n"]  # what it leaves out, g above
+    # predicted, error: what that has added up to, before and after the last sample
+    predicted: Annotated[Vector, "s"]
+    error: Annotated[Vector, "s"]
+    # squares of it in the last sample over the innovations' variances; their number
+    seen: Annotated[Vector, "2"]
     weight: Vector  # (1,) of the next sample in them
-    # shown, allowed: (1 + s,) sums over samples, of innovations and of each unknown, see `judge`
-    shown: Vector
-    allowed: Vector
-    size: Vector  # (1,) of the next part of a step [s], 0: not yet known
-    # ends, taken: (k,) shares of the step at which its parts end; (1,) number of them
-    ends: Vector
-    taken: NDArray[np.intp]
-    given: Vector  # (1,) 1 where parts end where those of the step before did
-    coarse: Vector  # (1,) steps that the most parts leave too large an error of
-    inputs: Vector  # (m + 1,) the last sample of the inputs, and its time
-    # begin, end, between: (m + 1,) inputs and time at the beginning of a step, its end, within it
-    begin: Vector
-    end: Vector
-    between: Vector
+    # shown, allowed: sums over samples, of innovations and of each unknown, see `judge`
+    shown: Annotated[Vector, "1 + s"]
+    allowed: Annotated[Vector, "1 + s"]
+    size: Annotated[Vector, "1"]  # of the next part of a step [s], 0: not yet known
+    # ends, taken: shares of the step at which its parts end; number of them
+    ends: Annotated[Vector, "k"]
+    taken: Annotated[NDArray[np.intp], "1"]
+    given: Annotated[Vector, "1"]  # 1 where parts end where those of the step before did
+    coarse: Annotated[Vector, "1"]  # steps that the most parts leave too large an error of
+    inputs: Annotated[Vector, "m"]  # the last sample of the inputs, and its time
+    # begin, end, between: inputs and time at the beginning of a step, its end, within it
+    begin: Annotated[Vector, "m"]
+    end: Annotated[Vector, "m"]
+    between: Annotated[Vector, "m"]
     # (m + 1,) inputs and time at the end of a model's step before, which took `lasted`
-    ended: Vector
+    ended: Annotated[Vector, "m"]
     lasted: Vector  # (1,) [s]
-    x: Vector  # (n,) states that advance, of a law that keeps no others
-    rates: Vector  # (n,) f at the beginning
-    # W, pivots: (n, n) and (n,), see `invert`
-    W: Matrix
-    pivots: NDArray[np.intp]
-    # d, r: (n,) change of the states without what bends it, and by that: 3/2 h psi r; d of Euler's
+    x: Annotated[Vector, "n"]  # states that advance, of a law that keeps no others
+    rates: Annotated[Vector, "n"]  # f at the beginning
+    # W, pivots: see `invert`
+    W: Annotated[Matrix, "n, n"]
+    pivots: Annotated[NDArray[np.intp], "n"]
+    # d, r: change of the states without what bends it, and by that: 3/2 h psi r; d of Euler's
     # step, too
-    d: Vector
-    r: Vector
-    # w1, w2, w3: (n,) powers of W times a vector
-    w1: Vector
-    w2: Vector
-    w3: Vector
-    bend: Vector  # (n,) what the rates have beyond their Jacobian
-    # bent, curved: (n,) error of d by the step of order 2; that of r, of curvature alone
-    bent: Vector
-    curved: Vector
-    F: Matrix  # (n, s) derivatives of the step by states and quantities
-    # second, third, part: (n, n), (n, n), (n, s) work space of it
-    second: Matrix
-    third: Matrix
-    part: Matrix
+    d: Annotated[Vector, "n"]
+    r: Annotated[Vector, "n"]
+    # w1, w2, w3: powers of W times a vector
+    w1: Annotated[Vector, "n"]
+    w2: Annotated[Vector, "n"]
+    w3: Annotated[Vector, "n"]
+    bend: Annotated[Vector, "n"]  # what the rates have beyond their Jacobian
+    # bent, curved: error of d by the step of order 2; that of r, of curvature alone
+    bent: Annotated[Vector, "n"]
+    curved: Annotated[Vector, "n"]
+    F: Annotated[Matrix, "n, s"]  # derivatives of the step by states and quantities
+    # second, third, part: work space of it
+    second: Annotated[Matrix, "n, n"]
+    third: Annotated[Matrix, "n, n"]
+    part: Annotated[Matrix, "n, s"]
 
 
 def model_step(fmu: FMU, walk: Vector, inputs: int, size: int, columns: int = 0) -> Step:
@@ -146,50 +146,16 @@ def model_step(fmu: FMU, walk: Vector, inputs: int, size: int, columns: int = 0)
     size : number of states and quantities by which steps are differentiated.
     columns : see `Step`; 0: of rates alone.
     """
-    n, m = len(fmu.states), inputs + 1
+    n = len(fmu.states)
     nominal = {v.name: abs(v.nominal or 1.0) for v in fmu.description.variables}
-    return Step(
+    return zeros(
+        Step,
+        {"n": n, "m": inputs + 1, "s": size, "k": _MOST + 2},
         walk=np.ascontiguousarray(walk),
-        reach=np.zeros(n),
         least=_SMALLEST * np.array([nominal[name] for name in fmu.states]),
         columns=columns or n,
-        accurate=np.zeros(1),
-        system=np.zeros((n, n + 1)),
-        spread=np.zeros((n, n + size + 1)),
-        left=np.zeros(n),
-        predicted=np.zeros(size),
-        error=np.zeros(size),
-        seen=np.zeros(2),
         weight=np.ones(1),
-        shown=np.zeros(1 + size),
-        allowed=np.zeros(1 + size),
-        size=np.zeros(1),
-        ends=np.zeros(_MOST + 2),
-        taken=np.zeros(1, np.intp),
-        given=np.zeros(1),
-        coarse=np.zeros(1),
-        inputs=np.zeros(m),
-        begin=np.zeros(m),
-        end=np.zeros(m),
-        between=np.zeros(m),
-        ended=np.zeros(m),
         lasted=np.ones(1),
-        x=np.zeros(n),
-        rates=np.zeros(n),
-        W=np.zeros((n, n)),
-        pivots=np.zeros(n, np.intp),
-        d=np.zeros(n),
-        r=np.zeros(n),
-        w1=np.zeros(n),
-        w2=np.zeros(n),
-        w3=np.zeros(n),
-        bend=np.zeros(n),
-        bent=np.zeros(n),
-        curved=np.zeros(n),
-        F=np.zeros((n, size)),
-        second=np.zeros((n, n)),
-        third=np.zeros((n, n)),
-        part=np.zeros((n, size)),
     )
 
 

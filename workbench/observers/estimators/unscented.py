@@ -1,10 +1,10 @@
 """The square-root unscented Kalman filter, with the noise levels of the extended one."""
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from workbench.arrays import Matrix, Vector
+from workbench.arrays import Matrix, Vector, zeros
 from workbench.models.fmu import FMU
 from workbench.models.native import assign, compiled, linearise, read
 from workbench.observers.estimators.kalman import (
@@ -45,21 +45,21 @@ TANGENT_SHARE = 0.8
 class PointsState(NamedTuple):
     """As that of the extended filter, and root (upper triangle, P = root' root), points, stack."""
 
-    z: Vector
-    P: Matrix
+    z: Annotated[Vector, "s"]
+    P: Annotated[Matrix, "s, s"]
     step: Step
-    product: Matrix
-    least: Vector
-    change: Vector
-    column: Vector
+    product: Annotated[Matrix, "n, s"]
+    least: Annotated[Vector, "n"]
+    change: Annotated[Vector, "s"]
+    column: Annotated[Vector, "k"]
     levels: Levels
-    start: Vector  # z before the step
-    off: Vector  # (l,) error of steps in the outputs
-    root: Matrix
-    points: Matrix  # (2 size, size)
-    seen: Matrix  # (2 size, l) outputs at the points
-    stack: Matrix  # (2 size + l, size + l)
-    triangle: Matrix  # (size + l, size + l)
+    start: Annotated[Vector, "s"]  # z before the step
+    off: Annotated[Vector, "l"]  # error of steps in the outputs
+    root: Annotated[Matrix, "s, s"]
+    points: Annotated[Matrix, "2*s, s"]
+    seen: Annotated[Matrix, "2*s, l"]  # outputs at the points
+    stack: Annotated[Matrix, "2*s + l, s + l"]
+    triangle: Annotated[Matrix, "s + l, s + l"]
 
 
 @compiled
@@ -324,16 +324,8 @@ class UnscentedKalmanFilter(ExtendedKalmanFilter):
     def __init__(self, fmu: FMU, system: System, gains: Gains) -> None:
         super().__init__(fmu, system, gains)
         size, outputs = len(self._settings.walk), len(self.system.outputs)
-        self._state = PointsState(
-            *filter_state(self._state.step, outputs, max(size, 2 * outputs)),
-            start=np.zeros(size),
-            off=np.zeros(outputs),
-            root=np.zeros((size, size)),
-            points=np.zeros((2 * size, size)),
-            seen=np.zeros((2 * size, outputs)),
-            stack=np.zeros((2 * size + outputs, size + outputs)),
-            triangle=np.zeros((size + outputs, size + outputs)),
-        )
+        filter_ = filter_state(self._state.step, outputs, max(size, 2 * outputs))
+        self._state = zeros(PointsState, {"s": size, "l": outputs}, **filter_._asdict())
 
     @staticmethod
     def _distance(size: int) -> float:

@@ -21,11 +21,11 @@ share); P. S. Maybeck, Stochastic Models, Estimation and Control 2, Academic Pre
 """
 
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from workbench.arrays import Matrix, Vector
+from workbench.arrays import Matrix, Tensor, Vector, zeros
 from workbench.errors import InputError
 from workbench.models.fmu import FMU
 from workbench.models.native import assign, compiled, read
@@ -56,64 +56,53 @@ class ArrowState(NamedTuple):
     """What the law remembers, and its work space.
 
     With b unknowns in blocks of at most m, of which k are states, s shared ones, n states in all;
-    w = s + m are the shared unknowns and the factor, by each unknown of a block.
-
-    Attributes
-    ----------
-    z : (n + q,) states and deviations of quantities.
-    P : (w, w) covariance of the shared unknowns, and of the factor, of which no variance need be
-        positive: what blocks have in common whose sum is known is negative.
-    G : (b, w) regression of a block's unknowns on the shared ones and the factor.
-    C : (b, m) covariance of a block given these, in rows of its unknowns.
-    slopes : (b, k + s) derivatives of the rates of a block and of the shared ones, by its unknowns.
-    common : (s, n) of all rates, by the shared unknowns.
-    inverse : (b, m) of a block's part of an implicit step, in rows of its states.
-    passed, tied : (b, s) what the shared unknowns take from a block in a step, and how its unknowns
-        vary with them.
-    system : (s, 2 s + 1) of the step of the shared unknowns, with right-hand sides.
-    step, after : (s, s) that step without them, and the covariance after it.
-    kept, moved : (s, w) what a step leaves of the shared unknowns; times their covariance.
-    known : (s, s) covariance of what a step makes the shared unknowns of, then its inverse.
-    along, against : (2, m, w) and (2, m, s) sums over blocks; between: (m, m) see `liken`.
-    block, left, weighed : (m + k, m), (m, w), (m, w) work space of a block.
-    solved : (k, k + m) step of a block with its right-hand sides.
-    change : (n + q + m,) of the mean, in the order of blocks, and of the factor.
-    column, row, told : (m,), (w,), (w,) work space of an output.
-    measured : (l, m + s) derivatives of the outputs that are no states.
-    reported : (n + q, r) derivatives of reported outputs, in the order of blocks.
-    inputs, acting : (m,) the sample before, and what acts in the step, see `act`.
+    w = s + m are the shared unknowns and the factor, by each unknown of a block; l outputs, r that
+    are reported, i inputs and time.
     """
 
-    z: Vector
-    P: Matrix
-    G: Matrix
-    C: Matrix
-    slopes: Matrix
-    common: Matrix
-    inverse: Matrix
-    passed: Matrix
-    tied: Matrix
-    system: Matrix
-    step: Matrix
-    kept: Matrix
-    moved: Matrix
-    known: Matrix
-    after: Matrix
-    along: Any
-    against: Any
-    between: Matrix
-    block: Matrix
-    left: Matrix
-    weighed: Matrix
-    solved: Matrix
-    change: Vector
-    column: Vector
-    row: Vector
-    told: Vector
-    measured: Matrix
-    reported: Matrix
-    inputs: Vector
-    acting: Vector
+    z: Annotated[Vector, "b + s"]  # states and deviations of quantities
+    # covariance of the shared unknowns, and of the factor, of which no variance need be positive:
+    # what blocks have in common whose sum is known is negative
+    P: Annotated[Matrix, "w, w"]
+    # regression of a block's unknowns on the shared ones and the factor
+    G: Annotated[Matrix, "b, w"]
+    C: Annotated[Matrix, "b, m"]  # covariance of a block given these, in rows of its unknowns
+    # derivatives of the rates of a block and of the shared ones, by its unknowns
+    slopes: Annotated[Matrix, "b, k + s"]
+    common: Annotated[Matrix, "s, n"]  # of all rates, by the shared unknowns
+    # of a block's part of an implicit step, in rows of its states
+    inverse: Annotated[Matrix, "b, m"]
+    # passed, tied: what the shared unknowns take from a block in a step, and how its unknowns vary
+    # with them
+    passed: Annotated[Matrix, "b, s"]
+    tied: Annotated[Matrix, "b, s"]
+    # of the step of the shared unknowns, with right-hand sides
+    system: Annotated[Matrix, "s, 2*s + 1"]
+    step: Annotated[Matrix, "s, s"]  # that step without them
+    kept: Annotated[Matrix, "s, w"]  # what a step leaves of the shared unknowns
+    moved: Annotated[Matrix, "s, w"]  # times their covariance
+    # covariance of what a step makes the shared unknowns of, then its inverse
+    known: Annotated[Matrix, "s, s"]
+    after: Annotated[Matrix, "s, s"]  # covariance after the step
+    # along, against, between: sums over blocks, see `liken`
+    along: Annotated[Tensor, "2, m, w"]
+    against: Annotated[Tensor, "2, m, s"]
+    between: Annotated[Matrix, "m, m"]
+    # block, left, weighed: work space of a block
+    block: Annotated[Matrix, "m + k, m"]
+    left: Annotated[Matrix, "m, w"]
+    weighed: Annotated[Matrix, "m, w"]
+    solved: Annotated[Matrix, "k, k + m"]  # step of a block with its right-hand sides
+    change: Annotated[Vector, "b + s + m"]  # of the mean, in the order of blocks, and of the factor
+    # column, row, told: work space of an output
+    column: Annotated[Vector, "m"]
+    row: Annotated[Vector, "w"]
+    told: Annotated[Vector, "w"]
+    measured: Annotated[Matrix, "l, m + s"]  # derivatives of the outputs that are no states
+    # derivatives of reported outputs, in the order of blocks
+    reported: Annotated[Matrix, "b + s, r"]
+    inputs: Annotated[Vector, "i"]  # the sample before
+    acting: Annotated[Vector, "i"]  # what acts in the step, see `act`
 
 
 @compiled
@@ -275,37 +264,8 @@ class BlockKalmanFilter(ExtendedKalmanFilter):
 
 def _state(parts: Blocks, layout: Layout, n: int) -> ArrowState:
     """Memory and work space of the law, in which everything is zero."""
-    b, size, (m, k) = int(parts.first[-2]), parts.order.size, widths(parts)
-    s, outputs = size - b, layout.seen.size
-    return ArrowState(
-        z=np.zeros(size),
-        P=np.zeros((s + m, s + m)),
-        G=np.zeros((b, s + m)),
-        C=np.zeros((b, m)),
-        slopes=np.zeros((b, k + s)),
-        common=np.zeros((s, n)),
-        inverse=np.zeros((b, m)),
-        passed=np.zeros((b, s)),
-        tied=np.zeros((b, s)),
-        system=np.zeros((s, 2 * s + 1)),
-        step=np.zeros((s, s)),
-        kept=np.zeros((s, s + m)),
-        moved=np.zeros((s, s + m)),
-        known=np.zeros((s, s)),
-        after=np.zeros((s, s)),
-        along=np.zeros((2, m, s + m)),
-        against=np.zeros((2, m, s)),
-        between=np.zeros((m, m)),
-        block=np.zeros((m + k, m)),
-        left=np.zeros((m, s + m)),
-        weighed=np.zeros((m, s + m)),
-        solved=np.zeros((k, k + m)),
-        change=np.zeros(size + m),
-        column=np.zeros(m),
-        row=np.zeros(s + m),
-        told=np.zeros(s + m),
-        measured=np.zeros((outputs, m + s)),
-        reported=np.zeros((size, layout.reported)),
-        inputs=np.zeros(layout.holds.size),
-        acting=np.zeros(layout.holds.size),
-    )
+    b, (m, k) = int(parts.first[-2]), widths(parts)
+    s = parts.order.size - b
+    sizes = {"b": b, "m": m, "k": k, "s": s, "w": s + m, "n": n}
+    sizes |= {"l": layout.seen.size, "r": layout.reported, "i": layout.holds.size}
+    return zeros(ArrowState, sizes)

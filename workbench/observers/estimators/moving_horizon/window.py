@@ -11,17 +11,15 @@ allowed. Sources: A. Bryson, M. Frazier (1963), Smoothing for linear and nonline
 G. Bierman (1973), Automatica 9, 503-508.
 """
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.arrays import Matrix, Vector
+from workbench.arrays import Matrix, Tensor, Vector, zeros
 from workbench.models.native import assign, compiled, inlined
 from workbench.observers.estimators.kalman import carry
 from workbench.observers.layout import assign_rows
-
-Tensor = NDArray[np.float64]
 
 # Share of its variance that rounding leaves to what other bounds already determine.
 DETERMINED = 1e-12
@@ -31,86 +29,65 @@ class Data(NamedTuple):
     """What was measured along the last N steps, oldest first, and how the model moves there.
 
     s unknowns at a node (n states), m inputs, l outputs.
-
-    Attributes
-    ----------
-    filled : (1,) nodes that are there.
-    mean, covariance : of the first node before the noise of the model; all older samples.
-    low, high : (s,) bounds.
-    nodes : (N, s) where the steps are linearised; inputs, samples, steps : of each node's step;
-        reached : (N, m) inputs at its end.
-    noise : (N, s) variances of the model's noise; levels : (N, l) variances of samples.
-    arrived : (N, s) where a step from the node leads; F : (N, n, s) its derivatives.
-    slopes : (N, l, s) derivatives of outputs there; errors : (N, l) samples less outputs.
-    weight : (N, l) share of a sample's information that counts; wider : (N, s) variance of the
-        model's noise over what is declared, less where levels are learnt; older : (s,) of the node
-        before; alert : (1,) whether it may be wider.
     """
 
-    filled: NDArray[np.intp]
-    mean: Vector
-    covariance: Matrix
+    filled: Annotated[NDArray[np.intp], "1"]  # nodes that are there
+    # mean, covariance: of the first node before the noise of the model; all older samples
+    mean: Annotated[Vector, "s"]
+    covariance: Annotated[Matrix, "s, s"]
+    # low, high: (s,) bounds
     low: Vector
     high: Vector
-    nodes: Matrix
-    inputs: Matrix
-    reached: Matrix
-    samples: Matrix
-    steps: Vector
-    noise: Matrix
-    levels: Matrix
-    arrived: Matrix
-    F: Tensor
-    slopes: Tensor
-    errors: Matrix
-    weight: Matrix
+    nodes: Annotated[Matrix, "N, s"]  # where the steps are linearised
+    # inputs, reached, samples, steps: of the step of each node, at its beginning and at its end
+    inputs: Annotated[Matrix, "N, m"]
+    reached: Annotated[Matrix, "N, m"]
+    samples: Annotated[Matrix, "N, l"]
+    steps: Annotated[Vector, "N"]
+    noise: Annotated[Matrix, "N, s"]  # variances of the model's noise
+    levels: Annotated[Matrix, "N, l"]  # variances of samples
+    arrived: Annotated[Matrix, "N, s"]  # where a step from the node leads
+    F: Annotated[Tensor, "N, n, s"]  # its derivatives
+    slopes: Annotated[Tensor, "N, l, s"]  # derivatives of outputs there
+    errors: Annotated[Matrix, "N, l"]  # samples less outputs
+    weight: Matrix  # (N, l) share of a sample's information that counts
+    # (N, s) variance of the model's noise over what is declared, less where levels are learnt
     wider: Matrix
-    older: Vector
-    alert: NDArray[np.intp]
+    older: Vector  # (s,) of the node before
+    alert: Annotated[NDArray[np.intp], "1"]  # whether it may be wider
 
 
 class Solution(NamedTuple):
-    """The best change of the nodes, and how it was found; rows are l outputs, then s bounds.
+    """The best change of the nodes, and how it was found; rows are l outputs, then s bounds."""
 
-    Attributes
-    ----------
-    active : (N, s) 1 at the upper bound, -1 at the lower one; multiplier : (N, s) of it.
-    scale : (N, s) variances without bounds.
-    offset : (N, s) filtered less node; spread : (N, s, s) covariance of it.
-    gain : (N, l + s, s), total, surprise, force : (N, l + s) of samples and bounds, see
-        `measurement_update`.
-    change : (N, s) best node less node.
-    next_mean, next_covariance : as mean and covariance of the data, of the second node.
-    before : (s, s) covariance of the last arrival before its sample; moved : (s,) by the sample.
-    costates : (N, s) of the nodes: what noise does to the cost.
-    error, P : (s,) and (s, s) of the arrival that the filter is at.
-    """
-
-    active: NDArray[np.intp]
-    multiplier: Matrix
-    scale: Matrix
-    offset: Matrix
-    spread: Tensor
-    gain: Tensor
-    total: Matrix
-    surprise: Matrix
-    force: Matrix
-    change: Matrix
-    next_mean: Vector
-    next_covariance: Matrix
-    before: Matrix
-    moved: Vector
-    costates: Matrix
-    error: Vector
-    P: Matrix
+    active: Annotated[NDArray[np.intp], "N, s"]  # 1 at the upper bound, -1 at the lower one
+    multiplier: Annotated[Matrix, "N, s"]  # of it
+    scale: Annotated[Matrix, "N, s"]  # variances without bounds
+    offset: Annotated[Matrix, "N, s"]  # filtered less node
+    spread: Annotated[Tensor, "N, s, s"]  # covariance of it
+    # gain, total, surprise, force: of samples and bounds, see `measurement_update`
+    gain: Annotated[Tensor, "N, l + s, s"]
+    total: Annotated[Matrix, "N, l + s"]
+    surprise: Annotated[Matrix, "N, l + s"]
+    force: Annotated[Matrix, "N, l + s"]
+    change: Annotated[Matrix, "N, s"]  # best node less node
+    # next_mean, next_covariance: as mean and covariance of the data, of the second node
+    next_mean: Annotated[Vector, "s"]
+    next_covariance: Annotated[Matrix, "s, s"]
+    before: Annotated[Matrix, "s, s"]  # covariance of the last arrival before its sample
+    moved: Annotated[Vector, "s"]  # by the sample
+    costates: Annotated[Matrix, "N, s"]  # of the nodes: what noise does to the cost
+    # error, P: of the arrival that the filter is at
+    error: Annotated[Vector, "s"]
+    P: Annotated[Matrix, "s, s"]
 
 
 class Scratch(NamedTuple):
-    """Work space: costate, work : (s,); product : (n, s)."""
+    """Work space."""
 
-    costate: Vector
-    work: Vector
-    product: Matrix
+    costate: Annotated[Vector, "s"]
+    work: Annotated[Vector, "s"]
+    product: Annotated[Matrix, "n, s"]
 
 
 class Window(NamedTuple):
@@ -124,49 +101,10 @@ class Window(NamedTuple):
 def window(N: int, n: int, m: int, outputs: int, low: Vector, high: Vector) -> Window:
     """An empty window of N nodes of a model with so many states, inputs and outputs."""
     s = low.size
-    rows = outputs + s
-    data = Data(
-        filled=np.zeros(1, np.intp),
-        mean=np.zeros(s),
-        covariance=np.zeros((s, s)),
-        low=low,
-        high=high,
-        nodes=np.zeros((N, s)),
-        inputs=np.zeros((N, m)),
-        reached=np.zeros((N, m)),
-        samples=np.zeros((N, outputs)),
-        steps=np.zeros(N),
-        noise=np.zeros((N, s)),
-        levels=np.zeros((N, outputs)),
-        arrived=np.zeros((N, s)),
-        F=np.zeros((N, n, s)),
-        slopes=np.zeros((N, outputs, s)),
-        errors=np.zeros((N, outputs)),
-        weight=np.ones((N, outputs)),
-        wider=np.ones((N, s)),
-        older=np.ones(s),
-        alert=np.zeros(1, np.intp),
-    )
-    solution = Solution(
-        active=np.zeros((N, s), np.intp),
-        multiplier=np.zeros((N, s)),
-        scale=np.zeros((N, s)),
-        offset=np.zeros((N, s)),
-        spread=np.zeros((N, s, s)),
-        gain=np.zeros((N, rows, s)),
-        total=np.zeros((N, rows)),
-        surprise=np.zeros((N, rows)),
-        force=np.zeros((N, rows)),
-        change=np.zeros((N, s)),
-        next_mean=np.zeros(s),
-        next_covariance=np.zeros((s, s)),
-        before=np.zeros((s, s)),
-        moved=np.zeros(s),
-        costates=np.zeros((N, s)),
-        error=np.zeros(s),
-        P=np.zeros((s, s)),
-    )
-    return Window(data, solution, Scratch(np.zeros(s), np.zeros(s), np.zeros((n, s))))
+    sizes = {"N": N, "n": n, "m": m, "l": outputs, "s": s}
+    wide = {"weight": np.ones((N, outputs)), "wider": np.ones((N, s)), "older": np.ones(s)}
+    data = zeros(Data, sizes, low=low, high=high, **wide)
+    return Window(data, zeros(Solution, sizes), zeros(Scratch, sizes))
 
 
 @compiled

@@ -5,12 +5,9 @@ it inverts nothing. Sources: A. Bryson, M. Frazier (1963), Smoothing for linear 
 dynamic systems; G. Bierman (1973), Automatica 9, 503-508.
 """
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
-from workbench.arrays import Matrix
+from workbench.arrays import Matrix, Tensor, zeros
 from workbench.models.native import compiled
 from workbench.observers.estimators.kalman import carry
 
@@ -18,16 +15,15 @@ from workbench.observers.estimators.kalman import carry
 class Spread(NamedTuple):
     """Covariances of what a window estimates."""
 
-    information: Matrix  # (s, s) what later samples tell
-    product: Matrix  # (s, s) work space
-    covariances: NDArray[np.float64]  # (N, s, s) of where the step from each node leads
-    first: Matrix  # (s, s) before them all
+    information: Annotated[Matrix, "s, s"]  # what later samples tell
+    product: Annotated[Matrix, "s, s"]  # work space
+    covariances: Annotated[Tensor, "N, s, s"]  # of where the step from each node leads
+    first: Annotated[Matrix, "s, s"]  # before them all
 
 
 def spread(N: int, s: int) -> Spread:
     """Room for N nodes of s unknowns."""
-    information, product, first = (np.zeros((s, s)) for _ in range(3))
-    return Spread(information, product, np.zeros((N, s, s)), first)
+    return zeros(Spread, {"N": N, "s": s})
 
 
 @compiled
