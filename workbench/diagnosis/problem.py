@@ -41,23 +41,17 @@ def catalogue(system: System, library: Library | None) -> tuple[Effect, ...]:
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """What is asked of a diagnosis.
+    """What is asked of a diagnosis."""
 
-    Attributes
-    ----------
-    system : whose observer model is diagnosed, or an extension of it: its values are kept.
-    cases : what is only there to judge by is compared if all of them have it. Of a single one,
-        parts are held out, since a cause is judged on what it was not fitted to.
-    library : of the system, which holds the effects; None if its model is an FMU alone.
-    effects : that are considered.
-    held_out : recordings on which only the errors of both models are measured: all that is common
-        is as fitted to the others, only what differs between recordings is fitted.
-    """
-
-    system: System
+    system: System  # whose observer model is diagnosed, or an extension of it: its values are kept
+    # what is only there to judge by is compared if all of them have it. Of a single one, parts are
+    # held out, since a cause is judged on what it was not fitted to.
     cases: Sequence[Case]
+    # of the system, which holds the effects; None if its model is an FMU alone
     library: Library | None
-    effects: Sequence[Effect]
+    effects: Sequence[Effect]  # that are considered
+    # recordings on which only the errors of both models are measured: all that is common is as
+    # fitted to the others, only what differs between recordings is fitted
     held_out: Sequence[Case] = ()
 
     @property

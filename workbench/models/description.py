@@ -41,30 +41,25 @@ class Interface:
 
 @dataclass(frozen=True)
 class Variable:
-    """One variable; `start` as written, None where the description has none.
-
-    Attributes
-    ----------
-    real : a scalar of type Real (FMI 2.0) or Float64 (FMI 3.0).
-    nominal, minimum, maximum : in `unit`, None where the description has none.
-    of, element, size : of an element of an array: its name, the place in it, how many it has.
-    initial : "exact" and "approx" may be set before the start, "calculated" may not.
-    """
+    """One variable; `start` as written, None where the description has none."""
 
     name: str
     reference: int
     type: str
-    real: bool
+    real: bool  # a scalar of type Real (FMI 2.0) or Float64 (FMI 3.0)
     causality: str
     variability: str
     unit: str | None
     start: str | None
+    # nominal, minimum, maximum: in `unit`, None where the description has none
     nominal: float | None
     minimum: float | None
     maximum: float | None
     text: str
     array: bool = False
+    # "exact" and "approx" may be set before the start, "calculated" may not
     initial: str | None = None
+    # of, element, size: of an element of an array: its name, the place in it, how many it has
     of: str = ""
     element: int = 0
     size: int = 1

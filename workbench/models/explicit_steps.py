@@ -36,20 +36,15 @@ _SAFETY, _LEAST, _GROWTH = 0.9, 0.2, 5.0  # of steps, as SciPy has them
 
 
 class _Method(NamedTuple):
-    """Coefficients.
+    """Coefficients."""
 
-    Attributes
-    ----------
-    a, c : (6, 5), (6,) of the stages.
-    b, e : (6,), (7,) weights of the end and of its error, per h.
-    looks : (3, 7) weights of the points at `_LOOKS`, per h.
-    """
-
+    # a, c: (6, 5), (6,) of the stages
     a: Matrix
     c: Vector
+    # b, e: (6,), (7,) weights of the end and of its error, per h
     b: Vector
     e: Vector
-    looks: Matrix
+    looks: Matrix  # (3, 7) weights of the points at `_LOOKS`, per h
 
 
 _METHOD = _Method(

@@ -60,31 +60,12 @@ def _call(model, function, words):  # type: ignore[no-untyped-def]
 
 
 class Instance(NamedTuple):
-    """One FMU instance, its functions and the buffers they read and write.
+    """One FMU instance, its functions and the buffers they read and write."""
 
-    Attributes
-    ----------
-    address : of the FMU instance.
-    set_states, derivatives, set_real, get_real, directional, set_time : addresses of the FMU's
-        functions; get_indicators, too, and complete_step, 0 where the FMU does not need it.
-        FMI 2.0 takes no length of values in set_real and get_real; the register it would be in is
-        not read.
-    fmi : 2 or 3 with directional derivatives, 0 for differences.
-    measured : number of the measured inputs, the first of u.
-    time : (1,) that the FMU was set to last [s].
-    indicators, event_signs : (z,) event indicators, and whether they were above 0 at the start.
-    next_event : (1,) time of the next time event [s], infinite for none.
-    warned : (1,) calls that the FMU answered with a warning.
-    ended : (2,) whether the step ends at an event, and whether the FMU asks to end.
-    x, dx : (n,) states and their derivatives.
-    u, y : (m,) inputs, (l,) outputs.
-    jacobian : (n + q, n + l) derivatives of [dx; y] (columns) by [x; last q inputs] (rows).
-    seed : (1,) one.
-    inputs, outputs, unknowns, knowns : value references of u and y, of columns and rows of the
-        Jacobian.
-    """
-
-    address: int
+    address: int  # of the FMU instance
+    # set_states, derivatives, set_real, get_real, directional, set_time: addresses of the FMU's
+    # functions; get_indicators, too, and complete_step, 0 where the FMU does not need it. FMI 2.0
+    # takes no length of values in set_real and get_real; the register it would be in is not read.
     set_states: int
     derivatives: int
     set_real: int
@@ -93,20 +74,26 @@ class Instance(NamedTuple):
     set_time: int
     get_indicators: int
     complete_step: int
-    fmi: int
-    measured: int
-    time: Vector
+    fmi: int  # 2 or 3 with directional derivatives, 0 for differences
+    measured: int  # number of the measured inputs, the first of u
+    time: Vector  # (1,) that the FMU was set to last [s]
+    # indicators, event_signs: (z,) event indicators, and whether they were above 0 at the start
     indicators: Vector
     event_signs: NDArray[np.bool_]
-    next_event: Vector
-    warned: NDArray[np.int64]
+    next_event: Vector  # (1,) time of the next time event [s], infinite for none
+    warned: NDArray[np.int64]  # (1,) calls that the FMU answered with a warning
+    # (2,) whether the step ends at an event, and whether the FMU asks to end
     ended: NDArray[np.int32]
+    # x, dx: (n,) states and their derivatives
     x: Vector
     dx: Vector
+    # u, y: (m,) inputs, (l,) outputs
     u: Vector
     y: Vector
-    jacobian: Matrix
-    seed: Vector
+    jacobian: Matrix  # (n + q, n + l) derivatives of [dx; y] (columns) by [x; last q inputs] (rows)
+    seed: Vector  # (1,) one
+    # inputs, outputs, unknowns, knowns: value references of u and y, of columns and rows of the
+    # Jacobian
     inputs: References
     outputs: References
     unknowns: References

@@ -46,16 +46,11 @@ class Drive(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Derivatives:
-    """Of outputs along a drive, by differences of whole simulations.
+    """Of outputs along a drive, by differences of whole simulations."""
 
-    Attributes
-    ----------
-    values : (n, l, p).
-    unsure : (p,) share of each column by which differences with other steps disagree; 0 where
-        they agree to 1 %, or where no output moves by a millionth.
-    """
-
-    values: NDArray[np.float64]
+    values: NDArray[np.float64]  # (n, l, p)
+    # (p,) share of each column by which differences with other steps disagree; 0 where they agree
+    # to 1 %, or where no output moves by a millionth
     unsure: Vector
 
 

@@ -81,19 +81,15 @@ class SearchSpace:
 
     A gain is smallest * sinh(s * asinh(largest / smallest)): proportional to s where it is too
     small to matter, logarithmic beyond, of either sign.
-
-    Attributes
-    ----------
-    smallest, largest : (n,) magnitudes between which a gain matters.
-    lower, upper : (n,) range of s: -1..1 for both signs.
-    start : (n,) coordinates of the reasoned gains.
     """
 
+    # smallest, largest: (n,) magnitudes between which a gain matters
     smallest: Vector
     largest: Vector
+    # lower, upper: (n,) range of s: -1..1 for both signs
     lower: Vector
     upper: Vector
-    start: Vector
+    start: Vector  # (n,) coordinates of the reasoned gains
 
     def gains(self, coordinates: Vector) -> Vector:
         """Gains (..., n) at coordinates (..., n)."""

@@ -21,39 +21,32 @@ from workbench.system.system import System
 
 
 class Layout(NamedTuple):
-    """Where a law finds things in the model; the same for all laws.
+    """Where a law finds things in the model; the same for all laws."""
 
-    Attributes
-    ----------
-    seen : (l,) index of the state that is an output, or -1 - index among the model's outputs.
-    nominal, low, high : (q,) nominal estimated quantities, and limits of their corrections.
-    doubt : (q,) share of quantities by which the model lets them be wrong [1].
-    acts_on : (q,) column of the Jacobian that shows a correction's effect: rate of a state, or an
-        output that is none; -1 for none.
-    pace : (l,) coefficients of the outputs in the signal with which feedback fades; half of it is
-        left at `half`, 0: it never fades.
-    follower, leader : states of which one rolls along with the other, -1 for none.
-    ratio : of follower over leader while it rolls [1]; lead : coefficient of the leader in `pace`.
-    reported : number of the model's outputs that estimates hold.
-    columns : of the Jacobian that laws need: rates, and all outputs if one that is fed is no state.
-    holds : (m + 1,) 1 of an input that stays as it was sampled until the next sample, -1 of one
-        whose sample is the mean since the one before, else 0, as of the time.
-    """
-
+    # (l,) index of the state that is an output, or -1 - index among the model's outputs
     seen: NDArray[np.intp]
+    # nominal, low, high: (q,) nominal estimated quantities, and limits of their corrections
     nominal: Vector
     low: Vector
     high: Vector
-    doubt: Vector
+    doubt: Vector  # (q,) share of quantities by which the model lets them be wrong [1]
+    # (q,) column of the Jacobian that shows a correction's effect: rate of a state, or an output
+    # that is none; -1 for none
     acts_on: NDArray[np.intp]
+    # (l,) coefficients of the outputs in the signal with which feedback fades; half of it is left
+    # at `half`, 0: it never fades
     pace: Vector
     half: float
+    # follower, leader: states of which one rolls along with the other, -1 for none
     follower: int
     leader: int
-    ratio: float
-    lead: float
-    reported: int
+    ratio: float  # of follower over leader while it rolls [1]
+    lead: float  # coefficient of the leader in `pace`
+    reported: int  # number of the model's outputs that estimates hold
+    # of the Jacobian that laws need: rates, and all outputs if one that is fed is no state
     columns: int
+    # (m + 1,) 1 of an input that stays as it was sampled until the next sample, -1 of one whose
+    # sample is the mean since the one before, else 0, as of the time
     holds: Vector
 
 

@@ -150,27 +150,19 @@ def prior(system: System) -> Vector:
 
 @dataclass(frozen=True)
 class LinearTest:
-    """Observability at an operating point from samples of a second, see `tested_span`.
+    """Observability at an operating point from samples of a second, see `tested_span`."""
 
-    Attributes
-    ----------
-    model : name of the model, without its library.
-    states : (k,) names.
-    x : (k,) operating point.
-    scale : (k,) largest deviation that a quantity off by its prior causes within the second, or
-        what is not known of the state at the start, where no quantity moves it or that is declared.
-    information : (k,) eigenvalues of the Gramian in units of `scale`, ascending [1]: squared ratio
-        of signal to noise. Above 1 the samples say more than `scale` does.
-    directions : (k, k) unit vectors in units of `scale`, one column per eigenvalue.
-    remaining : (k,) standard deviation left of each state after the second, over `scale` [1].
-    """
-
-    model: str
-    states: tuple[str, ...]
-    x: Vector
+    model: str  # name of the model, without its library
+    states: tuple[str, ...]  # (k,) names
+    x: Vector  # (k,) operating point
+    # (k,) largest deviation that a quantity off by its prior causes within the second, or what is
+    # not known of the state at the start, where no quantity moves it or that is declared
     scale: Vector
+    # (k,) eigenvalues of the Gramian in units of `scale`, ascending [1]: squared ratio of signal to
+    # noise. Above 1 the samples say more than `scale` does.
     information: Vector
-    directions: Matrix
+    directions: Matrix  # (k, k) unit vectors in units of `scale`, one column per eigenvalue
+    # (k,) standard deviation left of each state after the second, over `scale` [1]
     remaining: Vector
 
     @property
@@ -225,21 +217,16 @@ class WindowTest:
 
 @dataclass(frozen=True)
 class Information:
-    """What a whole recording tells of constant quantities, and of the states at its end.
+    """What a whole recording tells of constant quantities, and of the states at its end."""
 
-    Attributes
-    ----------
-    states, quantities : (n,) and (q,) names.
-    left : (n + q, n + q) covariance that no estimator falls below, in units of what is known
-        before: standard deviations of states at the start, see `start_spreads`, and of quantities,
-        see `prior`.
-    ruled : quantities of which the machine says where they are told.
-    """
-
+    # states, quantities: (n,) and (q,) names
     states: tuple[str, ...]
     quantities: tuple[str, ...]
+    # (n + q, n + q) covariance that no estimator falls below, in units of what is known before:
+    # standard deviations of states at the start, see `start_spreads`, and of quantities, see
+    # `prior`
     left: Matrix
-    ruled: frozenset[str] = frozenset()
+    ruled: frozenset[str] = frozenset()  # quantities of which the machine says where they are told
 
     @property
     def inseparable(self) -> dict[tuple[str, ...], float]:

@@ -28,21 +28,15 @@ _POINTS, _ROUNDED = 8, 1e-9  # states by chance, and share of a value that arith
 
 @dataclass(frozen=True)
 class Score:
-    """Errors of one run; None where they cannot be judged, and why.
+    """Errors of one run; None where they cannot be judged, and why."""
 
-    Attributes
-    ----------
-    rms : rms error of the judged signal in the window, below the bandwidth [its unit].
-    nrmse : the same over the mean of its size [1].
-    z : objective z_k of equation (12), over the whole recording, of deviations below the
-        bandwidth [1].
-    reason : why a value is missing; empty if none is.
-    """
-
+    # rms error of the judged signal in the window, below the bandwidth [its unit]
     rms: float | None
-    nrmse: float | None
+    nrmse: float | None  # the same over the mean of its size [1]
+    # objective z_k of equation (12), over the whole recording, of deviations below the bandwidth
+    # [1]
     z: float | None
-    reason: str
+    reason: str  # why a value is missing; empty if none is
 
 
 def with_readings(system: System, models: Sequence[FMU]) -> System:

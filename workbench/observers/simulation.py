@@ -75,29 +75,23 @@ _MOST = 5e8
 
 @dataclass(frozen=True)
 class CaseResult:
-    """All estimators on one case: runs and scores by estimator name.
-
-    Attributes
-    ----------
-    reference : the smoother's estimate, where no sensor is only there to judge by; else None.
-    inseparable : estimated quantities that the recording cannot tell apart, and states
-        among them, and their correlation.
-    untold : estimated quantities that it does not show, whatever others are.
-    doubts : what is said of its start, and of its samples beside the model's time constants.
-    resolved : whether its samples resolve the model, see `sampling_doubt` and `time_doubt`.
-    step_share : of an open loop's error that coarse steps make, see `step_doubt`; 0 if it did not
-        run.
-    """
+    """All estimators on one case: runs and scores by estimator name."""
 
     system: System
     case: Case
     runs: Mapping[str, Run]
     scores: Mapping[str, Score]
+    # the smoother's estimate, where no sensor is only there to judge by; else None
     reference: Run | None
+    # estimated quantities that the recording cannot tell apart, and states among them, and their
+    # correlation
     inseparable: Mapping[tuple[str, ...], float] = field(default_factory=dict)
-    untold: tuple[str, ...] = ()
+    untold: tuple[str, ...] = ()  # estimated quantities that it does not show, whatever others are
+    # what is said of its start, and of its samples beside the model's time constants
     doubts: tuple[str, ...] = ()
+    # whether its samples resolve the model, see `sampling_doubt` and `time_doubt`
     resolved: bool = True
+    # of an open loop's error that coarse steps make, see `step_doubt`; 0 if it did not run
     step_share: float = 0.0
 
     def measured(self) -> Vector | None:
@@ -260,14 +254,10 @@ class CaseResult:
 
 @dataclass(frozen=True)
 class Simulation:
-    """What runs on every case; travels to the processes.
-
-    Attributes
-    ----------
-    kinds, gains : of the estimators by name, in the order of the results.
-    """
+    """What runs on every case; travels to the processes."""
 
     system: System
+    # kinds, gains: of the estimators by name, in the order of the results
     kinds: Mapping[str, type[Estimator]]
     gains: Mapping[str, Gains]
 

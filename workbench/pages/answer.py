@@ -38,17 +38,12 @@ class Measure:
 
 @dataclass(frozen=True)
 class Answer:
-    """What is read first.
+    """What is read first."""
 
-    Attributes
-    ----------
-    sentence : with its uncertainty.
-    headline : numbers that tell the result, by what they are.
-    details : those behind them, such as of each recording.
-    """
-
-    sentence: str
+    sentence: str  # with its uncertainty
+    # numbers that tell the result, by what they are
     headline: Mapping[str, Measure] = field(default_factory=dict)
+    # those behind them, such as of each recording
     details: Mapping[str, Measure] = field(default_factory=dict)
 
     def to_dict(self) -> dict[str, Any]:

@@ -83,28 +83,21 @@ class Panel:
 
 @dataclass(frozen=True)
 class CaseFigure:
-    """What the figure of a case shows.
+    """What the figure of a case shows."""
 
-    Attributes
-    ----------
-    name, title : of the case.
-    finding : what the figure says, for those who do not see it.
-    time : (n,) [s], or of what `axis` names, rising.
-    window : begin and end [s] of the time in which estimators are judged; None without.
-    legend : (style, text) of each entry; from the ninth estimator on, styles repeat.
-    panels : from top to bottom.
-    hidden : styles whose curves a page shows on demand, at a press of their entry of the legend.
-    axis : what is at the bottom, and its unit; empty where it is a count.
-    """
-
+    # name, title: of the case
     name: str
     title: str
-    finding: str
-    time: Vector
+    finding: str  # what the figure says, for those who do not see it
+    time: Vector  # (n,) [s], or of what `axis` names, rising
+    # begin and end [s] of the time in which estimators are judged; None without
     window: tuple[float, float] | None
+    # (style, text) of each entry; from the ninth estimator on, styles repeat
     legend: tuple[tuple[str, str], ...]
-    panels: tuple[Panel, ...]
+    panels: tuple[Panel, ...]  # from top to bottom
+    # styles whose curves a page shows on demand, at a press of their entry of the legend
     hidden: frozenset[str] = frozenset()
+    # what is at the bottom, and its unit; empty where it is a count
     axis: tuple[str, str] = ("time", "s")
 
 

@@ -95,15 +95,10 @@ class Article:
 
 @dataclass(frozen=True)
 class Strip:
-    """Things that are alike and stand in a row, as wheels of a vehicle do: which one is not well.
+    """Things that are alike and stand in a row, as wheels of a vehicle do: which is not well."""
 
-    Attributes
-    ----------
-    finding : what it shows, for those who do not see it.
-    entries : name of each, and what is wrong with it; empty where nothing is.
-    """
-
-    finding: str
+    finding: str  # what it shows, for those who do not see it
+    # name of each, and what is wrong with it; empty where nothing is
     entries: Sequence[tuple[str, str]]
 
 

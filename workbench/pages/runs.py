@@ -49,18 +49,14 @@ class RunRecord:
 
 @dataclass(frozen=True)
 class Change:
-    """One number before and after.
-
-    Attributes
-    ----------
-    before, after : None where there is none.
-    verdict : "unchanged" where both are the same in four digits; "unclear" where the 95 %
-        intervals of both overlap; "changed" where neither way is better.
-    """
+    """One number before and after."""
 
     name: str
+    # before, after: None where there is none
     before: Measure | None
     after: Measure | None
+    # "unchanged" where both are the same in four digits; "unclear" where the 95 % intervals of both
+    # overlap; "changed" where neither way is better
     verdict: Verdict
 
     @property

@@ -31,16 +31,11 @@ _LARGEST = 1e100  # no measurement comes near; leaves room for the factors of un
 
 @dataclass(frozen=True, eq=False)
 class Column:
-    """One column of a recording.
+    """One column of a recording."""
 
-    Attributes
-    ----------
-    unit : as the header spells it.
-    values : (n,) finite numbers in that unit, NaN where a field may be empty and is; row i stands
-        on line i + 2 of the file.
-    """
-
-    unit: str
+    unit: str  # as the header spells it
+    # (n,) finite numbers in that unit, NaN where a field may be empty and is; row i stands on line
+    # i + 2 of the file
     values: Vector
 
 

@@ -57,22 +57,16 @@ class PublishedRecording:
 
 @dataclass(frozen=True)
 class FolderLayout:
-    """A way in which the set lies in a folder.
+    """A way in which the set lies in a folder."""
 
-    Attributes
-    ----------
-    name : for people, such as "the publisher's own files".
-    files : SHA-256 of each, by its path in the folder; all must be there.
-    read : the recordings in a folder with these files.
-    pattern : of files that anybody may have recorded in this format, in place of `files`; their
-        checksums are noted.
-    one : reads a single recording from its own folder, where it has one with a case.toml; or None.
-    """
-
-    name: str
-    files: Mapping[str, str]
+    name: str  # for people, such as "the publisher's own files"
+    files: Mapping[str, str]  # SHA-256 of each, by its path in the folder; all must be there
+    # the recordings in a folder with these files
     read: Callable[[Path], Sequence[PublishedRecording]]
+    # of files that anybody may have recorded in this format, in place of `files`; their checksums
+    # are noted
     pattern: str = ""
+    # reads a single recording from its own folder, where it has one with a case.toml; or None
     one: Callable[[Path], PublishedRecording] | None = None
 
     def hashes_in(self, source: Path) -> dict[str, str]:

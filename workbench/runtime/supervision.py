@@ -42,22 +42,17 @@ _PATIENCE = 10  # [s] from a request to end until the end; results are written i
 
 @dataclass(frozen=True)
 class Limits:
-    """What foreign code may use: while it is tried, and for memory and `call` in a command, too.
+    """What foreign code may use: while it is tried, and for memory and `call` in a command, too."""
 
-    Attributes
-    ----------
-    processor : time of the processor in one call [s]. Calls take microseconds, a start seconds.
-    answer : time until the end of all [s], long enough for a machine that has other work to do.
-    memory : that can be written [bytes]; models hold kilobytes, runtimes that they bring megabytes.
-    file : the largest file that is written [bytes].
-    call : time in which a call must return while a command runs [s]. The longest of them is a
-        compiled loop over a recording, of minutes for a million samples.
-    """
-
+    # time of the processor in one call [s]. Calls take microseconds, a start seconds.
     processor: float = 3.0
+    # time until the end of all [s], long enough for a machine that has other work to do
     answer: float = 10.0
+    # that can be written [bytes]; models hold kilobytes, runtimes that they bring megabytes
     memory: int = 2 << 30
-    file: int = 100 << 20
+    file: int = 100 << 20  # the largest file that is written [bytes]
+    # time in which a call must return while a command runs [s]. The longest of them is a compiled
+    # loop over a recording, of minutes for a million samples.
     call: float = 900.0
 
     def __str__(self) -> str:

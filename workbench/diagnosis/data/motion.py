@@ -55,16 +55,11 @@ class ModelSource(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class OpenModel:
-    """An FMU that is open in this process, for one set of recordings after the other.
-
-    Attributes
-    ----------
-    motion : of the model at its design point; None of an FMU that is to be simulated as a whole, or
-        can only be: Co-Simulation alone, other types than Real, events where it should be
-        linearised.
-    """
+    """An FMU that is open in this process, for one set of recordings after the other."""
 
     fmu: FMU
+    # of the model at its design point; None of an FMU that is to be simulated as a whole, or can
+    # only be: Co-Simulation alone, other types than Real, events where it should be linearised
     motion: Motion | None
 
 

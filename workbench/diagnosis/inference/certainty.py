@@ -32,25 +32,19 @@ Ends = tuple[float | None, float | None]
 
 @dataclass(frozen=True, eq=False)
 class Certainty:
-    """What fits beside the best one say of it.
+    """What fits beside the best one say of it."""
 
-    Attributes
-    ----------
-    unknowns : that all recordings share: sizes of causes, levels; then what differs between them,
-        which they share in the mean.
-    correlations : (p, p) of their errors, as noise makes them.
-    ends : of each size, where chi-squared has risen by what chance exceeds in 5 of 100, to both
-        sides [SI]; None where it does not, within the bounds of the size.
-    behind : chi-squared that each fit from elsewhere leaves beyond the best; None of one that could
-        not be begun, or led to no derivative.
-    tolerance : of `behind`, within which fits end at the same minimum.
-    """
-
+    # that all recordings share: sizes of causes, levels; then what differs between them, which they
+    # share in the mean
     unknowns: tuple[Key, ...]
-    correlations: Matrix
+    correlations: Matrix  # (p, p) of their errors, as noise makes them
+    # of each size, where chi-squared has risen by what chance exceeds in 5 of 100, to both sides
+    # [SI]; None where it does not, within the bounds of the size
     ends: Mapping[Key, Ends]
+    # chi-squared that each fit from elsewhere leaves beyond the best; None of one that could not be
+    # begun, or led to no derivative
     behind: tuple[float | None, ...]
-    tolerance: float
+    tolerance: float  # of `behind`, within which fits end at the same minimum
 
     @property
     def same(self) -> int:

@@ -21,24 +21,19 @@ from workbench.system.units import with_unit
 
 @dataclass(frozen=True)
 class ShiftedLevel:
-    """A nuisance parameter that is further from its sheet than declared, or that hides an effect.
+    """A nuisance parameter that is further from its sheet than declared, or hides an effect."""
 
-    Attributes
-    ----------
-    name, choice : of the parameter, and of the condition that it is calibrated by.
-    value, sheet : as calibrated, and as conditions or the model say, in `unit`.
-    declared : relative standard deviation by the system file; None where it declares none,
-        or the sheet's value is zero.
-    hides : effects that these recordings cannot tell from it.
-    """
-
+    # name, choice: of the parameter, and of the condition that it is calibrated by
     name: str
     choice: str
+    # value, sheet: as calibrated, and as conditions or the model say, in `unit`
     value: float
     sheet: float
     unit: str
+    # relative standard deviation by the system file; None where it declares none, or the sheet's
+    # value is zero
     declared: float | None
-    hides: tuple[str, ...]
+    hides: tuple[str, ...]  # effects that these recordings cannot tell from it
 
     @property
     def text(self) -> str:

@@ -22,18 +22,12 @@ _CERTAIN = 1e-7  # reciprocal condition far above both, however it is estimated
 
 @dataclass(frozen=True, eq=False)
 class Quadratic:
-    """Chi-squared of one stop over the common unknowns, c + 2 g z + z N z; local ones eliminated.
+    """Chi-squared of one stop over common unknowns, c + 2 g z + z N z; local ones eliminated."""
 
-    Attributes
-    ----------
-    N : (p, p); g : (p,); c : scalar, about the present point.
-    rows : number of whitened errors.
-    """
-
-    N: Matrix
-    g: Vector
-    c: float
-    rows: int
+    N: Matrix  # (p, p)
+    g: Vector  # (p,)
+    c: float  # scalar, about the present point
+    rows: int  # number of whitened errors
 
     def at(self, z: Vector) -> float:
         """Chi-squared at a step z, (p,)."""
@@ -123,26 +117,17 @@ def minimum_within(total: Quadratic, low: Vector, high: Vector) -> Vector:
 
 @dataclass(frozen=True, eq=False)
 class RecordingSystem:
-    """Whitened errors of one stop, r + J z + P l, with l ~ N(-prior, 1) where `prior` has entries.
+    """Whitened errors of a stop, r + J z + P l, with l ~ N(-prior, 1) where `prior` has entries."""
 
-    Attributes
-    ----------
-    r : (n,); J : (n, p); P : (n, q).
-    deviations : (d,) of the present point, of the first unknowns in l; phases are free.
-    furthest : (q,) from zero, of a deviation or of a step of what is no deviation.
-    channels : c; r holds the errors of blocks, each by channel, and last those at rest.
-    held : (q,) entries of l that are not free any more; NaN of those that are. None: all are.
-    rests : number of errors at rest.
-    """
-
-    r: Vector
-    J: Matrix
-    P: Matrix
-    deviations: Vector
-    furthest: Vector
-    channels: int
+    r: Vector  # (n,)
+    J: Matrix  # (n, p)
+    P: Matrix  # (n, q)
+    deviations: Vector  # (d,) of the present point, of the first unknowns in l; phases are free
+    furthest: Vector  # (q,) from zero, of a deviation or of a step of what is no deviation
+    channels: int  # c; r holds the errors of blocks, each by channel, and last those at rest
+    # (q,) entries of l that are not free any more; NaN of those that are. None: all are.
     held: Vector | None = None
-    rests: int = 1
+    rests: int = 1  # number of errors at rest
 
     @property
     def blocks(self) -> int:

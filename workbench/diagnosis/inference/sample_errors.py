@@ -17,27 +17,21 @@ from workbench.runtime.engine import Engine
 
 @dataclass(frozen=True)
 class Errors:
-    """Of one channel along one recording, by the nominal and by the last model.
-
-    Attributes
-    ----------
-    held_out : whether nothing common to the recordings was fitted to this one.
-    samples : whose errors are told.
-    rms, mean_absolute : of these, (before, after) [unit].
-    corrected : what corrects the simulation that they are of: measured outputs, where inputs have
-        noise that a motion integrates, or restarts; empty for a free run.
-    free_run : root mean square of a free run, which nothing corrects, (before, after) [unit]; None
-        where the model cannot be simulated so far.
-    """
+    """Of one channel along one recording, by the nominal and by the last model."""
 
     recording: str
     channel: str
     unit: str
-    held_out: bool
-    samples: int
+    held_out: bool  # whether nothing common to the recordings was fitted to this one
+    samples: int  # whose errors are told
+    # rms, mean_absolute: of these, (before, after) [unit]
     rms: tuple[float, float]
     mean_absolute: tuple[float, float]
+    # what corrects the simulation that they are of: measured outputs, where inputs have noise that
+    # a motion integrates, or restarts; empty for a free run
     corrected: str
+    # root mean square of a free run, which nothing corrects, (before, after) [unit]; None where the
+    # model cannot be simulated so far
     free_run: tuple[float | None, float | None]
 
 

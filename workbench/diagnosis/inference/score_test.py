@@ -26,31 +26,23 @@ Candidate = tuple[Effect, Mapping[str, float]]
 
 @dataclass(frozen=True, eq=False)
 class CandidateScore:
-    """What one effect would explain, linearised.
+    """What one effect would explain, linearised."""
 
-    Attributes
-    ----------
-    effect, shape : the candidate, and the shape it was tried with.
-    size, sigma : estimate of its size and standard deviation.
-    units : of the size and of the parameters of the shape, by name.
-    gain : fall of chi-squared when it is fitted to all stops, beside immaterial companions.
-    by_levels : what of it is that levels, or the one recording's own, are less far from expected.
-    least : the same fall without any one of the stops, the least.
-    held_out : (K,) rise of twice the log density of each stop, as the others predict it, when it is
-        fitted alone.
-    phases : (K,) [rad] of an order-locked effect.
-    """
-
+    # effect, shape: the candidate, and the shape it was tried with
     effect: Effect
     shape: Mapping[str, float]
+    # size, sigma: estimate of its size and standard deviation
     size: float
     sigma: float
-    units: Mapping[str, str]
-    gain: float
+    units: Mapping[str, str]  # of the size and of the parameters of the shape, by name
+    gain: float  # fall of chi-squared when it is fitted to all stops, beside immaterial companions
+    # what of it is that levels, or the one recording's own, are less far from expected
     by_levels: float
-    least: float
+    least: float  # the same fall without any one of the stops, the least
+    # (K,) rise of twice the log density of each stop, as the others predict it, when it is fitted
+    # alone
     held_out: Vector
-    phases: Vector
+    phases: Vector  # (K,) [rad] of an order-locked effect
 
     @property
     def like_levels(self) -> bool:

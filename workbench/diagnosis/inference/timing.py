@@ -22,19 +22,14 @@ _ROUNDED = 1e-6  # of chi-squared
 
 @dataclass(frozen=True)
 class LateSignals:
-    """Signals that are late against all others, by themselves.
+    """Signals that are late against all others, by themselves."""
 
-    Attributes
-    ----------
-    signals : those that are late together; or all that are late, by different times.
-    skew, sigma : by how much, and its standard deviation [s]; 0 where times differ.
-    skews : by how much each of them is late [s].
-    """
-
+    # those that are late together; or all that are late, by different times
     signals: tuple[str, ...]
+    # skew, sigma: by how much, and its standard deviation [s]; 0 where times differ
     skew: float
     sigma: float
-    skews: Mapping[str, float]
+    skews: Mapping[str, float]  # by how much each of them is late [s]
 
     def skew_of(self, signals: Sequence[str], recorded: Sequence[str]) -> float:
         """How late a clock of some of the recorded signals is [s]; 0 where others are late."""

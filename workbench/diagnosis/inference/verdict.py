@@ -120,19 +120,15 @@ class Gain:
 
     Root mean square of means over a lasting time, or over a block where a cause turns with a shaft,
     in units of the noise of such a mean.
-
-    Attributes
-    ----------
-    before, after : of the nominal and of the extended model, with levels calibrated alike.
-    low, high : 95 % interval of `after`, from drawing stops with replacement.
-    recordings : (before, after) by name.
     """
 
+    # before, after: of the nominal and of the extended model, with levels calibrated alike
     before: float
     after: float
+    # low, high: 95 % interval of `after`, from drawing stops with replacement
     low: float
     high: float
-    recordings: Mapping[str, tuple[float, float]]
+    recordings: Mapping[str, tuple[float, float]]  # (before, after) by name
 
 
 @dataclass(frozen=True)
@@ -152,49 +148,39 @@ class NearestCandidate:
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
-    """All that was found out.
+    """All that was found out."""
 
-    Attributes
-    ----------
-    verdict : see `Verdict`.
-    interrupted : whether the search was ended before its end, so that there may be more causes.
-    causes : that which alone explains most first, of equals the usual one; empty unless found, in
-        full or in part.
-    gain : None when nothing was extended.
-    partial : effects that explain a part; empty unless something remains unexplained.
-    nearest : candidates that come nearest where none is accepted, the nearest first.
-    noise_alone : whether causes leave no more than noise on held-out recordings; if not, what they
-        leave widens their intervals.
-    late : signals that are late by themselves, as the system file does not say of any logger, and
-        that explain clearly more; it is then unexplained.
-    base, best : the nominal model and the last one, fitted.
-    rivals : `best`, and fits that these data do not tell from it; empty without causes.
-    steps : how the causes were found.
-    scores : of the candidates about the nominal model, best first.
-    names, cosines : effects, and the similarity of their signatures in these data, (e, e).
-    not_visible : why these stops cannot show an effect, by its name.
-    hidden : by a nuisance parameter, effects that these data cannot tell from it.
-    shifted : nuisance parameters that are far from their sheet.
-    """
-
-    verdict: Verdict
+    verdict: Verdict  # see `Verdict`
+    # whether the search was ended before its end, so that there may be more causes
     interrupted: bool
+    # that which alone explains most first, of equals the usual one; empty unless found, in full or
+    # in part
     causes: tuple[Cause, ...]
-    gain: Gain | None
+    gain: Gain | None  # None when nothing was extended
+    # effects that explain a part; empty unless something remains unexplained
     partial: tuple[str, ...]
+    # candidates that come nearest where none is accepted, the nearest first
     nearest: tuple[NearestCandidate, ...]
+    # whether causes leave no more than noise on held-out recordings; if not, what they leave widens
+    # their intervals
     noise_alone: bool
+    # signals that are late by themselves, as the system file does not say of any logger, and that
+    # explain clearly more; it is then unexplained
     late: LateSignals | None
+    # base, best: the nominal model and the last one, fitted
     base: FittedModel
     best: FittedModel
+    # `best`, and fits that these data do not tell from it; empty without causes
     rivals: tuple[FittedModel, ...]
-    steps: tuple[Step, ...]
-    scores: tuple[CandidateScore, ...]
+    steps: tuple[Step, ...]  # how the causes were found
+    scores: tuple[CandidateScore, ...]  # of the candidates about the nominal model, best first
+    # names, cosines: effects, and the similarity of their signatures in these data, (e, e)
     names: tuple[str, ...]
     cosines: Matrix
-    not_visible: Mapping[str, str]
+    not_visible: Mapping[str, str]  # why these stops cannot show an effect, by its name
+    # by a nuisance parameter, effects that these data cannot tell from it
     hidden: Mapping[str, tuple[str, ...]]
-    shifted: tuple[ShiftedLevel, ...]
+    shifted: tuple[ShiftedLevel, ...]  # nuisance parameters that are far from their sheet
 
     def outdone(self, law: str) -> "Diagnosis":
         """The diagnosis where one free law explains as much as several causes with less.

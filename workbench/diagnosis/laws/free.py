@@ -54,18 +54,12 @@ class FreeFunction(Effect):
 
 @dataclass(frozen=True, eq=False)
 class FittedLaw:
-    """A law, fitted as a free function.
+    """A law, fitted as a free function."""
 
-    Attributes
-    ----------
-    prospect : about what is known.
-    evidence : log of the marginal likelihood over that of what is known.
-    coefficients, posterior : of the function, (K,) and their covariance, (K, K); of what turns,
-        cosine and sine of each recording.
-    """
-
-    prospect: LawScore
-    evidence: float
+    prospect: LawScore  # about what is known
+    evidence: float  # log of the marginal likelihood over that of what is known
+    # coefficients, posterior: of the function, (K,) and their covariance, (K, K); of what turns,
+    # cosine and sine of each recording
     coefficients: Vector
     posterior: Matrix
 

@@ -60,20 +60,16 @@ class Place:
 
 @dataclass(frozen=True)
 class LawInfluence:
-    """What a law may depend on.
+    """What a law may depend on."""
 
-    Attributes
-    ----------
-    kind : "value", "size" or "rate" of an input, "time", "since", the time for which an input has
-        been there, "work", the integral of the size of a power, or "turn", that of the size of an
-        input, or time, over and over again.
-    factors : inputs, and an output that is a coefficient, whose product it is.
-    span : [s] over which a rate is taken; time constant with which work is lost, 0 if it is kept;
-        period of what turns; size [unit] above which an input is there.
-    """
-
+    # "value", "size" or "rate" of an input, "time", "since", the time for which an input has been
+    # there, "work", the integral of the size of a power, or "turn", that of the size of an input,
+    # or time, over and over again
     kind: str
+    # inputs, and an output that is a coefficient, whose product it is
     factors: tuple[Quantity, ...] = ()
+    # [s] over which a rate is taken; time constant with which work is lost, 0 if it is kept; period
+    # of what turns; size [unit] above which an input is there
     span: float = 0.0
 
     @property

@@ -24,13 +24,9 @@ _JITTER = 1e-6  # of the covariance, so that it has an inverse
 
 @dataclass(frozen=True)
 class Knots:
-    """Where a function lives: constant beyond its ends.
+    """Where a function lives: constant beyond its ends."""
 
-    Attributes
-    ----------
-    low, high : ends.
-    """
-
+    # low, high: ends
     low: float
     high: float
 

@@ -186,19 +186,13 @@ def _predict(model, state, args):  # type: ignore[no-untyped-def]
 
 @dataclass(frozen=True)
 class Variation:
-    """A parameter that is varied.
+    """A parameter that is varied."""
 
-    Attributes
-    ----------
-    variables : of the FMU that take its value; of a state it is the start.
-    setting : other variables that are set while it is varied, such as the shape of an effect that
-        is absent otherwise.
-    size : a typical change; 0 where its value tells.
-    """
-
-    variables: tuple[str, ...]
+    variables: tuple[str, ...]  # of the FMU that take its value; of a state it is the start
+    # other variables that are set while it is varied, such as the shape of an effect that is absent
+    # otherwise
     setting: Mapping[str, float] = field(default_factory=dict)
-    size: float = 0.0
+    size: float = 0.0  # a typical change; 0 where its value tells
 
 
 class Predictor:

@@ -48,20 +48,14 @@ def delay(signal: str) -> str:
 
 @dataclass(frozen=True, eq=False)
 class WhitenedResiduals:
-    """One recording, linearised about a point.
+    """One recording, linearised about a point."""
 
-    Attributes
-    ----------
-    errors : (b, c) whitened prediction errors of the blocks, by channel.
-    rest : (q,) whitened errors of inputs at rest.
-    sizes : (2, c) root mean square and mean absolute error of single samples, in SI units; NaN of
-        a silent channel.
-    jacobian : (b*c + q, p) derivatives of [errors, rest] in SI units, by delays and columns.
-    """
-
-    errors: Matrix
-    rest: Vector
+    errors: Matrix  # (b, c) whitened prediction errors of the blocks, by channel
+    rest: Vector  # (q,) whitened errors of inputs at rest
+    # (2, c) root mean square and mean absolute error of single samples, in SI units; NaN of a
+    # silent channel
     sizes: Matrix
+    # (b*c + q, p) derivatives of [errors, rest] in SI units, by delays and columns
     jacobian: Matrix
 
     @property

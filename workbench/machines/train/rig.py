@@ -45,19 +45,9 @@ class AskedStop:
 
 
 class Train(NamedTuple):
-    """A train and its stop, as the equations read them, SI.
+    """A train and its stop, as the equations read them, SI."""
 
-    Attributes
-    ----------
-    friction, units, drag, radius, stiffness, share, inertia : (8,) of each axle.
-    target, begin, lag : (4,) pressure of each bogie, when it begins to rise, lag of its cylinders.
-    mass : (2,) of each vehicle.
-    resistance : (3,) A, B, C.
-    law : (6,) of the pads: speed, exponent, fade, glazing, film of water at the start, energy of a
-        disc that leaves 1/e of it [J].
-    polach : (4,) kA, kS, A, B.
-    """
-
+    # friction, units, drag, radius, stiffness, share, inertia: (8,) of each axle
     friction: Vector
     units: Vector
     drag: Vector
@@ -65,13 +55,16 @@ class Train(NamedTuple):
     stiffness: Vector
     share: Vector
     inertia: Vector
+    # target, begin, lag: (4,) pressure of each bogie, when it begins to rise, lag of its cylinders
     target: Vector
     begin: Vector
     lag: Vector
-    mass: Vector
-    resistance: Vector
+    mass: Vector  # (2,) of each vehicle
+    resistance: Vector  # (3,) A, B, C
+    # (6,) of the pads: speed, exponent, fade, glazing, film of water at the start, energy of a disc
+    # that leaves 1/e of it [J]
     law: Vector
-    polach: Vector
+    polach: Vector  # (4,) kA, kS, A, B
 
 
 class Way(NamedTuple):
@@ -102,29 +95,23 @@ class StopResult:
 
 
 class _State(NamedTuple):
-    """State of the equations.
+    """State of the equations."""
 
-    Attributes
-    ----------
-    omega, before : (8,) speeds of the axles, and when slide protection last looked [rad/s].
-    T, heat, rubbed : (8, 3) temperature of each disc [degrees C], torque of its pads [N.m], and
-        their work [J].
-    supply : (4,) pressure behind the relay valves [Pa].
-    cylinder, passed : (8,) pressure in the cylinders of an axle [Pa], and share of what its valve
-        passes on.
-    valve : (8,) of slide protection: 1 fills, 0 holds, -1 vents.
-    force, loads : (8,) creep force of an axle, load of one wheel [N].
-    """
-
+    # omega, before: (8,) speeds of the axles, and when slide protection last looked [rad/s]
     omega: Vector
     before: Vector
+    # T, heat, rubbed: (8, 3) temperature of each disc [degrees C], torque of its pads [N.m], and
+    # their work [J]
     T: Matrix
     heat: Matrix
     rubbed: Matrix
-    supply: Vector
+    supply: Vector  # (4,) pressure behind the relay valves [Pa]
+    # cylinder, passed: (8,) pressure in the cylinders of an axle [Pa], and share of what its valve
+    # passes on
     cylinder: Vector
     passed: Vector
-    valve: Vector
+    valve: Vector  # (8,) of slide protection: 1 fills, 0 holds, -1 vents
+    # force, loads: (8,) creep force of an axle, load of one wheel [N]
     force: Vector
     loads: Vector
 

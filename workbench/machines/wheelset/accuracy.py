@@ -220,19 +220,14 @@ class StopAccuracy:
 
 @dataclass(frozen=True)
 class Row:
-    """A quantity, and the stops of which the worst counts.
-
-    Attributes
-    ----------
-    quantity : field of Accuracy.
-    wet, slides : what must be so of a stop; None if either will do.
-    badness : of two values the one for which it is larger is worse.
-    """
+    """A quantity, and the stops of which the worst counts."""
 
     text: str
-    quantity: str
+    quantity: str  # field of Accuracy
+    # wet, slides: what must be so of a stop; None if either will do
     wet: bool | None = None
     slides: bool | None = None
+    # of two values the one for which it is larger is worse
     badness: Callable[[float], float] = float
 
     def concerns(self, stop: StopAccuracy) -> bool:

@@ -10,67 +10,48 @@ from workbench.arrays import Vector
 
 @dataclass(frozen=True, eq=False)
 class FileChannel:
-    """One channel of a file.
+    """One channel of a file."""
 
-    Attributes
-    ----------
-    name : as the recorder has it.
-    unit : as the file spells it; empty where it says none.
-    values : (n,) in that unit, NaN where the recorder has no number.
-    about : what the file says of it beside the name.
-    start : of time stamps, the time from which they count [s since 1970]; NaN: none is known.
-    stamp : whether values are times that were written as dates or times of day.
-    shown : of time stamps without a known date, what they show where they count from [s]; NaN: no
-        time of day.
-    zoned : whether `start` is in UTC; else in some local time.
-    corrections : how time stamps were made to go on, in words.
-    doubt : why time stamps cannot be read before somebody says how, in words; empty: they can.
-    censored : samples of which the file says only that they are below or above another value.
-    unread : a cell that looks like a number and is not read as one, and how many there are, in
-        words; empty: there is none.
-    texts : (n,) cells of time stamps, or of texts that nobody knows; empty for numbers.
-    """
-
-    name: str
-    unit: str
-    values: Vector
-    about: str = ""
+    name: str  # as the recorder has it
+    unit: str  # as the file spells it; empty where it says none
+    values: Vector  # (n,) in that unit, NaN where the recorder has no number
+    about: str = ""  # what the file says of it beside the name
+    # of time stamps, the time from which they count [s since 1970]; NaN: none is known
     start: float = math.nan
-    stamp: bool = False
+    stamp: bool = False  # whether values are times that were written as dates or times of day
+    # of time stamps without a known date, what they show where they count from [s]; NaN: no time of
+    # day
     shown: float = math.nan
-    zoned: bool = False
-    corrections: tuple[str, ...] = ()
+    zoned: bool = False  # whether `start` is in UTC; else in some local time
+    corrections: tuple[str, ...] = ()  # how time stamps were made to go on, in words
+    # why time stamps cannot be read before somebody says how, in words; empty: they can
     doubt: str = ""
+    # samples of which the file says only that they are below or above another value
     censored: tuple[int, ...] = ()
+    # a cell that looks like a number and is not read as one, and how many there are, in words;
+    # empty: there is none
     unread: str = ""
+    # (n,) cells of time stamps, or of texts that nobody knows; empty for numbers
     texts: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
 class Group:
-    """Channels that were sampled together.
+    """Channels that were sampled together."""
 
-    Attributes
-    ----------
-    name : of a sheet, a table or a group of the file; empty where it has one alone.
-    channels : (n,) samples each.
-    time : what the file itself says when its samples were taken, in s; None: one of the channels
-        may be the time.
-    step : time between two samples that the file states [s]; NaN: it states none.
-    step_doubt : why what the file states of it cannot be taken, in words; empty: nothing is.
-    left : texts beside the channels, which a user may say are times.
-    begun : when the recording began, as the file says beside its times [s since 1970]; NaN: it does
-        not say.
-    within : names of what holds it in the file, outermost first: a sheet, nested structures.
-    """
-
-    name: str
-    channels: tuple[FileChannel, ...]
+    name: str  # of a sheet, a table or a group of the file; empty where it has one alone
+    channels: tuple[FileChannel, ...]  # (n,) samples each
+    # what the file itself says when its samples were taken, in s; None: one of the channels may be
+    # the time
     time: FileChannel | None = None
-    step: float = math.nan
+    step: float = math.nan  # time between two samples that the file states [s]; NaN: it states none
+    # why what the file states of it cannot be taken, in words; empty: nothing is
     step_doubt: str = ""
+    # names of what holds it in the file, outermost first: a sheet, nested structures
     within: tuple[str, ...] = ()
-    left: tuple[FileChannel, ...] = ()
+    left: tuple[FileChannel, ...] = ()  # texts beside the channels, which a user may say are times
+    # when the recording began, as the file says beside its times [s since 1970]; NaN: it does not
+    # say
     begun: float = math.nan
 
     def renamed(self, name: str) -> "Group":

@@ -26,18 +26,14 @@ _GRID = 48  # settings, which two cores predict in a quarter of a minute
 
 @dataclass(frozen=True)
 class Profile:
-    """Demand on an input.
-
-    Attributes
-    ----------
-    levels : of a step or staircase, one after the other and again; of a sine its ends; of what is
-        released, before it is [unit].
-    period : [s] that a stair lasts, and the period of a sine; after it, a demand is released.
-    """
+    """Demand on an input."""
 
     input: VariedInput
     shape: str
+    # of a step or staircase, one after the other and again; of a sine its ends; of what is
+    # released, before it is [unit]
     levels: tuple[float, ...]
+    # [s] that a stair lasts, and the period of a sine; after it, a demand is released
     period: float
 
     def demand(self, time: Vector) -> Vector:

@@ -131,26 +131,20 @@ LIKELY = 0.5  # a chance that is more likely than not
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
-    """What one experiment would tell.
+    """What one experiment would tell."""
 
-    Attributes
-    ----------
-    candidate, case : the experiment, and a recording of it as the first rival predicts it.
-    pairwise : (r, r) chi-squared that the second rival leaves beyond the first where the first is
-        true, in all recordings with this one.
-    chance : (r, r) that a diagnosis then tells them apart.
-    precision : mean deviation of the sizes of the first rival, before and after.
-    block_time : (b,) [s].
-    left : (r, b, c) what each leaves of the first one's response, by block and channel, in units of
-        its noise.
-    """
-
+    # candidate, case: the experiment, and a recording of it as the first rival predicts it
     candidate: Experiment
     case: Case
+    # (r, r) chi-squared that the second rival leaves beyond the first where the first is true, in
+    # all recordings with this one
     pairwise: Matrix
-    chance: Matrix
+    chance: Matrix  # (r, r) that a diagnosis then tells them apart
+    # mean deviation of the sizes of the first rival, before and after
     precision: tuple[float, float]
-    block_time: Vector
+    block_time: Vector  # (b,) [s]
+    # (r, b, c) what each leaves of the first one's response, by block and channel, in units of its
+    # noise
     left: NDArray[np.float64]
 
     @cached_property

@@ -48,17 +48,12 @@ class Quantile:
 
 @dataclass(frozen=True, eq=False)
 class Tail:
-    """The lower tail of a distribution, from runs that know nothing of each other.
+    """The lower tail of a distribution, from runs that know nothing of each other."""
 
-    Attributes
-    ----------
-    runs : two or more.
-    addend : cumulative distribution of what is added to each sample, which nothing that was sampled
-        tells, (n,) of (n,); or None. It is not sampled, because chains that follow the bulk miss a
-        single variable with a heavy tail.
-    """
-
-    runs: tuple[Descent, ...]
+    runs: tuple[Descent, ...]  # two or more
+    # cumulative distribution of what is added to each sample, which nothing that was sampled tells,
+    # (n,) of (n,); or None. It is not sampled, because chains that follow the bulk miss a single
+    # variable with a heavy tail.
     addend: Callable[[Vector], Vector] | None = None
 
     def quantile(self, decade: int) -> Quantile:

@@ -82,13 +82,9 @@ def run_length(level: float, largest: float = LARGEST) -> float:
 
 @dataclass
 class Scatter:
-    """Variance of estimates about their own past, over the stated one, pooled over like quantities.
+    """Variance of estimates about their past, over the stated one, pooled over like quantities."""
 
-    Attributes
-    ----------
-    share : of a like quantity that is independent, where all are taken relative to each other.
-    """
-
+    # of a like quantity that is independent, where all are taken relative to each other
     share: float
     squares: float = 0.0
     freedom: float = 0.0

@@ -66,23 +66,18 @@ def predict_campaign(
 
 @dataclass(frozen=True)
 class EffectLimit:
-    """The least that recordings can show of one effect, whatever the diagnosis.
+    """The least that recordings can show of one effect, whatever the diagnosis."""
 
-    Attributes
-    ----------
-    effect, unit : of the library, or of the rig where the library lacks it; of its sizes, SI.
-    sigma : standard deviation of its size by the exact model, which knows that nothing else is
-        missing [unit]; None where recordings cannot show it.
-    found : size from which on it is significant with the chance `SURE` [unit]; None as `sigma`.
-    like : the effect whose signature is most like its own; empty as `sigma`.
-    told : size from which on it is told from that one as surely [unit]; None where none is.
-    """
-
+    # effect, unit: of the library, or of the rig where the library lacks it; of its sizes, SI
     effect: str
     unit: str
+    # standard deviation of its size by the exact model, which knows that nothing else is missing
+    # [unit]; None where recordings cannot show it
     sigma: float | None
+    # size from which on it is significant with the chance `SURE` [unit]; None as `sigma`
     found: float | None
-    like: str
+    like: str  # the effect whose signature is most like its own; empty as `sigma`
+    # size from which on it is told from that one as surely [unit]; None where none is
     told: float | None
 
 

@@ -20,24 +20,16 @@ Indices = NDArray[np.intp]
 
 
 class Blocks(NamedTuple):
-    """States and estimated quantities (the unknowns of a filter) by blocks, the shared ones last.
+    """States and estimated quantities (unknowns of a filter) by blocks, the shared ones last."""
 
-    Attributes
-    ----------
-    first : (N + 2,) where in `order` block i begins; the shared unknowns begin at first[N].
-    states : (N + 1,) how many of them are states, which come first.
-    order : (n + q,) number of an unknown among states and quantities.
-    rates : (N, k) value references of the rates of a block's states, then of the shared ones.
-    home : (l,) block of each output that is fed; N: it depends on shared unknowns alone.
-    place : (l,) where in `order` an output that is a state stands, -1: it is none.
-    """
-
+    # (N + 2,) where in `order` block i begins; the shared unknowns begin at first[N]
     first: Indices
-    states: Indices
-    order: Indices
+    states: Indices  # (N + 1,) how many of them are states, which come first
+    order: Indices  # (n + q,) number of an unknown among states and quantities
+    # (N, k) value references of the rates of a block's states, then of the shared ones
     rates: References
-    home: Indices
-    place: Indices
+    home: Indices  # (l,) block of each output that is fed; N: it depends on shared unknowns alone
+    place: Indices  # (l,) where in `order` an output that is a state stands, -1: it is none
 
 
 def blocks(fmu: FMU, system: System, layout: Layout) -> Blocks:

@@ -34,17 +34,12 @@ class _Use:
 
 @dataclass
 class Names:
-    """What a function does with its names.
+    """What a function does with its names."""
 
-    Attributes
-    ----------
-    assigned : how often each is given a value, as an argument too; loops' counters left out.
-    counters : of loops.
-    local : those that C can declare where they are first assigned.
-    """
-
+    # how often each is given a value, as an argument too; loops' counters left out
     assigned: Counter[str] = field(default_factory=Counter)
-    counters: set[str] = field(default_factory=set)
+    counters: set[str] = field(default_factory=set)  # of loops
+    # those that C can declare where they are first assigned
     local: set[str] = field(default_factory=set)
 
 
