@@ -22,7 +22,7 @@ from workbench.errors import InputError
 from workbench.models.compiler.expressions import BINARY, NO_EVENT, REWRITE, Arena, Value, each
 from workbench.models.modelica import Library, check, files, packages, read_library
 from workbench.models.modelica.classes import Class, Component, Modifier
-from workbench.models.modelica.source import EXPERIMENT
+from workbench.models.modelica.source import EXPERIMENT, KINDS
 from workbench.runtime.supervision import blaming, limited_memory, quiet_panics
 
 SCHEMA = 43
@@ -73,6 +73,7 @@ _REMEDIES = (
 )
 
 
+_DECLARED = re.compile(r"\b(package|end|extends|constrainedby)\s+[\w.]+")
 _CALLED = re.compile(r"([A-Za-z_][\w.]*)\s*\(")
 # The front end takes 15 s for so many turns of a function, and time grows by their square.
 _MOST_TURNS = 10_000
@@ -170,9 +171,11 @@ def flatten(package: Path, model: str) -> FlatModel:
         )
     library = read_library(package)
     reached = check(library, model)
+    source = library.find(model)
     _refuse_dropped(library, reached)
     _refuse_misread(library, reached)
-    source = library.find(model)
+    _refuse_shared_constants(library, reached)
+    _refuse_stale_constants(library, (source.name, *library.ancestors(source.name)))
     if source.partial or source.kind in ("package", "function", "type", "connector", "record"):
         raise InputError(
             where=source.where,
@@ -712,17 +715,100 @@ def _refuse_dropped(library: Library, reached: Iterable[str]) -> None:
 
     The redeclaration by a class that extends of what its base has from its own base; the value
     that is given together with attributes to what is inherited, or to a part of a part, as in
-    `extends Part(k(max=2.0)=1.0)`.
+    `extends Part(k(max=2.0)=1.0)`; modifiers of classes that are redeclared.
     """
+    held = [c for c in library.classes.values() if c.name.rpartition(".")[0] in reached]
+    aliases = {
+        c.name.rpartition(".")[2]: c
+        for c in held
+        if "replaceable" in c.prefixes
+        and not c.constraint
+        and any(base.modifier.inner for base in c.extends)
+    }
+    for element in [c for c in held if "redeclare" in c.prefixes]:
+        name = element.name.rpartition(".")[2]
+        if name in aliases:
+            raise _lost_modifiers(name, element.where, aliases[name].name)
     for name in reached:
         _refuse_redeclarations(library, name)
         for extends in library.classes[name].extends:
             _refuse_values(extends.modifier)
+            _refuse_lost_modifiers(extends.modifier, aliases)
         for component in library.classes[name].components:
+            _refuse_lost_modifiers(component.modifier, aliases)
             for modification in component.modifier.inner.values():
                 _refuse_values(_inside(modification))
             if "outer" in component.prefixes:
                 _refuse_outer(component)
+
+
+def _refuse_shared_constants(library: Library, reached: Iterable[str]) -> None:
+    """Refuse a package beside another one that extends it with other values of its constants.
+
+    The front end gives both the values of one.
+    """
+    own = set(map(str, files(library.file)))
+    texts = {
+        library.classes[name].where: _DECLARED.sub("", "\n".join(_own_lines(library.classes[name])))
+        for name in reached
+        if library.classes[name].where.rpartition(":")[0] in own
+    }
+
+    def named(package: str) -> str:
+        short = re.compile(rf"\b{package.rpartition('.')[2]}\b(?!\s*\()")
+        return next((where for where, text in texts.items() if short.search(text)), "")
+
+    for package in [c for c in library.classes.values() if c.kind == "package"]:
+        for base, dotted in zip(package.extends, library.bases(package.name), strict=True):
+            given = library.components(dotted) if dotted in library.classes else {}
+            valued = [n for n in base.modifier.inner if n in given and given[n].modifier.value]
+            if valued and named(package.name) and (where := named(dotted)):
+                raise InputError(
+                    where=where,
+                    found=f"package {dotted} beside {package.name}, which changes its constant "
+                    f"'{valued[0]}'",
+                    expected="packages of which none changes what another one has",
+                    remedy=f"declare '{valued[0]}' without a value in a partial package, and "
+                    "extend that with each value",
+                )
+
+
+def _refuse_stale_constants(library: Library, lineage: Sequence[str]) -> None:
+    """Refuse functions of a package that a model, or what it extends, redeclares with constants.
+
+    The front end computes them with the values of the package before it. That of a component is
+    taken as it is meant.
+    """
+    for name in lineage:
+        if name not in library.classes:
+            continue
+        inner = [m for base in library.classes[name].extends for m in base.modifier.inner.values()]
+        redeclared = [(m.redeclared.type, name, m.where) for m in inner if m.redeclared]
+        redeclared += [
+            (base.name, name, cls.where)
+            for cls in library.classes.values()
+            if cls.name.rpartition(".")[0] == name and "redeclare" in cls.prefixes
+            for base in cls.extends
+        ]
+        for type_name, scope, where in redeclared:
+            package = library.resolve(type_name, scope)
+            around = (package, *library.ancestors(package)) if package in library.classes else ()
+            known = [library.classes[cls] for cls in around if cls in library.classes]
+            changed = any(base.modifier.inner for cls in known for base in cls.extends)
+            functions = [
+                cls.name
+                for cls in library.classes.values()
+                if cls.kind == "function" and cls.name.rpartition(".")[0] in around
+            ]
+            if changed and functions:
+                raise InputError(
+                    where=where,
+                    found=f"package {package}, which {name} redeclares, with function "
+                    f"{functions[0]} and constants that it changes",
+                    expected="the package at a component, as the Modelica front end takes it then",
+                    remedy=f"declare a component of the class that has it, such as "
+                    f"'Part part(redeclare package Medium = {type_name})'",
+                )
 
 
 def _refuse_misread(library: Library, reached: Iterable[str]) -> None:
@@ -812,7 +898,17 @@ def _refuse_long_loops(text: str, file: str, line: int) -> None:
 
 
 def _refuse_outer(component: Component) -> None:
-    """Refuse an outer variable: the front end misses the equation that ties it to the inner one."""
+    """Refuse an outer variable: the front end misses the equation that ties it to the inner one.
+
+    It takes what is outer and inner at once for a new one.
+    """
+    if "inner" in component.prefixes:
+        raise InputError(
+            where=component.where,
+            found=f"'inner outer {component.name}'",
+            expected="an outer or an inner component, as the Modelica front end needs",
+            remedy=f"declare '{component.name}' outer; what is within finds the same inner one",
+        )
     if component.type in ("Real", "Integer", "Boolean") and not component.prefixes & {
         "parameter",
         "constant",
@@ -853,6 +949,32 @@ def _refuse_values(modifier: Modifier) -> None:
                 remedy=f"give '{name}' its value alone, or its attributes in a class of its own",
             )
         _refuse_values(_inside(given))
+
+
+def _refuse_lost_modifiers(modifier: Modifier, aliases: Mapping[str, Class]) -> None:
+    """Refuse modifiers of a class that is redeclared, and of the one that stood in its place.
+
+    Parameters
+    ----------
+    aliases : replaceable classes with modifiers, which hold for what comes in their place, too
+        (spec 7.3.2), by their own names.
+    """
+    for name, given in modifier.inner.items():
+        new = given.redeclared
+        if new is not None and new.prefixes & KINDS:
+            own = new.modifier.inner if "function" not in new.prefixes else {}
+            if own or name in aliases:
+                raise _lost_modifiers(name, new.where, new.type if own else aliases[name].name)
+        _refuse_lost_modifiers(_inside(given), aliases)
+
+
+def _lost_modifiers(name: str, where: str, of: str) -> InputError:
+    return InputError(
+        where=where,
+        found=f"a redeclaration of class '{name}', with modifiers of {of}",
+        expected="classes without modifiers, as the Modelica front end drops them here",
+        remedy=f"declare {of} with its modifiers as a class of another name, and put that there",
+    )
 
 
 def _inside(modifier: Modifier) -> Modifier:
