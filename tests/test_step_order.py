@@ -1,6 +1,7 @@
 """The step of estimators: of its order, damped as it must be, as accurate as sensors need."""
 
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -80,12 +81,27 @@ def test_a_linear_model_takes_a_step_of_order_three_that_forgets_what_is_stiff()
     assert max(abs(R(1j * y)) for y in np.linspace(0.0, 1e3, 20001)) <= 1.0 + 1e-12
 
 
-def test_a_swing_does_not_fade_without_feedback(spring, fmu):
-    kind = estimators_of(spring)["open_loop"]
-    run = replay(recorded(spring, 0.0), kind(fmu, spring, kind.default_gains(fmu, spring)))
+@pytest.mark.parametrize("off", [0.0, 3.0])
+def test_a_swing_does_not_fade_without_feedback(off, spring, fmu):
+    """Where what is measured is far off, too, as by the zero of a sensor from the second sample."""
+    kind, case = estimators_of(spring)["open_loop"], recorded(spring, 0.0)
+    case = replace(case, signals={**case.signals, "s": case["s"] + off * (case.time > 0.0)})
+    run = replay(case, kind(fmu, spring, kind.default_gains(fmu, spring)))
     # 1e-4 of the range after 20 s, what is asked of an integrator with a tolerance of 1e-8.
     places = swing()[2]
     assert_allclose(run.signal("s"), places, rtol=0.0, atol=1e-4 * np.ptp(places))
+
+
+def test_an_output_is_read_at_the_inputs_of_its_sample(spring, fmu):
+    """An evaluation within a step is at inputs between."""
+    straight = replace(spring, inputs=(replace(spring.inputs[0], held=False),), reported={"R": "N"})
+    kind, time = estimators_of(spring)["open_loop"], H * np.arange(400)
+    force = np.sin(7.0 * time)
+    estimator = kind(fmu, straight, kind.default_gains(fmu, straight))
+    values = np.asarray(estimator.run(time, force[:, None], np.full((400, 1), np.nan)).values)
+    assert estimator.steps[0].accurate[0] == 1.0
+    place, acts = (values[:, list(straight.columns).index(name)] for name in ("s", "R"))
+    assert_allclose(acts, force - 10.0 * (place - 1.0), rtol=0.0, atol=1e-12)
 
 
 def test_a_step_of_a_linear_model_ends_at_the_rate_that_the_next_one_begins_with(spring, fmu):

@@ -5,9 +5,10 @@ package Swing "Motions of known course"
     input Real dm(unit="kg");
     output Real s(unit="m", start=1.0, fixed=true);
     output Real v(unit="m/s", start=0.0, fixed=true);
+    output Real R(unit="N") = F - 10.0*(s - 1.0) "What acts on it";
   equation
     der(s) = v;
-    (m + dm)*der(v) = F - 10.0*(s - 1.0);
+    (m + dm)*der(v) = R;
   end Spring;
   model Relaxation "Van der Pol"
     parameter Real mu(unit="1") = 1000.0;
