@@ -1,8 +1,9 @@
-/* FMI 3.0 Model Exchange whose variables are arrays: der(x[i]) = -k[i] x[i], y = x. */
+/* FMI 3.0 whose variables are arrays: der(x[i]) = u[i] - k[i] x[i], y = x. */
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include "fmi3FunctionTypes.h"
-enum { X, DX, K, Y, ARRAYS };
+enum { X, DX, K, Y, U, ARRAYS };
 typedef double Model[ARRAYS][2];
 static void reset(void *m) {
     const double first[2] = {1.0, 2.0};
@@ -10,7 +11,7 @@ static void reset(void *m) {
     memcpy(((double(*)[2])m)[X], first, sizeof first), memcpy(((double(*)[2])m)[K], first, sizeof first);
 }
 static void calculate(double (*m)[2]) {
-    for (int i = 0; i < 2; i++) m[DX][i] = -m[K][i] * m[X][i], m[Y][i] = m[X][i];
+    for (int i = 0; i < 2; i++) m[DX][i] = m[U][i] - m[K][i] * m[X][i], m[Y][i] = m[X][i];
 }
 const char *fmi3GetVersion(void) { return "3.0"; }
 fmi3Instance fmi3InstantiateModelExchange(fmi3String a, fmi3String b, fmi3String c, fmi3Boolean d, fmi3Boolean e, fmi3InstanceEnvironment f, fmi3LogMessageCallback g) {
@@ -18,6 +19,20 @@ fmi3Instance fmi3InstantiateModelExchange(fmi3String a, fmi3String b, fmi3String
     reset(m);
     return m;
 }
+fmi3Instance fmi3InstantiateCoSimulation(fmi3String a, fmi3String b, fmi3String c, fmi3Boolean d, fmi3Boolean e, fmi3Boolean f, fmi3Boolean g, const fmi3ValueReference h[], size_t n, fmi3InstanceEnvironment i, fmi3LogMessageCallback j, fmi3IntermediateUpdateCallback k) { return fmi3InstantiateModelExchange(a, b, c, d, e, i, j); }
+#ifndef SHARE /* of a step that it takes, without a word */
+#define SHARE 1.0
+#endif
+fmi3Status fmi3DoStep(fmi3Instance m, fmi3Float64 t, fmi3Float64 h, fmi3Boolean a, fmi3Boolean *b, fmi3Boolean *c, fmi3Boolean *d, fmi3Float64 *last) {
+    double(*r)[2] = m;
+    for (int i = 0; i < 2; i++) r[X][i] = r[U][i] / r[K][i] + (r[X][i] - r[U][i] / r[K][i]) * exp(-r[K][i] * SHARE * h);
+    *b = *c = *d = fmi3False, *last = t + SHARE * h;
+    return fmi3OK;
+}
+#ifndef INDICATORS /* more than the model structure has */
+#define INDICATORS 0
+#endif
+fmi3Status fmi3GetNumberOfEventIndicators(fmi3Instance m, size_t *n) { *n = INDICATORS; return fmi3OK; }
 void fmi3FreeInstance(fmi3Instance m) { free(m); }
 fmi3Status fmi3Reset(fmi3Instance m) { reset(m); return fmi3OK; }
 fmi3Status fmi3EnterInitializationMode(fmi3Instance m, fmi3Boolean a, fmi3Float64 b, fmi3Float64 c, fmi3Boolean d, fmi3Float64 e) { return fmi3OK; }

@@ -2,6 +2,9 @@
 #include <stdlib.h>
 #include <string.h>
 #include "fmi2FunctionTypes.h"
+#ifndef SAYS /* whether it says that states have changed */
+#define SAYS fmi2True
+#endif
 enum { H, DH, V, DV, G, DG, E, SIZE };
 typedef struct { double r[SIZE]; } Ball;
 static void reset(Ball *m) {
@@ -26,7 +29,7 @@ OK(fmi2EnterContinuousTimeMode, fmi2Component c) OK(fmi2SetTime, fmi2Component c
 fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *e) {
     double *r = ((Ball *)c)->r;
     memset(e, 0, sizeof *e);
-    if (r[H] <= 0.0 && r[V] < 0.0) r[H] = 0.0, r[V] *= -r[E], e->valuesOfContinuousStatesChanged = fmi2True;
+    if (r[H] <= 0.0 && r[V] < 0.0) r[H] = 0.0, r[V] *= -r[E], e->valuesOfContinuousStatesChanged = SAYS;
     return fmi2OK;
 }
 fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean n, fmi2Boolean *event, fmi2Boolean *end) { *event = *end = fmi2False; return fmi2OK; }

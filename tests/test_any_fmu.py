@@ -17,6 +17,9 @@ import pytest
 
 import workbench as wb
 from workbench.__main__ import main
+from workbench.diagnosis.data.motion import ModelSource
+from workbench.diagnosis.effects.candidates import candidates
+from workbench.diagnosis.simulation.residual_model import ResidualModel
 from workbench.errors import FMUError, InputError
 from workbench.models.added import CONSTANT, RateTerm, write_extended
 from workbench.models.fmu import FMU, CoSimulation, EventError
@@ -323,6 +326,8 @@ def test_a_boolean_input_that_starts_as_a_word_is_0_and_1(build):
     begun = exact(1500.0, 30.0)
     more = exact(1500.0, 10.0, begun) + 2000.0 * (1.0 - np.exp(-10.0 / 2000.0))
     assert heated[[3, 4]] == pytest.approx([begun, more], abs=0.01)
+    with open_model(system) as fmu:  # it cannot read a little more than 1, which a diagnosis tried
+        assert {e.sensor for e in candidates(fmu, system) if e.sensor} == {"Ta", "T"}
 
 
 def test_derivatives_stop_at_limits_and_say_where_steps_disagree(build):
@@ -356,6 +361,12 @@ def test_the_open_loop_agrees_with_fmpy_through_events(build, capsys):
     assert rows[0].startswith("| FMU | FMI | largest difference | verdict |")
     assert re.match(r"\| Room.fmu \| 2.0 \| \d.\de-0[678] of `[TP]` \| right \|", rows[2])
     assert "| refused: none.fmu: found no such file" in rows[3]
+
+
+@pytest.mark.parametrize("limit", [291.10, 291.11, 291.12])
+def test_the_open_loop_sees_rates_that_switch_without_an_indicator(limit, build):
+    """At another share of a step each; a switch after the last evaluation was passed over."""
+    assert compare_with_fmpy(build("RELAYS", flags=[f"-DBENDS={limit}"])).verdict == RIGHT
 
 
 @pytest.mark.parametrize("name", ["ekf", "ukf", "mhe"])
@@ -425,6 +436,46 @@ def test_kalman_filters_go_through_impacts_that_reverse_a_speed(name, tmp_path, 
         assert not law.doubt
     assert square == pytest.approx(1.0, abs=5.0 * np.sqrt(2.0 / 1592.0))
     assert (inside > 0.93).all()
+
+
+def test_states_that_change_at_an_event_without_a_word_are_read(tmp_path, compiled):
+    """Some tools do not raise valuesOfContinuousStatesChanged: a ball fell through the ground."""
+    time = 0.01 * np.arange(100.0)
+    with FMU(bouncing(tmp_path, compiled("ball.c", "-DSAYS=fmi2False"))) as fmu:
+        simulated = Simulation(fmu, [], ["h"], []).run(Drive(time, np.zeros((100, 0))), {})
+    assert simulated[:, 0] == pytest.approx(fall(time, 9.81)[0], abs=1e-6)
+
+
+def test_states_that_change_without_an_event_are_refused(build):
+    """At the end of a step, where an integrator goes on with its own."""
+    with FMU(build("RELAYS", flags=["-DMOVES"])) as fmu:
+        with pytest.raises(FMUError, match=r"changes 'T' at the end of a step without an event"):
+            run(fmu, "open_loop", 900.0)
+        law, warm = estimator(fmu, "ekf"), np.full((9, 1), 296.0)
+        with pytest.raises(EventError, match="an event of the model"):
+            law.run(10.0 * np.arange(9.0), warm - 16.0, warm)
+
+
+def test_outputs_that_follow_at_the_end_of_a_step_alone_are_refused(build):
+    """They were those of the sample before."""
+    shown = VARIABLES.replace('variability="discrete"><Real/>', "><Real/>")
+    path = build("TIMETABLE", variables=shown, flags=["-DLATE"])
+    with pytest.raises(FMUError, match=r"' is .* once a step was said to be over"):
+        FMU(path)
+
+
+def test_inputs_of_whole_numbers_act_in_whole_simulations(build):
+    """Without discrete variables too: compiled steps passed over 1 K/s from 20 s to 40 s."""
+    command = VARIABLES.replace(
+        'name="flag" valueReference="1" causality="parameter" variability="fixed"',
+        'name="flag" valueReference="1" causality="input"',
+    ).replace('variability="discrete"><Real/>', "><Real/>")
+    time = 10.0 * np.arange(7.0)
+    u = np.column_stack([np.full(7, 280.0), (time >= 20.0) & (time < 40.0)])
+    with FMU(build("RELAYS", variables=command)) as fmu:
+        simulated = Simulation(fmu, ["Ta", "flag"], ["T"], [0.0, 0.0]).run(Drive(time, u), {})
+    heated = exact(1500.0 + 1e5, 20.0, begin=exact(1500.0, 20.0))
+    assert simulated[4, 0] == pytest.approx(heated, abs=1e-4)
 
 
 @pytest.mark.parametrize("saves", [True, False])
@@ -914,35 +965,81 @@ def test_what_co_simulation_alone_cannot_do_is_said_with_what_would_make_it_poss
             fmu.state_jacobian()
 
 
-def test_the_open_loop_reads_and_sets_elements_of_arrays(tmp_path):
-    """der(x[i]) = -k[i] x[i]: the second element with k[2] = 3 instead of 2."""
-    headers = Path(fmpy.__file__).parent / "c-code"
-    source = Path(__file__).with_name("arrays.c").read_text()
-    types = (headers / "fmi3FunctionTypes.h").read_text()
-    # FMPy looks for all functions of FMI.
-    others = sorted(
-        set(re.findall(r"(fmi3\w+)TYPE\b", types)) - set(re.findall(r"fmi3\w+", source))
-    )
-    source += "".join(f"int {name}(void) {{ return 3; }}\n" for name in others)
-    (tmp_path / "model.c").write_text(source)
-    library = tmp_path / f"Arrays{fmpy.sharedLibraryExtension}"
-    flags = ["-shared", "-fPIC", "-w", "-I", headers]
-    subprocess.run([str(COMPILER), *flags, tmp_path / "model.c", "-o", library], check=True)
-    with zipfile.ZipFile(tmp_path / "Arrays.fmu", "w") as archive:
-        archive.writestr("modelDescription.xml", machine_file("arrays_fmu/modelDescription.xml"))
-        archive.write(library, f"binaries/{fmpy.platform_tuple}/{library.name}")
-    (tmp_path / "system.toml").write_text(
-        'title = "Arrays"\nsample_time = "0.5 s"\nmodels.observer = { fmu = "Arrays.fmu" }\n'
-        'outputs."y[2]" = { unit = "1", noise = 0.1, scale = 1.0 }\n'
-        '[parameters]\n"k[2]" = 3.0\n'
-    )
-    assert compare_with_fmpy(tmp_path / "Arrays.fmu").verdict == RIGHT
-    system = load_system(tmp_path)
-    time, nothing = np.linspace(0.0, 2.0, 5), np.zeros((5, 0))
+@pytest.fixture
+def arrays(tmp_path) -> Callable[..., Path]:
+    """Builds the arrays for an interface of FMI 3.0, with their system file; returns the FMU."""
+
+    def make(interface: str = "ModelExchange", *flags: str) -> Path:
+        headers = Path(fmpy.__file__).parent / "c-code"
+        source = Path(__file__).with_name("arrays.c").read_text()
+        types = (headers / "fmi3FunctionTypes.h").read_text()
+        # FMPy looks for all functions of FMI.
+        others = sorted(
+            set(re.findall(r"(fmi3\w+)TYPE\b", types)) - set(re.findall(r"fmi3\w+", source))
+        )
+        source += "".join(f"int {name}(void) {{ return 3; }}\n" for name in others)
+        (tmp_path / "model.c").write_text(source)
+        library = tmp_path / f"Arrays{fmpy.sharedLibraryExtension}"
+        given = ["-shared", "-fPIC", "-w", "-I", headers, *flags, tmp_path / "model.c", "-o"]
+        subprocess.run([str(COMPILER), *given, library, "-lm"], check=True)
+        description = machine_file("arrays_fmu/modelDescription.xml")
+        with zipfile.ZipFile(tmp_path / "Arrays.fmu", "w") as archive:
+            described = description.replace("ModelExchange", interface)
+            archive.writestr("modelDescription.xml", described)
+            archive.write(library, f"binaries/{fmpy.platform_tuple}/{library.name}")
+        (tmp_path / "system.toml").write_text(
+            'title = "Arrays"\nsample_time = "0.05 s"\nmodels.observer = { fmu = "Arrays.fmu" }\n'
+            'inputs."u[2]" = { unit = "1", noise = 0.0, scale = 1.0, held = true }\n'
+            'outputs."y[2]" = { unit = "1", noise = 0.001, scale = 1.0 }\n'
+            '[parameters]\n"k[2]" = 3.0\n'
+        )
+        return tmp_path / "Arrays.fmu"
+
+    return make
+
+
+def test_the_open_loop_and_a_diagnosis_read_and_set_elements_of_arrays(arrays):
+    """der(x[i]) = u[i] - k[i] x[i]: the second element with k[2] = 3 instead of 2, u[2] = 6.
+
+    A diagnosis began with states of zero.
+    """
+    path = arrays()
+    assert compare_with_fmpy(path).verdict == RIGHT
+    system = load_system(path.parent)
+    time = 0.05 * np.arange(301.0)
+    u = 6.0 * (time >= 1.0)[:, None]
+    exact = np.where(time < 1.0, 2.0 * np.exp(-3.0 * time), 0.0)
+    after = time >= 1.0
+    exact[after] = 2.0 + (2.0 * np.exp(-3.0) - 2.0) * np.exp(-3.0 * (time[after] - 1.0))
     with open_model(system) as fmu:
         kinds = estimators_of(system)
         loop = kinds["open_loop"](fmu, system, usual_gains(kinds["open_loop"], fmu, system))
-        values = np.asarray(loop.run(time, nothing, np.full((5, 1), np.nan)).values)[:, 0]
+        values = np.asarray(loop.run(time, u, np.full((301, 1), np.nan)).values)[:, 0]
         with pytest.raises(InputError, match=r"an element of .x.|Float64"):
             kinds["ukf"](fmu, system, usual_gains(kinds["ukf"], fmu, system))
-    np.testing.assert_allclose(values, 2.0 * np.exp(-3.0 * time), atol=1e-6)
+    np.testing.assert_allclose(values, exact, atol=1e-6)
+    noise = 0.001 * np.random.default_rng(1).standard_normal(301)
+    columns = {"time [s]": time, "u[2] [1]": u[:, 0], "y[2] [1]": exact + noise}
+    case = wb.case_from_frame(system, pd.DataFrame(columns))
+    assert wb.diagnose(system, [case], workers=1).diagnosis.verdict == "nothing"
+    with ResidualModel(ModelSource(path, system, {}, free=True), [case]) as simulations:
+        assert simulations.nominal["x[2]"] == 2.0
+
+
+@pytest.mark.parametrize(
+    ("interface", "flag", "said"),
+    [
+        ("ModelExchange", "-DINDICATORS=1", "EventIndicators says 1, and the model structure"),
+        ("CoSimulation", "-DSHARE=0.5", "ends the step at 0.25 s, where it was told that steps"),
+        ("CoSimulation", "-DSHARE=1.0", ""),
+    ],
+)
+def test_what_an_fmu_does_otherwise_than_it_says_is_refused(interface, flag, said, arrays):
+    """More events than it describes, which were passed over; half of each step."""
+    path = arrays(interface, flag)
+    fmu_class = FMU if interface == "ModelExchange" else CoSimulation
+    drive = Drive(0.5 * np.arange(3.0), np.zeros((3, 0)))
+    with pytest.raises(FMUError, match=said) if said else nullcontext():  # noqa: SIM117
+        with fmu_class(path) as fmu:
+            values = Simulation(fmu, [], ["y[2]"], []).run(drive, {})
+            np.testing.assert_allclose(values[:, 0], 2.0 * np.exp(-2.0 * drive.time))

@@ -212,7 +212,7 @@ def given_values(everything: Path, system: System) -> dict[str, float]:
         return {
             name: value
             for name, value in diagnosed.defaults.items()
-            if name in extended.parameters and value != extended.defaults[name]
+            if name in extended.parameters and value != extended.defaults.get(name)
         }
 
 

@@ -69,6 +69,11 @@ class Variable:
         """Whether its type is of numbers, of which a Boolean has two."""
         return self.type not in _NO_NUMBERS
 
+    @property
+    def floats(self) -> bool:
+        """Whether its type is of numbers that need not be whole."""
+        return self.type in _FLOATS
+
 
 @dataclass(frozen=True)
 class Description:

@@ -124,9 +124,7 @@ class EventUpdate(NamedTuple):
     """What an FMU says after an event."""
 
     time: float  # of the next time event [s], infinite where there is none
-    # states_changed, nominals_changed: of the continuous states
-    states_changed: bool
-    nominals_changed: bool
+    nominals_changed: bool  # of the continuous states, whose values may change at any event
 
 
 def _weakly(method: Callable[..., None]) -> Callable[..., None]:
@@ -353,17 +351,16 @@ class FMUInstance:
         update = (
             instance.newDiscreteStates if self.version == "2.0" else instance.updateDiscreteStates
         )
-        nominals_changed = states_changed = False
+        nominals_changed = False
         for _ in range(_MOST_ITERATIONS):
-            needed, end, nominals, states, defined, time = update()
+            needed, end, nominals, _, defined, time = update()
             nominals_changed |= bool(nominals)
-            states_changed |= bool(states)
             if end:
                 raise self.end_error()
             if not needed:
                 instance.enterContinuousTimeMode()
                 next_time = float(time) if defined else math.inf
-                return EventUpdate(next_time, states_changed, nominals_changed)
+                return EventUpdate(next_time, nominals_changed)
         raise FMUError(
             f"{self._description.path.name}: its discrete states are not stable after "
             f"{_MOST_ITERATIONS} iterations"
@@ -870,8 +867,25 @@ class FMU:
         return update
 
     def complete_step(self) -> bool:
-        """Say that a step of integration is over; returns whether a step event is due."""
-        return self.needs_completed_steps and self._loaded.complete_step()
+        """Say that a step of integration is over; returns whether a step event is due.
+
+        Raises
+        ------
+        FMUError
+            If the FMU asks to end, or moves its states without an event.
+        """
+        if not self.needs_completed_steps:
+            return False
+        before = self.get_states()
+        event = self._loaded.complete_step()
+        moved = np.flatnonzero(self.get_states() != before)
+        if moved.size and not event:
+            raise FMUError(
+                f"{self.path.name}: it changes '{self.states[moved[0]]}' at the end of a step "
+                f"without an event, by {self.time[0]:.9g} s of its time, which no integrator can "
+                "follow. Export it with an event there (enterEventMode)"
+            )
+        return event
 
     def nominals(self) -> Vector:
         """Typical sizes of the states at the present point, (n,)."""
@@ -1038,6 +1052,10 @@ class CoSimulation(FMU):
         super().start(states, parameters)
         self._t, self._length = self.start_time, 0.0
 
+    @cached_property
+    def _typed_states(self) -> TypedVariables:
+        return self.typed(self.states)
+
     def check_event(self) -> None:
         """Nothing: a Co-Simulation treats its events itself."""
 
@@ -1077,23 +1095,31 @@ class CoSimulation(FMU):
             self._length = self._length or length
         tail: tuple[object, ...] = ()
         event, end, early = (ctypes.c_bool() for _ in range(3))
+        reached = ctypes.c_double()
         if self.version == "3.0":
-            reached = ctypes.c_double()
             tail = tuple(ctypes.byref(value) for value in (event, end, early, reached))
         begin = self._t
         for part in range(parts):
             t, span = ctypes.c_double(begin + part * h / parts), ctypes.c_double(h / parts)
+            reached.value = t.value + span.value
             # The zero: the state may be rolled back to before this point.
             try:
                 self._loaded.call("do_step", t, span, ctypes.c_int(0), *tail)
-                if end.value or early.value:
+                if end.value:
                     raise self._loaded.end_error()
+                short = begin + (part + 1) * h / parts - reached.value
+                if early.value or event.value or abs(short) > _SAME_STEP * span.value:
+                    raise FMUError(
+                        f"{self.path.name}: it ends the step at {reached.value:.9g} s"
+                        f"{' and asks for Event Mode' * event.value}, where it was told that "
+                        "steps are whole and without events (earlyReturnAllowed, eventModeUsed)"
+                    )
             except FMUError as error:
                 raise FMUError(
                     f"{error}; in its step of {span.value:.9g} s from {t.value:.9g} s of its time"
                 ) from None
         self._t = begin + h
-        return self.get(self._state_variables).copy()
+        return self.get_typed(self._typed_states)
 
 
 def open_fmu(

@@ -137,9 +137,10 @@ class HybridSimulation:
 
     @cached_property
     def _jump_matters(self) -> bool:
-        """Whether a jump of an input may be an event: indicators or discrete variables follow."""
-        variables = self._fmu.description.variables
-        return bool(self._signs.size) or any(v.variability == "discrete" for v in variables)
+        """Whether a jump of an input may be an event, or compiled steps cannot set it."""
+        if self._signs.size or self._inputs.others:
+            return True
+        return any(v.variability == "discrete" for v in self._fmu.description.variables)
 
     def keep(self) -> None:
         """Keep the present point, to which `start_from` goes back; the FMU must save its state."""
@@ -315,8 +316,7 @@ class HybridSimulation:
             update = self._fmu.handle_event(self._inputs, u)
         except FMUError as error:
             raise FMUError(f"{error}; at {self._t:.9g} s of its time") from None
-        if update.states_changed:
-            self._x = self._fmu.get_states()
+        self._x = self._fmu.get_states()  # some tools change them, and do not say so
         if update.nominals_changed:
             self._nominal = self._fmu.nominals()
         self._signs = np.sign(self._fmu.event_indicators())

@@ -63,10 +63,12 @@ class Instance(NamedTuple):
     """One FMU instance, its functions and the buffers they read and write."""
 
     address: int  # of the FMU instance
-    # set_states, derivatives, set_real, get_real, directional, set_time: addresses of the FMU's
-    # functions; get_indicators, too, and complete_step, 0 where the FMU does not need it. FMI 2.0
-    # takes no length of values in set_real and get_real; the register it would be in is not read.
+    # set_states, get_states, derivatives, set_real, get_real, directional, set_time: addresses of
+    # the FMU's functions; get_indicators, too, and complete_step, 0 where the FMU does not need it.
+    # FMI 2.0 takes no length of values in set_real and get_real; the register it would be in is not
+    # read.
     set_states: int
+    get_states: int
     derivatives: int
     set_real: int
     get_real: int
@@ -84,6 +86,7 @@ class Instance(NamedTuple):
     warned: NDArray[np.int64]  # (1,) calls that the FMU answered with a warning
     # (2,) whether the step ends at an event, and whether the FMU asks to end
     ended: NDArray[np.int32]
+    kept: Matrix  # (2, n) states before and after the end of a step
     # x, dx: (n,) states and their derivatives
     x: Vector
     dx: Vector
@@ -133,6 +136,7 @@ def instance(
     return Instance(
         address=fmu.instance_address,
         set_states=fmu.function_address("set_states"),
+        get_states=fmu.function_address("get_states"),
         derivatives=fmu.function_address("derivatives"),
         set_real=fmu.function_address("set"),
         get_real=fmu.function_address("get"),
@@ -148,6 +152,7 @@ def instance(
         next_event=fmu.next_event,
         warned=fmu.warned,
         ended=np.zeros(2, np.int32),
+        kept=np.zeros((2, n)),
         x=np.zeros(n),
         dx=np.zeros(n),
         u=np.zeros(m + q),
@@ -286,14 +291,25 @@ def check_state_events(model):  # type: ignore[no-untyped-def]
 
 @inlined
 def end_step(model):  # type: ignore[no-untyped-def]
-    """Tell the FMU that a step is over; EVENT if it says that a step event is due."""
+    """Tell the FMU that a step is over; EVENT if it says that a step event is due.
+
+    Also if it moves its states, which it may at an event alone.
+    """
     if model.complete_step != 0:
+        n, before, after = model.x.size, model.kept[0], model.kept[1]
         # The zero: states may be set back to before this point. FMI 3.0 writes one byte of each.
         words = model.address, 0, model.ended, model.ended[1:]
-        if _call(model, model.complete_step, words):
+        status = _call(model, model.get_states, (model.address, before, n)) if n else OK
+        status = status or _call(model, model.complete_step, words)
+        if status == OK and n:
+            status = _call(model, model.get_states, (model.address, after, n))
+        if status != OK:
             return REFUSED
         if model.ended[0] != 0 or model.ended[1] != 0:
             return EVENT
+        for i in range(n):
+            if after[i] != before[i]:
+                return EVENT
     return OK
 
 

@@ -25,6 +25,7 @@ _STEP, _LEAST = 6e-6, 1e-3  # relative step of differences, cube root of eps; an
 _EPSILON = sys.float_info.epsilon
 _BENDS, _WRONG = 0.01, 0.1  # shares of a derivative: more is a bend, or no derivative of that rate
 _MOVED, _SAME = 0.01, 1e-4  # iterations within models end at 1e-6, calls that add up do not
+_OVER = "a step was said to be over, without an event"
 _OK, _WARNING, _DISCARD, _FATAL = 0, 1, 2, 4
 _STATUS = {_DISCARD: "discard", 3: "error", _FATAL: "fatal", 5: "pending"}
 _DIE_WITH_PARENT, _ADOPT = 1, 36  # PR_SET_PDEATHSIG, PR_SET_CHILD_SUBREAPER
@@ -309,7 +310,10 @@ def _is_wrong(
 
 
 def _require_function(call: _Calls, task: dict[str, Any]) -> None:
-    """Refuse rates and outputs that change where time, states and inputs are set off and back."""
+    """Refuse rates and outputs that change where time, states and inputs are set off and back.
+
+    Or where a step is said to be over, without an event.
+    """
     n, inputs, outputs = task["states"], task["inputs"], task["outputs"]
     states, rates = (_DOUBLE * n)(), (_DOUBLE * n)()
     held, shown = (_DOUBLE * len(inputs))(), (_DOUBLE * len(outputs))()
@@ -327,25 +331,55 @@ def _require_function(call: _Calls, task: dict[str, Any]) -> None:
         states[:] = [x + share * size for x, size in zip(begun, sizes, strict=True)]
         if n:
             call("SetContinuousStates", states, _SIZE(n))
+        return read()
+
+    def read() -> list[float]:
+        if n:
             rate = "GetContinuousStateDerivatives" if call.three else "GetDerivatives"
             call(rate, rates, _SIZE(n))
         call.reals("Get", outputs, shown)
         return [*rates, *shown]
 
+    def ended(values: list[float]) -> list[float]:
+        event, end = ctypes.c_int(), ctypes.c_int()
+        if task["completed"]:
+            call("CompletedIntegratorStep", ctypes.c_int(0), *map(ctypes.byref, (event, end)))
+        return values if event.value else read()
+
     try:
         before, moved, again = at(_MOVED), at(-_MOVED), at(_MOVED)  # at rest, much is 0
         at(-_MOVED, 1e-3)
         after = at(_MOVED)
+        later = ended(after)
     except _RefusedError:  # nobody else moves them so
         return
     names = [*task["rates"], *task["shown"]]
-    for name, a, b, *others in zip(names, before, moved, again, after, strict=True):
-        other = max(others, key=lambda c: abs(c - a))
-        if abs(other - a) > _SAME * max(abs(a), abs(b - a)):
+    for name, a, b, *others, e in zip(names, before, moved, again, after, later, strict=True):
+        back = max(others, key=lambda c: abs(c - a))
+        for other, then in (
+            (back, "time, states and inputs were set to others and back"),
+            (e, _OVER),
+        ):
+            if abs(other - a) > _SAME * max(abs(a), abs(b - a)):
+                raise _RefusedError(
+                    f"'{name}' is {a:.6g}, and {other:.6g} once {then}: the model remembers calls, "
+                    "which no integrator and no observer can follow. Export it with equations that "
+                    "follow from states and inputs alone",
+                    3,
+                )
+
+
+def _require_counts(call: _Calls, task: dict[str, Any]) -> None:
+    """Refuse a model structure of FMI 3.0 with other numbers than the FMU has."""
+    for name, use in (("ContinuousStates", "states"), ("EventIndicators", "indicators")):
+        size = _SIZE(task[use])
+        with suppress(_RefusedError, AttributeError):  # few ask
+            call(f"GetNumberOf{name}", ctypes.byref(size))
+        if size.value != task[use]:
             raise _RefusedError(
-                f"'{name}' is {a:.6g}, and {other:.6g} once time, states and inputs were set to "
-                "others and back: the model remembers calls, which no integrator and no observer "
-                "can follow. Export it with equations that follow from states and inputs alone",
+                f"fmi3GetNumberOf{name} says {size.value}, and the model structure of its "
+                f"description has {task[use]}: events or states would be passed over. Export it "
+                "again",
                 3,
             )
 
@@ -387,6 +421,8 @@ def _try(task: dict[str, Any], tell: Callable[[str], None]) -> tuple[str, bool]:
         with suppress(_RefusedError):
             contradicted = call.component is not None and _contradicted(call, task)
         if call.component is not None and task["exchange"]:
+            if call.three:
+                _require_counts(call, task)
             _require_function(call, task)
     except _RefusedError as error:
         if call.component is None or error.status != _DISCARD or task["exchange"]:

@@ -106,7 +106,7 @@ def _check_aliases(system: System, model: Description) -> None:
 
     One of the two would overwrite the other. Of aliases, FMI lets one be set at most.
     """
-    settable = [v for v in model.variables if v.causality in ("input", "parameter")]
+    settable = [v for v in model.variables if v.causality in ("input", "parameter") and not v.array]
     known = {(v.type, v.reference, v.element): v.name for v in reversed(settable)}
     names = {*(signal.name for signal in system.inputs), *system.corrections}
     for variable in settable:

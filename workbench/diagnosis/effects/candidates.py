@@ -100,8 +100,11 @@ def candidates(model: FMU, system: System) -> tuple[Effect, ...]:
     effects : parameters in the order of the FMU, gain and offset of each input and output, terms
         beside the rates, by state, starts of states, then other errors of sensors.
     """
-    zeros = [effect for effect in wrong_sensors(system) if effect.size in (GAIN, OFFSET)]
-    others = [effect for effect in wrong_sensors(system) if effect.size not in (GAIN, OFFSET)]
+    # An input that takes whole numbers alone cannot read a little more.
+    whole = {v.name for v in model.description.variables if v.causality == "input" and not v.floats}
+    sensors = [effect for effect in wrong_sensors(system) if effect.sensor not in whole]
+    zeros = [effect for effect in sensors if effect.size in (GAIN, OFFSET)]
+    others = [effect for effect in sensors if effect.size not in (GAIN, OFFSET)]
     parameters, terms = _parameters(model, system), _terms(model, system)
     return (*parameters, *zeros, *terms, *_starts(model, system), *others)
 

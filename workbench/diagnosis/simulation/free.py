@@ -51,6 +51,8 @@ class FreePredictor:
         inputs = [signal.name for signal in system.inputs]
         readings = [*(system.signals[name].reading for name in signals), *watched]
         self._simulation = Simulation(fmu, inputs, readings, system.holds)
+        kinds = {v.name: v for v in fmu.description.variables}
+        self._whole = np.array([not kinds[name].floats for name in inputs], bool)
         self._scales = {name: signal.scale for name, signal in system.signals.items()}
         self._scales |= {name: spread for name, spread in system.spreads.items() if spread > 0.0}
 
@@ -120,8 +122,11 @@ class FreePredictor:
         }
         return self.errors(samples, values), FreeDerivatives(derivatives, unsure)
 
-    @staticmethod
-    def _drive(samples: Samples) -> Drive:
-        """Inputs up to one sample after the last that is told."""
+    def _drive(self, samples: Samples) -> Drive:
+        """Inputs up to one sample after the last that is told; whole ones as at the next sample.
+
+        What moves a recording in time reads between samples.
+        """
         end = int(np.flatnonzero(samples.told)[-1]) + 2
-        return Drive(samples.time[:end], samples.u[:end], samples.model_time)
+        u = np.where(self._whole, np.round(samples.u[:end]), samples.u[:end])
+        return Drive(samples.time[:end], u, samples.model_time)

@@ -114,6 +114,9 @@ class ResidualModel:
 
     def _tell(self, fmu: FMU) -> None:
         self.nominal = dict(fmu.defaults)
+        if unsaid := [state for state in fmu.states if state not in fmu.defaults]:
+            fmu.start({})  # as of what it calculates, and of elements of arrays
+            self.nominal |= zip(unsaid, fmu.get_typed(fmu.typed(unsaid)), strict=True)
         self.units = dict(fmu.units)
         self.bounds = {
             v.name: (
