@@ -22,6 +22,7 @@ import pytest
 from threadpoolctl import threadpool_limits
 
 from workbench import __main__ as program
+from workbench.cli import simulate as command
 from workbench.diagnosis import build_everything, read_effects
 from workbench.models.fmu import FMU
 from workbench.models.modelica import read_library
@@ -67,7 +68,7 @@ MOST = ("workbench.observers.report", "workbench.observers.simulation", "workben
 def workers_begin_with_most() -> Iterator[None]:
     preload = partial(pools.preload, *MOST)
     with pytest.MonkeyPatch.context() as patch:
-        for module in (program, pools):
+        for module in (program, pools, command):
             patch.setattr(module, "preload", preload)
         yield
 

@@ -81,7 +81,8 @@ def _write_csv(folder: Path, output: Output) -> None:
     for packed in sorted(folder.rglob("*.npz")):
         path = packed.with_suffix(".csv")
         if not path.exists():
-            write_numbers(read_estimates(packed), path, 7)
+            columns = read_estimates(packed)
+            write_numbers({str(name): columns[name].to_numpy() for name in columns}, path, 7)
             output.stage(f"wrote {path}")
 
 

@@ -15,6 +15,7 @@ from workbench.cli import arguments
 from workbench.cli.output import CommandResult, Output, warn
 from workbench.errors import InputError
 from workbench.runtime.files import locked_folder, write_json
+from workbench.runtime.pool import preload
 from workbench.runtime.supervision import memory_limit
 
 if TYPE_CHECKING:
@@ -22,8 +23,6 @@ if TYPE_CHECKING:
     from workbench.observers.simulation import CaseResult, Simulation
     from workbench.recordings.case import Case
     from workbench.system.system import System
-
-WORKERS_NEED = ("workbench.observers.simulation", "workbench.observers.report")
 
 # That a run holds at its peak for each number of the recording: measured, EKF of the wheelset.
 _NUMBERS = 22
@@ -94,11 +93,16 @@ def add(commands: arguments.Commands, text: str) -> argparse.ArgumentParser:
 def run(options: argparse.Namespace, output: Output) -> CommandResult:
     """Run all estimators on the recordings."""
     from workbench.cli.inputs import chosen_system
-    from workbench.observers.live import LiveWindow
 
     system, cases = chosen_system(options)
+    if min(options.workers, len(cases)) > 1:  # one recording is for this process
+        preload("workbench.observers.simulation", "workbench.observers.report")
     _require_memory(cases)
-    window = LiveWindow(system) if options.live else None
+    window = None
+    if options.live:
+        from workbench.observers.live import LiveWindow  # draws, which takes long to load
+
+        window = LiveWindow(system)
     with locked_folder(options.out):
         return _run(options, output, system, cases, window)
 

@@ -107,7 +107,7 @@ def _write_recording(residuals: Residuals, span: int, path: Path) -> None:
         columns[f"lasting_sigma.{name}"] = means.sigma[:, c]
     for balance, values in zip(residuals.balances, at_blocks(residuals).values(), strict=True):
         columns[f"residual.{balance.name} [{balance.unit}]"] = values
-    write_numbers(pd.DataFrame(columns), path, 6)
+    write_numbers(columns, path, 6)
 
 
 def _write_tables(summary: Mapping[str, Any], out: Path) -> None:

@@ -7,7 +7,6 @@ from html import escape
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from workbench.arrays import Matrix, Vector
@@ -15,6 +14,7 @@ from workbench.pages.figures import ESTIMATORS, CaseFigure, Curve, Panel
 from workbench.system.units import BAND
 
 if TYPE_CHECKING:
+    import pandas as pd
     from matplotlib.figure import Figure
 
 
@@ -86,8 +86,10 @@ class Run:
             columns[f"probability_{mode} [1]"] = probability
         return columns
 
-    def to_frame(self) -> pd.DataFrame:
+    def to_frame(self) -> "pd.DataFrame":
         """The estimate as a table: time, then the columns of `to_columns`."""
+        import pandas as pd
+
         return pd.DataFrame({"time [s]": self.time, **self.to_columns()})
 
     def to_dict(self) -> dict[str, Any]:

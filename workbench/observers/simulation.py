@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 
 from workbench.arrays import Vector
 from workbench.errors import FMUError, InputError
@@ -67,6 +66,7 @@ from workbench.system.registry import open_model
 from workbench.system.system import System
 
 if TYPE_CHECKING:
+    import pandas as pd
     from matplotlib.figure import Figure
 
 # [byte] that a smoother may take that nobody asked for; for each sample, it keeps five matrices.
@@ -174,8 +174,14 @@ class CaseResult:
         """What is said first of the recording: guesses, and doubts by the model."""
         return [*self.guesses(), *self.doubts]
 
-    def to_frame(self) -> pd.DataFrame:
-        """All that the figure of the case shows: time, then `source.signal [unit]`.
+    def to_frame(self) -> "pd.DataFrame":
+        """All that the figure of the case shows, as a table; see `to_columns`."""
+        import pandas as pd  # takes its time, and files are written without it
+
+        return pd.DataFrame(self.to_columns())
+
+    def to_columns(self) -> dict[str, Vector]:
+        """All that the figure of the case shows, (n,) each: time, then `source.signal [unit]`.
 
         The source is `measured` or an estimator. Signals that a method does not estimate are left
         out; `..._5Hz` and `..._error` are the judged signal and its error below the bandwidth,
@@ -183,7 +189,7 @@ class CaseResult:
         """
         system, case = self.system, self.case
         reference, bandwidth = system.objective.signal, system.objective.bandwidth
-        columns: dict[str, Any] = {"time [s]": case.time}
+        columns: dict[str, Vector] = {"time [s]": case.time}
         for name, signal in system.signals.items():
             if name in case:
                 columns[f"measured.{name} [{signal.unit}]"] = case[name]
@@ -198,7 +204,7 @@ class CaseResult:
             columns |= {
                 f"{best.estimator}.{key}": to_column for key, to_column in best.to_columns().items()
             }
-        return pd.DataFrame(columns)
+        return columns
 
     def to_dict(self) -> dict[str, Any]:
         """Title and doubts of the case, and scores by estimator, as plain numbers and texts."""
@@ -234,6 +240,8 @@ class CaseResult:
 
     def summary(self) -> str:
         """Scores by estimator, for people."""
+        import pandas as pd
+
         table = pd.DataFrame(self.to_dict()["estimators"]).T
         title = f"{self.case.name}: {self.case.title}"
         contradicted = contradiction_lines({self.case.name: self.contradictions})
@@ -248,6 +256,8 @@ class CaseResult:
 
     def _repr_html_(self) -> str:
         """The table of scores, for notebooks."""
+        import pandas as pd
+
         table = pd.DataFrame(self.to_dict()["estimators"]).T
         return str(table.to_html(na_rep="n/a"))
 

@@ -9,15 +9,19 @@ byte by byte, the lowest bytes of all samples first, as most others are zero.
 """
 
 import zipfile
+from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from workbench.arrays import Vector
 from workbench.errors import InputError
 from workbench.runtime.files import replacing
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 # Of a quantum below the median magnitude of its column, in powers of two: 5e-7 of it, six digits.
 # A sensor has three to four. The first column is the time, which no sample may lose.
@@ -26,8 +30,8 @@ _UNKNOWN = -(2**62)  # multiple that stands for NaN
 _QUANTA = "quanta"
 
 
-def pack_estimates(table: pd.DataFrame, path: Path) -> None:
-    """Write the columns of a table, of which the first is the time; see `read_estimates`."""
+def pack_estimates(table: Mapping[str, Vector], path: Path) -> None:
+    """Write columns (n,), of which the first is the time; see `read_estimates`."""
     quanta = []
     with replacing(path) as stream, zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as archive:
 
@@ -35,15 +39,15 @@ def pack_estimates(table: pd.DataFrame, path: Path) -> None:
             with archive.open(f"{name}.npy", "w", force_zip64=True) as entry:
                 np.lib.format.write_array(entry, values, allow_pickle=False)
 
-        for place, name in enumerate(table):
-            values = table[name].to_numpy(float)
+        for place, (name, column) in enumerate(table.items()):
+            values = np.asarray(column, float)
             multiples, quantum = _multiples(values, _DIGITS if place else _TIME_DIGITS)
             quanta.append(quantum)
-            add(str(name), _packed(multiples))
+            add(name, _packed(multiples))
         add(_QUANTA, np.array(quanta))
 
 
-def read_estimates(path: Path) -> pd.DataFrame:
+def read_estimates(path: Path) -> "pd.DataFrame":
     """Read the table that `pack_estimates` wrote: (n,) numbers in each column, of six digits."""
     try:
         with np.load(path, allow_pickle=False) as archive:
@@ -62,6 +66,8 @@ def read_estimates(path: Path) -> pd.DataFrame:
             expected="estimates that 'workbench simulate' wrote, NAME.npz",
             remedy="pass one, or run 'workbench simulate' again",
         ) from error
+    import pandas as pd  # takes its time, and what only writes needs it not
+
     return pd.DataFrame(columns)
 
 

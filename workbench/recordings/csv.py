@@ -3,8 +3,9 @@
 import csv
 import math
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -82,15 +83,22 @@ def csv_text(table: "pd.DataFrame", digits: int | None = 6) -> str:
     ----------
     digits : of numbers; None for all that they have.
     """
-
-    def escape(value: Any) -> Any:
-        formula = isinstance(value, str) and value.startswith(("=", "+", "-", "@", "\t", "\r"))
-        return f"'{value}" if formula else value
-
-    plain = table.rename(columns=escape)
+    plain = table.rename(columns=_escaped)
     for name in plain.select_dtypes(exclude="number"):
-        plain[name] = plain[name].map(escape)
+        plain[name] = plain[name].map(_escaped)
     return plain.to_csv(index=False, float_format=None if digits is None else f"%.{digits}g")
+
+
+def header_text(names: Iterable[str]) -> str:
+    """The first line of a CSV; see `csv_text`."""
+    line = StringIO()
+    csv.writer(line, lineterminator="\n").writerow(map(_escaped, names))
+    return line.getvalue()
+
+
+def _escaped(value: Any) -> Any:
+    formula = isinstance(value, str) and value.startswith(("=", "+", "-", "@", "\t", "\r"))
+    return f"'{value}" if formula else value
 
 
 def table_text(columns: Mapping[str, Vector]) -> str:

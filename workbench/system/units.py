@@ -6,10 +6,12 @@ from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 from tokenize import TokenError
-
-import pint
+from typing import TYPE_CHECKING
 
 from workbench.errors import InputError
+
+if TYPE_CHECKING:
+    import pint
 
 _EXAMPLES = {
     "s": "s or ms",
@@ -114,6 +116,8 @@ def _parse(unit: str) -> "pint.Unit | None":
         return _units().Unit("")
     if len(unit) > _LONGEST or not _UNIT.fullmatch(unit):
         return None
+    from pint import PintError  # takes its time, and SI units need no other
+
     spelled = _pint_spelling(unit)
     try:
         if any(
@@ -123,7 +127,7 @@ def _parse(unit: str) -> "pint.Unit | None":
         ):
             return None
         return _units().parse_units(spelled)
-    except (pint.PintError, ValueError, TokenError):  # ValueError: "nan", a number to pint
+    except (PintError, ValueError, TokenError):  # ValueError: "nan", a number to pint
         return None
 
 
@@ -136,7 +140,9 @@ def _pint_spelling(unit: str) -> str:
 
 
 @cache
-def _units() -> pint.UnitRegistry[float]:
+def _units() -> "pint.UnitRegistry[float]":
+    import pint
+
     registry: pint.UnitRegistry[float] = pint.UnitRegistry(None)
     registry.load_definitions(_definitions().splitlines())
     return registry

@@ -15,7 +15,6 @@ from pathlib import Path
 
 import numpy as np
 from scipy.optimize import Bounds, differential_evolution
-from scipy.stats.qmc import LatinHypercube
 
 from workbench.arrays import Matrix, Vector
 from workbench.errors import InputError
@@ -204,6 +203,8 @@ def _evolve(
     """Generation `number` from the one before, and whether the search has converged."""
     rng = np.random.default_rng([plan.seed, number])
     if objective.before is None:
+        from scipy.stats.qmc import LatinHypercube  # takes its time, and little else needs it
+
         size = max(5, plan.population * space.start.size)  # SciPy's least is 5
         low, high = (np.clip(space.start + side * SPREAD, 0.0, 1.0) for side in (-1, 1))
         members = low + LatinHypercube(space.start.size, rng=rng).random(size) * (high - low)

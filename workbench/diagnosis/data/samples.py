@@ -10,7 +10,6 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter, lfiltic
 
 from workbench.arrays import Matrix, Vector
 from workbench.diagnosis.data.cleaning import Mask, first_value, smooth
@@ -109,6 +108,8 @@ class Samples:
         """What a sensor reads of quantities, (n, ...): a mode of second order in between."""
         if column not in self._filters:
             return values
+        from scipy.signal import lfilter, lfiltic  # takes its time, and little else needs it
+
         numerator, denominator = self._filters[column]
         rest = lfiltic(numerator, denominator, np.ones(2), np.ones(2))
         begin = np.multiply.outer(rest, values[0])

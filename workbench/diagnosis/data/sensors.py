@@ -9,7 +9,6 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.signal import lfilter
 
 from workbench.arrays import Matrix, Vector
 from workbench.diagnosis.data.clocks import greatest_skew
@@ -92,6 +91,8 @@ def lagged(time: Vector, values: Matrix, lag: float) -> Matrix:
     """
     if lag == 0.0:
         return values
+    from scipy.signal import lfilter  # takes its time, and little else needs it
+
     h = float(np.median(np.diff(time)))
     q = np.exp(-h / lag)
     w = lag / h * (1.0 - q)

@@ -8,7 +8,7 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from workbench.arrays import Matrix, Vector
 from workbench.diagnosis.data.cleaning import Mask
@@ -84,7 +84,7 @@ class CrossValidation:
     def noise_alone(self, fitted: FittedModel, *, fast: bool) -> bool:
         """Whether a fit leaves no more than noise does in 95 of 100 sets."""
         count = sum(self._counts(fitted, fast=fast))
-        most = (1.0 + self._fit.decides.excess) * float(chi2.isf(0.05, count)) / count
+        most = (1.0 + self._fit.decides.excess) * float(chdtri(count, 0.05)) / count
         return float(self.squares(fitted, fast=fast).mean()) <= most
 
     def _counts(self, fitted: FittedModel, *, fast: bool) -> list[int]:

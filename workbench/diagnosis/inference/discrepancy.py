@@ -17,7 +17,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from scipy.linalg import matmul_toeplitz
-from scipy.stats import t
+from scipy.special import stdtrit
 
 from workbench.arrays import Vector
 from workbench.diagnosis.effects.catalogue import Effect
@@ -42,7 +42,7 @@ def share_by_form(left: float, explained: float) -> float:
     >>> round(share_by_form(1.0, 100.0), 3)
     0.22
     """
-    scale = float(t.isf(0.025, _SHAPES)) / BAND
+    scale = float(-stdtrit(_SHAPES, 0.025)) / BAND
     return float(scale * np.sqrt(max(left, 0.0) / max(explained, left, 1e-9)))
 
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from workbench.diagnosis.effects.catalogue import Effect, variant
 from workbench.diagnosis.inference.fit import Fit
@@ -115,7 +115,7 @@ def shifted_levels(
     matters = {effect.name: effect.matters for effect in catalogue}
     sigmas = np.sqrt(np.diag(trial.covariance()))
     levels = {key: v for key, v in best.point.levels.items() if key[1] != SENSOR}
-    limit = chi2.isf(fit.unknowns.false_alarms / max(1, len(levels)), 1)
+    limit = chdtri(1, fit.unknowns.false_alarms / max(1, len(levels)))
     shifted = []
     for key, value in levels.items():
         sheet, declared = fit.unknowns.sheet(key)

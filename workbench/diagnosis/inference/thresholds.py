@@ -7,7 +7,7 @@ reason; `workbench power --thresholds` shows what half and twice of each change.
 import math
 from dataclasses import dataclass
 
-from scipy.stats import chi2, norm
+from scipy.special import chdtri, ndtr, ndtri
 
 from workbench.system.comparison import RATE, Comparison
 
@@ -82,7 +82,7 @@ class Thresholds:
         >>> round(decides.fall_of(1), 1), round(decides.fall_of(7), 1)
         (15.8, 30.7)
         """
-        return float(chi2.isf(2.0 * norm.sf(self.significant), unknowns))
+        return float(chdtri(unknowns, 2.0 * ndtr(-self.significant)))
 
     @property
     def needed(self) -> float:
@@ -110,11 +110,11 @@ def thresholds(candidates: int, rate: float = RATE, left: float = Thresholds.lef
     >>> round(usual.significant, 2), round(usual.fall, 1), round(usual.tied, 1)
     (3.97, 15.8, 12.4)
     """
-    size = float(norm.isf(0.5 * rate / candidates))
+    size = float(-ndtri(0.5 * rate / candidates))
     return Thresholds(
         significant=size,
         fall=size**2,
-        immaterial=float(norm.isf(0.5 * rate)),
+        immaterial=float(-ndtri(0.5 * rate)),
         tied=-2.0 * math.log(rate),
         left=left,
     )

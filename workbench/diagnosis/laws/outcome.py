@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
-from scipy.stats import ttest_rel
+from scipy.special import stdtr
 
 from workbench.arrays import Vector
 from workbench.diagnosis import Cause, Errors, Gain, Outcome
@@ -70,10 +70,12 @@ class Proposal:
             return False
         if worse_everywhere(held_out, self.before.errors):
             return False
-        squares = np.square(list(gain.recordings.values()))
-        chance = ttest_rel(squares[:, 0], squares[:, 1], alternative="greater").pvalue
-        if not held_out and not chance < _CHANCE:
-            return False
+        if not held_out:
+            before, after = np.square(list(gain.recordings.values())).T
+            fall = before - after
+            student = fall.mean() / fall.std(ddof=1) * np.sqrt(fall.size)
+            if not stdtr(fall.size - 1, -student) < _CHANCE:
+                return False
         if self.before.diagnosis.verdict == "unexplained":
             return True
         return description_length(outcome.diagnosis.best) < description_length(

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import gammaincinv
 
 from workbench.arrays import Vector
 from workbench.machines.wheelset.truth import BUILT_UP, Truth, lowest_speed, rolling_speed
@@ -52,7 +52,7 @@ def held_by_bands(stop: "KnownStop", name: str) -> dict[str, BandCoverage]:
     for quantity in COVERED:
         valid = window & run.claimed.get(quantity, True)
         if quantity == INNOVATIONS:
-            reach = np.full(valid.sum(), chi2.ppf(SURE, len(stop.system.outputs)))
+            reach = np.full(valid.sum(), 2.0 * gammaincinv(0.5 * len(stop.system.outputs), SURE))
             errors = run.nis[valid]
         else:
             reach = BAND * run.deviation(quantity)[valid]

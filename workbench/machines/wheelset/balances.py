@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 
 import numpy as np
-from scipy.signal import savgol_filter
 
 from workbench.arrays import Vector
 from workbench.diagnosis.data.samples import Samples
@@ -21,6 +20,8 @@ def balances(
 
     Balances and the slip law need Fx: without it, what the contact explains is not known.
     """
+    from scipy.signal import savgol_filter  # takes its time, and little else needs it
+
     h = float(np.median(np.diff(case.time)))
     width = max(5, round(_WINDOW / h) | 1)
     pB, tauR, (omegaW, omegaR) = recorded.u[:, 0], recorded.u[:, 1], recorded.y.T[:2]

@@ -8,7 +8,7 @@ fades, the measurement noise grows and the model noise fades.
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from workbench.arrays import Matrix, Vector, zeros
 from workbench.errors import FMUError
@@ -69,7 +69,7 @@ class Levels(NamedTuple):
 def learning(system: System) -> Learning:
     """How filters of a system learn."""
     once = system.sample_time / 3600.0
-    return Learning(system.learns, float(chi2.isf(once, len(system.outputs))))
+    return Learning(system.learns, float(chdtri(len(system.outputs), once)))
 
 
 def levels(size: int, outputs: int) -> Levels:

@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
-from scipy.signal import lfilter
 
 from workbench.arrays import Vector
 from workbench.system.experiments import (
@@ -50,6 +49,8 @@ class Profile:
 
     def signal(self, time: Vector) -> Vector:
         """Input at each time, (n,) [unit]: the demand behind its lags."""
+        from scipy.signal import lfilter  # takes its time, and little else needs it
+
         values, h = self.demand(time), float(time[1] - time[0])
         for lag in self.input.lags:
             pole = np.exp(-h / lag)

@@ -13,7 +13,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
-from scipy.stats import ncx2
 
 from workbench.arrays import Matrix, Vector
 from workbench.diagnosis.data.counting import CountedSamples, count
@@ -98,6 +97,8 @@ def discrimination_chance(chi_squared: float, explained: float, decides: Thresho
     explained : chi-squared that the true cause explains in all recordings.
     """
     form = max(decides.form, decides.form_share * explained)
+    from scipy.stats import ncx2  # takes its time, and little else needs it
+
     return float(ncx2.sf(form, 1, max(chi_squared, 0.0)))
 
 

@@ -10,8 +10,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import stdtr
-from scipy.stats import norm, t
+from scipy.special import ndtr, stdtr, stdtrit
 
 from workbench.arrays import Matrix, Vector
 from workbench.errors import FMUError, InputError
@@ -219,7 +218,7 @@ def dimension(question: Question, system: System, stopping: Stopping) -> int:
 
 def _student(u: Vector, freedom: int) -> Vector:
     """Values of Student's t that are as likely as those of a standard normal variable, (n,)."""
-    far: Vector = np.copysign(t.isf(norm.sf(np.abs(u)), freedom), u)
+    far: Vector = np.copysign(stdtrit(freedom, ndtr(-np.abs(u))), u)
     return far
 
 

@@ -15,7 +15,7 @@ from typing import Self
 
 import numpy as np
 from scipy.optimize import brentq
-from scipy.stats import binom, t
+from scipy.special import stdtrit
 
 from workbench.arrays import Matrix, Vector
 from workbench.studies.distance.standard import NominalRate
@@ -64,7 +64,7 @@ class Tail:
         """
         values = np.array([self._quantile(run, 10.0**-decade) for run in self.runs])
         middle, root = float(values.mean()), math.sqrt(values.size)
-        half = float(t.isf(0.025, values.size - 1) * values.std(ddof=1)) / root
+        half = float(-stdtrit(values.size - 1, 0.025) * values.std(ddof=1)) / root
         beyond = np.array([self._beyond(run, middle) for run in self.runs])
         variation = float(beyond.std(ddof=1) / beyond.mean()) / root
         return Quantile(10.0**-decade, middle, middle - half, middle + half, variation)
@@ -226,6 +226,8 @@ def quantile(shortness: Vector, probability: float) -> tuple[float, float, float
     >>> quantile(np.arange(1.0, 10_001.0), 1e-2)
     (100.0, 81.0, 121.0)
     """
+    from scipy.stats import binom  # takes its time, and little else needs it
+
     n = shortness.size
     low, high = (int(binom.ppf(share, n, probability)) for share in (0.025, 0.975))
     if low < 1 or high + 1 > n:

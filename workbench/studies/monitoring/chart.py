@@ -10,8 +10,7 @@ from functools import cache
 
 import numpy as np
 from scipy.optimize import brentq
-from scipy.special import ndtr, ndtri, stdtr, stdtrit
-from scipy.stats import chi2, norm
+from scipy.special import gammaincinv, ndtr, ndtri, stdtr, stdtrit
 
 from workbench.arrays import Matrix, Vector
 
@@ -218,7 +217,7 @@ class Chart:
         kept, weight = np.array(self.kept), 1.0 / np.array(self.variances)
         gain = _gains(kept, weight) / self.scatter.variance
         first = int(np.argmax(gain)) + 1  # of those after it
-        likely = np.flatnonzero(gain > gain.max() - chi2.ppf(SURE, 1))
+        likely = np.flatnonzero(gain > gain.max() - 2.0 * gammaincinv(0.5, SURE))
         before = Chart(self.scatter, kept=self.kept[:first], variances=self.variances[:first])
         last, earliest, latest = (
             self.numbers[k] for k in (first - 1, int(likely[0]), int(likely[-1]))
@@ -249,7 +248,7 @@ class Chart:
         if not self.changes:
             return False
         (old, doubt), (new, own) = self.changes[-1].before, self.level
-        return bool(abs(new - old) < norm.isf(0.5 * (1.0 - SURE)) * np.hypot(doubt, own))
+        return bool(abs(new - old) < -ndtri(0.5 * (1.0 - SURE)) * np.hypot(doubt, own))
 
 
 def _gains(values: Vector, weight: Vector) -> Vector:

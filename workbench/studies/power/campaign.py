@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import chndtrinc
-from scipy.stats import ncx2
 
 from workbench.arrays import Matrix
 from workbench.diagnosis import Diagnosis, Effect
@@ -254,6 +253,8 @@ def chance(distance: float, unknowns: int, decides: Thresholds) -> float:
     >>> round(chance(decides.significant, 1, decides), 3), round(chance(0.0, 1, decides), 6)
     (0.5, 7.1e-05)
     """
+    from scipy.stats import ncx2  # takes its time, and little else needs it
+
     return float(ncx2.sf(decides.fall_of(unknowns), unknowns, distance**2))
 
 

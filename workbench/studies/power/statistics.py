@@ -7,8 +7,6 @@ from functools import partial
 from itertools import permutations
 from typing import Any
 
-from scipy.stats import binomtest
-
 from workbench.studies.power.journal import SetVerdict
 from workbench.studies.power.planting import Repertoire
 
@@ -25,6 +23,8 @@ def share(outcomes: Iterable[bool]) -> dict[str, Any]:
     >>> none["share"], none["low"], round(none["high"], 4)
     (0.0, 0.0, 0.3085)
     """
+    from scipy.stats import binomtest  # takes its time, and little else needs it
+
     values = list(outcomes)
     hits, of = sum(values), len(values)
     if not of:
