@@ -12,15 +12,13 @@ from typing import TYPE_CHECKING, Any
 from workbench.cli import arguments
 from workbench.cli.output import CommandResult, Output, read_result
 from workbench.runtime.files import locked_folder
-from workbench.runtime.pool import Pool
+from workbench.runtime.pool import Pool, preload
 
 if TYPE_CHECKING:
     from workbench.arrays import Vector
     from workbench.observers.observability import CaseObservability
     from workbench.recordings.case import Case
     from workbench.system.system import System
-
-WORKERS_NEED = ("workbench.observers.observability_report",)
 
 
 def add(commands: arguments.Commands, text: str) -> argparse.ArgumentParser:
@@ -49,6 +47,8 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
     from workbench.cli.inputs import chosen_system
 
     system, cases = chosen_system(options)
+    if min(options.workers, len(cases)) > 1:
+        preload("workbench.observers.observability_report")
     with locked_folder(options.out):
         return _run(options, output, system, cases)
 

@@ -24,7 +24,6 @@ from types import FrameType
 from typing import Any
 
 import numpy as np
-from scipy.integrate import solve_ivp
 
 from workbench.arrays import Matrix, Vector
 from workbench.errors import FMUError, InputError
@@ -781,6 +780,7 @@ def _compare_interfaces(path: Path, instantiations: int) -> Iterator[CheckResult
 
 def _integrate(fmu: FMU, excitation: Excitation, start: Vector, end: float) -> Matrix:
     """Trajectory at the communication points, (k, n), by Radau on the FMU's derivatives."""
+    from scipy.integrate import solve_ivp  # takes its time, and no other check needs it
 
     def rates(t: float, x: Vector) -> Vector:
         fmu.set_time(t)
