@@ -200,6 +200,17 @@ class CodeCache(caching.FunctionCache):  # type: ignore[misc]
             code = super().load_overload(sig, target_context)
         return code
 
+    def _index_key(self, sig: Any, codegen: Any) -> Any:
+        """Key of code for a signature; functions that a closure holds count by their sources.
+
+        numba takes the objects themselves, which differ from process to process.
+        """
+        held = [cell.cell_contents for cell in self._py_func.__closure__ or ()]
+        if not held or not all(isinstance(function, _LinkedFunction) for function in held):
+            return super()._index_key(sig, codegen)
+        stamps = [CodeCache(f.py_func)._impl.locator.get_source_stamp() for f in held]
+        return sig, codegen.magic_tuple(), self._py_func.__code__.co_code, tuple(stamps)
+
     def compiled(self) -> None:
         """Release the lock once the function is compiled, or cannot be."""
         self._lock.release()

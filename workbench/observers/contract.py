@@ -4,6 +4,7 @@ import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any, ClassVar
 
 import numpy as np
@@ -11,7 +12,7 @@ import numpy as np
 from workbench.arrays import Matrix, Vector
 from workbench.errors import InputError
 from workbench.models.fmu import FMU
-from workbench.models.native import Instance, instance, raise_on_failure, read_only
+from workbench.models.native import Instance, compiled, instance, raise_on_failure, read_only
 from workbench.observers.estimators.step import Step
 from workbench.observers.gains import Gains, SearchSpace
 from workbench.observers.layout import layout, rolling_ratio
@@ -47,12 +48,28 @@ class Parts:
     width: int  # entries of an estimate
 
 
+@cache
+def _loop_of(step: Any) -> Any:
+    """Compile the loop of a step over samples, which ends at the first status that is not 0."""
+
+    def loop(model, settings, state, steps, u, y, estimates):  # type: ignore[no-untyped-def]
+        for k in range(steps.size):
+            status = step(model, settings, state, steps[k], u[k], y[k], estimates[k])
+            if status:
+                return status
+        return 0
+
+    # By this name its code is kept, apart from that of others.
+    loop.__qualname__ = f"{step.py_func.__module__}.{step.py_func.__qualname__}.loop"
+    return compiled(loop)
+
+
 class Estimator(ABC):
     """Feeds on measured inputs u and outputs y of a system, sample by sample.
 
-    A method provides `_begin`, which fills its state, and two compiled functions: `_step` advances
-    by one sample, `_loop` runs it over a recording. What is tuned are its gains: `default_gains`
-    says what they are before tuning, `space` where they are sought.
+    A method provides `_begin`, which fills its state, and `_step`, a compiled function, which
+    advances by one sample. What is tuned are its gains: `default_gains` says what they are before
+    tuning, `space` where they are sought.
 
     Parameters
     ----------
@@ -102,7 +119,8 @@ class Estimator(ABC):
     modes: tuple[str, ...] = ()
     finds: frozenset[str] = frozenset()
     _step: Any
-    _loop: Any
+    _settings: Any
+    _state: Any
 
     def __init__(self, fmu: FMU, system: System, gains: Gains) -> None:
         self.fmu = fmu
@@ -214,9 +232,9 @@ class Estimator(ABC):
     def _begin(self, u: Vector, y: Vector) -> None:
         """Set the state to the first sample."""
 
-    @abstractmethod
     def _arguments(self) -> tuple[Any, Any]:
         """Settings and state of the step."""
+        return self._settings, self._state
 
     @property
     def steps(self) -> tuple[Step, ...]:
@@ -329,7 +347,7 @@ class Estimator(ABC):
         rows = np.full((steps.size, self._width), np.nan)
         settings, state = self._arguments()
         u, y = self._samples(steps, u, y)
-        status = self._loop(self._model, settings, state, steps, u, y, rows)
+        status = _loop_of(self._step)(self._model, settings, state, steps, u, y, rows)
         raise_on_failure(status, self.fmu)
         for model in self.models:
             model.check_event()

@@ -14,7 +14,6 @@ from workbench.tuning.cost import Workers as Workers
 from workbench.tuning.cost import evaluate_all as evaluate_all
 from workbench.tuning.cost import evaluators as evaluators
 from workbench.tuning.cost import recording as recording
-from workbench.tuning.cost import recordings as recordings
 from workbench.tuning.recipe import Lines as Lines
 from workbench.tuning.recipe import Problem as Problem
 from workbench.tuning.recipe import Progress as Progress
@@ -28,9 +27,6 @@ from workbench.tuning.search import Checkpointing as Checkpointing
 from workbench.tuning.search import Plan as Plan
 from workbench.tuning.search import Search as Search
 from workbench.tuning.search import search as search
-from workbench.tuning.validation import Fold as Fold
-from workbench.tuning.validation import Sensitivity as Sensitivity
 from workbench.tuning.validation import cross_validate as cross_validate
 from workbench.tuning.validation import evaluate_gains as evaluate_gains
 from workbench.tuning.validation import sensitivities as sensitivities
-from workbench.tuning.validation import untuned_filters as untuned_filters

@@ -7,20 +7,14 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Modifier:
-    """What follows a name, as in `x(min=0) = 1`: a value, as text, and modifiers by name.
-
-    Attributes
-    ----------
-    where : file and line; empty for one that nobody wrote.
-    final : whether nothing may modify it further.
-    redeclared : what `redeclare` declares under the name, a component or a class; its owner is the
-        class in which it is written. None where the name is modified only.
-    """
+    """What follows a name, as in `x(min=0) = 1`: a value, as text, and modifiers by name."""
 
     value: str = ""
     inner: Mapping[str, "Modifier"] = field(default_factory=dict)
-    where: str = ""
-    final: bool = False
+    where: str = ""  # file and line; empty for one that nobody wrote
+    final: bool = False  # whether nothing may modify it further
+    # what `redeclare` declares under the name, a component or a class; its owner is the class in
+    # which it is written. None where the name is modified only.
     redeclared: "Component | None" = None
 
 
@@ -66,37 +60,25 @@ class Connection:
 
 @dataclass(frozen=True)
 class Class:
-    """A class as it is written.
+    """A class as it is written."""
 
-    Attributes
-    ----------
-    name : dotted, from the library's on.
-    kind : model, package, type, ...
-    prefixes : such as partial, expandable, replaceable.
-    constraint : of a replaceable class, named as written there; empty without `constrainedby`.
-    constraining : what modifies the constraint.
-    imports : (name, what it stands for); the name is "*" for all that a package holds.
-    equations : components that stand alone on the left side of an equation.
-    vendor : content of `annotation(__Workbench(...))`: numbers, strings, booleans, tuples and, for
-        what stands in parentheses, mappings.
-    experiment : what its annotation of that name says, as text by name.
-    where : file and line.
-    """
-
-    name: str
-    kind: str
-    prefixes: frozenset[str]
-    constraint: str
-    constraining: Modifier
+    name: str  # dotted, from the library's on
+    kind: str  # model, package, type, ..
+    prefixes: frozenset[str]  # such as partial, expandable, replaceable
+    constraint: str  # of a replaceable class, named as written there; empty without `constrainedby`
+    constraining: Modifier  # what modifies the constraint
     description: str
     extends: tuple[Extends, ...]
+    # (name, what it stands for); the name is "*" for all that a package holds
     imports: tuple[tuple[str, str], ...]
     components: tuple[Component, ...]
-    equations: frozenset[str]
+    equations: frozenset[str]  # components that stand alone on the left side of an equation
     connections: tuple[Connection, ...]
+    # content of `annotation(__Workbench(...))`: numbers, strings, booleans, tuples and, for what
+    # stands in parentheses, mappings
     vendor: Mapping[str, Any]
-    experiment: Mapping[str, str]
-    where: str
+    experiment: Mapping[str, str]  # what its annotation of that name says, as text by name
+    where: str  # file and line
 
     @property
     def partial(self) -> bool:

@@ -11,7 +11,7 @@ that has such a model moves it.
 """
 
 from collections.abc import Sequence
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,7 @@ from scipy.linalg import LinAlgError, solve_continuous_are
 from workbench.arrays import Matrix, Vector, zeros
 from workbench.errors import InputError
 from workbench.models.fmu import FMU
-from workbench.models.native import assign, compiled, evaluate, inlined, linearise, solve
+from workbench.models.native import assign, evaluate, inlined, linearise, solve
 from workbench.observers.contract import Estimator
 from workbench.observers.gains import (
     Gains,
@@ -151,15 +151,6 @@ def disturbance_step(model, settings, state, h, u, y, estimate):  # type: ignore
     return status or report(model, layout, estimate)
 
 
-@compiled
-def _loop(model, settings, state, steps, u, y, estimates):  # type: ignore[no-untyped-def]
-    for k in range(steps.size):
-        status = disturbance_step(model, settings, state, steps[k], u[k], y[k], estimates[k])
-        if status:
-            return status
-    return 0
-
-
 def _hidden(A: Matrix, C: Matrix, names: Sequence[str]) -> list[str]:
     """Names in directions, (s,), that do not fade by themselves and that no output shows.
 
@@ -204,7 +195,6 @@ class DisturbanceObserver(Estimator):
         "rate at which a deviation decays"
     )
     _step = staticmethod(disturbance_step)
-    _loop = staticmethod(_loop)
 
     def __init__(self, fmu: FMU, system: System, gains: Gains) -> None:
         super().__init__(fmu, system, gains)
@@ -230,9 +220,6 @@ class DisturbanceObserver(Estimator):
         )
         sizes = {"n": len(fmu.states), "m": len(system.inputs) + 1, "l": outputs, "q": q, "s": s}
         self._state = zeros(ObserverState, sizes)
-
-    def _arguments(self) -> tuple[Any, Any]:
-        return self._settings, self._state
 
     def _begin(self, u: Vector, y: Vector) -> None:
         state = self._state

@@ -201,15 +201,6 @@ def _step(models, settings, state, h, u, y, estimate):  # type: ignore[no-untype
     return status
 
 
-@compiled
-def _loop(models, settings, state, steps, u, y, estimates):  # type: ignore[no-untyped-def]
-    for k in range(steps.size):
-        status = _step(models, settings, state, steps[k], u[k], y[k], estimates[k])
-        if status:
-            return status
-    return 0
-
-
 class InteractingMultipleModel(ExtendedKalmanFilter):
     """Extended Kalman filters under one hypothesis each, mixed by their probabilities.
 
@@ -222,7 +213,6 @@ class InteractingMultipleModel(ExtendedKalmanFilter):
     Parameters
     ----------
     fmu : any model with the inputs and outputs of the system, and the parameters of conditions.
-    gains : see ExtendedKalmanFilter.
     """
 
     passes_events = False
@@ -233,7 +223,6 @@ class InteractingMultipleModel(ExtendedKalmanFilter):
     tunable = False
     tuned_as = ExtendedKalmanFilter.name
     _step = staticmethod(_step)
-    _loop = staticmethod(_loop)
 
     def __init__(self, fmu: FMU, system: System, gains: Gains) -> None:
         modes = hypotheses(system)

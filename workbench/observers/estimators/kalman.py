@@ -486,15 +486,6 @@ def ekf_step(model, settings, state, h, u, y, estimate):  # type: ignore[no-unty
     return finish(model, settings, state, estimate)
 
 
-@compiled
-def _loop(model, settings, state, steps, u, y, estimates):  # type: ignore[no-untyped-def]
-    for k in range(steps.size):
-        status = ekf_step(model, settings, state, steps[k], u[k], y[k], estimates[k])
-        if status:
-            return status
-    return 0
-
-
 class ExtendedKalmanFilter(Estimator):
     """Continuous-discrete extended Kalman filter with quantities as random walks.
 
@@ -517,7 +508,6 @@ class ExtendedKalmanFilter(Estimator):
     aided = True
     meaning = "standard deviations of samples, and random walks"
     _step = staticmethod(ekf_step)
-    _loop = staticmethod(_loop)
 
     def __init__(self, fmu: FMU, system: System, gains: Gains) -> None:
         super().__init__(fmu, system, gains)
@@ -540,9 +530,6 @@ class ExtendedKalmanFilter(Estimator):
         step = model_step(fmu, of_states, len(system.inputs), n + q)
         self._state: Any = filter_state(step, len(system.outputs), n + q)
         self._events: EventMap | None = None
-
-    def _arguments(self) -> tuple[Any, Any]:
-        return self._settings, self._state
 
     def _run(self, steps: Vector, u: Matrix, y: Matrix) -> Matrix:
         """Rows of estimates; from the first piece on in which the model has an event, by points."""

@@ -1,6 +1,6 @@
 """What an observer must beat: the nominal model alone."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from workbench.arrays import Matrix, Vector
 from workbench.models.description import MODEL_EXCHANGE
 from workbench.models.fmu import FMU, CoSimulation, EventError
 from workbench.models.hybrid import CoSimulationRun, HybridSimulation
-from workbench.models.native import assign, compiled, inlined, set_states
+from workbench.models.native import assign, inlined, set_states
 from workbench.observers.contract import Estimate, Estimator
 from workbench.observers.estimators.step import (
     Step,
@@ -93,15 +93,6 @@ def _judge(model, settings, step, y):  # type: ignore[no-untyped-def]
     judge(step, 0, shown, allowed)
 
 
-@compiled
-def _loop(model, settings, state, steps, u, y, estimates):  # type: ignore[no-untyped-def]
-    for k in range(steps.size):
-        status = _step(model, settings, state, steps[k], u[k], y[k], estimates[k])
-        if status:
-            return status
-    return 0
-
-
 class OpenLoop(Estimator):
     """The nominal model, driven by measured inputs, without feedback."""
 
@@ -111,7 +102,6 @@ class OpenLoop(Estimator):
     tunable = False
     co_simulates = True
     _step = staticmethod(_step)
-    _loop = staticmethod(_loop)
 
     def __init__(self, fmu: FMU, system: System, gains: Gains) -> None:
         super().__init__(fmu, system, gains)
@@ -137,9 +127,6 @@ class OpenLoop(Estimator):
     def steps(self) -> tuple[Step, ...]:
         """See Estimator."""
         return (self._state,)
-
-    def _arguments(self) -> tuple[Any, Any]:
-        return self._settings, self._state
 
     def run(self, time: Vector, u: Matrix, y: Matrix) -> Estimate:
         """See Estimator; accurate steps, where they turn out to be needed, begin at the start.

@@ -4,7 +4,7 @@ The estimated quantities of the model follow the measured outputs directly, dmu 
 dy]: a PI controller that drives the model onto the measurement. The states are left alone.
 """
 
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -112,15 +112,6 @@ def _step(model, settings, state, h, u, y, estimate):  # type: ignore[no-untyped
     return status or report(model, layout, estimate)
 
 
-@compiled
-def _loop(model, settings, state, steps, u, y, estimates):  # type: ignore[no-untyped-def]
-    for k in range(steps.size):
-        status = _step(model, settings, state, steps[k], u[k], y[k], estimates[k])
-        if status:
-            return status
-    return 0
-
-
 class ParameterEstimator(Estimator):
     """A model whose estimated quantities are set by a PI controller from measured outputs.
 
@@ -142,7 +133,6 @@ class ParameterEstimator(Estimator):
     rank = 30
     meaning = "L: rows corrections of quantities; columns dy, integral of dy"
     _step = staticmethod(_step)
-    _loop = staticmethod(_loop)
 
     def __init__(self, fmu: FMU, system: System, gains: Gains) -> None:
         super().__init__(fmu, system, gains)
@@ -155,9 +145,6 @@ class ParameterEstimator(Estimator):
         )
         sizes = {"n": n, "m": len(system.inputs) + 1, "l": outputs, "q": q}
         self._state = zeros(_State, sizes)
-
-    def _arguments(self) -> tuple[Any, Any]:
-        return self._settings, self._state
 
     def _begin(self, u: Vector, y: Vector) -> None:
         self._model.x[:] = self.fmu.get_states()

@@ -260,11 +260,6 @@ class Smoother(MovingHorizonEstimator):
     has the smoother of Rauch, Tung and Striebel.
     Sources: B. Bell (1994), SIAM J. Optim. 4, 626-636; S. Särkkä, L. Svensson (2020),
     Levenberg-Marquardt and line-search extended Kalman smoothers, ICASSP.
-
-    Parameters
-    ----------
-    fmu : any model with the inputs and outputs of the system.
-    gains : see MovingHorizonEstimator.
     """
 
     name = "smoother"

@@ -291,15 +291,6 @@ def _step(model, settings, state, h, u, y, estimate):  # type: ignore[no-untyped
     return status or finish(model, settings, state, estimate)
 
 
-@compiled
-def _loop(model, settings, state, steps, u, y, estimates):  # type: ignore[no-untyped-def]
-    for k in range(steps.size):
-        status = _step(model, settings, state, steps[k], u[k], y[k], estimates[k])
-        if status:
-            return status
-    return 0
-
-
 class UnscentedKalmanFilter(ExtendedKalmanFilter):
     """Square-root unscented Kalman filter: no derivative of the filter, the same noise levels.
 
@@ -308,18 +299,12 @@ class UnscentedKalmanFilter(ExtendedKalmanFilter):
     without downdates.
     Source: R. van der Merwe, E. Wan (2001), The square-root unscented Kalman filter for state and
     parameter estimation, ICASSP; I. Arasaratnam, S. Haykin (2009), Cubature Kalman filters.
-
-    Parameters
-    ----------
-    fmu : any model with the inputs and outputs of the system.
-    gains : see ExtendedKalmanFilter.
     """
 
     name = "ukf"
     label = "unscented Kalman filter"
     rank = 45
     _step = staticmethod(_step)
-    _loop = staticmethod(_loop)
 
     def __init__(self, fmu: FMU, system: System, gains: Gains) -> None:
         super().__init__(fmu, system, gains)

@@ -14,10 +14,7 @@ from workbench.runtime.engine import Engine
 from workbench.runtime.pool import Pool
 from workbench.runtime.progress import StepReporter
 from workbench.runtime.resources import own_version
-from workbench.studies.monitoring.chart import LevelChange as LevelChange
-from workbench.studies.monitoring.estimate import RecordingEstimate as RecordingEstimate
-from workbench.studies.monitoring.estimate import RecordingEstimator, open_estimator
-from workbench.studies.monitoring.estimate import watched as watched
+from workbench.studies.monitoring.estimate import RecordingEstimator, open_estimator, watched
 from workbench.studies.monitoring.outcome import MonitoringResult as MonitoringResult
 from workbench.studies.monitoring.outcome import conclude
 from workbench.studies.monitoring.state import (

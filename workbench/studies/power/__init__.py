@@ -17,7 +17,6 @@ from workbench.studies.power.run import diagnose_sets as diagnose_sets
 from workbench.studies.power.statistics import CLEAR as CLEAR
 from workbench.studies.power.statistics import share as share
 from workbench.studies.power.statistics import summarise as summarise
-from workbench.studies.power.virtual_rig import RecordedSets as RecordedSets
 from workbench.studies.power.virtual_rig import VirtualRig as VirtualRig
 from workbench.studies.power.virtual_rig import open_virtual_rig as open_virtual_rig
 from workbench.studies.power.virtual_rig import read_recorded_sets as read_recorded_sets

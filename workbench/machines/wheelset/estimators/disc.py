@@ -83,15 +83,6 @@ def _step(model, settings, state, h, u, y, estimate):  # type: ignore[no-untyped
     return disturbance_step(model, settings.observer, observer, h, u, y, estimate)
 
 
-@compiled
-def _loop(model, settings, state, steps, u, y, estimates):  # type: ignore[no-untyped-def]
-    for k in range(steps.size):
-        status = _step(model, settings, state, steps[k], u[k], y[k], estimates[k])
-        if status:
-            return status
-    return 0
-
-
 class DiscObserver(DisturbanceObserver):
     """Disturbance observer whose muDC decays to what speed and temperature of the disc make it.
 
@@ -124,7 +115,6 @@ class DiscObserver(DisturbanceObserver):
     tunable = False
     tuned_as = DisturbanceObserver.name
     _step = staticmethod(_step)
-    _loop = staticmethod(_loop)
 
     def __init__(
         self, fmu: FMU, system: System, gains: Gains, disc: DiscModel | None = None

@@ -1,13 +1,13 @@
 """What an observer must beat: the roller's balance alone."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from workbench.arrays import Vector
 from workbench.errors import InputError
 from workbench.models.fmu import FMU
-from workbench.models.native import compiled, evaluate, inlined, read, set_states
+from workbench.models.native import evaluate, inlined, read, set_states
 from workbench.observers.contract import Estimator
 from workbench.observers.gains import Gains
 from workbench.observers.layout import measure
@@ -46,15 +46,6 @@ def _step(model, settings, state, h, u, y, estimate):  # type: ignore[no-untyped
     return status
 
 
-@compiled
-def _loop(model, settings, state, steps, u, y, estimates):  # type: ignore[no-untyped-def]
-    for k in range(steps.size):
-        status = _step(model, settings, state, steps[k], u[k], y[k], estimates[k])
-        if status:
-            return status
-    return 0
-
-
 class DirectInversion(Estimator):
     """Creep force from the roller's balance, Fx = (tauR - JR*d(omegaR)/dt - loss)/rR.
 
@@ -71,7 +62,6 @@ class DirectInversion(Estimator):
     rank = 10
     tunable = False
     _step = staticmethod(_step)
-    _loop = staticmethod(_loop)
 
     def __init__(self, fmu: FMU, system: System, gains: Gains) -> None:
         super().__init__(fmu, system, gains)
@@ -90,9 +80,6 @@ class DirectInversion(Estimator):
             TIME_CONSTANT,
         )
         self._state = _State(np.zeros(2))
-
-    def _arguments(self) -> tuple[Any, Any]:
-        return self._settings, self._state
 
     def _begin(self, u: Vector, y: Vector) -> None:
         self._model.x[:] = self.fmu.get_states()

@@ -12,15 +12,10 @@ from workbench.machines.wheelset.rig.files import write_recording as write_recor
 from workbench.machines.wheelset.rig.proposed import proposed_stop as proposed_stop
 from workbench.machines.wheelset.rig.proposed import stop_of as stop_of
 from workbench.machines.wheelset.rig.run import TRUTH as TRUTH
-from workbench.machines.wheelset.rig.run import Drawn as Drawn
-from workbench.machines.wheelset.rig.run import Phases as Phases
 from workbench.machines.wheelset.rig.run import StopTruth as StopTruth
 from workbench.machines.wheelset.rig.run import simulate as simulate
 from workbench.machines.wheelset.rig.scenarios import SCENARIOS as SCENARIOS
 from workbench.machines.wheelset.rig.scenarios import STANDARD as STANDARD
-from workbench.machines.wheelset.rig.scenarios import Conditions as Conditions
 from workbench.machines.wheelset.rig.scenarios import Scenario as Scenario
 from workbench.machines.wheelset.rig.scenarios import select as select
-from workbench.machines.wheelset.rig.sensors import MEASURED as MEASURED
-from workbench.machines.wheelset.rig.sensors import received as received
 from workbench.machines.wheelset.rig.sensors import sample as sample

@@ -170,25 +170,12 @@ def arrow_step(model, settings, state, h, u, y, estimate):  # type: ignore[no-un
     return finish(model, settings, state, estimate)
 
 
-@compiled
-def _loop(model, settings, state, steps, u, y, estimates):  # type: ignore[no-untyped-def]
-    for k in range(steps.size):
-        status = arrow_step(model, settings, state, steps[k], u[k], y[k], estimates[k])
-        if status:
-            return status
-    return 0
-
-
 class BlockKalmanFilter(ExtendedKalmanFilter):
     """Extended Kalman filter whose cost grows with the number of blocks that a model is made of.
 
     Blocks and what they share follow from the model structure of the FMU, see `blocks`. Step and
     correction are those of the extended Kalman filter, but for the covariance of two blocks. On a
     model without like blocks, or whose structure is not said, it is the extended Kalman filter.
-
-    Parameters
-    ----------
-    fmu, gains : see ExtendedKalmanFilter.
 
     Raises
     ------
@@ -220,7 +207,7 @@ class BlockKalmanFilter(ExtendedKalmanFilter):
                 expected="levels that are held, as they are learnt of all unknowns at once",
                 remedy="leave 'learns' out of the system file, or use the estimator ekf",
             )
-        self._step, self._loop = arrow_step, _loop
+        self._step = arrow_step
         self._settings = ArrowSettings(self._settings, self._blocks)
         self._state = _state(self._blocks, self._layout, len(self.fmu.states))
 

@@ -288,15 +288,6 @@ def horizon_step(model, settings, state, h, u, y, estimate):  # type: ignore[no-
     return status or measure(model, u) or finish(model, settings, state.filter, estimate)
 
 
-@compiled
-def _loop(model, settings, state, steps, u, y, estimates):  # type: ignore[no-untyped-def]
-    for k in range(steps.size):
-        status = horizon_step(model, settings, state, steps[k], u[k], y[k], estimates[k])
-        if status:
-            return status
-    return 0
-
-
 class MovingHorizonEstimator(ExtendedKalmanFilter):
     """Best trajectory through the last samples, with the noise levels of the extended filter.
 
@@ -314,7 +305,6 @@ class MovingHorizonEstimator(ExtendedKalmanFilter):
 
     Parameters
     ----------
-    fmu : any model with the inputs and outputs of the system.
     gains : see ExtendedKalmanFilter; `horizon` [samples], `iterations` and `rare` are constants of
         the design.
     """
@@ -325,7 +315,6 @@ class MovingHorizonEstimator(ExtendedKalmanFilter):
     rank = 46
     standard = False
     _step = staticmethod(horizon_step)
-    _loop = staticmethod(_loop)
 
     def __init__(self, fmu: FMU, system: System, gains: Gains) -> None:
         super().__init__(fmu, system, gains)
