@@ -23,17 +23,12 @@ _LIVE_PERIOD = 5.0  # [s] between two drawings of the convergence
 
 
 class PrintedProgress(Progress):
-    """Prints one line per generation, draws now and then if asked to, and keeps the gains.
-
-    Attributes
-    ----------
-    kept : whether the gains could be written.
-    """
+    """Prints one line per generation, draws now and then if asked to, and keeps the gains."""
 
     def __init__(self, output: Output, plan: Plan, out: Path, *, live: bool) -> None:
         self._output, self._plan, self._out, self._live = output, plan, out, live
         self._drawn = -np.inf
-        self.kept = False
+        self.kept = False  # whether the gains could be written
 
     def begins(self, fold: int) -> None:
         """See Progress."""

@@ -156,11 +156,6 @@ _LOGGER = fmi2.fmi2CallbackLoggerTYPE(_log_formatted)
 class FMUInstance:
     """An FMU that is unpacked and loaded, with one instance.
 
-    Attributes
-    ----------
-    version : of FMI.
-    warned : (1,) calls that it answered with a warning.
-
     Raises
     ------
     InputError
@@ -171,10 +166,10 @@ class FMUInstance:
 
     def __init__(self, description: Description, interface: str) -> None:
         identifier = description.require(interface).identifier
-        self.version = description.version
+        self.version = description.version  # of FMI
         self._description = description
         self._interface = interface
-        self.warned = np.zeros(1, np.int64)
+        self.warned = np.zeros(1, np.int64)  # (1,) calls that it answered with a warning
         self._log: deque[str] = deque(maxlen=_LOGGED)
         self._warning_messages, self._first_warning = 0, ""
         self._number = max(_LOGGING, default=0) + 1

@@ -275,10 +275,6 @@ class TemporaryFolder:
     Parameters
     ----------
     place : folder that it is made in; the usual one unless another is given.
-
-    Attributes
-    ----------
-    path : of the folder.
     """
 
     def __init__(self, place: str | None = None) -> None:
@@ -286,7 +282,7 @@ class TemporaryFolder:
         sweep(place)
         lock = None
         while lock is None:
-            self.path = Path(tempfile.mkdtemp(prefix=_PREFIX, dir=place))
+            self.path = Path(tempfile.mkdtemp(prefix=_PREFIX, dir=place))  # of the folder
             if fcntl is None:
                 break
             (self.path / _MARK).touch()

@@ -123,14 +123,10 @@ class Watch:
     """Sees whether the calls of another process return; see `beat`.
 
     It counts its own looks, so that who is stopped together with it has not missed any.
-
-    Attributes
-    ----------
-    period : at which it looks [s].
     """
 
     def __init__(self, heart: Path, limit: float) -> None:
-        self.period = limit / _TICKS
+        self.period = limit / _TICKS  # at which it looks [s]
         self._heart, self._last, self._silent = heart, 0, 0
 
     def is_stuck(self) -> bool:

@@ -143,10 +143,6 @@ class _Objective:
     It is asked first for the population before, whose z is known, then for a trial beside each
     member. With deferred updating trial i competes with member i and no other, so that a trial has
     lost where its z exceeds that of the member.
-
-    Attributes
-    ----------
-    evaluations : of the candidates that were not known.
     """
 
     def __init__(
@@ -163,7 +159,7 @@ class _Objective:
         self._limits: Vector | None = None
         self._order = tuple(cases)
         self.before = before
-        self.evaluations: list[Evaluation] = []
+        self.evaluations: list[Evaluation] = []  # of the candidates that were not known
         if before is not None:
             for member, z, z_k in zip(before.members, before.z, before.z_k, strict=True):
                 self._known[member.tobytes()] = float(z), z_k

@@ -92,13 +92,6 @@ class Unknowns:
     simulations : of the recordings.
     effects : that may be asked for.
     beside : other recordings of the machine, whose conditions say what it has too.
-
-    Attributes
-    ----------
-    effects : by name.
-    modes : of structures before sensors, by the name of their delay.
-    presence : of effects.
-    opened : bounds in place of those of the model, by effect and parameter.
     """
 
     def __init__(
@@ -106,14 +99,16 @@ class Unknowns:
     ) -> None:
         self._simulations = simulations
         self._compare = simulations.system.comparison
-        self.effects = {effect.name: effect for effect in effects}
+        self.effects = {effect.name: effect for effect in effects}  # by name
+        # bounds in place of those of the model, by effect and parameter
         self.opened: dict[Key, tuple[float, float]] = {}
+        # of structures before sensors, by the name of their delay
         self.modes = {
             delay(signal.name): signal.mode
             for signal in simulations.system.reference_signals + simulations.system.outputs
             if signal.mode is not None and signal.name in simulations.recordings[0].signals
         }
-        self.presence = Presence(simulations.cases, simulations.recordings, beside)
+        self.presence = Presence(simulations.cases, simulations.recordings, beside)  # of effects
         self.count = len(simulations.cases)
 
     @property

@@ -90,10 +90,6 @@ class Scan:
     ----------
     about : what is known, fitted.
     slots : where laws are sought, which do not begin anew; None: all laws, in all of them.
-
-    Attributes
-    ----------
-    prospects : of all laws, the likeliest first.
     """
 
     def __init__(
@@ -108,7 +104,7 @@ class Scan:
         asked = [s for s in read_slots(library, base) if slots is None or s.name in slots]
         where = tuple(places(library, base, asked))
         if not where:
-            self.prospects: list[LawScore] = []
+            self.prospects: list[LawScore] = []  # of all laws, the likeliest first
             return
         names = list(
             dict.fromkeys(

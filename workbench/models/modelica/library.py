@@ -85,17 +85,12 @@ class Library:
     file : `package.mo` of the library, or its only file.
     classes : all, in the order of `package.order` and of the files; those of used libraries last.
     installed : libraries of MODELICAPATH that it uses; their classes are read when they are named.
-
-    Attributes
-    ----------
-    name : of the library.
-    classes : by dotted name.
     """
 
     def __init__(self, file: Path, classes: list[Class], installed: Sequence[Path] = ()) -> None:
         self.file = file
-        self.name = classes[0].name
-        self.classes = _Classes(installed)
+        self.name = classes[0].name  # of the library
+        self.classes = _Classes(installed)  # by dotted name
         for cls in classes:
             if cls.name in self.classes:
                 raise InputError(

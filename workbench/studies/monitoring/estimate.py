@@ -63,14 +63,10 @@ class RecordingEstimator:
     Parameters
     ----------
     model : of the system's observer.
-
-    Attributes
-    ----------
-    system : whose recordings they are.
     """
 
     def __init__(self, system: System, model: FMU) -> None:
-        self.system = system
+        self.system = system  # whose recordings they are
         constant = [
             replace(quantity, walk=0.0, spread=reach(quantity))
             for quantity in system.estimated

@@ -95,11 +95,6 @@ class Journal:
     identity : all that a verdict depends on; only verdicts of the same may stand together.
     resume : whether to go on from what is there, instead of beginning anew.
 
-    Attributes
-    ----------
-    results : in the order of the file.
-    damaged : numbers of the lines that were left out.
-
     Raises
     ------
     InputError
@@ -107,8 +102,8 @@ class Journal:
     """
 
     def __init__(self, path: Path, identity: Mapping[str, Any], *, resume: bool) -> None:
-        self.results: list[SetVerdict] = []
-        self.damaged: list[int] = []
+        self.results: list[SetVerdict] = []  # in the order of the file
+        self.damaged: list[int] = []  # numbers of the lines that were left out
         self._path = path
         if path.exists():
             text = read_text(path, "run without --resume, or give another --out")

@@ -36,17 +36,12 @@ class Brake:
     pad_lag : [s] of the pads behind the cylinder pressure.
     hysteresis : share of the force that friction of the calipers takes or gives.
     dt : [s] time between two steps.
-
-    Attributes
-    ----------
-    cylinder : [Pa] gauge pressure where it is measured.
-    pads : [Pa] gauge pressure that presses the pads.
-    efficiency : force of the calipers over that of calipers without friction.
     """
 
     def __init__(self, pad_lag: float, hysteresis: float, dt: float) -> None:
-        self.cylinder = 0.0
-        self.pads = 0.0
+        self.cylinder = 0.0  # [Pa] gauge pressure where it is measured
+        self.pads = 0.0  # [Pa] gauge pressure that presses the pads
+        # force of the calipers over that of calipers without friction
         self.efficiency = 1.0 + hysteresis
         self._hysteresis = hysteresis
         self._side = -1.0  # of the play: 1 where pressure has risen, -1 where it has fallen

@@ -35,20 +35,16 @@ class Pads:
     level : friction over FRICTION, from rig to rig.
     phase : [rad] of the discs' thickness.
     dt : [s] time between two steps.
-
-    Attributes
-    ----------
-    temperature : [degC] of each disc.
-    film : water on each disc, 1 at the start if wet, what is planted if dry.
     """
 
     def __init__(
         self, effects: Effects, conditions: Conditions, level: float, phase: float, dt: float
     ) -> None:
         discs = conditions.discs
-        self.temperature = [conditions.disc_temperature - _ICE] * len(discs)
+        self.temperature = [conditions.disc_temperature - _ICE] * len(discs)  # [degC] of each disc
         films = [effects.water_film] * len(discs)
         films[1] = max(films[1], effects.single_disc_film)
+        # water on each disc, 1 at the start if wet, what is planted if dry
         self.film = [
             1.0 if disc == "wet" else film for disc, film in zip(discs, films, strict=True)
         ]

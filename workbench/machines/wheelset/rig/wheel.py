@@ -56,14 +56,10 @@ class CleanedContact:
     ----------
     recovery : share of friction that a clean contact has more.
     dt : [s] time between two steps.
-
-    Attributes
-    ----------
-    friction : over that of the soiled contact.
     """
 
     def __init__(self, recovery: float, dt: float) -> None:
-        self.friction = 1.0
+        self.friction = 1.0  # over that of the soiled contact
         self._recovery = recovery
         self._dt = dt
         self._soiled = 1.0

@@ -122,13 +122,6 @@ class Statements(Expressions):
     Parameters
     ----------
     kinds : of variables and of what is returned, by name, as far as they are known; extended.
-
-    Attributes
-    ----------
-    acts : whether it changes memory or the model.
-    changed : whether a kind turned out wider than was known, so that the text is not right yet.
-    declared : declarations at the top.
-    returned : how many numbers it returns, None: not known yet.
     """
 
     def __init__(
@@ -142,10 +135,11 @@ class Statements(Expressions):
         self.names = names_of(function)
         self.own = {*self.names.assigned, *self.names.counters}
         self.kinds = kinds
-        self.acts = False
+        self.acts = False  # whether it changes memory or the model
+        # whether a kind turned out wider than was known, so that the text is not right yet
         self.changed = False
-        self.declared: list[str] = []
-        self.returned: int | None = None
+        self.declared: list[str] = []  # declarations at the top
+        self.returned: int | None = None  # how many numbers it returns, None: not known yet
         self._open: set[str] = set()  # variables that are declared
         self._here: set[str] = set()  # arrays and records that were named in this block
 
