@@ -1,7 +1,7 @@
 """Whether the recording that is proposed next discriminates what a set leaves together."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any, TypedDict
 
 import numpy as np
@@ -61,28 +61,29 @@ class SensedRecording(FollowingRecording):
     sensor: str
 
 
-class FollowingRow(TypedDict):
+@dataclass
+class FollowingRow:
     """A set and the recordings that follow it, as followed.json has them."""
 
     rig: str  # options that make the set
     planted: str
     multiple: float
     # verdict, group: on the set: causes, with those that are as good
-    verdict: str
-    group: list[str]
+    verdict: str = "failed"
+    group: list[str] = field(default_factory=list)
     # sentence, sensors: of the proposal: its answer, and sensors that it names
-    sentence: str
-    sensors: list[str]
+    sentence: str = ""
+    sensors: list[str] = field(default_factory=list)
     # proposed, drawn, sensed: recordings as proposed, at random, with a sensor that is named
-    proposed: FollowingRecording | None
-    drawn: list[FollowingRecording]
-    sensed: SensedRecording | None
-    error: str  # why it failed
+    proposed: FollowingRecording | None = None
+    drawn: list[FollowingRecording] = field(default_factory=list)
+    sensed: SensedRecording | None = None
+    error: str = ""  # why it failed
 
 
 def follow_proposals(
     groups: Sequence[Group], study: PowerStudy, engine: Engine
-) -> tuple[list[FollowingRow], bool]:
+) -> tuple[list[dict[str, Any]], bool]:
     """Make sets with one cause each, make what is proposed next, and diagnose all of it.
 
     Parameters
@@ -91,7 +92,7 @@ def follow_proposals(
 
     Returns
     -------
-    rows : one for each set; sets whose cause is named alone have no proposal.
+    rows : one for each set, see `FollowingRow`; sets whose cause is named alone have no proposal.
     interrupted : whether Ctrl-C ended the run; what was finished is in the rows.
 
     Raises
@@ -112,16 +113,16 @@ def follow_proposals(
 
     def collect(planting: Planting, row: FollowingRow | WorkerError) -> None:
         if isinstance(row, WorkerError):
-            row = _empty_row(planting, repr(row))
+            row = _row_of(planting, repr(row))
         rows[sets.index(planting)] = row
-        text = " or ".join(row["group"]) or row["verdict"]
-        if (proposed := row["proposed"]) is not None:
+        text = " or ".join(row.group) or row.verdict
+        if (proposed := row.proposed) is not None:
             text += f" -> {' or '.join(proposed['named']) or proposed['verdict']}"
-        progress.step(f"{row['planted']}: {text}{row['error']}")
+        progress.step(f"{row.planted}: {text}{row.error}")
 
     with study.setup() as setup:
         interrupted = work_off(setup, engine, _row, sets, collect)
-    return [rows[k] for k in sorted(rows)], interrupted
+    return [asdict(rows[k]) for k in sorted(rows)], interrupted
 
 
 def summarise_following(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
@@ -152,29 +153,17 @@ def _agrees(separation: Mapping[str, Any]) -> bool:
     return bool(abs(shown * abs(shown) - predicted * abs(predicted)) <= max(near, noise))
 
 
-def _empty_row(planting: Planting, error: str = "") -> FollowingRow:
-    return {
-        "rig": planting.options,
-        "planted": planting.effects[0],
-        "multiple": planting.multiple,
-        "verdict": "failed",
-        "group": [],
-        "sentence": "",
-        "sensors": [],
-        "proposed": None,
-        "drawn": [],
-        "sensed": None,
-        "error": error,
-    }
+def _row_of(planting: Planting, error: str = "") -> FollowingRow:
+    return FollowingRow(planting.options, planting.effects[0], planting.multiple, error=error)
 
 
 def _row(setup: Setup, planting: Planting) -> FollowingRow:
     """Diagnose a set, make the recording that is proposed, and diagnose all of it."""
-    row = _empty_row(planting)
+    row = _row_of(planting)
     try:
         _follow(row, setup, planting)
     except Exception as error:  # one set must not end a run of hours; it is counted
-        row["error"] = repr(error)
+        row.error = repr(error)
     return row
 
 
@@ -182,12 +171,12 @@ def _follow(row: FollowingRow, setup: Setup, planting: Planting) -> None:
     (planted,) = planting.effects
     cases = setup.record(planting, setup.rig.simulate(planting.seed, planting.gains))
     diagnosis, rivals = rivals_of_set(setup.system, setup.effects, setup.everything, cases)
-    row["verdict"], row["group"] = diagnosis.verdict, _names(diagnosis)
+    row.verdict, row.group = diagnosis.verdict, _names(diagnosis)
     if rivals is None or len(rivals.models) == 1:
         return
     experiments = setup.system.experiments
     proposal = next_stop(setup.system, rivals, ALONE)
-    row["sentence"], row["sensors"] = proposal.sentence, list(proposal.sensors)
+    row.sentence, row.sensors = proposal.sentence, list(proposal.sensors)
     if planted not in proposal.names:
         return
     assert experiments is not None  # or nothing were proposed
@@ -197,16 +186,16 @@ def _follow(row: FollowingRow, setup: Setup, planting: Planting) -> None:
     def make(experiment: RankedExperiment, fitted: Setup = setup) -> FollowingRecording:
         return _diagnose_with(experiment, fitted, planting, rivals, cases)
 
-    row["proposed"] = proposed = make(proposal.tried[0])
+    row.proposed = proposed = make(proposal.tried[0])
     if not proposed["foreseen"]:
         at = proposal.names.index(planted)
         for sensor in experiments.sensors:
             sensed = proposal.sensors.get(sensor.label)
             if sensed is not None and (at,) in sensed.prediction.groups:
                 fitted = replace(setup, system=with_sensor(setup.system, sensor))
-                row["sensed"] = {"sensor": sensor.label, **make(sensed, fitted)}
+                row.sensed = {"sensor": sensor.label, **make(sensed, fitted)}
                 break
-    row["drawn"] = list(map(make, predict_experiments(setup.system, rivals, plan, 1)))
+    row.drawn = list(map(make, predict_experiments(setup.system, rivals, plan, 1)))
 
 
 def _diagnose_with(

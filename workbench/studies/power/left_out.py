@@ -2,9 +2,9 @@
 
 import tempfile
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any, TypedDict
+from typing import Any
 
 import numpy as np
 
@@ -39,26 +39,27 @@ SHARES = {
 """Shares of `summarise_left_out`, by what they count."""
 
 
-class LeftOutRow(TypedDict):
+@dataclass
+class LeftOutRow:
     """A set whose cause is left out of the catalogue, as left_out.json has it."""
 
     rig: str  # options that make the set
     left_out: list[str]  # effects that the catalogue lacks
     # verdict, named, late: of the diagnosis without them: causes, and signals that are late
-    verdict: str
-    named: list[str]
-    late: list[str]
-    asked: bool  # whether it asks for a law
+    verdict: str = "failed"
+    named: list[str] = field(default_factory=list)
+    late: list[str] = field(default_factory=list)
+    asked: bool = False  # whether it asks for a law
     # laws, slots: that are proposed, and slots of all laws that are as good
-    laws: list[str]
-    slots: list[str]
-    slot_right: bool | None  # whether the cause acts in one of them; None without a cause
+    laws: list[str] = field(default_factory=list)
+    slots: list[str] = field(default_factory=list)
+    slot_right: bool | None = None  # whether the cause acts in one of them; None without a cause
     # before, after, after_with_it: held-out errors, without and with the law, with the true cause
-    before: float | None
-    after: float | None
-    after_with_it: float | None
-    function_error: float | None  # see `function_error`
-    error: str  # why it failed
+    before: float | None = None
+    after: float | None = None
+    after_with_it: float | None = None
+    function_error: float | None = None  # see `function_error`
+    error: str = ""  # why it failed
 
 
 def summarise_left_out(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
@@ -82,7 +83,7 @@ def summarise_left_out(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
 
 def propose_left_out(
     groups: Sequence[Group], study: PowerStudy, engine: Engine
-) -> tuple[list[LeftOutRow], bool]:
+) -> tuple[list[dict[str, Any]], bool]:
     """Make sets with one cause each, and diagnose them with a catalogue that lacks it.
 
     Parameters
@@ -91,15 +92,15 @@ def propose_left_out(
 
     Returns
     -------
-    rows : one for each set.
+    rows : one for each set, see `LeftOutRow`.
     interrupted : whether Ctrl-C ended the run; what was finished is in the rows.
     """
     sets = [group[0] for group in groups if group[0].kind != "pair"]
-    rows: list[LeftOutRow] = []
+    rows: list[dict[str, Any]] = []
     progress = StepReporter(engine.report, len(sets))
     try:
         for planting in sets:
-            rows.append(_row(planting, study, engine.workers))
+            rows.append(asdict(_row(planting, study, engine.workers)))
             laws = ", ".join(rows[-1]["laws"]) or f"{rows[-1]['verdict']}, nothing proposed"
             progress.step(f"{planting.options}: {laws}")
     except KeyboardInterrupt:
@@ -117,22 +118,7 @@ def _row(planting: Planting, study: PowerStudy, workers: int) -> LeftOutRow:
         for plantable in rig.plantables
         if plantable.name in planting.gains and plantable.slot
     }
-    row: LeftOutRow = {
-        "rig": planting.options,
-        "left_out": [effect.name for effect in planted],
-        "verdict": "failed",
-        "named": [],
-        "late": [],
-        "asked": False,
-        "laws": [],
-        "slots": [],
-        "slot_right": None,
-        "before": None,
-        "after": None,
-        "after_with_it": None,
-        "function_error": None,
-        "error": "",
-    }
+    row = LeftOutRow(planting.options, [effect.name for effect in planted])
     try:
         with tempfile.TemporaryDirectory() as folder:
             recordings, out, new = (Path(folder) / name for name in ("recordings", "out", "new"))
@@ -142,32 +128,32 @@ def _row(planting: Planting, study: PowerStudy, workers: int) -> LeftOutRow:
             engine = Engine(workers, out=out)
             problem = Problem(system, cases, library, others)
             before = diagnose(problem, engine)
-            row["verdict"] = before.diagnosis.verdict
-            row["named"] = [cause.effect.name for cause in before.diagnosis.causes]
+            row.verdict = before.diagnosis.verdict
+            row.named = [cause.effect.name for cause in before.diagnosis.causes]
             late = before.diagnosis.late
-            row["late"] = [] if late is None else list(late.signals)
-            row["asked"] = needs_law(before)
-            if row["asked"]:
+            row.late = [] if late is None else list(late.signals)
+            row.asked = needs_law(before)
+            if row.asked:
                 proposal = propose(before, problem, engine)
                 if proposal.laws:
                     laws = [form.law for form in proposal.forms.values()]
-                    row["laws"] = [proposal.said(law) for law in proposal.laws]
-                    row["slots"] = list(dict.fromkeys(law.place.slot.name for law in laws))
+                    row.laws = [proposal.said(law) for law in proposal.laws]
+                    row.slots = list(dict.fromkeys(law.place.slot.name for law in laws))
                     if proposal.outcome and (gain := proposal.outcome.diagnosis.gain):
-                        row["before"], row["after"] = gain.before, gain.after
+                        row.before, row.after = gain.before, gain.after
                 if planted and proposal.laws:
                     known = diagnose(replace(problem, effects=effects), engine)
                     gain = known.diagnosis.gain
-                    row["after_with_it"] = None if gain is None else gain.after
+                    row.after_with_it = None if gain is None else gain.after
                     rig.write(rig.simulate(planting.seed + 1, planting.gains), planting.gains, new)
                     fresh = read_cases([new], system)
-                    row["function_error"] = function_error(
+                    row.function_error = function_error(
                         replace(problem, cases=fresh), known, proposal, planted[0]
                     )
     except Exception as error:  # one set must not end a run of hours; it is counted
-        row["error"] = repr(error)
+        row.error = repr(error)
     if acting:
-        row["slot_right"] = bool(acting & {*row["slots"]})
+        row.slot_right = bool(acting & {*row.slots})
     return row
 
 
