@@ -611,6 +611,15 @@ def test_parameters_are_set_by_their_type_where_references_repeat(build):
             fmu.variables(["mode"])
 
 
+def test_an_enumeration_takes_its_items_alone(build):
+    """It has holes: of `off`, 0, and `boost`, 2, the value 1 is none, and was set all the same."""
+    kind = '<Enumeration declaredType="Mode" start="0"/>'
+    with FMU(build("RELAYS", variables=VARIABLES.replace('<Integer start="0"/>', kind))) as fmu:
+        fmu.start({}, {"mode": 2.0})
+        with pytest.raises(InputError, match="found the value 1; expected 0, 2, an item"):
+            fmu.start({}, {"mode": 1.0})
+
+
 SWITCHED = VARIABLES.replace(
     'name="flag" valueReference="1" causality="parameter" variability="fixed"',
     'name="flag" valueReference="1" causality="input" variability="discrete"',

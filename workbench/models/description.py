@@ -63,6 +63,7 @@ class Variable:
     of: str = ""
     element: int = 0
     size: int = 1
+    items: tuple[int, ...] = ()  # values of an enumeration, which may have holes
 
     @property
     def holds_number(self) -> bool:
@@ -455,7 +456,18 @@ def _variable(variable: "fmpy.model_description.ModelVariable") -> Variable:
         text=variable.description or "",
         array=bool(variable.dimensions),
         initial=variable.initial,
+        items=_items(variable),
     )
+
+
+def _items(variable: "fmpy.model_description.ModelVariable") -> tuple[int, ...]:
+    """Values of an enumeration, in its order; none of other types."""
+    declared = variable.declaredType
+    items = declared.items or [] if variable.type == "Enumeration" and declared else []
+    try:
+        return tuple(int(item.value) for item in items)
+    except (TypeError, ValueError):
+        raise _WrongError(f"an item of '{declared.name}' without a whole number") from None
 
 
 def _elements(variable: "fmpy.model_description.ModelVariable") -> tuple[Variable, ...]:

@@ -405,12 +405,16 @@ class FMUInstance:
         """
         low, high = _limits(variable.type)
         whole = variable.type not in ("Float32", "Float64")
-        if not low <= value <= high or (whole and value != int(value)):
+        items = variable.items
+        held = low <= value <= high and not (whole and value != int(value))
+        if not held or (items and value not in items):
             raise InputError(
                 where=f"{self._description.path}, variable '{variable.name}'",
                 found=f"the value {value:g}",
                 expected="0 or 1, of a Boolean"
                 if variable.type == "Boolean"
+                else f"{', '.join(map(str, items))}, an item of its enumeration"
+                if items
                 else f"a {'whole ' * whole}number from {low:.4g} to {high:.4g}, of {variable.type}",
                 remedy="correct the value",
             )
