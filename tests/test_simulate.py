@@ -9,9 +9,13 @@ import pandas as pd
 import pytest
 
 from workbench.__main__ import main
+from workbench.errors import InputError
+from workbench.observers import choose
 from workbench.observers.gains import matrix_names
+from workbench.observers.simulation import prepare
 from workbench.pages.columns import read_estimates
 
+from . import heater
 from .test_figures import figures
 
 OBSERVERS = ("disturbance_observer", "parameter_estimator", "ekf", "ukf")
@@ -174,3 +178,16 @@ def test_an_estimator_that_fails_in_every_case_is_no_success(root, tmp_path, cap
     assert main([*arguments, *chosen]) == 1
     assert "disturbance_observer estimated nothing in any case" in capsys.readouterr().err
     assert (out / "summary.json").is_file()  # with the reasons
+
+
+def test_of_all_estimators_those_run_that_the_design_point_lets_be_designed(tmp_path):
+    """Without heat the casing is as warm as its surroundings, and its conductance moves nothing."""
+    cold, left = heater.system(tmp_path / "heater"), {}
+    every = prepare(cold, choose(cold, []), leave_out=left.setdefault)
+    assert list(left) == ["disturbance_observer", "parameter_estimator"]
+    assert list(every.kinds) == ["open_loop", "ekf", "ukf"]
+    for name in left:
+        with pytest.raises(InputError, match="found Gc, which the outputs do not show"):
+            prepare(cold, choose(cold, [name]))
+    with pytest.raises(InputError):
+        prepare(cold, choose(cold, list(left)), leave_out=left.setdefault)

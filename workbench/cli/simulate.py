@@ -150,7 +150,11 @@ def _run(
 
     _warn_of_findings(system)
     chosen = choose(system, options.estimator)
-    simulation = prepare(system, chosen, options.gains, tuned=not options.untuned)
+    # Who asks for all wants those that can be had.
+    leave_out = None if options.estimator else lambda name, error: warn(f"without {name}: {error}")
+    simulation = prepare(
+        system, chosen, options.gains, tuned=not options.untuned, leave_out=leave_out
+    )
     output.stage("preparing the observers' loops (compiled once, up to a minute)")
     run = run_of("simulate", system, sources(cases))
     settings = _settings(simulation)
@@ -161,7 +165,7 @@ def _run(
         if name in settings
     }
     # Each estimate has a band.
-    width = len(cases[0].signals) + 2 * len(chosen) * len(system.columns)
+    width = len(cases[0].signals) + 2 * len(simulation.kinds) * len(system.columns)
     small = width * sum(case.time.size for case in cases) <= _SMALL
     with_csv = options.csv or small
     suffixes = ("npz", *["csv"] * with_csv, *["png", "svg"] * options.figures)

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from workbench.arrays import Matrix, Vector
+from workbench.errors import InputError
 from workbench.models.description import CO_SIMULATION
 from workbench.models.fmu import FMU
 from workbench.observers.layout import layout
@@ -79,6 +80,21 @@ def settle(
         x[free] += np.linalg.solve(np.eye(len(free)) / h - A, fmu.derivatives()[free])
         fmu.set_states(x)
     return x, u
+
+
+class HiddenAtDesignError(InputError):
+    """A design point at which what is estimated moves no output, or not in its own way."""
+
+    @classmethod
+    def of(cls, fmu: FMU, hidden: str) -> "HiddenAtDesignError":
+        """Name what is hidden."""
+        return cls(
+            where=fmu.place,
+            found=f"{hidden}, which the outputs do not show, or not apart, at the design point",
+            expected="a model whose outputs show all that is estimated",
+            remedy="choose a [points.design] where each moves an output in its own way, leave "
+            "out quantities that no output shows, or use --estimator ekf",
+        )
 
 
 def linearised(fmu: FMU, system: System) -> LinearModel:

@@ -18,6 +18,7 @@ from workbench.observers.estimators.open_loop import OpenLoop
 from workbench.observers.estimators.smoother import Smoother
 from workbench.observers.gains_file import read_gains, usual_gains
 from workbench.observers.observability import guesses, information, trajectory
+from workbench.observers.operating import HiddenAtDesignError
 from workbench.observers.replay import replay, run_on_model
 from workbench.observers.run import (
     Ending,
@@ -415,6 +416,7 @@ def prepare(
     kinds: Mapping[str, type[Estimator]],
     file: Path | None = None,
     tuned: bool = True,
+    leave_out: Callable[[str, InputError], None] | None = None,
 ) -> Simulation:
     """Estimators with their gains.
 
@@ -422,14 +424,21 @@ def prepare(
     ----------
     file : of tuned gains, for the estimator that it names.
     tuned : whether the others have the gains that were tuned for the system, where there are any.
+    leave_out : called with each estimator that the design point does not let be designed, and why;
+        None: that is an error, as it is if none can be.
     """
+    gains: dict[str, Gains] = {}
     with ExitStack() as stack:
         models = _models(stack, system, kinds)
         system = with_readings(system, list(models.values()))
-        gains = {
-            name: gains_for(estimator, models[estimator.role], system, tuned)
-            for name, estimator in kinds.items()
-        }
+        for place, (name, estimator) in enumerate(kinds.items(), 1):
+            try:
+                gains[name] = gains_for(estimator, models[estimator.role], system, tuned)
+            except HiddenAtDesignError as error:
+                if leave_out is None or (place == len(kinds) and not gains):
+                    raise
+                leave_out(name, error)
+    kinds = {name: kinds[name] for name in gains}
     if file is not None:
         gains |= _gains_of_file(kinds, gains, file)
     return Simulation(system, kinds, gains)

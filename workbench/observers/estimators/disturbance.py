@@ -46,6 +46,7 @@ from workbench.observers.layout import (
     stick,
 )
 from workbench.observers.operating import (
+    HiddenAtDesignError,
     LinearModel,
     corrected_states,
     linearised,
@@ -307,13 +308,7 @@ class DisturbanceObserver(Estimator):
         except LinAlgError:
             estimated = (*names, *(quantity.name for quantity in system.estimated))
             hidden = " and ".join(_hidden(A, C, estimated)) or "a state or quantity"
-            raise InputError(
-                where=f"{fmu.place}, {cls.name}",
-                found=f"{hidden}, which the outputs do not show, or not apart, at the design point",
-                expected="a model whose outputs show all that is estimated",
-                remedy="choose a [points.design] where each moves an output in its own way, leave "
-                "out quantities that no output shows, or use --estimator ekf",
-            ) from None
+            raise HiddenAtDesignError.of(fmu, hidden) from None
         gain = process[:, None] * (covariance @ C.T) / measurement
         L = np.hstack([gain, np.zeros_like(gain)])
         source = "stationary Kalman gain of the linearised model"
@@ -368,12 +363,23 @@ class DisturbanceObserver(Estimator):
 
 
 def effects(fmu: FMU, system: System, model: LinearModel) -> Vector:
-    """Effect of each quantity on the rate or output that shows it, at the design point, (q,)."""
+    """Effect of each quantity on the rate or output that shows it, at the design point, (q,).
+
+    Raises
+    ------
+    InputError
+        If a quantity has none there, to which that elsewhere could be compared.
+    """
     shown = dict(zip((output.name for output in system.outputs), model.D, strict=True))
     shown |= dict(zip(model.states, model.B, strict=True))
-    return np.array(
+    effect = np.array(
         [
             shown[quantity.acts_on][i] if quantity.acts_on else 1.0
             for i, quantity in enumerate(system.estimated)
         ]
     )
+    moves = np.vstack([model.B, model.D]).any(axis=0) & (effect != 0.0)
+    if not moves.all():
+        hidden = [system.estimated[i].name for i in np.flatnonzero(~moves)]
+        raise HiddenAtDesignError.of(fmu, " and ".join(hidden))
+    return effect
