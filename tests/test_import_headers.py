@@ -154,6 +154,7 @@ def test_a_time_of_something_else_is_none_of_the_columns_behind_it(tmp_path):
         ("inflow [l/s];inflow_Q;h [mm];h_Q", "192", "0"),
         ("inflow [l/s];Quality;h [mm];Quality", "Good", "Bad"),
         ("inflow [l/s];x;h [mm];Validity", "1", "2"),
+        ("inflow [l/s];x;h [mm];h quality", "0", "3"),
     ],
 )
 def test_samples_that_a_column_calls_bad_are_gaps(tmp_path, names, good, bad):

@@ -242,8 +242,11 @@ def _rounds(values: Vector) -> int:
 
 
 def unit_doubt(signal: str, channel: str, unit: str) -> str:
-    """That nobody has said a unit, and how to."""
-    return f"no unit in the file, --column '{signal}={channel} [{unit}]' confirms [{unit}]"
+    """That nobody has said a unit, and how to; brackets of a name may hold one."""
+    match = _IN_BRACKETS.search(channel)
+    found = f"no unit that is known in the file, {match[0]} may be one" if match else ""
+    found = found or "no unit in the file"
+    return f"{found}, --column '{signal}={channel} [{unit}]' confirms [{unit}]"
 
 
 def unit_reason(reason: str, unit: str, concluded: bool) -> str:
@@ -413,6 +416,7 @@ _DIFFERENCE = re.compile(
     r"differen[cz]|delta|\u0394|\bd[ _]?T\b|spreizung|spread|superheat|subcool|\b(rise|lift)\b",
     re.IGNORECASE,
 )
+_IN_BRACKETS = re.compile(r"[({<][^(){}<>\d]+[)}>]$")
 _GALLON = re.compile(r"\b(gal|gallon|gpm)\b")
 _WORDS = frozenset(("in", "atm"))  # units that mean something else in a name: h_in, p_atm
 _HUGE = 1e100  # no sample, and its square would be no number

@@ -88,6 +88,7 @@ _VERDICT = re.compile(
     rf"((?P<own>.+?)[ _.])?(?P<word>quality|qual|qualit\u00e4t|{'|'.join(_VALID)}|(?<=_)q)",
     re.IGNORECASE,
 )
+_FEW_STATES = 3  # more are no verdicts, but a measure
 _GOOD, _OPC_GOOD = frozenset(("good", "ok", "valid", "gut", "true", "g")), 192
 _STATES = {"true": "1", "false": "0", "on": "1", "off": "0"}
 _WORDS = re.compile(r"[^\W\d_]+")
@@ -628,6 +629,9 @@ def _leave_out_bad(
         ]
         states = [cell.strip().casefold() for cell in columns[i]]
         good = {state for state in states if _is_good(state, match["word"])}
+        counts = Counter(filter(None, states)).most_common(_FEW_STATES + 1)
+        if not good and len(counts) <= _FEW_STATES and 2 * counts[0][1] > len(states):
+            good = {counts[0][0]}  # of codes that are not known, what most samples have
         bad = [k for k, state in enumerate(states) if state and state not in good]
         if not judged or not bad:
             continue

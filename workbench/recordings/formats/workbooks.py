@@ -194,7 +194,12 @@ def _read_sheets(
         filled = [i for i, row in enumerate(rows) if any(row)]
         try:
             table = find_table([rows[i] for i in filled], [i + 1 for i in filled], where)
-            parts = [read_group(part, tag or title, where) for tag, part in parted(table)]
+            parts = [
+                read_group(
+                    part, f"{title} {tag}".strip() if len(sheets) > 1 else tag or title, where
+                )
+                for tag, part in parted(table)
+            ]
         except InputError as error:
             refusal = error
             if filled:
