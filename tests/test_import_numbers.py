@@ -110,6 +110,27 @@ def test_segments_of_a_waveform_are_one_only_if_they_go_on(tmp_path, tank, first
         assert_allclose(clock(tmp_path / "a.tdms", tank).times, MINUTE, rtol=1e-12)
 
 
+@pytest.mark.parametrize("scale", ["Linear", "Reciprocal"])
+def test_a_scale_that_the_library_does_not_know_is_told(tmp_path, tank, scale):
+    """Its channel was taken as recorded: volts in place of millimetres."""
+    slope = {"NI_Scale[0]_Linear_Slope": 10.0, "NI_Scale[0]_Linear_Y_Intercept": 0.0}
+    stated = {
+        **{"unit_string": "mm", "wf_increment": 0.5, "NI_Number_Of_Scales": 1},
+        **{"NI_Scale[0]_Scale_Type": scale, "NI_Scale[0]_Linear_Input_Source": 0xFFFFFFFF, **slope},
+    }
+    with TdmsWriter(tmp_path / "a.tdms") as file:
+        own = {"unit_string": "l/s", "wf_increment": 0.5}
+        file.write_segment(
+            [ChannelObject("G", "inflow", MINUTE, own), ChannelObject("G", "h", MINUTE, stated)]
+        )
+    proposed = propose([read_recorded_file(tmp_path / "a.tdms")], tank, {})
+    if scale == "Linear":
+        assert_allclose(proposed.assigned["h"].values, 1e-2 * MINUTE, atol=1e-12)
+    else:
+        (problem,) = proposed.problems
+        assert problem == "h: 'h' has a scale that is not understood, 'Reciprocal'"
+
+
 def test_a_channel_of_times_that_contradicts_the_file_is_told(tmp_path, tank):
     """LabVIEW writes a step of 1 where nobody set one."""
     with TdmsWriter(tmp_path / "a.tdms") as file:

@@ -16,6 +16,9 @@ from workbench.recordings.formats.contents import Contents, FileChannel, Group
 from workbench.recordings.formats.spelling import conversion, name_and_unit, spell_unit
 from workbench.recordings.formats.stamps import read_stamps
 
+_SCALES = {"Linear", "Polynomial", "Table", "Add", "Subtract", "AdvancedAPI"} | {
+    *("RTD", "Strain", "Thermistor", "Thermocouple")
+}
 # Properties of a waveform, and their bytes in the file with four that tell their type.
 _WAVEFORM = {"wf_start_time": 20, "wf_start_offset": 12, "wf_increment": 12}
 _UNITS = ("unit_string", "NI_UnitDescription", "unit", "Unit", "units")
@@ -64,6 +67,11 @@ def _groups(held: Any, doubt: str, notes: list[str]) -> list[Group]:
     for recorded in held.channels():
         name, unit = name_and_unit(recorded.name)
         stated: Mapping[str, Any] = recorded.properties
+        scales = {str(text) for key, text in stated.items() if key.endswith("]_Scale_Type")}
+        if scales - _SCALES and stated.get("NI_Scaling_Status") != "scaled":
+            # The library leaves what it cannot scale as it was recorded.
+            notes.append(f"'{name}' has a scale that is not understood, {min(scales - _SCALES)!r}")
+            continue
         unit = unit or spell_unit(str(next((stated[key] for key in _UNITS if key in stated), "")))
         values = recorded[:]
         step, offset = _waveform_clock(stated)
