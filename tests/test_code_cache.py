@@ -23,11 +23,16 @@ from workbench.system.installed import built_models
 from .processes import LONGEST, ROOT, python, running
 
 PROGRAM = """
+import numba
 import numpy as np
+before = {key: getattr(numba.config, key) for key in dir(numba.config) if key.isupper()}
 from workbench.models import native
 a = np.array([[2.0, 0.0, 2.0], [0.0, 4.0, 2.0]])
 assert native.solve(a) == 0 and a[:, 2].tolist() == [1.0, 0.5]
-print(sum(native.solve.entry.stats.cache_hits.values()), "kept")
+hits, misses = (sum(counted.values()) for counted in native.solve.entry.stats[1:])
+assert hits + misses == 1
+assert before == {key: getattr(numba.config, key) for key in before}  # the user's own
+print(hits, "kept")
 """
 
 # One that does not end what it compiles, while a test may wait.
@@ -73,6 +78,8 @@ def test_kept_code_is_used_and_damaged_code_is_made_again(home):
     assert solved(home) == "0 kept"
     assert solved(home) == "1 kept"
     (file,) = files(home)
+    folder = next(path for path in file.parents if path.name == "observer-workbench")
+    assert [*folder.parent.iterdir()] == [folder]
     whole = file.read_bytes()
     flipped = bytearray(whole)
     flipped[len(whole) // 2] ^= 1

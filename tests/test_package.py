@@ -77,33 +77,6 @@ def test_a_name_that_is_not_public_is_refused():
         _ = workbench.read_case_s
 
 
-# --- compiled code ---
-
-SOLVE = """
-import numba, numpy as np
-before = {key: getattr(numba.config, key) for key in dir(numba.config) if key.isupper()}
-from workbench.models.native import solve
-a = np.array([[2.0, 6.0]])
-assert solve(a) == 0 and a[0, 1] == 3.0
-assert before == {key: getattr(numba.config, key) for key in before}
-print(sum(solve.entry.stats.cache_hits.values()), sum(solve.entry.stats.cache_misses.values()))
-"""
-
-
-def test_compiled_code_is_kept_and_the_setting_of_numba_is_not_touched(root, tmp_path):
-    environment = os.environ | {"XDG_CACHE_HOME": str(tmp_path)}
-    first = run("-c", SOLVE, cwd=root, env=environment)
-    again = run("-c", SOLVE, cwd=root, env=environment)
-    assert (first.stdout, again.stdout) == ("0 1\n", "1 0\n"), first.stderr + again.stderr
-    assert [p.name for p in tmp_path.iterdir()] == ["observer-workbench"]
-
-
-def test_code_is_compiled_where_nothing_can_be_kept(root):
-    for _ in range(2):
-        done = run("-c", SOLVE, cwd=root, env=os.environ | {"XDG_CACHE_HOME": os.devnull})
-        assert done.stdout == "0 1\n", done.stderr
-
-
 # --- what comes along ---
 
 
