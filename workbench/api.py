@@ -13,9 +13,7 @@ import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, TypedDict, Unpack
-
-import pandas as pd
+from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 from workbench import diagnosis, observers, recordings, tuning
 from workbench.diagnosis import Outcome, Problem, laws
@@ -45,6 +43,9 @@ from workbench.system.system import System
 from workbench.system.tables import Table
 from workbench.system.units import quantity, si_factor
 from workbench.tuning import Lines, Plan, TuningResult, evaluators, pose
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 class Work(TypedDict, total=False):
@@ -155,7 +156,7 @@ def prepare_cases(which: str, source: str | Path, out: str | Path) -> tuple[list
 
 def case_from_frame(
     system: System,
-    frame: pd.DataFrame,
+    frame: "pd.DataFrame",
     conditions: Mapping[str, Any] | None = None,
     name: str = "frame",
 ) -> Case:

@@ -6,8 +6,6 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import pandas as pd
-
 from workbench.cli.cluster import open_cluster
 from workbench.cli.extras import require
 from workbench.cli.output import CommandResult, Output
@@ -43,6 +41,8 @@ def provenance_of(system: System, history: Path) -> dict[str, Any]:
 
 def run_fleet(options: argparse.Namespace, output: Output) -> CommandResult:
     """Watch all machines."""
+    import pandas as pd
+
     if options.diagnose:
         raise InputError(
             where="command line, --diagnose",

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 
 from workbench.arrays import Matrix, Vector
 from workbench.diagnosis.data.counting import FAULTY, MISSING
@@ -32,6 +31,7 @@ from workbench.system.system import System
 from workbench.system.units import BAND, si_factor, with_interval
 
 if TYPE_CHECKING:
+    import pandas as pd
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -334,8 +334,10 @@ class Outcome:
         rms = np.sqrt(np.average(squares, weights=[e.samples for e in own]))
         return f"{rms / factor:.3g} {channel.shown}"
 
-    def to_frame(self) -> pd.DataFrame:
+    def to_frame(self) -> "pd.DataFrame":
         """Causes, strongest first, a row for each of their parameters."""
+        import pandas as pd
+
         rows = [
             {
                 "effect": cause.effect.name,

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
 from workbench.diagnosis import Outcome, Residuals
 from workbench.diagnosis.inference.best_estimate import bands, best_estimate
@@ -111,6 +110,8 @@ def _write_recording(residuals: Residuals, span: int, path: Path) -> None:
 
 
 def _write_tables(summary: Mapping[str, Any], out: Path) -> None:
+    import pandas as pd
+
     nested = ("shape", "shape_units")
     rows = [
         {**candidate, **{k: json.dumps(candidate[k]) for k in nested}}

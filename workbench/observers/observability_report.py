@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
+from workbench.arrays import Vector
 from workbench.observers.observability import (
     STRIDE,
     CaseObservability,
@@ -16,6 +16,7 @@ from workbench.observers.observability import (
     prior,
     tested_span,
 )
+from workbench.observers.report import write_numbers
 from workbench.pages.answer import (
     Answer,
     Measure,
@@ -27,8 +28,7 @@ from workbench.pages.answer import (
 from workbench.pages.figures import CaseFigure, Curve, Panel, draw_case
 from workbench.pages.parts import Definitions, Numbers, Page, Part, Table, number, zoomable
 from workbench.pages.views import called, capital, named, per_shown, shown_unit
-from workbench.recordings.csv import csv_text
-from workbench.runtime.files import write_json, write_whole
+from workbench.runtime.files import write_json
 from workbench.system.system import System
 
 
@@ -46,13 +46,13 @@ def write_windows(observability: CaseObservability, path: Path) -> None:
     """Write one CSV of a recording: end of the window, bounds and remaining shares by model."""
     system, first = observability.system, observability.tests[0]
     at = np.searchsorted(observability.case.time, first.time)
-    columns: dict[str, Any] = {"time [s]": first.time}
+    columns: dict[str, Vector] = {"time [s]": first.time}
     for signal in system.inputs:
         factor = per_shown(system, signal.name, signal.shown)
         columns[f"{signal.name} [{signal.shown}]"] = observability.case[signal.name][at] / factor
     for name in (*system.reported, *(quantity.name for quantity in system.estimated)):
         columns[f"{name} [{system.unit(name)}]"] = observability.run.signal(name)[at]
-    columns["judged [1]"] = observability.judged.astype(int)
+    columns["judged [1]"] = observability.judged.astype(float)
     for test in observability.tests:
         for j, quantity in enumerate(system.estimated):
             columns[f"{test.model}.bound_{quantity.correction} [{quantity.unit}]"] = test.bound[
@@ -60,7 +60,7 @@ def write_windows(observability: CaseObservability, path: Path) -> None:
             ]
         for j, name in enumerate(test.states):
             columns[f"{test.model}.remaining_{name} [1]"] = test.remaining[:, j]
-    write_whole(path, csv_text(pd.DataFrame(columns)))
+    write_numbers(columns, path, 6)
 
 
 def write_observability(

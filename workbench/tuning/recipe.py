@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 
 from workbench.arrays import Matrix, Vector
 from workbench.errors import FMUError, InputError, unknown_name
@@ -38,6 +37,7 @@ from workbench.tuning.validation import (
 )
 
 if TYPE_CHECKING:
+    import pandas as pd
     from matplotlib.figure import Figure
 
 
@@ -82,8 +82,10 @@ class TuningResult:
         """The gains that were found, for whoever runs the estimator."""
         return self.problem.job.gains.with_values(self.search.best, "tuned")
 
-    def to_frame(self) -> pd.DataFrame:
+    def to_frame(self) -> "pd.DataFrame":
         """Gains by name: what each does, its unit, its value, and that before tuning."""
+        import pandas as pd
+
         names, meanings = self.gains.names, self.problem.meanings
         return pd.DataFrame(
             {

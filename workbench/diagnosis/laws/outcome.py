@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 from scipy.special import stdtr
 
 from workbench.arrays import Vector
@@ -18,6 +17,7 @@ from workbench.diagnosis.laws.scan import LawScore
 from workbench.system.units import BAND
 
 if TYPE_CHECKING:
+    import pandas as pd
     from matplotlib.figure import Figure
 
 _CHANCE = 0.05  # that held-out recordings fare better with a law that is none
@@ -143,8 +143,10 @@ class Proposal:
             lines += ["", f"extended model: {extension.modelica}, {extension.fmu}"]
         return "\n".join(lines)
 
-    def to_frame(self) -> pd.DataFrame:
+    def to_frame(self) -> "pd.DataFrame":
         """Laws as free functions, the likeliest first; those fitted in full before the others."""
+        import pandas as pd
+
         fitted = {id(estimate.prospect): estimate for estimate in self.estimates}
         rows = []
         for prospect in (*(e.prospect for e in self.estimates), *self.prospects):
@@ -164,8 +166,10 @@ class Proposal:
                 )
         return pd.DataFrame(rows)
 
-    def functions(self) -> pd.DataFrame:
+    def functions(self) -> "pd.DataFrame":
         """Estimated functions with their 95 % bands, and those of their shapes, in SI units."""
+        import pandas as pd
+
         tables = []
         for estimate in self.estimates:
             if estimate.law.influence is None:

@@ -6,8 +6,6 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-import pandas as pd
-
 from workbench.machines.wheelset.accuracy import (
     COVERED,
     NOISE,
@@ -39,6 +37,8 @@ def write_accuracies(stops: Sequence[StopAccuracy], path: Path) -> None:
 
     A field is empty where there is nothing to judge, and `inf` if a delay never ends.
     """
+    import pandas as pd
+
     lines = [
         {"case": stop.name, "estimator": name}
         | {f"{q} [{meta['unit']}]": getattr(result, q) for q, meta in _QUANTITIES.items()}

@@ -6,7 +6,6 @@ from html import escape
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 
 from workbench.diagnosis.inference.rivals import Rivals
 from workbench.diagnosis.inference.thresholds import Thresholds
@@ -15,6 +14,7 @@ from workbench.system.comparison import Channel
 from workbench.system.system import System
 
 if TYPE_CHECKING:
+    import pandas as pd
     from matplotlib.figure import Figure
 
 PROPOSED = 3
@@ -159,8 +159,10 @@ class NextStop:
             lines += [f"{number}. {proposal.text}", f"   {proposal.measures}"]
         return "\n".join(lines)
 
-    def to_frame(self) -> pd.DataFrame:
+    def to_frame(self) -> "pd.DataFrame":
         """All that were tried, best first."""
+        import pandas as pd
+
         columns = ("experiment", "separation", "chance", "deviation_before", "deviation_after")
         rows = [
             (e.text, e.prediction.separation, e.prediction.right, *e.prediction.precision, e.cost)

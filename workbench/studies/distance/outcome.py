@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any, Self
 from warnings import warn
 
 import numpy as np
-import pandas as pd
 
 from workbench.arrays import Vector
 from workbench.pages.figures import LIGHT, styled
@@ -27,6 +26,7 @@ from workbench.system.system import System
 from workbench.system.units import si_factor
 
 if TYPE_CHECKING:
+    import pandas as pd
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -287,8 +287,10 @@ class Distance:
         lines += [f"warning: {warning}" for warning in self.warnings]
         return "\n".join(lines)
 
-    def to_frame(self) -> pd.DataFrame:
+    def to_frame(self) -> "pd.DataFrame":
         """Past stops: measured, corrected, and as the others predict them."""
+        import pandas as pd
+
         rating = stopping_of(self.system).rating
         rows = []
         for stop in self.past:
@@ -319,8 +321,10 @@ class Distance:
                 rows[-1]["rating [%]"] = np.nan if percent is None else percent
         return pd.DataFrame(rows)
 
-    def quantiles(self) -> pd.DataFrame:
+    def quantiles(self) -> "pd.DataFrame":
         """Of the distance and of the deceleration of the stop that is asked for."""
+        import pandas as pd
+
         distances = [self.ahead.quantile(share) for share in QUANTILES]
         return pd.DataFrame(
             {

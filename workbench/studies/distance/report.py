@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
 from workbench.pages.answer import Answer, Measure, with_answer
 from workbench.pages.figures import CaseFigure, Curve, Panel, save_figure
@@ -49,6 +48,8 @@ _TERMS = {
 
 def write_distance(result: Distance, provenance: Mapping[str, Any], out: Path) -> Path:
     """Write distance.json, tables as CSV, the figure and the page; returns this."""
+    import pandas as pd
+
     content = {**result.to_dict(), "provenance": provenance}
     summary = with_answer(distance_answer(content), content)
     write_json(out / "distance.json", summary)

@@ -2,14 +2,16 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-import pandas as pd
 
 from workbench.arrays import Matrix
 from workbench.observers.trust import Contradiction, residual_tests, variance_test
 from workbench.recordings.case import Case
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Loss = Literal["linear", "soft_l1"]
 LOSSES: tuple[Loss, ...] = ("linear", "soft_l1")
@@ -160,8 +162,10 @@ class FitOutcome:
         """A value by its label."""
         return next(value for value in self.values if value.label == label)
 
-    def to_frame(self) -> pd.DataFrame:
+    def to_frame(self) -> "pd.DataFrame":
         """A row for each value."""
+        import pandas as pd
+
         return pd.DataFrame([{"label": value.label, **vars(value)} for value in self.values])
 
     def correlations(self) -> list[tuple[str, str, float]]:

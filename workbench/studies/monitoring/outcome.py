@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 
 from workbench.arrays import Matrix, Vector
 from workbench.errors import InputError
@@ -20,6 +19,7 @@ from workbench.system.system import System
 from workbench.system.units import BAND
 
 if TYPE_CHECKING:
+    import pandas as pd
     from matplotlib.figure import Figure
 
 
@@ -93,8 +93,10 @@ class MonitoringResult:
         lines += [f"there twice: {name} is {other}" for name, other in self.again.items()]
         return "\n".join(lines)
 
-    def to_frame(self) -> pd.DataFrame:
+    def to_frame(self) -> "pd.DataFrame":
         """Estimates of all recordings, one row each for recording and quantity."""
+        import pandas as pd
+
         rows = [
             {
                 "recording": name,
@@ -110,8 +112,10 @@ class MonitoringResult:
         ]
         return pd.DataFrame(rows)
 
-    def alarms(self) -> pd.DataFrame:
+    def alarms(self) -> "pd.DataFrame":
         """All alarms, in their order."""
+        import pandas as pd
+
         columns = "told_at date quantity unit changed_after earliest latest before after change "
         columns += "standard_error share_of_nominal since_the_first"
         rows = [self._alarm(track, change) for track, change in self.changes]
@@ -136,8 +140,10 @@ class MonitoringResult:
             "since_the_first": change.after[0] - track.changes[0].before[0],
         }
 
-    def worked(self) -> pd.DataFrame:
+    def worked(self) -> "pd.DataFrame":
         """Work of friction in each recording [J], and seconds that the estimates rest on."""
+        import pandas as pd
+
         labels = [f"{wear.name} [J]" for wear in self.system.work]
         frame = pd.DataFrame(self.work, columns=labels)
         frame.insert(0, "counted [s]", self.counted)
