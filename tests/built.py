@@ -29,6 +29,14 @@ def machine(name: str, **values: object) -> tuple[str, str]:
     return machine_file(f"{name}/package.mo"), machine_file(f"{name}/system.toml", **values)
 
 
+def library(folder: Path, text: str) -> Path:
+    """Write a library `Lib` of classes; returns its package.mo."""
+    package = folder / "Lib" / "package.mo"
+    package.parent.mkdir(parents=True)
+    package.write_text(f"package Lib\n{text}\nend Lib;\n")
+    return package
+
+
 def build_here(package: Path, model: str, path: Path, fmi: int = 2) -> None:
     """Write the FMU of a model for this machine."""
     here = compiler.native()

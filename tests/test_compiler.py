@@ -19,15 +19,7 @@ from workbench.models.compiler.explicit import StateSpace, make_explicit
 from workbench.models.compiler.flat import flatten
 from workbench.models.fmu import FMU
 
-from .built import machine_file
-
-
-def library(folder: Path, text: str) -> Path:
-    """Write a library `Lib` and return its package.mo."""
-    path = folder / "Lib" / "package.mo"
-    path.parent.mkdir()
-    path.write_text(f"package Lib\n{text}\nend Lib;\n")
-    return path
+from .built import library, machine_file
 
 
 def state_space(folder: Path, text: str, model: str = "Lib.M") -> StateSpace:

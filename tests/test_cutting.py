@@ -124,19 +124,18 @@ def test_loggers_are_brought_together_by_their_time_stamps(system):
     assert_allclose(measured.signals["omegaW"], expected, rtol=1e-12)
 
 
-def test_clocks_that_cannot_be_compared_are_refused(system):
+@pytest.mark.parametrize(
+    ("begin", "match"),
+    [
+        (math.nan, "times without a date beside others that have one"),
+        (2000.0, "0 samples at common times"),
+    ],
+)
+def test_recordings_of_no_common_clock_or_time_are_refused(system, begin, match):
     time = np.arange(0.0, 5.0, 0.01)
     first = group("", time, 1000.0, **rolling(system, time, 20.0 + time))
-    files = [file(first), file(group("", time, pB=1e4 * time))]
-    with pytest.raises(InputError, match="times without a date beside others that have one"):
-        merge(files, propose(files, system, {}), system)
-
-
-def test_recordings_of_different_times_are_refused(system):
-    time = np.arange(0.0, 5.0, 0.01)
-    first = group("", time, 1000.0, **rolling(system, time, 20.0 + time))
-    files = [file(first), file(group("", time, 2000.0, pB=1e4 * time))]
-    with pytest.raises(InputError, match="0 samples at common times"):
+    files = [file(first), file(group("", time, begin, pB=1e4 * time))]
+    with pytest.raises(InputError, match=match):
         merge(files, propose(files, system, {}), system)
 
 

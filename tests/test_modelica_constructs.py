@@ -25,6 +25,8 @@ from workbench.models import compiler
 from workbench.models.compiler.explicit import StateSpace, make_explicit
 from workbench.models.compiler.flat import flatten
 
+from .built import library
+
 Series = NDArray[np.float64]
 TIMES = np.linspace(0.0, 1.0, 11)  # s
 # Far above the error of the integration (1e-9 a step), far below any other reading of the source;
@@ -60,14 +62,6 @@ CONSTRUCTS = read_table("modelica_constructs.txt")
 LIBRARY = read_table("modelica_library.txt")
 
 
-def write(folder: Path, body: str) -> Path:
-    """Write a package `Lib` of a body; returns its file."""
-    package = folder / "Lib" / "package.mo"
-    package.parent.mkdir(parents=True)
-    package.write_text(f"package Lib\n{body}\nend Lib;\n")
-    return package
-
-
 def first_output(model: StateSpace) -> Series:
     """The first output, or the first state that is one, at TIMES, by an integrator of scipy."""
     p, u = ([v.start for v in group] for group in (model.parameters, model.inputs))
@@ -93,7 +87,7 @@ def check(construct: Construct, folder: Path, place: str) -> None:
     ----------
     place : regular expression of where a refusal is to stand.
     """
-    package = write(folder, construct.source)
+    package = library(folder, construct.source)
     if construct.refusal:
         with pytest.raises(InputError) as refusal:
             make_explicit(flatten(package, "Lib.M"))
@@ -132,7 +126,9 @@ FOLLOWING = (
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_starts_in_an_fmu_follow_what_is_set_and_yield_to_a_start_that_is_set(fmi, tmp_path):
     fmu = tmp_path / "M.fmu"
-    compiler.build(write(tmp_path, FOLLOWING), "Lib.M", fmu, fmi=fmi, platforms=[compiler.native()])
+    compiler.build(
+        library(tmp_path, FOLLOWING), "Lib.M", fmu, fmi=fmi, platforms=[compiler.native()]
+    )
     assert validate_fmu(str(fmu)) == []  # without any unit, too
 
     def begin(start: Mapping[str, float], interface: str) -> list[float]:
@@ -154,7 +150,7 @@ def test_starts_in_an_fmu_follow_what_is_set_and_yield_to_a_start_that_is_set(fm
 
 def test_a_parameter_without_value_and_start_is_zero_and_said(tmp_path):
     body = "model M parameter Real a; output Real x(start=1,fixed=true); equation der(x)=a; end M;"
-    package = write(tmp_path, body)
+    package = library(tmp_path, body)
     model = make_explicit(flatten(package, "Lib.M"))
     assert [v.start for v in model.parameters] == [0.0]
     (note,) = model.notes
@@ -167,7 +163,7 @@ def test_an_experiment_gives_start_stop_step_and_tolerance(tmp_path):
         "annotation(experiment(StartTime=50, Interval=0.25, Tolerance=1e-9)); end M;"
     )
     fmu = tmp_path / "M.fmu"
-    compiler.build(write(tmp_path, body), "Lib.M", fmu, platforms=[compiler.native()])
+    compiler.build(library(tmp_path, body), "Lib.M", fmu, platforms=[compiler.native()])
     assert validate_fmu(str(fmu)) == []
     description = fmpy.read_model_description(str(fmu))
     experiment = description.defaultExperiment
@@ -181,7 +177,7 @@ def test_refusals_name_no_other_file_than_the_users(tmp_path):
     """The front end, the C compiler and the cache work in temporary folders of their own."""
     for number, construct in enumerate(CONSTRUCTS):
         if construct.refusal:
-            package = write(tmp_path / str(number), construct.source)
+            package = library(tmp_path / str(number), construct.source)
             with pytest.raises(InputError) as refusal:
                 make_explicit(flatten(package, "Lib.M"))
             paths = set(re.findall(r"/[\w./-]+\.mo\b", str(refusal.value)))

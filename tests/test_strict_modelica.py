@@ -11,19 +11,12 @@ from workbench.models.compiler import build, openmodelica
 from workbench.models.compiler.flat import flatten
 from workbench.models.modelica import check, read_library
 
-from .built import machine_file
+from .built import library, machine_file
 
 ROOT = Path(__file__).parent.parent
 LIBRARIES = sorted(path.parent for path in (ROOT / "modelica").glob("*/package.mo"))
 
-COMMON = machine_file("strict/package.mo").removesuffix("end Lib;\n")
-
-
-def write(folder: Path, text: str) -> Path:
-    file = folder / "Lib" / "package.mo"
-    file.parent.mkdir()
-    file.write_text(f"{COMMON}{text}\nend Lib;\n")
-    return file
+COMMON = machine_file("strict/package.mo").removeprefix("package Lib\n").removesuffix("end Lib;\n")
 
 
 # Model M, and what is said of it.
@@ -33,7 +26,7 @@ WRONG = tomllib.loads(machine_file("strict/wrong.toml"))
 @pytest.mark.parametrize("wrong", WRONG.values(), ids=WRONG)
 def test_what_is_not_so_is_refused_with_its_line(wrong, tmp_path):
     with pytest.raises(InputError, match=wrong["message"]) as refused:
-        check(read_library(write(tmp_path, wrong["text"])), "Lib.M")
+        check(read_library(library(tmp_path, COMMON + wrong["text"])), "Lib.M")
     assert re.search(r"Lib/package\.mo:\d+$", refused.value.where)
 
 
@@ -42,16 +35,16 @@ RIGHT = tomllib.loads(machine_file("strict/right.toml"))
 
 @pytest.mark.parametrize("text", RIGHT.values(), ids=RIGHT)
 def test_what_is_so_is_accepted(text, tmp_path):
-    check(read_library(write(tmp_path, text)), "Lib.M")
+    check(read_library(library(tmp_path, COMMON + text)), "Lib.M")
 
 
-@pytest.mark.parametrize("library", LIBRARIES, ids=lambda library: library.name)
-def test_every_class_that_comes_with_the_workbench_says_what_is_so(library):
-    check(read_library(library / "package.mo"))
+@pytest.mark.parametrize("folder", LIBRARIES, ids=lambda folder: folder.name)
+def test_every_class_that_comes_with_the_workbench_says_what_is_so(folder):
+    check(read_library(folder / "package.mo"))
 
 
 def test_either_compiler_refuses_it_before_its_front_end_is_asked(tmp_path, monkeypatch):
-    package = write(tmp_path, "model M Part part(slot(gain=2.0)); end M;")
+    package = library(tmp_path, COMMON + "model M Part part(slot(gain=2.0)); end M;")
     omc = tmp_path / "bin" / "omc"
     omc.parent.mkdir()
     omc.write_text("#!/bin/sh\ntouch called\n")
@@ -71,7 +64,7 @@ def test_what_the_front_end_would_drop_is_refused(tmp_path):
     text = "model N extends Part; end N; model M extends N(redeclare Named slot); end M;"
     message = r"redeclaration of 'slot', which Lib\.N inherits.*declare 'slot' in Lib\.N"
     with pytest.raises(InputError, match=message):
-        flatten(write(tmp_path, text), "Lib.M")
+        flatten(library(tmp_path, COMMON + text), "Lib.M")
 
 
 @pytest.mark.parametrize(
@@ -89,7 +82,7 @@ def test_a_value_that_the_front_end_would_lose_is_refused(text, tmp_path):
     with pytest.raises(
         InputError, match=r"package\.mo:\d+: found a value of 'k' together with max"
     ):
-        flatten(write(tmp_path, law + text), "Lib.M")
+        flatten(library(tmp_path, COMMON + law + text), "Lib.M")
     alone = text.replace("k(max=2.0)=1.0", "k=1.0")
     (tmp_path / "alone").mkdir()
-    flatten(write(tmp_path / "alone", law + alone), "Lib.M")
+    flatten(library(tmp_path / "alone", COMMON + law + alone), "Lib.M")
