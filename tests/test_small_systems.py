@@ -130,6 +130,12 @@ def test_noise_of_an_input_that_the_output_shows_at_once_counts(balance):
     assert_allclose(lead.ahead, [[1e-4]])
 
 
+def test_errors_of_a_model_that_was_built_unasked_name_the_model(balance):
+    """And not the kept file, whose name is a hash that nobody knows."""
+    with open_model(loaded(balance)) as fmu:
+        assert str(fmu.event_error()).startswith("model Balance.Observer: an event of the model")
+
+
 def test_the_pivot_that_rubs_is_named(balance, tmp_path):
     """Beside an effect that brings a state to a model that has none."""
     outcome = diagnosed(balance, tmp_path)

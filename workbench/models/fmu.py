@@ -104,6 +104,11 @@ def _limits(type_name: str) -> tuple[float, float]:
     return float(integer.min), float(integer.max)
 
 
+def _called(description: Description) -> str:
+    kept = description.path.is_relative_to(fmu_cache.folder())
+    return f"model {description.name}" if kept else description.path.name
+
+
 def co_simulation_alone(description: Description, found: str) -> InputError:
     """The refusal of an FMU whose states nobody can set or differentiate."""
     offered = ", ".join(description.interfaces)
@@ -241,7 +246,7 @@ class FMUInstance:
                     PROXY.addLoggerProxy(ctypes.byref(callbacks))
                 self._instance.instantiate(callbacks=callbacks)
         except Exception as error:  # FMPy raises bare Exception where the FMU returns NULL
-            raise FMUError(f"{self._description.path.name}: {error}: {self._logged()}") from None
+            raise FMUError(f"{_called(self._description)}: {error}: {self._logged()}") from None
         self._component = ctypes.c_void_p(self._instance.component)
         self._used = False
 
@@ -265,7 +270,7 @@ class FMUInstance:
         if not count:
             return ""
         times = f"{count} times, first" if count > 1 else "once"
-        return f"the FMU {self._description.path.name} warned {times}: {first}"
+        return f"the FMU {_called(self._description)} warned {times}: {first}"
 
     def close(self) -> None:
         """Free the instance and the unpacked files."""
@@ -357,7 +362,7 @@ class FMUInstance:
                 next_time = float(time) if defined else math.inf
                 return EventUpdate(next_time, nominals_changed)
         raise FMUError(
-            f"{self._description.path.name}: its discrete states are not stable after "
+            f"{_called(self._description)}: its discrete states are not stable after "
             f"{_MOST_ITERATIONS} iterations"
         )
 
@@ -373,7 +378,7 @@ class FMUInstance:
 
     def end_error(self) -> FMUError:
         """The error for an FMU that asks to end the simulation, with what it logged."""
-        name = self._description.path.name
+        name = _called(self._description)
         return FMUError(f"{name}: it asks to end the simulation: {self._logged()}")
 
     def get_whole(self, variable: Variable) -> float:
@@ -457,7 +462,7 @@ class FMUInstance:
         """The error for a call that returned `status`, with what the FMU logged."""
         name = _STATUSES.get(status, status)
         return FMUError(
-            f"{self._description.path.name}: {function} returned {name}: {self._logged()}"
+            f"{_called(self._description)}: {function} returned {name}: {self._logged()}"
         )
 
     def _logged(self) -> str:
@@ -647,8 +652,13 @@ class FMU:
     @property
     def place(self) -> str:
         """Where a refusal says it is: its file, or its model where it was built to be kept."""
-        kept = self.path.is_relative_to(fmu_cache.folder())
-        return f"model {self.name}" if kept else str(self.path)
+        called = self.called
+        return str(self.path) if called == self.path.name else called
+
+    @property
+    def called(self) -> str:
+        """What messages call it: its file's name, or its model where it was built to be kept."""
+        return _called(self.description)
 
     def __enter__(self) -> Self:
         return self
@@ -836,7 +846,7 @@ class FMU:
     def event_error(self) -> EventError:
         """The error for an event of the model, which estimators do not treat."""
         return EventError(
-            f"{self.path.name}: an event of the model by {self.time[0]:.6g} s of its time, or in "
+            f"{self.called}: an event of the model by {self.time[0]:.6g} s of its time, or in "
             "the step after: an event indicator changes its sign, a time event is due, or the "
             "model asks for Event Mode or to end. Only the open loop, fit and diagnose go through "
             "events, and the Kalman filters ekf and ukf on an FMU that saves its state "
@@ -880,7 +890,7 @@ class FMU:
         moved = np.flatnonzero(self.get_states() != before)
         if moved.size and not event:
             raise FMUError(
-                f"{self.path.name}: it changes '{self.states[moved[0]]}' at the end of a step "
+                f"{self.called}: it changes '{self.states[moved[0]]}' at the end of a step "
                 f"without an event, by {self.time[0]:.9g} s of its time, which no integrator can "
                 "follow. Export it with an event there (enterEventMode)"
             )
@@ -1086,7 +1096,7 @@ class CoSimulation(FMU):
             length = h / parts
             if self._length and abs(length - self._length) > _SAME_STEP * self._length:
                 raise FMUError(
-                    f"{self.path.name}: it takes steps of one size only "
+                    f"{self.called}: it takes steps of one size only "
                     "(canHandleVariableCommunicationStepSize is not true), and after "
                     f"{self._length:.6g} s comes one of {length:.6g} s. Record at equal steps, or "
                     "export the model with steps of any size"
@@ -1109,7 +1119,7 @@ class CoSimulation(FMU):
                 short = begin + (part + 1) * h / parts - reached.value
                 if early.value or event.value or abs(short) > _SAME_STEP * span.value:
                     raise FMUError(
-                        f"{self.path.name}: it ends the step at {reached.value:.9g} s"
+                        f"{self.called}: it ends the step at {reached.value:.9g} s"
                         f"{' and asks for Event Mode' * event.value}, where it was told that "
                         "steps are whole and without events (earlyReturnAllowed, eventModeUsed)"
                     )

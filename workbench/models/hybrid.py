@@ -323,7 +323,7 @@ class HybridSimulation:
         self._step = None
 
     def _error(self, what: str) -> FMUError:
-        return FMUError(f"{self._fmu.path.name}: it {what} at {self._t:.9g} s of its time")
+        return FMUError(f"{self._fmu.called}: it {what} at {self._t:.9g} s of its time")
 
 
 class CoSimulationRun:

@@ -551,6 +551,6 @@ def raise_on_failure(status: int, fmu: FMU) -> None:
         refusal = fmu.refusal("a call of the observer's loop", "discard, error or fatal")
         raise FMUError(f"{refusal}{at}")
     if status == SINGULAR:
-        raise FMUError(f"{fmu.path.name}: the implicit step has no solution{at}")
+        raise FMUError(f"{fmu.called}: the implicit step has no solution{at}")
     if status == EVENT:
         raise fmu.event_error()

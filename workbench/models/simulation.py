@@ -106,7 +106,7 @@ class Simulation:
             self._resets = np.array_equal(self._run(drive, values), outputs, equal_nan=True)
             if not self._resets and not np.array_equal(self._run(drive, values), outputs):
                 raise FMUError(
-                    f"{self.fmu.path.name}: the same run gives other results when it is repeated, "
+                    f"{self.fmu.called}: the same run gives other results when it is repeated, "
                     "even with a new instance"
                 )
         return outputs

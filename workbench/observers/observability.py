@@ -542,7 +542,7 @@ def linearise_along(fmu: FMU, system: System, time: Vector, x: Matrix, u: Matrix
             generator[k, :count, count:] = fmu.input_jacobian(inputs)
         if not all(np.isfinite(part[k]).all() for part in (x, generator, slopes, y)):
             raise FMUError(
-                f"{fmu.path.name}: its states, outputs or derivatives are no finite numbers at "
+                f"{fmu.called}: its states, outputs or derivatives are no finite numbers at "
                 f"{fmu.time[0]:.6g} s of its time"
             )
     steps = np.append(np.diff(time), time[-1] - time[-2])

@@ -304,7 +304,7 @@ class Predictor:
         status = _predict(self._model, _State(errors, work, along), run)
         raise_on_failure(status, fmu)
         if not np.isfinite(along.states).all():  # once lost, they stay so
-            raise FMUError(f"{fmu.path.name}: derivatives of {samples.name} grow beyond all bounds")
+            raise FMUError(f"{fmu.called}: derivatives of {samples.name} grow beyond all bounds")
         return errors, along
 
     def _led(self, samples: Samples) -> _Led:

@@ -153,7 +153,7 @@ class StopSimulation:
         status = _stop(self._model, inputs, limits, y, self._result, self._work)
         if status == _MOVING:
             raise FMUError(
-                f"{self._fmu.path.name}: not at rest after {self._stopping.longest:g} s; "
+                f"{self._fmu.called}: not at rest after {self._stopping.longest:g} s; "
                 "the stop asks for too little, or the way falls too steeply"
             )
         raise_on_failure(status, self._fmu)
