@@ -1,17 +1,18 @@
-/* FMI 3.0 whose variables are arrays: der(x[i]) = u[i] - k[i] x[i], y = x. */
+/* FMI 3.0 whose variables are arrays: der(x[i]) = g u[i] - k[i] x[i], y = x, g of Float32. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include "fmi3FunctionTypes.h"
-enum { X, DX, K, Y, U, ARRAYS };
+enum { X, DX, K, Y, U, G, ARRAYS };
 typedef double Model[ARRAYS][2];
 static void reset(void *m) {
     const double first[2] = {1.0, 2.0};
     memset(m, 0, sizeof(Model));
     memcpy(((double(*)[2])m)[X], first, sizeof first), memcpy(((double(*)[2])m)[K], first, sizeof first);
+    ((double(*)[2])m)[G][0] = 1.0;
 }
 static void calculate(double (*m)[2]) {
-    for (int i = 0; i < 2; i++) m[DX][i] = m[U][i] - m[K][i] * m[X][i], m[Y][i] = m[X][i];
+    for (int i = 0; i < 2; i++) m[DX][i] = m[G][0] * m[U][i] - m[K][i] * m[X][i], m[Y][i] = m[X][i];
 }
 const char *fmi3GetVersion(void) { return "3.0"; }
 fmi3Instance fmi3InstantiateModelExchange(fmi3String a, fmi3String b, fmi3String c, fmi3Boolean d, fmi3Boolean e, fmi3InstanceEnvironment f, fmi3LogMessageCallback g) {
@@ -65,3 +66,5 @@ fmi3Status fmi3SetFloat64(fmi3Instance m, const fmi3ValueReference k[], size_t n
     for (size_t i = 0; i < n; i++) memcpy(((double(*)[2])m)[k[i]], v + 2 * i, 2 * sizeof *v);
     return fmi3OK;
 }
+fmi3Status fmi3GetFloat32(fmi3Instance m, const fmi3ValueReference k[], size_t n, fmi3Float32 v[], size_t count) { v[0] = ((double(*)[2])m)[G][0]; return fmi3OK; }
+fmi3Status fmi3SetFloat32(fmi3Instance m, const fmi3ValueReference k[], size_t n, const fmi3Float32 v[], size_t count) { ((double(*)[2])m)[G][0] = v[0]; return fmi3OK; }

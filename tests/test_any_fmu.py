@@ -1033,6 +1033,9 @@ def test_the_open_loop_and_a_diagnosis_read_and_set_elements_of_arrays(arrays):
     assert wb.diagnose(system, [case], workers=1).diagnosis.verdict == "nothing"
     with ResidualModel(ModelSource(path, system, {}, free=True), [case]) as simulations:
         assert simulations.nominal["x[2]"] == 2.0
+    settings = wb.FitSettings(starts=1, profiles=False)
+    outcome = wb.fit(system, [case], ["g"], settings=settings, workers=1, report=lambda line: None)
+    assert outcome["g"].value == pytest.approx(1.0, abs=1e-3)  # of Float32
 
 
 @pytest.mark.parametrize(

@@ -75,6 +75,11 @@ class Variable:
         """Whether its type is of numbers that need not be whole."""
         return self.type in _FLOATS
 
+    @property
+    def scalar(self) -> bool:
+        """Whether it is one such number by itself, no array and no element of one."""
+        return self.floats and not self.array and not self.of
+
 
 @dataclass(frozen=True)
 class Description:

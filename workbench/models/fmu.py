@@ -591,7 +591,7 @@ class FMU:
         self.defaults = {
             v.name: float(v.start)
             for v in self.description.variables
-            if v.real and v.start is not None
+            if v.scalar and v.start is not None
         } | self._given
         self._references = {v.name: v.reference for v in self.description.variables}
         self._real_names = {v.name for v in self.description.variables if v.real}

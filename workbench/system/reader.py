@@ -152,7 +152,9 @@ def with_model(system: System, role: str, path: Path | None) -> System:
 
 
 def _values(description: Description) -> dict[str, float]:
-    return {v.name: float(v.start) for v in description.variables if v.real and v.start is not None}
+    return {
+        v.name: float(v.start) for v in description.variables if v.scalar and v.start is not None
+    }
 
 
 # --- values of what is declared ---

@@ -174,7 +174,7 @@ def resolve_parameters(
     known = [
         v.name
         for v in description.variables
-        if v.causality == "parameter" and v.real and v.initial != "calculated"
+        if v.causality == "parameter" and v.scalar and v.initial != "calculated"
     ]
     known += [name for name in description.states if name not in known]
     declared = {entry.name: entry for entry in system.fitted}
