@@ -130,10 +130,13 @@ def test_noise_of_an_input_that_the_output_shows_at_once_counts(balance):
     assert_allclose(lead.ahead, [[1e-4]])
 
 
-def test_errors_of_a_model_that_was_built_unasked_name_the_model(balance):
-    """And not the kept file, whose name is a hash that nobody knows."""
+def test_what_was_built_unasked_has_the_name_of_the_model(balance, tmp_path):
+    """In errors and files, and not that of the kept file, a hash that nobody knows."""
     with open_model(loaded(balance)) as fmu:
         assert str(fmu.event_error()).startswith("model Balance.Observer: an event of the model")
+    recording = str(balance / "recordings" / "00_pull")
+    main(["fit", recording, "--system", str(balance), "--parameter", "c", "--out", str(tmp_path)])
+    assert [path.name for path in tmp_path.glob("*.fmu")] == ["Balance.Observer_fitted.fmu"]
 
 
 def test_the_pivot_that_rubs_is_named(balance, tmp_path):

@@ -105,7 +105,7 @@ def _limits(type_name: str) -> tuple[float, float]:
 
 
 def _called(description: Description) -> str:
-    kept = description.path.is_relative_to(fmu_cache.folder())
+    kept = fmu_cache.is_cached(description.path)
     return f"model {description.name}" if kept else description.path.name
 
 

@@ -109,6 +109,11 @@ def folder() -> Path:
     return cache_folder() / "fmus"
 
 
+def is_cached(path: Path) -> bool:
+    """Whether a file was built to be kept here, under a name that says nothing to people."""
+    return path.is_relative_to(folder())
+
+
 def is_known(*names: str) -> bool:
     """Whether one of the names was remembered, by any process."""
     return any(name in _remembered() or _is_kept(name) for name in names)

@@ -50,6 +50,7 @@ _MOVES = 10.0  # deviations of a sample, by which a fit may move a start that it
 _SHARE = 0.1  # of the leading part of a direction, from which on another one belongs to it
 _CHEAP = 60.0  # [s] that profiles may take before a covariance has to do
 _FREE = FittedParameter(name="", range=(-np.inf, np.inf), prior=(), by_recording=None)
+_UNBOUNDED = 1e100  # deviations, whose squares can still be added up
 _FAILED = 1e4  # deviations, of all samples of a recording that cannot be simulated
 
 
@@ -384,7 +385,7 @@ class _Problem:
                 continue
             with np.errstate(over="ignore", invalid="ignore"):
                 away = ((simulated - run.y) / run.sigma)[run.counted]
-            parts.append(np.where(np.isfinite(away), away, _FAILED))
+            parts.append(np.where(np.abs(away) < _UNBOUNDED, away, _FAILED))
         values = x * self.size
         priors = [(values[q] - middle) / spread for q, (middle, spread) in self._known]
         residuals = np.concatenate([*parts, priors])

@@ -12,7 +12,9 @@ import numpy as np
 
 from workbench.errors import FMUError
 from workbench.models.archive import DESCRIPTION, opened
+from workbench.models.description import read_description
 from workbench.models.fmu import open_fmu
+from workbench.models.fmu_cache import is_cached
 from workbench.pages.answer import Answer, Measure, with_answer
 from workbench.pages.figures import CaseFigure, Curve, Panel
 from workbench.pages.parts import (
@@ -80,8 +82,10 @@ def write_fit(
             {n: (v.value, v.unit) for n, v in shared.items() if not v.is_state},
             out / "parameters.toml",
         )
-        fmu = out / f"{model_path(system, OBSERVER).stem}_fitted.fmu"
-        write_fmu(model_path(system, OBSERVER), own, fmu)
+        model = model_path(system, OBSERVER)
+        name = read_description(model).name if is_cached(model) else model.stem
+        fmu = out / f"{name}_fitted.fmu"
+        write_fmu(model, own, fmu)
         if not defaults_in_binary(fmu, own):
             notes.append(
                 f"{fmu.name} states the fitted values, and its binary keeps its own: a tool that "
