@@ -497,16 +497,12 @@ class Variables:
 
 @dataclass(frozen=True)
 class TypedVariables:
-    """A fixed set of variables of one FMU, of any types that hold numbers; see `FMU.typed`.
-
-    Attributes
-    ----------
-    real, others : those of type Real or Float64, and all others.
-    real_at, others_at : their places among all.
-    """
+    """A fixed set of variables of one FMU, of any types that hold numbers; see `FMU.typed`."""
 
     names: tuple[str, ...]
+    # real, others: those of type Real or Float64, and all others
     real: Variables
+    # real_at, others_at: their places among all
     real_at: NDArray[np.intp]
     others: tuple[Variable, ...]
     others_at: NDArray[np.intp]

@@ -180,28 +180,21 @@ def _refuse_discrete(fmu: FMU, names: Sequence[str]) -> None:
 
 
 class CoSimulationInstance(NamedTuple):
-    """One instance of a Co-Simulation FMU, as `Instance`.
+    """One instance of a Co-Simulation FMU, as `Instance`."""
 
-    Attributes
-    ----------
-    address, set_real, get_real, inputs, outputs, u, y, warned : see `Instance`.
-    do_step : address of the FMU's function.
-    fmi : version, 2 or 3.
-    time : (1,) where the next step begins [s].
-    flags, reached : (3,) and (1,) what FMI 3.0 says of a step.
-    """
-
+    # address, set_real, get_real, inputs, outputs, u, y, warned: see `Instance`
     address: int
     set_real: int
     get_real: int
-    do_step: int
-    fmi: int
+    do_step: int  # address of the FMU's function
+    fmi: int  # version, 2 or 3
     inputs: References
     outputs: References
     u: Vector
     y: Vector
-    time: Vector
+    time: Vector  # (1,) where the next step begins [s]
     warned: NDArray[np.int64]
+    # flags, reached: (3,) and (1,) what FMI 3.0 says of a step
     flags: NDArray[np.bool_]
     reached: Vector
 

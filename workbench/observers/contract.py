@@ -76,48 +76,35 @@ class Estimator(ABC):
     fmu : model with the variables of the system.
     system : whose signals are fed.
 
-    Attributes
-    ----------
-    name : in results and commands.
-    label : for people.
-    role : of the model that it runs on.
-    rank : place in tables.
-    standard : whether it runs unless others are asked for.
-    tunable : whether it has gains.
-    adapts : whether it makes its feedback as it goes; its gains are noise levels.
-    meaning : of the gains, with units, for whoever reads their file.
-    offline : whether it needs a whole recording, and has no `init`, `step` and `advance`.
-    tuned_as : estimator whose gains it takes; empty: its own.
-    co_simulates : whether it runs on a model that has Co-Simulation alone.
-    modes : what it weighs models by, in columns and figures; none if it runs on one model.
-    finds : conditions that it finds out by itself.
-    coarse_steps : whether it takes one step of first order from sample to sample, whatever swings.
-    passes_events : whether it goes through events of a model that saves its state.
-    aided : whether samples may be missing, so that it takes aids as outputs, too.
-    bands : (w,) what the law's standard deviations are multiplied by, see `System.bands`.
-
     Raises
     ------
     InputError
         If the model lacks a variable, or has it in another unit.
     """
 
-    name: str
-    label: ClassVar[str]
-    role: ClassVar[str] = OBSERVER
-    rank: ClassVar[int] = 50
-    standard: ClassVar[bool] = True
-    tunable: ClassVar[bool] = True
+    name: str  # in results and commands
+    label: ClassVar[str]  # for people
+    role: ClassVar[str] = OBSERVER  # of the model that it runs on
+    rank: ClassVar[int] = 50  # place in tables
+    standard: ClassVar[bool] = True  # whether it runs unless others are asked for
+    tunable: ClassVar[bool] = True  # whether it has gains
+    # whether it makes its feedback as it goes; its gains are noise levels
     adapts: ClassVar[bool] = False
-    meaning: ClassVar[str] = ""
+    meaning: ClassVar[str] = ""  # of the gains, with units, for whoever reads their file
+    # whether it needs a whole recording, and has no `init`, `step` and `advance`
     offline: ClassVar[bool] = False
-    tuned_as: ClassVar[str] = ""
+    tuned_as: ClassVar[str] = ""  # estimator whose gains it takes; empty: its own
+    # whether it runs on a model that has Co-Simulation alone
     co_simulates: ClassVar[bool] = False
+    # whether it takes one step of first order from sample to sample, whatever swings
     coarse_steps: ClassVar[bool] = False
+    # whether it goes through events of a model that saves its state
     passes_events: ClassVar[bool] = False
+    # whether samples may be missing, so that it takes aids as outputs, too
     aided: ClassVar[bool] = False
+    # what it weighs models by, in columns and figures; none if it runs on one model
     modes: tuple[str, ...] = ()
-    finds: frozenset[str] = frozenset()
+    finds: frozenset[str] = frozenset()  # conditions that it finds out by itself
     _step: Any
     _settings: Any
     _state: Any
@@ -138,6 +125,7 @@ class Estimator(ABC):
         self._model_time = fmu.start_time
         self._known: dict[str, float] = {}
         self._width = 2 * len(system.columns) + len(self.modes) + 1
+        # (w,) what the law's standard deviations are multiplied by, see `System.bands`
         bands = system.bands.get(self.name, {})
         self.bands = np.array([bands.get(name, 1.0) for name in system.columns])
 

@@ -25,27 +25,18 @@ class Point:
 
 @dataclass(frozen=True, eq=False)
 class LinearizedPoint:
-    """Evidence of all stops about a point.
-
-    Attributes
-    ----------
-    keys : of the columns of each jacobian: delays, what differs between recordings, (effect,
-        parameter).
-    lasting : blocks from which on an error is no noise.
-    inflation : (m,) variance of slow errors over that of white noise, by channel, at least 1.
-    away : chi-squared of levels and deviations against what tolerances say of them.
-    excess : see `Thresholds`.
-    settled : whether a fit that ended here found no step that is worth one.
-    """
+    """Evidence of all stops about a point."""
 
     point: Point
+    # of the columns of each jacobian: delays, what differs between recordings, (effect, parameter)
     keys: tuple[Key, ...]
     residuals: tuple[WhitenedResiduals, ...]
-    lasting: int
+    lasting: int  # blocks from which on an error is no noise
+    # (m,) variance of slow errors over that of white noise, by channel, at least 1
     variance_factors: Vector
-    away: float
-    excess: float = Thresholds.excess
-    settled: bool = False
+    away: float  # chi-squared of levels and deviations against what tolerances say of them
+    excess: float = Thresholds.excess  # see `Thresholds`
+    settled: bool = False  # whether a fit that ended here found no step that is worth one
 
     def extended(self, keys: Iterable[Key], jacobians: Sequence[Matrix]) -> "LinearizedPoint":
         """The same with more columns, (b*m + q, p) of each stop."""

@@ -29,25 +29,19 @@ class Extends:
 
 @dataclass(frozen=True)
 class Component:
-    """A component of a class.
-
-    Attributes
-    ----------
-    owner : dotted name of the class that declares it.
-    type, constraint : as written there; `constraint` is empty without `constrainedby`.
-    prefixes : such as input, parameter, final, replaceable; and protected.
-    constraining : what modifies the constraint.
-    """
+    """A component of a class."""
 
     name: str
-    owner: str
+    owner: str  # dotted name of the class that declares it
+    # type, constraint: as written there; `constraint` is empty without `constrainedby`
     type: str
+    # such as input, parameter, final, replaceable; and protected
     prefixes: frozenset[str]
     modifier: Modifier
     description: str
     where: str
     constraint: str = ""
-    constraining: Modifier = field(default_factory=Modifier)
+    constraining: Modifier = field(default_factory=Modifier)  # what modifies the constraint
 
 
 @dataclass(frozen=True)

@@ -99,17 +99,12 @@ class SheetError:
 
 @dataclass(frozen=True)
 class Scale:
-    """In what sizes are measured.
+    """In what sizes are measured."""
 
-    Attributes
-    ----------
-    unit : in words.
-    visible : size from which on a finding is expected [unit].
-    chances : by size [unit], the chance that an oracle finds it; empty where nobody asked one.
-    """
-
-    unit: str = "the least size that is worth a finding"
+    unit: str = "the least size that is worth a finding"  # in words
+    # size from which on a finding is expected [unit]
     visible: float = 2.0  # beyond what tolerances may hide
+    # by size [unit], the chance that an oracle finds it; empty where nobody asked one
     chances: Mapping[str, float] = field(default_factory=dict)
 
 
