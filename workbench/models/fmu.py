@@ -169,11 +169,12 @@ class FMUInstance:
         If it refuses to be instantiated, or is not known and does not stand being tried.
     """
 
-    def __init__(self, description: Description, interface: str) -> None:
-        identifier = description.require(interface).identifier
+    interface: str
+
+    def __init__(self, description: Description) -> None:
+        identifier = description.require(self.interface).identifier
         self.version = description.version  # of FMI
-        self._description = description
-        self._interface = interface
+        self.description = description
         self.warned = np.zeros(1, np.int64)  # (1,) calls that it answered with a warning
         self._log: deque[str] = deque(maxlen=_LOGGED)
         self._warning_messages, self._first_warning = 0, ""
@@ -182,10 +183,10 @@ class FMUInstance:
         own_umask()  # before a model can change it
         self._scratch = TemporaryFolder()
         try:
-            library = description.library(interface)
+            library = description.library(self.interface)
             folder = self._scratch.path
             unpack(description.path, folder, str(PurePosixPath(library).parent))
-            require_trial(description, interface, folder)
+            require_trial(description, self.interface, folder)
             self._library = str(folder / library)
             self._load(identifier)
         except BaseException:
@@ -196,8 +197,8 @@ class FMUInstance:
         """Load the library and make an instance."""
         here = os.getcwd()
         try:
-            self._instance = _CLASSES[self._interface, self.version](
-                guid=self._description.token,
+            self._instance = _CLASSES[self.interface, self.version](
+                guid=self.description.token,
                 unzipDirectory=str(self._scratch.path),
                 modelIdentifier=identifier,
                 instanceName=identifier,
@@ -207,7 +208,7 @@ class FMUInstance:
         except Exception as error:  # FMPy raises bare Exception where a library cannot be loaded
             os.chdir(here)  # it looks for the library in its own folder, and stays there
             raise InputError(
-                where=str(self._description.path),
+                where=str(self.description.path),
                 found=f"a binary that cannot be loaded ({error})",
                 expected="one that this machine can load, with the functions of FMI",
                 remedy="export the model again for this machine",
@@ -223,12 +224,12 @@ class FMUInstance:
 
     def _require(self, library: ctypes.CDLL) -> None:
         """Refuse a library without the functions that every use needs."""
-        names = [_FUNCTIONS[use][self.version] for use in _NEEDED[self._interface]]
+        names = [_FUNCTIONS[use][self.version] for use in _NEEDED[self.interface]]
         if missing := [name for name in names if not hasattr(library, name)]:
             raise InputError(
-                where=str(self._description.path),
+                where=str(self.description.path),
                 found=f"a binary without the function {missing[0]}",
-                expected=f"all of FMI {self.version}, {self._interface}",
+                expected=f"all of FMI {self.version}, {self.interface}",
                 remedy="export the model again",
             )
 
@@ -246,7 +247,7 @@ class FMUInstance:
                     PROXY.addLoggerProxy(ctypes.byref(callbacks))
                 self._instance.instantiate(callbacks=callbacks)
         except Exception as error:  # FMPy raises bare Exception where the FMU returns NULL
-            raise FMUError(f"{_called(self._description)}: {error}: {self._logged()}") from None
+            raise FMUError(f"{_called(self.description)}: {error}: {self._logged()}") from None
         self._component = ctypes.c_void_p(self._instance.component)
         self._used = False
 
@@ -270,7 +271,7 @@ class FMUInstance:
         if not count:
             return ""
         times = f"{count} times, first" if count > 1 else "once"
-        return f"the FMU {_called(self._description)} warned {times}: {first}"
+        return f"the FMU {_called(self.description)} warned {times}: {first}"
 
     def close(self) -> None:
         """Free the instance and the unpacked files."""
@@ -287,7 +288,7 @@ class FMUInstance:
         getattr(self._instance, free)(self._instance.component)
         self._instantiate()
 
-    def start(self, prepare: Callable[[], None], time: float) -> float:
+    def initialise(self, prepare: Callable[[], None], time: float) -> float:
         """Reset and initialise; in Model Exchange enter continuous-time mode.
 
         Parameters
@@ -317,13 +318,13 @@ class FMUInstance:
             else:
                 instance.enterInitializationMode(startTime=time)
             instance.exitInitializationMode()
-            if self._interface == CO_SIMULATION:
+            if self.interface == CO_SIMULATION:
                 return math.inf
             return self._update_discrete_states().time
         except FMICallException as error:
             raise self.refusal(error.function, error.status) from None
 
-    def handle_event(self, prepare: Callable[[], None]) -> EventUpdate:
+    def pass_event(self, prepare: Callable[[], None]) -> EventUpdate:
         """Enter Event Mode, set what changes there, and go on in continuous time.
 
         Parameters
@@ -362,7 +363,7 @@ class FMUInstance:
                 next_time = float(time) if defined else math.inf
                 return EventUpdate(next_time, nominals_changed)
         raise FMUError(
-            f"{_called(self._description)}: its discrete states are not stable after "
+            f"{_called(self.description)}: its discrete states are not stable after "
             f"{_MOST_ITERATIONS} iterations"
         )
 
@@ -378,7 +379,7 @@ class FMUInstance:
 
     def end_error(self) -> FMUError:
         """The error for an FMU that asks to end the simulation, with what it logged."""
-        name = _called(self._description)
+        name = _called(self.description)
         return FMUError(f"{name}: it asks to end the simulation: {self._logged()}")
 
     def get_whole(self, variable: Variable) -> float:
@@ -414,7 +415,7 @@ class FMUInstance:
         held = low <= value <= high and not (whole and value != int(value))
         if not held or (items and value not in items):
             raise InputError(
-                where=f"{self._description.path}, variable '{variable.name}'",
+                where=f"{self.description.path}, variable '{variable.name}'",
                 found=f"the value {value:g}",
                 expected="0 or 1, of a Boolean"
                 if variable.type == "Boolean"
@@ -442,15 +443,15 @@ class FMUInstance:
             If it has no such function: Co-Simulation alone does not let states be set.
         """
         if use not in self._call:
-            raise co_simulation_alone(self._description, _FUNCTIONS[use][self.version])
+            raise co_simulation_alone(self.description, _FUNCTIONS[use][self.version])
         status = self._call[use](self._component, *arguments)
         self.warned[0] += status == _WARNING
         if status > _WARNING:
             raise self.refusal(_FUNCTIONS[use][self.version], status)
 
     @property
-    def address(self) -> int:
-        """Address of the instance, for whoever calls its functions."""
+    def instance_address(self) -> int:
+        """Address of the instance, for compiled loops that call the FMU's functions."""
         return int(self._component.value or 0)
 
     def function_address(self, use: str) -> int:
@@ -462,7 +463,7 @@ class FMUInstance:
         """The error for a call that returned `status`, with what the FMU logged."""
         name = _STATUSES.get(status, status)
         return FMUError(
-            f"{_called(self._description)}: {function} returned {name}: {self._logged()}"
+            f"{_called(self.description)}: {function} returned {name}: {self._logged()}"
         )
 
     def _logged(self) -> str:
@@ -532,7 +533,7 @@ def central_differences(evaluate: Callable[[Vector], Vector], x: Vector, steps: 
     return np.column_stack(columns)
 
 
-class FMU:
+class FMU(FMUInstance):
     """One instance of a Model Exchange FMU, FMI 2.0 or 3.0.
 
     Parameters
@@ -577,7 +578,6 @@ class FMU:
         self.description = read_description(path).renamed(self.names)
         offered = self.description.require(self.interface)
         self.sha256 = self.description.sha256
-        self.version = self.description.version
         self.name = self.description.name
         self.states = self.description.states
         self.inputs = self.description.names("input")
@@ -621,8 +621,7 @@ class FMU:
         self.event_signs = np.zeros(self._z.size, np.bool_)
         self.time = np.full(1, self.start_time)
         self.next_event = np.full(1, np.inf)
-        self._loaded = FMUInstance(self.description, self.interface)
-        self.warned = self._loaded.warned
+        super().__init__(self.description)
         # Wrong ones would be wrong steps of a model, and nothing would show it.
         self.has_directional_derivatives = offered.directional_derivatives and derivatives_hold(
             self.description
@@ -666,17 +665,13 @@ class FMU:
         """Free the instance and the unpacked files, those of variants too."""
         for variant in self._variants:
             variant.close()
-        self._loaded.close()
+        super().close()
 
     def variant(self, parameters: Mapping[str, float]) -> "FMU":
         """Another instance with some parameters changed, which is closed with this one."""
         other = type(self)(self.path, self.names, {**self._given, **parameters})
         self._variants.append(other)
         return other
-
-    def renew(self, *, reload: bool) -> None:
-        """Free the instance and make a new one; with `reload` of a library loaded anew."""
-        self._loaded.renew(reload=reload)
 
     # --- variables ---
 
@@ -727,14 +722,14 @@ class FMU:
         """Read values as numbers, (k,) in the FMU's units."""
         values = np.zeros(len(variables.names))
         values[variables.real_at] = self.get(variables.real)
-        values[variables.others_at] = [self._loaded.get_whole(v) for v in variables.others]
+        values[variables.others_at] = [self.get_whole(v) for v in variables.others]
         return values
 
     def set_typed(self, variables: TypedVariables, values: Vector) -> None:
         """Set values, (k,) in the FMU's units."""
         self.set(variables.real, values[variables.real_at])
         for variable, value in zip(variables.others, values[variables.others_at], strict=True):
-            self._loaded.set_whole(variable, float(value))
+            self.set_whole(variable, float(value))
 
     def get(self, variables: Variables) -> Vector:
         """Read values; returns (k,) in the FMU's units, the buffer of `variables` itself."""
@@ -751,7 +746,7 @@ class FMU:
         if not count.value:
             return
         tail = (count,) if self.version == "3.0" else ()
-        self._loaded.call(use, references, count, values, *tail)
+        self.call(use, references, count, values, *tail)
 
     def references(self, names: Sequence[str]) -> References:
         """Value references of variables that there are, (k,)."""
@@ -768,23 +763,6 @@ class FMU:
             v.name == name and v.real and v.variability == "continuous"
             for v in self.description.variables
         )
-
-    def take_warning(self) -> str:
-        """How often it warned since this was asked last, and its first message; or nothing."""
-        return self._loaded.take_warning()
-
-    @property
-    def instance_address(self) -> int:
-        """Address of the instance, for compiled loops that call the FMU's functions."""
-        return self._loaded.address
-
-    def function_address(self, use: str) -> int:
-        """Address of the FMU's function for a use such as "get"; 0 if it has none."""
-        return self._loaded.function_address(use)
-
-    def refusal(self, function: str, status: int | str) -> FMUError:
-        """The error for a call that returned `status`, with what the FMU logged."""
-        return self._loaded.refusal(function, status)
 
     # --- the extended-FMI pattern ---
 
@@ -811,10 +789,10 @@ class FMU:
         def prepare() -> None:
             self.set(variables, values)
             for variable, value in whole:
-                self._loaded.set_whole(variable, value)
+                self.set_whole(variable, value)
 
         self.time[0] = self.start_time
-        self.next_event[0] = self._loaded.start(prepare, self.start_time)
+        self.next_event[0] = self.initialise(prepare, self.start_time)
         if self.interface != MODEL_EXCHANGE:
             return
         x = self.get_states()
@@ -865,7 +843,7 @@ class FMU:
             if variables is not None and values is not None:
                 self.set_typed(variables, values)
 
-        update = self._loaded.handle_event(prepare)
+        update = self.pass_event(prepare)
         self.next_event[0] = update.time
         if self.event_signs.size:
             self.event_signs[:] = self.event_indicators() > 0.0
@@ -882,7 +860,7 @@ class FMU:
         if not self.needs_completed_steps:
             return False
         before = self.get_states()
-        event = self._loaded.complete_step()
+        event = super().complete_step()
         moved = np.flatnonzero(self.get_states() != before)
         if moved.size and not event:
             raise FMUError(
@@ -906,7 +884,7 @@ class FMU:
     def set_time(self, t: float) -> None:
         """Set the time [s]."""
         self.time[0] = t
-        self._loaded.call("time", t)
+        self.call("time", t)
 
     def set_states(self, x: Vector) -> None:
         """Set the continuous states, (n,)."""
@@ -928,9 +906,7 @@ class FMU:
 
     def _states(self, use: str, buffer: Vector) -> None:
         if buffer.size:
-            self._loaded.call(
-                use, ctypes.c_void_p(buffer.ctypes.data), ctypes.c_size_t(buffer.size)
-            )
+            self.call(use, ctypes.c_void_p(buffer.ctypes.data), ctypes.c_size_t(buffer.size))
 
     def jacobian(self, unknowns: NDArray[np.uint32], knowns: Variables) -> Matrix:
         """Derivatives d(unknowns)/d(knowns), (rows, columns).
@@ -951,7 +927,7 @@ class FMU:
             size, single = ctypes.c_size_t(unknowns.size), ctypes.c_size_t(1)
             seeds, out = ctypes.c_void_p(seed.ctypes.data), ctypes.c_void_p(result[j].ctypes.data)
             tail = (seeds, single, out, size) if self.version == "3.0" else (seeds, out)
-            self._loaded.call("directional", unknown, size, known, single, *tail)
+            self.call("directional", unknown, size, known, single, *tail)
         return result.T
 
     def _difference(self, unknowns: NDArray[np.uint32], knowns: Variables) -> Matrix:
@@ -1015,29 +991,29 @@ class FMU:
         over : a saved state that is no longer needed, whose place it takes.
         """
         saved = ctypes.c_void_p() if over is None else over
-        self._loaded.call("save", ctypes.byref(saved))
+        self.call("save", ctypes.byref(saved))
         return saved
 
     def restore(self, saved: ctypes.c_void_p) -> None:
         """Roll the instance back to a saved state."""
-        self._loaded.call("restore", saved)
+        self.call("restore", saved)
 
     def release(self, saved: ctypes.c_void_p) -> None:
         """Free a saved state."""
-        self._loaded.call("release", ctypes.byref(saved))
+        self.call("release", ctypes.byref(saved))
 
     def serialise(self, saved: ctypes.c_void_p) -> bytes:
         """Turn a saved state into bytes, which outlive the instance."""
         size = ctypes.c_size_t()
-        self._loaded.call("size", saved, ctypes.byref(size))
+        self.call("size", saved, ctypes.byref(size))
         buffer = ctypes.create_string_buffer(size.value)
-        self._loaded.call("serialise", saved, buffer, size)
+        self.call("serialise", saved, buffer, size)
         return buffer.raw
 
     def deserialise(self, data: bytes) -> ctypes.c_void_p:
         """Turn bytes from any instance of this FMU back into a saved state."""
         saved = ctypes.c_void_p()
-        self._loaded.call("deserialise", data, ctypes.c_size_t(len(data)), ctypes.byref(saved))
+        self.call("deserialise", data, ctypes.c_size_t(len(data)), ctypes.byref(saved))
         return saved
 
 
@@ -1109,9 +1085,9 @@ class CoSimulation(FMU):
             reached.value = t.value + span.value
             # The zero: the state may be rolled back to before this point.
             try:
-                self._loaded.call("do_step", t, span, ctypes.c_int(0), *tail)
+                self.call("do_step", t, span, ctypes.c_int(0), *tail)
                 if end.value:
-                    raise self._loaded.end_error()
+                    raise self.end_error()
                 short = begin + (part + 1) * h / parts - reached.value
                 if early.value or event.value or abs(short) > _SAME_STEP * span.value:
                     raise FMUError(
