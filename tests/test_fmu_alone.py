@@ -171,6 +171,19 @@ def test_a_start_far_from_the_models_is_no_missing_effect(tmp_path):
     assert re.fullmatch(r"0\.0\d+ \(95 %: .*", change.text)  # no share, which would be 5 %
 
 
+def test_an_input_that_nothing_feeds_is_asked_about(tmp_path):
+    """It keeps its start, and what it does to the machine would be taken for a fault."""
+    text = machine_file("tank_alone/Tank.mo").replace(
+        "  Real x(", '  input Real rain(unit="m3/s", start=2e-4);\n  Real x('
+    )
+    build_text(tmp_path, text.replace("inflow - c", "inflow + rain - c"))
+    (tmp_path / "system.toml").write_text(SYSTEM)
+    said = "input 'rain' of the FMU: found no signal that feeds it, so that it keeps 0.0002"
+    with pytest.warns(UserWarning, match=said):
+        cases = read_cases(record(tmp_path / "recordings", seed=2), load_system(tmp_path))
+    assert [len(case.doubts) for case in cases] == [1] * len(cases)
+
+
 def test_candidates_are_parameters_and_sensors_of_a_stated_size(tank):
     names = [effect.name for effect in catalogue(tank, None)]
     # A leak of zero without bounds or nominal value has no size that a change can be small to.

@@ -5,7 +5,7 @@ told of a machine stands in its system file: ranges, redundancies, conditions th
 and times between samples.
 """
 
-from collections.abc import Iterator, Mapping, Set
+from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from workbench.arrays import Vector
 from workbench.errors import InputError
-from workbench.models.description import read_description
+from workbench.models.description import Variable, read_description
 from workbench.system.parts import FIRST, Condition, Redundancy, Signal
 from workbench.system.system import OBSERVER, System
 from workbench.system.units import si_factor
@@ -108,6 +108,7 @@ def doubts(
         or list(_jumps(time, signals, system, origin))
         or list(_sizes(signals, system, origin))
     )
+    findings += _unfed(system)
     return (*origin.doubts, *(str(finding.refusal()) for finding in findings))
 
 
@@ -141,17 +142,39 @@ def _ranges(
             break  # what is impossible is unlikely too
 
 
+def _described(system: System) -> Sequence[Variable]:
+    """Variables of the observer's model, by the system's names."""
+    try:
+        path = system.model(OBSERVER).path
+        return [] if path is None else read_description(path).renamed(system.names).variables
+    except (InputError, KeyError):  # whoever opens the model says what is wrong with it
+        return []
+
+
+def _unfed(system: System) -> Iterator[_Finding]:
+    """Inputs of the observer's model that nothing feeds, and that do not rest at zero."""
+    fed = {*system.signals, *system.corrections}
+    for variable in _described(system):
+        own = variable.causality == "input" and variable.name not in fed
+        if not own or variable.array or variable.type == "Boolean":
+            continue
+        if variable.holds_number and (start := float(variable.start or 0.0)):
+            theirs = system.names.get(variable.name, variable.name)
+            yield _Finding(
+                False,
+                f"{system.source}, input '{theirs}' of the FMU",
+                f"no signal that feeds it, so that it keeps {start:.6g}",
+                "a recorded signal for each input of the FMU, unless it is constant",
+                f"add [inputs.{theirs}], or go on if the value is right in these recordings",
+            )
+
+
 def _sizes(signals: Mapping[str, Vector], system: System, origin: Origin) -> Iterator[_Finding]:
     """Signals of a size, or with a first value, that another unit of the column would explain.
 
     Against `scale`, and against limits and start of the variable in the observer's model.
     """
-    try:
-        path = system.model(OBSERVER).path
-        described = [] if path is None else read_description(path).renamed(system.names).variables
-    except (InputError, KeyError):  # whoever opens the model says what is wrong with it
-        described = []
-    variables = {variable.name: variable for variable in described}
+    variables = {variable.name: variable for variable in _described(system)}
     for signal in (*system.inputs, *system.outputs):
         values = signals.get(signal.name, np.zeros(0))
         values = values[np.isfinite(values)]
