@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from scipy.linalg.lapack import dtbtrs
 
 from workbench.arrays import Matrix, Vector
 from workbench.errors import FMUError
@@ -22,8 +21,6 @@ _CORNER = 2 * np.pi / np.sqrt(np.sqrt(2) - 1)
 # Samples whose line scores the estimate before them: its noise has 1.5 times a sample's variance;
 # to repeat the noise costs 29 %, and a line through more would cut curves of the motion.
 _AFTER = 4
-
-_BEYOND = 9  # samples that a low-pass settles in, mirrored at each end
 
 _POINTS, _ROUNDED = 8, 1e-9  # states by chance, and share of a value that arithmetic leaves
 
@@ -112,32 +109,15 @@ def low_pass(time: Vector, signal: Vector, bandwidth: float) -> Vector:
     >>> float(np.abs(ringing[100:-100]).max().round(3))
     0.002
     """
+    from scipy.signal import butter, sosfiltfilt  # takes its time to load
+
     step = (time[-1] - time[0]) / (time.size - 1)
     if 2 * bandwidth * step >= 1.0:
         return signal
     even = time[0] + step * np.arange(time.size)
-    signal = np.pad(np.interp(even, time, signal), _BEYOND, "reflect", reflect_type="odd")
-    omega = np.tan(np.pi * bandwidth * step)
-    poles = np.array([1 + omega * (np.sqrt(2) + omega), 2 * (omega**2 - 1), 0.0])
-    poles[2] = 4 * omega**2 - poles[0] - poles[1]  # keeps what is constant
-    for _ in range(2):
-        signal = _filtered(signal, omega**2 / poles[0] * np.array([1, 2, 1]), poles / poles[0])
-        signal = signal[::-1]
-    return np.interp(time, even, signal[_BEYOND:-_BEYOND])
-
-
-def _filtered(values: Vector, zeros: Vector, poles: Vector) -> Vector:
-    """Values (n,) behind a filter of second order that rests before them.
-
-    With u the values, a the poles of which the first is 1, and b the zeros:
-    y_k = b_0 u_k + b_1 u_k-1 + b_2 u_k-2 - a_1 y_k-1 - a_2 y_k-2. As equations of all y at once,
-    as SciPy's own filters take long to load.
-    """
-    driven = np.convolve(np.r_[values[0], values[0], values], zeros, "valid")
-    driven[:2] -= values[0] * np.array([poles[1] + poles[2], poles[2]])
-    bands = np.repeat(poles[:, np.newaxis], values.size, axis=1)
-    filtered: Vector = dtbtrs(bands, driven[:, np.newaxis], uplo="L")[0][:, 0]
-    return filtered
+    sections = butter(2, 2 * bandwidth * step, output="sos")
+    smooth: Vector = sosfiltfilt(sections, np.interp(even, time, signal))
+    return np.interp(time, even, smooth)
 
 
 def samples(time: Vector) -> tuple[Vector, Vector]:

@@ -6,7 +6,6 @@ change of that view box, and curves are drawn anew from all samples, which come 
 
 import base64
 import json
-import math
 import zlib
 from collections.abc import Sequence
 from typing import Any
@@ -130,14 +129,10 @@ def drawing(figure: CaseFigure) -> dict[str, Any]:
 
 def ticks_within(low: float, high: float, most: int) -> list[tuple[float, str]]:
     """Round values from low to high, at most so many, each with its text."""
-    power = 10.0 ** math.floor(math.log10((high - low) / most))
-    steps = [power * share for share in (0.5, 1.0, 2.0, 5.0, 10.0)]
-    wide = next(place for place, step in enumerate(steps) if step * most >= high - low)
-    for step in steps[wide::-1]:
-        values = step * np.arange(math.floor(low / step), math.ceil(high / step) + 1)
-        inside = values[(low <= values) & (values <= high)].tolist()
-        if len(inside) > 1:
-            break
+    from matplotlib.ticker import MaxNLocator  # loaded where something is drawn
+
+    values = MaxNLocator(most, steps=[1, 2, 5, 10]).tick_values(low, high)
+    inside = [float(value) for value in values if low <= value <= high]
     return [(value, f"{value:.6g}".replace("-", "\N{MINUS SIGN}")) for value in inside]
 
 

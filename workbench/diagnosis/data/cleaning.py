@@ -133,29 +133,19 @@ def uneven_steps(time: Vector, h: float) -> Mask:
 
 
 def _smooth_evenly(values: Vector, windows: Sequence[float], h: float, held: float) -> Vector:
+    from scipy.signal import savgol_filter  # takes its time to load
+
     best, noise = values, deviation_of(values)
     for seconds, order in zip(windows, (2, 1), strict=False):
         window = 2 * (round(seconds / h) // 2) + 1
         if order < window <= values.size:
-            smooth = _polynomials(values, window, order)
+            smooth = savgol_filter(values, window, order)
             moves = maximum_filter1d(np.abs(best - smooth) > held * noise, window)
             weight = uniform_filter1d(moves.astype(np.float64), window)
             best = weight * best + (1.0 - weight) * smooth
             # Of a parabola over n samples, the variance is 9/4 of that of a mean.
             noise *= 1.5 / np.sqrt(window)
     return best
-
-
-def _polynomials(values: Vector, window: int, order: int) -> Vector:
-    """Middles of polynomials that fit a window around each of (n,) values, at the ends all of it.
-
-    Source: Savitzky and Golay (1964), Anal. Chem. 36, 1627-1639. SciPy's takes long to load.
-    """
-    half = window // 2
-    powers = np.vander(np.linspace(-1.0, 1.0, window), order + 1, increasing=True)
-    fit = np.linalg.pinv(powers)
-    ends = (powers @ (fit @ values[:window]))[:half], (powers @ (fit @ values[-window:]))[-half:]
-    return np.concatenate([ends[0], np.correlate(values, fit[0], "valid"), ends[1]])
 
 
 def noise_in(values: Vector, signal: Signal) -> float:

@@ -540,13 +540,20 @@ def _share(before: FittedModel, after: FittedModel) -> float:
 
 
 def _gain(fit: Fit, chosen: Selection) -> Gain:
+    from scipy.stats import bootstrap  # takes its time to load
+
     fast = any(effect.order_locked for effect in chosen.best.active)
     before, after = (
         chosen.validation.squares(fitted_model, fast=fast)
         for fitted_model in (chosen.base, chosen.best)
     )
-    drawn = np.random.default_rng(0).integers(0, after.size, (_DRAWS, after.size))
-    low, high = np.percentile(np.sqrt(after[drawn].mean(axis=1)), [2.5, 97.5])  # a bootstrap
+    low, high = bootstrap(
+        (after,),
+        lambda squares, axis: np.sqrt(squares.mean(axis=axis)),
+        n_resamples=_DRAWS,
+        method="percentile",
+        rng=np.random.default_rng(0),
+    ).confidence_interval
     return Gain(
         before=float(np.sqrt(before.mean())),
         after=float(np.sqrt(after.mean())),
