@@ -14,13 +14,18 @@ from workbench.system.comparison import RATE, Comparison
 
 @dataclass(frozen=True)
 class Soundness:
-    """Which samples are taken for wrong, and what moves, in standard deviations of their noise."""
+    """Which samples are taken for wrong, and what moves, in standard deviations of their noise.
 
-    # off the running median: no noise reaches it. By theory 5.8 in the 240 000 samples of six
-    # stops; but noise may grow with a signal, and structures ring.
+    Attributes
+    ----------
+    spike : off the running median: no noise reaches it. By theory 5.8 in the 240 000 samples of six
+        stops; but noise may grow with a signal, and structures ring.
+    stuck : equal samples in a row: a channel that is noisy does not repeat itself.
+    held : a polynomial that takes away more is no smoothing: chance makes 3.8 in a stop's samples.
+    """
+
     spike: float = 8.0
-    stuck: int = 6  # equal samples in a row: a channel that is noisy does not repeat itself
-    # a polynomial that takes away more is no smoothing: chance makes 3.8 in a stop's samples
+    stuck: int = 6
     held: float = 4.0
 
 
@@ -29,46 +34,57 @@ SOUND = Soundness()
 
 @dataclass(frozen=True)
 class Thresholds:
-    """What decides in a diagnosis."""
+    """What decides in a diagnosis.
 
-    significant: float  # standard deviations of a size; the largest of all candidates' by chance
-    fall: float  # of chi-squared on held-out recordings; likewise, its square
-    # standard deviations from zero to a size that matters, of a second effect too small to; of one
-    # effect alone, what is significant
+    Attributes
+    ----------
+    significant : standard deviations of a size; the largest of all candidates' by chance.
+    fall : of chi-squared on held-out recordings; likewise, its square.
+    immaterial : standard deviations from zero to a size that matters, of a second effect too small
+        to; of one effect alone, what is significant.
+    tied : chi-squared by which fits are equals: odds that chance turns at the rate.
+    wrong : variance of errors that last, over noise, from which on much is wrong. Chance makes 1.5
+        of a hundred means, and 4.3 of five; laws that differ a little in form may make as much.
+    form : chi-squared that a candidate may owe to its form, since laws are simplified.
+    form_share : the same, as a share of what the effect explains: laws agree to some 3 %, squared.
+    twin : one less cosine of signatures within which an effect is fitted in full.
+        The scatter of a candidate is then 5 times that alone; it costs time only.
+    near : share of the best score from which on an effect is a candidate: scores are linear, and
+        laws bend.
+    behind : times the chi-squared of the best from which on a fit that has begun is not finished.
+    idle : share of the explainable below which an effect beside others is no cause, but bends to
+        what their forms leave.
+    left : share of systematic errors that a right effect leaves by its form; wrong ones leave more.
+    excess : of the mean square of white errors over 1, which an estimate of noise may leave: a
+        tenth of the deviation is a fifth of it, and block means keep some ringing.
+    worse : of deviance, which no step of a fit is worth: a thirtieth of what is significant.
+    furthest : standard deviations that no tolerance goes beyond; chance makes 4 of thirty.
+    furthest_level : the same of levels, which differ by more; beyond 3 a friction may
+        be none.
+    most : causes; more than that is not a diagnosis.
+    rivals : effects that are fitted in full before one is named; it costs time only.
+    samples : which samples count.
+    """
+
+    significant: float
+    fall: float
     immaterial: float
-    tied: float  # chi-squared by which fits are equals: odds that chance turns at the rate
-    # variance of errors that last, over noise, from which on much is wrong. Chance makes 1.5 of a
-    # hundred means, and 4.3 of five; laws that differ a little in form may make as much.
+    tied: float
     wrong: float = 6.0
-    # chi-squared that a candidate may owe to its form, since laws are simplified
     form: float = 40.0
-    # the same, as a share of what the effect explains: laws agree to some 3 %, squared
     form_share: float = 0.001
-    # one less cosine of signatures within which an effect is fitted in full. The scatter of a
-    # candidate is then 5 times that alone; it costs time only.
     twin: float = 0.02
-    # share of the best score from which on an effect is a candidate: scores are linear, and laws
-    # bend
     near: float = 0.4
-    # times the chi-squared of the best from which on a fit that has begun is not finished
     behind: float = 3.0
-    # share of the explainable below which an effect beside others is no cause, but bends to what
-    # their forms leave
     idle: float = 0.05
-    # share of systematic errors that a right effect leaves by its form; wrong ones leave more
     left: float = 0.03
-    # of the mean square of white errors over 1, which an estimate of noise may leave: a tenth of
-    # the deviation is a fifth of it, and block means keep some ringing
     excess: float = 0.3
-    # of deviance, which no step of a fit is worth: a thirtieth of what is significant
     worse: float = 0.5
-    # standard deviations that no tolerance goes beyond; chance makes 4 of thirty
     furthest: float = 5.0
-    # the same of levels, which differ by more; beyond 3 a friction may be none
     furthest_level: float = 3.0
-    most: int = 4  # causes; more than that is not a diagnosis
-    rivals: int = 5  # effects that are fitted in full before one is named; it costs time only
-    samples: Soundness = SOUND  # which samples count
+    most: int = 4
+    rivals: int = 5
+    samples: Soundness = SOUND
 
     @property
     def hint(self) -> float:
