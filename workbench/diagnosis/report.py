@@ -60,7 +60,7 @@ def write_diagnosis(
         write_estimates(best, out / "smoothed.csv")
     for name, draw in _drawings(outcome, summary, figures).items():
         paths = [out / f"{name}.{suffix}" for suffix in PICTURES]
-        if pictures:
+        if pictures and draw is not None:
             draw(paths)
         else:
             for path in paths:
@@ -70,18 +70,16 @@ def write_diagnosis(
 
 def _drawings(
     outcome: Outcome, summary: Mapping[str, Any], figures: Sequence[CaseFigure]
-) -> dict[str, Callable[[Sequence[Path]], None]]:
-    """What draws each figure to some files, by its name."""
+) -> dict[str, Callable[[Sequence[Path]], None] | None]:
+    """What draws each figure to some files, by its name; None: there is nothing to draw."""
     names, cosines = outcome.diagnosis.names, outcome.diagnosis.cosines
     effects = [cause["effect"] for cause in summary["causes"]]
-    drawings: dict[str, Callable[[Sequence[Path]], None]] = {
+    return {
         **{figure.name: partial(draw_case, figure) for figure in figures},
         "confusability": partial(draw_confusability, names, cosines, effects),
         "dependences": partial(draw_dependences, summary["dependences"]),
+        "gain": summary["gain"] and partial(draw_gain, summary["gain"]),
     }
-    if summary["gain"] is not None:
-        drawings["gain"] = partial(draw_gain, summary["gain"])
-    return drawings
 
 
 def relate_diagnosis(outcome: Outcome, out: Path, related: Mapping[str, str]) -> None:
