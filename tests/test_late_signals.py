@@ -2,6 +2,7 @@
 
 import itertools
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
@@ -12,16 +13,20 @@ import pandas as pd
 import pytest
 from scipy.integrate import solve_ivp
 
-from workbench.diagnosis import Outcome, Problem, catalogue, diagnose
+from workbench.diagnosis import Outcome, Problem, catalogue, diagnose, read_effects
+from workbench.diagnosis.data.motion import ModelSource
 from workbench.diagnosis.inference import timing
+from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.quadratic import Quadratic
 from workbench.diagnosis.inference.thresholds import thresholds
 from workbench.diagnosis.inference.timing import LateSignals, by_themselves
+from workbench.diagnosis.run import build_everything
+from workbench.diagnosis.simulation.residual_model import ResidualModel
 from workbench.models.modelica import read_library
 from workbench.runtime.engine import Engine
 from workbench.system.registry import load_system
 
-from .built import machine
+from .built import declare, machine
 from .heater import cases
 
 SAMPLE = 1e-3  # [s]
@@ -170,6 +175,38 @@ def test_one_late_signal_is_named_and_its_advice_leads_to_the_cause(signal, ms, 
     assert cause.effect.name == "LoggerTimeSkew[own]"
     skew = cause.parameters["skew"]
     assert skew.low <= 1e-3 * ms <= skew.high
+
+
+def test_a_clock_tells_nothing_of_an_input_that_moves_nothing(tmp_path):
+    """A thermometer in the workshop: its samples reach no output, whatever its clock says.
+
+    Where a clock leaves the ends of a recording without input, other errors stand there, as many
+    as before: their noise is no derivative.
+    """
+    library = MOTOR.replace(
+        "    input Real u", '    input Real room(unit="K") "Room";\n    input Real u'
+    )
+    file = MOTOR_FILE + '[inputs.room]\nunit = "K"\nnoise = "0.1 K"\nscale = "5 K"\n'
+    of = declare(tmp_path / "motor", library, file)
+    frames = [recorded({}, seed) for seed in range(2)]
+    rooms = [290.0 + np.random.default_rng(seed).standard_normal(3000) for seed in range(2)]
+    recordings = cases(
+        of, [f.assign(**{"room [K]": room}) for f, room in zip(frames, rooms, strict=True)]
+    )
+    effects, path = read_effects(read_library(of.library), "Observer"), tmp_path / "all.fmu"
+    build_everything(of, read_library(of.library), effects, path)
+    with ResidualModel(ModelSource(path, of, of.given), recordings) as simulations:
+        alone = Fit(simulations, effects)
+        fit = alone.beside(alone.own_clocks)
+        for late in (0.0, 2.5e-3):
+            sizes = {(clock.name, clock.size): late for clock in alone.own_clocks}
+            lin = fit.linearise(
+                fit.at(replace(fit.unknowns.start(), sizes=sizes)), alone.own_clocks
+            )
+            joint = fit.quadratics(lin)
+            tells = dict(zip(joint.shared, np.diag(joint.total().N), strict=True))
+            assert tells["TimeSkew[room]", "skew"] == 0.0
+            assert tells["TimeSkew[u]", "skew"] > (1.0 / SAMPLE) ** 2
 
 
 def test_signals_in_time_are_not_late(tmp_path):

@@ -28,7 +28,7 @@ from workbench.recordings.case import Case
 from workbench.system.comparison import Channel
 from workbench.system.parts import Signal
 from workbench.system.system import System
-from workbench.system.units import BAND, si_factor, with_interval
+from workbench.system.units import BAND, si_factor, with_interval, with_unit
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -483,7 +483,7 @@ class Outcome:
 def _late(late: LateSignals) -> str:
     """Signals that are late, and what to do, for people."""
     if len({*late.skews.values()}) > 1:
-        each = ", ".join(f"{name} by {1e3 * skew:.3g} ms" for name, skew in late.skews.items())
+        each = ", ".join(f"{name} by {with_unit(skew, 's')}" for name, skew in late.skews.items())
         return (
             f"Signals are late by different times: {each}. Say in [loggers] which signals share a "
             "logger, and diagnose again."

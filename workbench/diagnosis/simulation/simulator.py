@@ -258,8 +258,9 @@ class Simulator:
     ) -> Matrix:
         """Derivatives of the errors by clocks, sensors, and parameters of an FMU alone, (b*c, p).
 
-        Of a time over a sample: within one, a signal that is moved is a straight line. What is read
-        in steps follows no step; by its size it goes from what is not.
+        Of a time over a sample: within one, a signal that is moved is a straight line. Both ends of
+        a difference are mirrored alike: noise of other samples would look like what the clock does.
+        What is read in steps follows no step; by its size it goes from what is not.
 
         Parameters
         ----------
@@ -268,13 +269,17 @@ class Simulator:
         recording = self._recordings[number]
         sample = float(np.median(np.diff(recording.time)))
 
-        def read(simulated: Matrix, values: Mapping[str, float]) -> Matrix:
-            return self._whitened(number, self._read(number, simulated, values)).ravel()
+        def read(
+            simulated: Matrix, values: Mapping[str, float], *clocks: Mapping[str, float]
+        ) -> Matrix:
+            return self._whitened(number, self._read(number, simulated, values, *clocks)).ravel()
 
-        def errors(values: Mapping[str, float]) -> Matrix:
-            return read(self._simulated(number, values)[0], values)
+        def errors(values: Mapping[str, float], *clocks: Mapping[str, float]) -> Matrix:
+            return read(self._simulated(number, values)[0], values, *clocks)
 
-        now = errors(values) if simulated is None else read(simulated, values)
+        if simulated is None:
+            simulated = self._simulated(number, values)[0]
+        now = read(simulated, values)
         columns = []
         for column in varied:
             name, known = column.variables[0], {**values, **column.setting}
@@ -288,10 +293,11 @@ class Simulator:
                 continue
             timed = name not in self._typical or (sensor is not None and sensor.parameter == LAG)
             step = sample if timed else _DIFFERENCE * self._typical[name]
-            before = now
+            later = {**known, name: at + step}
+            before = read(simulated, values, values, later) if name in self._clocks else now
             if sensor is not None and sensor.parameter in (LOSS, RECTIFIED) and not at:
                 before = errors({**known, name: _CUT})  # nothing leads either run
-            columns.append((errors({**known, name: at + step}) - before) / step)
+            columns.append((errors(later, values, later) - before) / step)
         return np.column_stack(columns)
 
     def weighed(self, number: int, values: Mapping[str, float]) -> Samples:
@@ -403,17 +409,32 @@ class Simulator:
         known = {name: value for name, value in values.items() if name not in others}
         return starts(known, self._wrong(values))
 
-    def _read(self, number: int, errors: Matrix, values: Mapping[str, float]) -> Matrix:
-        """Errors of samples (n, c) with sensors behind structures, as late as `values` say."""
+    def _read(
+        self,
+        number: int,
+        errors: Matrix,
+        values: Mapping[str, float],
+        *clocks: Mapping[str, float],
+    ) -> Matrix:
+        """Errors of samples (n, c) with sensors behind structures, as late as `values` say.
+
+        Parameters
+        ----------
+        clocks : values by whose clocks errors are mirrored, one after the other; unless any are
+            given, `values`.
+        """
         recording = self._recordings[number]
         seen = sensed(recording, recording.y - errors, self._wrong(values))
-        return self._compared(number, self._late(number, seen, values), values)
+        return self._compared(number, self._late(number, seen, values), *(clocks or (values,)))
 
-    def _compared(self, number: int, read_: Matrix, values: Mapping[str, float]) -> Matrix:
+    def _compared(self, number: int, read_: Matrix, *clocks: Mapping[str, float]) -> Matrix:
         """Errors of samples (n, c) of what sensors read."""
-        recording, late = self._recordings[number], lateness(self._clocks, values)
+        recording = self._recordings[number]
         errors = recording.y - read_
-        return mirrored(recording, errors, late) if late else errors
+        for values in clocks:
+            if late := lateness(self._clocks, values):
+                errors = mirrored(recording, errors, late)
+        return errors
 
     def _behind(self, number: int, signals: Matrix) -> dict[int, tuple[Matrix, Matrix]]:
         """What sensors behind structures read of signals (n, c, ...), and its rates, by column."""
