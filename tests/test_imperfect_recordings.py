@@ -4,6 +4,8 @@ A heated block whose casing takes some of the heat; the casing's temperature is 
 recordings are exact solutions of the linear equations, not of the compiled model.
 """
 
+from dataclasses import replace
+
 import fmpy
 import lxml.html
 import numpy as np
@@ -223,6 +225,21 @@ def test_a_fast_rise_between_slow_falls_is_no_spike(heater):
     assert not outliers(values, sensor, SOUND).any()
     values[[100, 300, 301, 731]] += [1.0, -2.0, -2.0, 1.5]
     assert list(np.flatnonzero(outliers(values, sensor, SOUND))) == [100, 300, 301, 731]
+
+
+@pytest.mark.parametrize("step", [0.0, 0.4, 1.0])
+def test_a_dropout_is_found_in_what_is_read_in_steps(heater, step):
+    """Unless steps are coarser than the noise, which is then no reason to change."""
+    sensor, rng = replace(heater.signals["T"], resolution=step * NOISE), np.random.default_rng(3)
+    slow = 20.0 + np.sin(np.arange(300) / 30.0)
+    for share in (1.0, 0.7):  # of the declared noise
+        values = slow + share * NOISE * rng.standard_normal(slow.size)
+        values = in_steps(values, sensor.resolution) if step else values
+        assert not outliers(values, sensor, SOUND).any()
+        values[100:120] = 0.0
+        assert list(np.flatnonzero(outliers(values, sensor, SOUND))) == [*range(100, 120)]
+    coarse = replace(sensor, resolution=2.0 * NOISE)
+    assert not outliers(in_steps(slow, coarse.resolution), coarse, SOUND).any()
 
 
 def test_the_ends_of_a_clear_swing_are_no_spikes(heater):

@@ -9,6 +9,7 @@ from scipy.ndimage import maximum_filter1d, median_filter, uniform_filter1d
 
 from workbench.arrays import Vector
 from workbench.diagnosis.inference.thresholds import Soundness
+from workbench.system.comparison import RATE
 from workbench.system.parts import Signal
 
 ALONG = 2.0  # standard deviations, of a line through few samples: noise alone scatters by one
@@ -17,6 +18,8 @@ _FEW = 6  # samples; three fourth differences have no median to speak of
 # Samples on each side where there are so many, and the order of the curve through them: where up to
 # seven are off the median in a swing of 24 samples a period, it is within a hundredth of its size.
 _BESIDE, _ORDER = 4, 5
+# Share of equal samples, beyond what rounding makes, from which a channel does repeat itself.
+_OFTEN = 0.2
 _MOVED = 0.5  # of what second differences say: noise comes below in a thousandth of 20 samples
 # Steps in a row of another length that are another rate. Of samples lost at random, three in ten,
 # steps of three or more have a share of 0.09, so many in a row 5e-7: once in 20 recordings of 1e5.
@@ -35,8 +38,8 @@ def saturated(values: Vector, signal: Signal) -> Mask:
 def outliers(values: Vector, signal: Signal, sound: Soundness, *, flat: bool = False) -> Mask:
     """Isolated wrong samples (Hampel's identifier), repeated ones and a saturated extreme.
 
-    A command is what it is, and what is read in steps repeats itself. Samples at the limit of a
-    sensor say nothing of the noise of others.
+    A command is what it is, and what is read in steps repeats itself, unless noise is as large as a
+    step. Samples at the limit of a sensor say nothing of the noise of others.
 
     Parameters
     ----------
@@ -59,16 +62,30 @@ def _outliers(values: Vector, signal: Signal, sound: Soundness, *, flat: bool) -
     scale = np.maximum(1.4826 * noise, deviation_of(values))
     wrong = _out_and_back(values, away > sound.spike * scale, sound.spike * scale)
     same = np.diff(values) == 0.0
-    if same.mean() < 0.2 and not signal.resolution:
-        extremes = (values.min(), values.max())
+    alike = _alike(signal)
+    if same.mean() < min(_OFTEN + alike, 1.0 - alike):
+        extremes, stuck = (values.min(), values.max()), sound.stuck
+        if alike > 0.0:  # as seldom as a false alarm, by noise that is declared or smaller
+            often = max(alike, float(same.mean()))
+            stuck = max(stuck, 1 + math.ceil(math.log(RATE / values.size) / math.log(often)))
         for first, end in runs(same):
-            if end - first >= sound.stuck - 1 and not (flat and values[first] in extremes):
+            if end - first >= stuck - 1 and not (flat and values[first] in extremes):
                 wrong[first : end + 1] = True
         for extreme in () if flat else extremes:
             at = values == extreme
-            if at.sum() > 2 * sound.stuck and same[at[1:]].mean() > 0.5:
+            if at.sum() > 2 * stuck and same[at[1:]].mean() > 0.5:
                 wrong |= at
     return wrong
+
+
+def _alike(signal: Signal) -> float:
+    """How often two samples of white noise are rounded to one step; 1 of steps beyond the noise.
+
+    The integral of the squared density, 1/(2 sqrt(pi)) over the standard deviation, times a step.
+    """
+    if signal.resolution > signal.noise:
+        return 1.0
+    return signal.resolution / (2.0 * math.sqrt(math.pi) * signal.noise) if signal.noise else 0.0
 
 
 def _out_and_back(values: Vector, mask: Mask, jump: Vector) -> Mask:
