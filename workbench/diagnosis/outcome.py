@@ -803,10 +803,8 @@ def _measured(
     factor = per_shown(system, signal, unit)
     values = system.under(case.conditions).signal(signal, case.signals)
     curve = Curve("measured", parted(np.interp(residuals.block_time, case.time, values / factor)))
-    low, high = float(np.nanmin(curve.values)), float(np.nanmax(curve.values))
-    room = 0.08 * (high - low) or 1.0
     title = f"{capital(named(system, signal))}, as measured [{unit}]"
-    return Panel(title, unit, low - room, high + room, 0.45, (curve,))
+    return Panel.around(title, unit, 0.45, curve)
 
 
 def _errors(

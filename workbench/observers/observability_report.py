@@ -295,12 +295,8 @@ def _figure(observability: CaseObservability) -> CaseFigure:
     for signal in system.inputs[:1]:
         unit = shown_unit(system, signal.name)
         values = observability.case[signal.name][at] / per_shown(system, signal.name, unit)
-        low, high = float(values.min()), float(values.max())
-        room = 0.08 * (high - low) or 1.0
         title = f"{capital(named(system, signal.name))} [{unit}]"
-        panels.append(
-            Panel(title, unit, low - room, high + room, 0.6, (Curve("measured", values),))
-        )
+        panels.append(Panel.around(title, unit, 0.6, Curve("measured", values)))
     for j, quantity in enumerate(system.estimated):
         line = Curve("raw", np.full(time.size, quantity.useful))
         curves = [

@@ -1,7 +1,7 @@
 """What an estimator made of a recording, with its figure."""
 
 import enum
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from html import escape
 from typing import TYPE_CHECKING, Any
@@ -129,8 +129,7 @@ def run_figure(run: Run) -> CaseFigure:
         if not np.isnan(run.signal(name)).all():
             curve = Curve("2", run.signal(name), half_band(run, name, 1.0))
             curves = claimed_parts(curve, run, name)
-            ends = value_range([part.values for part in curves])
-            panels.append(Panel(f"{name} [{unit}]", unit, *ends, 1.0, tuple(curves)))
+            panels.append(Panel.around(f"{name} [{unit}]", unit, 1.0, *curves))
     panels += [panel for panel in [probability_panel([run])] if panel.curves]
     return CaseFigure(
         name=run.case,
@@ -170,14 +169,3 @@ def half_band(run: Run, signal: str, factor: float) -> Vector | None:
     """Half of the 95 % band of an estimated signal, in its panel's unit; None without."""
     sigma = run.deviation(signal)
     return None if np.isnan(sigma).all() else BAND * sigma / factor
-
-
-def value_range(signals: Sequence[Vector], margin: float = 0.08) -> tuple[float, float]:
-    """Lowest and highest value with a margin on both sides; 0 to 1 where there is none."""
-    values = np.concatenate([*signals, []])  # none, where nothing was estimated
-    values = values[np.isfinite(values)]
-    if not values.size:
-        return 0.0, 1.0
-    low, high = float(values.min()), float(values.max())
-    room = margin * (high - low) or 1.0
-    return low - room, high + room

@@ -26,7 +26,6 @@ from workbench.observers.run import (
     claimed_parts,
     half_band,
     probability_panel,
-    value_range,
 )
 from workbench.observers.score import (
     Score,
@@ -48,7 +47,7 @@ from workbench.observers.trust import (
     time_doubt,
     unit_doubt,
 )
-from workbench.pages.figures import ESTIMATORS, CaseFigure, Curve, Panel
+from workbench.pages.figures import ESTIMATORS, CaseFigure, Curve, Panel, value_range
 from workbench.pages.views import (
     below,
     called,

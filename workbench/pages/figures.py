@@ -8,7 +8,9 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
 
 from workbench.arrays import Vector
 from workbench.runtime.files import replacing, warning_if_unwritable
@@ -80,6 +82,11 @@ class Panel:
     height: float
     curves: tuple[Curve, ...]
 
+    @classmethod
+    def around(cls, title: str, unit: str, height: float, *curves: Curve) -> Self:
+        """A panel that shows all of its curves, without their bands."""
+        return cls(title, unit, *value_range([c.values for c in curves]), height, curves)
+
 
 @dataclass(frozen=True)
 class CaseFigure:
@@ -99,6 +106,17 @@ class CaseFigure:
     hidden: frozenset[str] = frozenset()
     # what is at the bottom, and its unit; empty where it is a count
     axis: tuple[str, str] = ("time", "s")
+
+
+def value_range(signals: Sequence[Vector], margin: float = 0.08) -> tuple[float, float]:
+    """Lowest and highest value with a margin on both sides; 0 to 1 where there is none."""
+    values = np.concatenate([*signals, []])  # none, where nothing was estimated
+    values = values[np.isfinite(values)]
+    if not values.size:
+        return 0.0, 1.0
+    low, high = float(values.min()), float(values.max())
+    room = margin * (high - low) or 1.0
+    return low - room, high + room
 
 
 @contextmanager

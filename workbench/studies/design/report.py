@@ -128,11 +128,8 @@ def _figure(proposal: NextStop, experiment: RankedExperiment, place: int) -> Cas
         signal = proposal.system.signals[profile.input.name]
         factor = si_factor(signal.shown, signal.unit, signal.name)
         values = np.interp(time, prediction.case.time, prediction.case[signal.name]) / factor
-        low, high = float(values.min()), float(values.max())
-        room = 0.08 * (high - low) or 1.0
         title = f"{capital(signal.label)} {signal.name} [{signal.shown}]"
-        curve = (Curve("measured", values),)
-        panels.append(Panel(title, signal.shown, low - room, high + room, 0.6, curve))
+        panels.append(Panel.around(title, signal.shown, 0.6, Curve("measured", values)))
     for c, channel in enumerate(proposal.channels):
         curves = tuple(
             Curve(style, left[:, c])
