@@ -9,15 +9,35 @@
 #include "fmi2FunctionTypes.h"
 enum { THERMOSTAT, TIMETABLE, RELAYS, FUSE, STUCK };
 enum { T, DT, TA, G, DG, C, P, SIZE };
-typedef struct { double r[SIZE], time; int mode, flag, relay; const fmi2CallbackFunctions *callbacks; } Room;
+#define MOST 2000 /* steps that a delay remembers */
+typedef struct { double r[SIZE], time, past[MOST][2]; int mode, flag, relay, steps; const fmi2CallbackFunctions *callbacks; } Room;
 static void reset(Room *m) {
     const fmi2CallbackFunctions *callbacks = m->callbacks;
     memset(m, 0, sizeof *m);
     m->callbacks = callbacks;
     m->r[T] = 291.0, m->r[TA] = 280.0, m->r[G] = 50.0, m->r[C] = 1e5;
 }
+static double delayed(const Room *m, double by) { /* T, on a straight line between steps */
+    const double t = m->time - by;
+    int k = m->steps - 1;
+    if (t <= m->past[0][0]) return m->past[0][1];
+    while (m->past[k][0] > t) k--;
+    const double *a = m->past[k], here[2] = {m->time, m->r[T]}, *b = k + 1 < m->steps ? m->past[k + 1] : here;
+    return a[1] + (b[1] - a[1]) * (t - a[0]) / (b[0] - a[0]);
+}
 static void calculate(Room *m) {
     const double *r = m->r;
+#ifdef DELAY /* of the heat loss, whose steps it remembers */
+    m->r[DT] = (r[P] - r[G] * (delayed(m, DELAY) - r[TA])) / r[C];
+    return;
+#endif
+#ifdef UNREAD
+    m->r[DT] = r[G] * (r[TA] - r[T]) / r[C];
+    return;
+#endif
+#ifdef HIDDEN /* a thermostat in the code, which no event tells */
+    m->relay = r[T] < 293.0 ? 1 : r[T] > 295.0 ? 0 : m->relay, m->r[P] = m->relay ? 1500.0 : 0.0;
+#endif
 #ifdef BENDS /* a heating with half of its power above a temperature, which no indicator tells */
     if (r[T] > BENDS) { m->r[DT] = (r[P] / 2.0 - (r[G] + r[DG]) * (r[T] - r[TA])) / r[C]; return; }
 #endif
@@ -39,7 +59,11 @@ fmi2Status fmi2Reset(fmi2Component c) { reset(c); return fmi2OK; }
 #endif
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean a, fmi2Real b, fmi2Real t, fmi2Boolean d, fmi2Real e) { ((Room *)c)->time = t; return fmi2OK; }
 fmi2Status fmi2EnterInitializationMode(fmi2Component c) { return fmi2OK; }
-fmi2Status fmi2ExitInitializationMode(fmi2Component c) { return fmi2OK; }
+fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
+    Room *m = c;
+    m->past[0][0] = m->time, m->past[0][1] = m->r[T], m->steps = 1;
+    return fmi2OK;
+}
 fmi2Status fmi2Terminate(fmi2Component c) { return fmi2OK; }
 fmi2Status fmi2EnterEventMode(fmi2Component c) { return fmi2OK; }
 fmi2Status fmi2EnterContinuousTimeMode(fmi2Component c) { return fmi2OK; }
@@ -65,6 +89,7 @@ fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean n, fmi2Boole
 #ifdef MOVES /* a window that cools it at the end of a step, which is no event */
     if (m->r[T] > 295.0) m->r[T] -= 0.2;
 #endif
+    if (m->steps < MOST) m->past[m->steps][0] = m->time, m->past[m->steps++][1] = m->r[T];
 #ifdef LATE /* an output that follows at the end of a step alone */
     m->r[P] = m->r[T] - m->r[TA];
 #endif
@@ -76,9 +101,12 @@ fmi2Status fmi2SetTime(fmi2Component c, fmi2Real t) { ((Room *)c)->time = t; ret
 fmi2Status fmi2SetContinuousStates(fmi2Component c, const fmi2Real x[], size_t n) { ((Room *)c)->r[T] = x[0]; return fmi2OK; }
 fmi2Status fmi2GetContinuousStates(fmi2Component c, fmi2Real x[], size_t n) { x[0] = ((Room *)c)->r[T]; return fmi2OK; }
 fmi2Status fmi2GetDerivatives(fmi2Component c, fmi2Real x[], size_t n) {
-    const Room *m = c;
+    Room *m = c;
     calculate(c);
     x[0] = m->r[DT];
+#ifdef UNREAD /* an output that follows where derivatives are read */
+    m->r[P] = m->r[T] - m->r[TA];
+#endif
 #ifdef LOST /* above its table */
     if (m->r[T] > 292.0) x[0] = NAN;
 #endif

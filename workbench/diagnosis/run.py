@@ -40,6 +40,7 @@ from workbench.models.fmu import FMU, EventError
 from workbench.models.modelica import Library
 from workbench.observers.estimators.disturbance import DisturbanceObserver
 from workbench.observers.estimators.kalman import ExtendedKalmanFilter
+from workbench.observers.observability import require_function
 from workbench.observers.replay import replay
 from workbench.observers.score import score
 from workbench.runtime.engine import Engine
@@ -71,6 +72,9 @@ def diagnose(
         compiled, or the model is none of this library.
     """
     refuse_too_few(problem.cases, problem.system, len(problem.held_out))
+    if problem.library is None:
+        with open_model(problem.system) as fmu:
+            require_function(fmu, problem.system, problem.cases)
     with tempfile.TemporaryDirectory() as scratch:
         problem, everything = _with_model(problem, Path(scratch), engine.report)
         try:

@@ -18,7 +18,7 @@ from workbench.errors import InputError
 from workbench.models import fmu_cache
 from workbench.models.archive import DESCRIPTION
 from workbench.models.description import MODEL_EXCHANGE, Description, read_description
-from workbench.models.trial import derivatives_hold
+from workbench.models.trial import derivatives_hold, remembers_steps
 
 COULOMB, STRIBECK, VISCOUS = "coulomb", "stribeck", "viscous"
 QUADRATIC, CONSTANT = "quadratic", "constant"
@@ -103,7 +103,8 @@ def write_extended(
         described = _described(text, token, description, terms, coefficients, parameters)
         (folder / DESCRIPTION).write_bytes(described)
         pack(folder, out)
-    if derivatives_hold(description):  # else they are tried again, around this one
+    # Else what was found is found again, around this one.
+    if derivatives_hold(description) and not remembers_steps(description):
         fmu_cache.remember(digest_file(out))
 
 

@@ -34,7 +34,7 @@ from workbench.models.description import (
     Variable,
     read_description,
 )
-from workbench.models.trial import PROXY, derivatives_hold, require_trial
+from workbench.models.trial import PROXY, derivatives_hold, remembers_steps, require_trial
 from workbench.runtime.files import TemporaryFolder, own_umask
 
 _FUNCTIONS = {
@@ -83,6 +83,7 @@ _ACCESSORS = {
 _STATUSES: Mapping[int | str, str] = {2: "discard", 3: "error", 4: "fatal", 5: "pending"}
 _WARNING, _LOGGED = 1, 3  # status of FMI; messages that an error shows
 _SAME_STEP = 1e-4  # by which sample times may differ: what rounding of time stamps leaves
+_SAME_RATE = 1e-4  # of its change, by which iterations within a model may change a rate
 _MOST_ITERATIONS = 100  # of discrete states at one event; models need some
 
 _CLASSES = {
@@ -122,7 +123,11 @@ def co_simulation_alone(description: Description, found: str) -> InputError:
 
 
 class EventError(FMUError):
-    """A model passes an event, at which the method does not stop."""
+    """A model passes an event, at which the method does not stop, or remembers its steps."""
+
+
+class NoFunctionError(FMUError):
+    """Rates of a model do not follow from time, states and inputs alone."""
 
 
 class EventUpdate(NamedTuple):
@@ -626,6 +631,7 @@ class FMU(FMUInstance):
         self.has_directional_derivatives = offered.directional_derivatives and derivatives_hold(
             self.description
         )
+        self.remembers_steps = self.needs_completed_steps and remembers_steps(self.description)
         self._variants: list[FMU] = []
 
     def states_derivatives(self, unknowns: NDArray[np.uint32]) -> bool:
@@ -634,11 +640,16 @@ class FMU(FMUInstance):
         FMI asks for those of outputs and rates only; some tools refuse all others (FMI 2.0.4,
         section 2.1.9). FMUs that were built here have those of all variables.
         """
-        if self.has_directional_derivatives and not self.description.tool.startswith(OWN_TOOL):
+        if self.has_directional_derivatives and not self.is_own:
             outputs = self.references(list(filter(self.is_real, self.outputs)))
             asked = {*self.rate_references.tolist(), *outputs.tolist()}
             return asked.issuperset(unknowns.tolist())
         return self.has_directional_derivatives
+
+    @property
+    def is_own(self) -> bool:
+        """Whether it was built here, from equations."""
+        return self.description.tool.startswith(OWN_TOOL)
 
     @cached_property
     def _state_variables(self) -> Variables:
@@ -804,11 +815,19 @@ class FMU(FMUInstance):
 
     @property
     def has_events(self) -> bool:
-        """Whether it has event indicators, or named a time event at its start."""
-        return bool(self.event_signs.size or np.isfinite(self.next_event[0]))
+        """Whether it has event indicators, named a time event at its start, or remembers steps."""
+        announced = self.event_signs.size or np.isfinite(self.next_event[0])
+        return bool(announced or self.remembers_steps)
 
     def check_event(self) -> None:
-        """Refuse to go on if the FMU has passed an event since its start."""
+        """Refuse to go on if the FMU has passed an event since its start, or remembers steps."""
+        if self.remembers_steps:
+            raise EventError(
+                f"{self.called}: its rates or outputs follow from earlier steps, too, as those of "
+                "a delay. Only the open loop, fit and diagnose go step by step, and the Kalman "
+                "filters ekf and ukf on an FMU that saves its state (canGetAndSetFMUState); "
+                "results of other estimators would be wrong. Replace what is remembered by states"
+            )
         signs = self.event_signs
         if (
             self.time[0] > self.next_event[0]
@@ -848,6 +867,46 @@ class FMU(FMUInstance):
         if self.event_signs.size:
             self.event_signs[:] = self.event_indicators() > 0.0
         return update
+
+    def require_function(
+        self, variables: tuple[Variables, Variables], time: Vector, x: Matrix, u: Matrix
+    ) -> None:
+        """Refuse rates and outputs that are others if points are visited in the opposite order.
+
+        As of a hysteresis in code, which no event tells; the model is left at the first point.
+
+        Parameters
+        ----------
+        variables : inputs and outputs.
+        time, x, u : (k,) of the FMU [s], (k, n) states, (k, m) inputs.
+
+        Raises
+        ------
+        NoFunctionError
+        """
+        if self.remembers_steps or self.is_own:
+            return
+        inputs, outputs = variables
+
+        def visit(k: int) -> Vector:
+            self.set_time(time[k])
+            self.set(inputs, u[k])
+            self.set_states(x[k])
+            values = np.concatenate([self.derivatives(), self.get(outputs)])
+            self.complete_step()
+            return values
+
+        forth = np.array([visit(k) for k in range(time.size)])
+        back = np.array([visit(k) for k in reversed(range(time.size))])[::-1]
+        sizes = np.maximum(np.abs(forth), np.ptp(forth, axis=0))
+        names = [*self.description.rates, *outputs.names]
+        for k, i in np.argwhere(np.abs(back - forth) > _SAME_RATE * sizes):
+            raise NoFunctionError(
+                f"{self.called}: '{names[i]}' is {forth[k, i]:.6g} at {time[k]:.6g} s of its time, "
+                f"or {back[k, i]:.6g} at the same states and inputs if it was at later ones "
+                "before: the model remembers what came before, and no event tells it. Export it "
+                "with events where it switches, and with states for what it remembers"
+            )
 
     def complete_step(self) -> bool:
         """Say that a step of integration is over; returns whether a step event is due.

@@ -55,8 +55,8 @@ class Derivatives:
 
 
 def needs_simulation(fmu: FMU, inputs: Sequence[str], outputs: Sequence[str]) -> bool:
-    """Whether a compiled loop cannot step an FMU: Co-Simulation alone, types that are not Real."""
-    if isinstance(fmu, CoSimulation):
+    """Whether no compiled loop steps an FMU: Co-Simulation alone, not Real, or remembers steps."""
+    if isinstance(fmu, CoSimulation) or fmu.remembers_steps:
         return True
     real = all(map(fmu.is_real, (*fmu.states, *outputs)))
     return not real or not all(map(fmu.is_continuous, inputs))

@@ -45,6 +45,7 @@ except (ImportError, OSError):
     PROXY = None
 
 _MOST_REPORTED = 16 << 20  # [byte]; the records of a trial take some 0.1 MB
+_SPAN = 1000.0  # [s] of a walk through an FMU that names no end, beyond what delays mostly are
 _GRACE = 5.0  # [s] beyond the limit, for the process that watches it to say so
 
 
@@ -68,7 +69,7 @@ def require_trial(description: Description, interface: str, folder: Path) -> Non
     FMUError
         If it answers a call with an error.
     """
-    built, borne, _ = _marks(description, interface)
+    built, borne, *_ = _marks(description, interface)
     if description.sha256 in _packaged() or fmu_cache.is_known(built):
         return
     limits = usual_limits()
@@ -93,15 +94,21 @@ def derivatives_hold(description: Description) -> bool:
     return not fmu_cache.is_known(_marks(description, MODEL_EXCHANGE)[2])
 
 
-def _marks(description: Description, interface: str) -> tuple[str, str, str]:
+def remembers_steps(description: Description) -> bool:
+    """Whether rates and outputs of an FMU that was tried follow from earlier steps, too."""
+    return fmu_cache.is_known(_marks(description, MODEL_EXCHANGE)[3])
+
+
+def _marks(description: Description, interface: str) -> tuple[str, str, str, str]:
     """Names under which an FMU is remembered.
 
-    That was built here; that bore its calls; whose directional derivatives are wrong.
+    That was built here; that bore its calls; whose directional derivatives are wrong; that
+    remembers steps.
     """
     # Co-Simulation brings a solver, which Model Exchange does not run.
-    kind = "cs" if interface == CO_SIMULATION else "exchange"
+    kind = "cs" if interface == CO_SIMULATION else "model-exchange"
     mark = description.sha256
-    return mark, f"{mark}-{kind}", f"{mark}-differences"
+    return mark, f"{mark}-{kind}", f"{mark}-differences", f"{mark}-memory"
 
 
 @cache
@@ -174,6 +181,8 @@ def run_trial(description: Description, interface: str, folder: Path, limits: Li
         )
     if last["contradicted"]:
         fmu_cache.remember(_marks(description, interface)[2])
+    if last["remembers"]:
+        fmu_cache.remember(_marks(description, interface)[3])
     if not last["partly"]:
         fmu_cache.remember(_marks(description, interface)[1])
     return f"{where}: {last['refused']}. {tried}" if last["refused"] else ""
@@ -233,6 +242,7 @@ def _task(description: Description, interface: str, folder: Path, limits: Limits
         "outputs": outputs,
         "start": begin,
         "time": description.start or 0.0,
+        "span": max((description.stop or 0.0) - (description.start or 0.0), 0.0) or _SPAN,
         "step": description.step or 1e-3,
         "directional": [pair for pair in wanted if all(pair)]
         if exchange and offered.directional_derivatives

@@ -25,6 +25,8 @@ _STEP, _LEAST = 6e-6, 1e-3  # relative step of differences, cube root of eps; an
 _EPSILON = sys.float_info.epsilon
 _BENDS, _WRONG = 0.01, 0.1  # shares of a derivative: more is a bend, or no derivative of that rate
 _MOVED, _SAME = 0.01, 1e-4  # iterations within models end at 1e-6, calls that add up do not
+_BACK = "time, states and inputs were set to others and back"
+_UNREAD = "outputs are read before derivatives"
 _OVER = "a step was said to be over, without an event"
 _OK, _WARNING, _DISCARD, _FATAL = 0, 1, 2, 4
 _STATUS = {_DISCARD: "discard", 3: "error", _FATAL: "fatal", 5: "pending"}
@@ -309,57 +311,70 @@ def _is_wrong(
     return False
 
 
+class _Function:
+    """Rates and outputs of the FMU by time, states and inputs, about where it is."""
+
+    def __init__(self, call: _Calls, task: dict[str, Any]) -> None:
+        self._call, self._task, n = call, task, task["states"]
+        self._states, self._rates = (_DOUBLE * n)(), (_DOUBLE * n)()
+        self._held = (_DOUBLE * len(task["inputs"]))()
+        self._shown = (_DOUBLE * len(task["outputs"]))()
+        if n:
+            call("GetContinuousStates", self._states, _SIZE(n))
+        call.reals("Get", task["inputs"], self._held)
+        self._begun, self._given = list(self._states), list(self._held)
+
+    def at(self, share: float, time: float, *, only_shown: bool = False) -> list[float]:
+        """Values at a time [s], where states and inputs are off by a share of their sizes."""
+        self._call("SetTime", _DOUBLE(time))
+        self._held[:] = [u + share * max(abs(u), 1.0) for u in self._given]
+        self._call.reals("Set", self._task["inputs"], self._held)
+        nominal = zip(self._begun, self._task["nominal"], strict=True)
+        self._states[:] = [x + share * max(abs(x), size) for x, size in nominal]
+        if self._begun:
+            self._call("SetContinuousStates", self._states, _SIZE(len(self._begun)))
+        return self.read(only_shown=only_shown)
+
+    def read(self, *, only_shown: bool = False) -> list[float]:
+        """Values where it is; rates are those of before where nobody is to evaluate them."""
+        if self._begun and not only_shown:
+            rate = "GetContinuousStateDerivatives" if self._call.three else "GetDerivatives"
+            self._call(rate, self._rates, _SIZE(len(self._begun)))
+        self._call.reals("Get", self._task["outputs"], self._shown)
+        return [*self._rates, *self._shown]
+
+    def end_step(self) -> bool:
+        """Say that a step is over; whether that is an event, or the end."""
+        event, end = ctypes.c_int(), ctypes.c_int()
+        if self._task["completed"]:
+            arguments = ctypes.c_int(0), ctypes.byref(event), ctypes.byref(end)
+            self._call("CompletedIntegratorStep", *arguments)
+        return bool(event.value or end.value)
+
+
 def _require_function(call: _Calls, task: dict[str, Any]) -> None:
     """Refuse rates and outputs that change where time, states and inputs are set off and back.
 
-    Or where a step is said to be over, without an event.
+    Or where outputs are read before rates, or a step is said to be over, without an event.
     """
-    n, inputs, outputs = task["states"], task["inputs"], task["outputs"]
-    states, rates = (_DOUBLE * n)(), (_DOUBLE * n)()
-    held, shown = (_DOUBLE * len(inputs))(), (_DOUBLE * len(outputs))()
     time = task["time"] + 1e-3 * _ROUNDS
-    if n:
-        call("GetContinuousStates", states, _SIZE(n))
-    call.reals("Get", inputs, held)
-    begun, given = list(states), list(held)
-
-    def at(share: float, later: float = 0.0) -> list[float]:
-        call("SetTime", _DOUBLE(time + later))
-        held[:] = [u + share * max(abs(u), 1.0) for u in given]
-        call.reals("Set", inputs, held)
-        sizes = [max(abs(x), size) for x, size in zip(begun, task["nominal"], strict=True)]
-        states[:] = [x + share * size for x, size in zip(begun, sizes, strict=True)]
-        if n:
-            call("SetContinuousStates", states, _SIZE(n))
-        return read()
-
-    def read() -> list[float]:
-        if n:
-            rate = "GetContinuousStateDerivatives" if call.three else "GetDerivatives"
-            call(rate, rates, _SIZE(n))
-        call.reals("Get", outputs, shown)
-        return [*rates, *shown]
-
-    def ended(values: list[float]) -> list[float]:
-        event, end = ctypes.c_int(), ctypes.c_int()
-        if task["completed"]:
-            call("CompletedIntegratorStep", ctypes.c_int(0), *map(ctypes.byref, (event, end)))
-        return values if event.value else read()
-
     try:
-        before, moved, again = at(_MOVED), at(-_MOVED), at(_MOVED)  # at rest, much is 0
-        at(-_MOVED, 1e-3)
-        after = at(_MOVED)
-        later = ended(after)
+        function = _Function(call, task)
+        before, moved = function.at(_MOVED, time), function.at(-_MOVED, time)  # at rest, much is 0
+        shown = function.at(_MOVED, time, only_shown=True)
+        again = function.at(_MOVED, time)
+        function.at(-_MOVED, time + 1e-3)
+        after = function.at(_MOVED, time)
+        later = after if function.end_step() else function.read()
     except _RefusedError:  # nobody else moves them so
         return
+    shown[: task["states"]] = again[: task["states"]]
     names = [*task["rates"], *task["shown"]]
-    for name, a, b, *others, e in zip(names, before, moved, again, after, later, strict=True):
-        back = max(others, key=lambda c: abs(c - a))
-        for other, then in (
-            (back, "time, states and inputs were set to others and back"),
-            (e, _OVER),
-        ):
+    for name, a, b, *others, e in zip(
+        names, before, moved, again, after, shown, later, strict=True
+    ):
+        back, read = max(others[:2], key=lambda c: abs(c - a)), others[2]
+        for other, then in ((back, _BACK), (read, _UNREAD), (e, _OVER)):
             if abs(other - a) > _SAME * max(abs(a), abs(b - a)):
                 raise _RefusedError(
                     f"'{name}' is {a:.6g}, and {other:.6g} once {then}: the model remembers calls, "
@@ -367,6 +382,31 @@ def _require_function(call: _Calls, task: dict[str, Any]) -> None:
                     "follow from states and inputs alone",
                     3,
                 )
+
+
+def _remembers_steps(call: _Calls, task: dict[str, Any]) -> bool:
+    """Whether rates and outputs follow from the steps that were over before, as those of a delay.
+
+    They are compared at the end of a way of steps, and in a new instance that is put there at once.
+    """
+    if not task["completed"]:
+        return False
+    with suppress(_RefusedError):  # nobody else moves them so
+        values, times = [], [task["time"] + task["span"] * k / _ROUNDS for k in range(_ROUNDS + 1)]
+        for way in (times, times[-1:]):
+            call.free()
+            call.instantiate()
+            _initialise(call, task)
+            function = _Function(call, task)
+            for k, time in enumerate(way, 1):
+                values.append(function.at(_MOVED * (-1) ** (len(way) - k), time))
+                if k < len(way) and function.end_step():
+                    return False
+        before, after, fresh = values[-3:]
+        for b, a, other in zip(before, after, fresh, strict=True):
+            if abs(other - a) > _SAME * max(abs(a), abs(b - a)):
+                return True
+    return False
 
 
 def _require_counts(call: _Calls, task: dict[str, Any]) -> None:
@@ -392,20 +432,20 @@ def _roll_back(call: _Calls) -> None:
     call(f"Free{name}", ctypes.byref(saved))
 
 
-def _try(task: dict[str, Any], tell: Callable[[str], None]) -> tuple[str, bool]:
+def _try(task: dict[str, Any], tell: Callable[[str], None]) -> tuple[str, bool, bool]:
     """Make the calls.
 
     Returns
     -------
-    What the FMU refused that not everybody needs, and whether differences contradict its
-    directional derivatives.
+    What the FMU refused that not everybody needs, whether differences contradict its directional
+    derivatives, and whether it remembers steps.
 
     Raises
     ------
     _RefusedError
         If it refuses another call.
     """
-    call, contradicted = _Calls(task, tell), False
+    call, contradicted, remembers = _Calls(task, tell), False, False
     try:
         call.instantiate()
         _initialise(call, task)
@@ -424,6 +464,7 @@ def _try(task: dict[str, Any], tell: Callable[[str], None]) -> tuple[str, bool]:
             if call.three:
                 _require_counts(call, task)
             _require_function(call, task)
+            remembers = _remembers_steps(call, task)
     except _RefusedError as error:
         if call.component is None or error.status != _DISCARD or task["exchange"]:
             raise
@@ -431,7 +472,7 @@ def _try(task: dict[str, Any], tell: Callable[[str], None]) -> tuple[str, bool]:
     finally:
         call.free()
     call.unload()
-    return "; ".join(call.refused), contradicted
+    return "; ".join(call.refused), contradicted, remembers
 
 
 def _work(task: dict[str, Any], report: int) -> None:
@@ -447,15 +488,16 @@ def _work(task: dict[str, Any], report: int) -> None:
     if resource is not None:
         signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # Python ignores it
     limit_sizes(task["file"], task["memory"])
-    refused, contradicted = "", False
+    refused, contradicted, remembers = "", False, False
     try:
-        partly, contradicted = _try(task, tell)
+        partly, contradicted, remembers = _try(task, tell)
     except _RefusedError as error:
         partly = refused = str(error)
     except (OSError, AttributeError) as error:
         tell("not loaded", error=str(error))
         os._exit(0)
-    tell("end", refused=refused, partly=partly, contradicted="yes" * contradicted)
+    found = {"contradicted": "yes" * contradicted, "remembers": "yes" * remembers}
+    tell("end", refused=refused, partly=partly, **found)
     os._exit(0)
 
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from workbench.arrays import Matrix, Vector
 from workbench.errors import FMUError, InputError
-from workbench.models.fmu import FMU
+from workbench.models.fmu import FMU, NoFunctionError
 from workbench.observers.estimators.disturbance import DisturbanceObserver
 from workbench.observers.estimators.open_loop import OpenLoop
 from workbench.observers.operating import settle, start_spreads
@@ -408,7 +408,13 @@ def window_test(
 
 
 def trajectory(fmu: FMU, system: System, case: Case) -> Trajectory | None:
-    """Lead a model along a recording, at nominal quantities; None where samples are missing."""
+    """Lead a model along a recording, at nominal quantities; None where samples are missing.
+
+    Raises
+    ------
+    FMUError
+        If it fails there, or its rates follow from more than time, states and inputs.
+    """
     held = [output.name for output in system.outputs if output.name in fmu.states]
     kept = np.unique(np.linspace(0, case.time.size - 1, _POINTS).astype(int))
     u = np.column_stack([case.u[kept], np.zeros((kept.size, len(system.estimated)))])
@@ -416,7 +422,27 @@ def trajectory(fmu: FMU, system: System, case: Case) -> Trajectory | None:
     if not np.isfinite(values).all() or not np.isfinite(u).all():
         return None
     fmu.begin_at(case.model_time)
-    return Trajectory(kept, _states_that_follow(fmu, system, case.time[kept], held, values, u), u)
+    x = _states_that_follow(fmu, system, case.time[kept], held, values, u)
+    time = fmu.start_time + case.time[kept] - case.time[0]
+    shown = [output.name for output in system.outputs if output.name not in fmu.states]
+    fmu.require_function((fmu.variables(_inputs(system)), fmu.variables(shown)), time, x, u)
+    return Trajectory(kept, x, u)
+
+
+def require_function(fmu: FMU, system: System, cases: Sequence[Case]) -> None:
+    """Refuse a model that remembers along recordings what came before; none that they cannot lead.
+
+    Raises
+    ------
+    NoFunctionError
+    """
+    for case in () if fmu.is_own else cases:
+        try:
+            trajectory(fmu, system, case)
+        except NoFunctionError:
+            raise
+        except (InputError, FMUError, np.linalg.LinAlgError):
+            return
 
 
 def information(fmu: FMU, system: System, case: Case) -> Information | None:

@@ -12,7 +12,7 @@ import numpy as np
 
 from workbench.arrays import Vector
 from workbench.errors import FMUError, InputError
-from workbench.models.fmu import FMU, EventError
+from workbench.models.fmu import FMU, EventError, NoFunctionError
 from workbench.observers import Estimator, Gains, label
 from workbench.observers.estimators.open_loop import OpenLoop
 from workbench.observers.estimators.smoother import Smoother
@@ -361,6 +361,8 @@ class Simulation:
             )
             doubts = (unit, unchecked if self.system.estimated else "", assumed)
             return {"doubts": tuple(filter(None, doubts))}
+        except NoFunctionError:  # no estimate of it may be relied on
+            raise
         except (InputError, FMUError, np.linalg.LinAlgError):
             return {"doubts": tuple(filter(None, (unit, assumed)))}
         return {
