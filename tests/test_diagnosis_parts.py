@@ -428,12 +428,15 @@ def test_a_tolerance_at_its_bound_stays_there_while_the_rest_does_its_best():
 
 
 def linearised(errors: Matrix) -> LinearizedPoint:
-    residuals = (
-        WhitenedResiduals(
-            errors, np.zeros(1), np.zeros((2, errors.shape[1])), np.zeros((errors.size + 1, 0))
-        ),
-    )
+    residuals = (whitened(errors, np.zeros(1)),)
     return LinearizedPoint(Point({}, {}, np.zeros((1, 5)), {}), (), residuals, 20, np.ones(3), 0.0)
+
+
+def whitened(errors: Matrix, rest: Vector) -> WhitenedResiduals:
+    """Of a recording that has all its signals."""
+    (b, c), q = errors.shape, rest.size
+    jacobian, blocks = np.zeros((b * c + q, 0)), np.full(c, b)
+    return WhitenedResiduals(errors, rest, np.zeros((2, c)), jacobian, blocks)
 
 
 def test_deviance_is_chi_squared_where_errors_are_noise():
@@ -763,13 +766,10 @@ def test_what_one_recording_alone_tells_is_no_failure_of_the_others():
 
 def test_what_remains_where_an_effect_does_nothing_says_nothing_of_its_form():
     """Of two stops of ten blocks, the effect takes 4 of 5 in the first, and nothing of 9 after."""
-    still, none = Point({}, {}, np.zeros((2, 0)), {}), np.zeros(0)
+    still = Point({}, {}, np.zeros((2, 0)), {})
 
     def model(*errors: float) -> FittedModel:
-        stops = tuple(
-            WhitenedResiduals(np.full((10, 1), error), none, np.ones((2, 1)), np.zeros((10, 0)))
-            for error in errors
-        )
+        stops = tuple(whitened(np.full((10, 1), error), np.zeros(0)) for error in errors)
         return FittedModel((), still, LinearizedPoint(still, (), stops, 1, np.ones(1), 0.0), 0.0)
 
     class Recorded(CrossValidation):

@@ -200,6 +200,23 @@ def test_candidates_are_parameters_and_sensors_of_a_stated_size(tank):
     assert names[12:] == ["Start[x]", "InputLag[inflow]", *bent, *late]
 
 
+def test_what_nothing_shows_and_what_is_exact_are_no_candidates(tmp_path):
+    """A sensor that no recording has, and a start that is said to have no spread."""
+    build_text(tmp_path, machine_file("tank_alone/Tank.mo"))
+    more = '[judged.second]\nvariable = "x"\nunit = "m"\nnoise = "1 mm"\nscale = "1 m"\n'
+    (tmp_path / "system.toml").write_text(
+        f'{SYSTEM}\n{more}[states]\nsecond = {{ spread = "0 m" }}\n'
+    )
+    system = load_system(tmp_path)
+    names = [effect.name for effect in catalogue(system, None)]
+    assert "Start[x]" not in names
+    assert "SensorQuantisation[second]" in names
+    cases = read_cases(record(tmp_path / "recordings", seed=2), system)
+    outcome = diagnose(system, cases, out=tmp_path / "out", workers=1, report=lambda line: None)
+    tried = [score.effect.name for score in outcome.diagnosis.scores]
+    assert not [name for name in tried if name.startswith("Sensor") and name.endswith("[second]")]
+
+
 def test_candidates_are_chosen_in_the_system_file(tank, tmp_path, capsys):
     text = SYSTEM.replace("Tank.fmu", str(tank.source.parent / "Tank.fmu"))
     chosen = '[candidates]\nonly = ["c", "Sensor*"]\nwithout = ["*[level]"]\nmatters = 0.05\n'

@@ -591,7 +591,7 @@ class LastingErrors:
     def noises(self) -> tuple[Vector, Vector]:
         """Root mean square before and after in units of the noise, (c,); noise leaves 1."""
         before, after = (
-            np.sqrt(np.mean((errors / self.sigma) ** 2, axis=0))
+            np.sqrt(np.nanmean((errors / self.sigma) ** 2, axis=0))
             for errors in (self.before, self.after)
         )
         return before, after
@@ -606,15 +606,13 @@ def lasting(residuals: Residuals, span: int) -> LastingErrors:
     """Running means over a number of blocks, none across what was set aside."""
     before, after, sigma = (np.empty_like(residuals.sigma) for _ in range(3))
     for run in _runs(residuals.block_time):
-        before[run] = _sums(residuals.before[run], span) / _sums(
-            np.ones_like(residuals.sigma[run]), span
-        )
-        after[run] = _sums(residuals.after[run], span) / _sums(
-            np.ones_like(residuals.sigma[run]), span
-        )
-        sigma[run] = np.sqrt(_sums(residuals.sigma[run] ** 2, span)) / _sums(
-            np.ones_like(residuals.sigma[run]), span
-        )
+        known = np.isfinite(residuals.sigma[run])
+        count = _sums(known.astype(float), span)
+        count = np.where(count > 0.5, count, np.nan)
+        before[run] = _sums(np.where(known, residuals.before[run], 0.0), span) / count
+        after[run] = _sums(np.where(known, residuals.after[run], 0.0), span) / count
+        variance = _sums(np.where(known, residuals.sigma[run] ** 2, 0.0), span)
+        sigma[run] = np.sqrt(variance) / count
     return LastingErrors(before, after, sigma)
 
 

@@ -17,6 +17,7 @@ from workbench.system.parts import (
     SIGNAL,
     STATE,
     VARIABLE,
+    Signal,
     Threshold,
     unit_of_signal,
 )
@@ -32,8 +33,13 @@ WAYS = ("value", "size", "rate", "integral", "turn")
 def _label(scope: Scope) -> str:
     """That of the measured signal of this name, else the name."""
     name: str = scope.own["name"]
-    compared = (*scope.whole["outputs"], *scope.whole["reference_signals"])
-    return next((signal.label for signal in compared if signal.name == name), name)
+    return next((signal.label for signal in _compared(scope) if signal.name == name), name)
+
+
+def _compared(scope: Scope) -> list[Signal]:
+    """What is measured of the model, aids last."""
+    groups = ("outputs", "reference_signals", "intermittent")
+    return [signal for group in groups for signal in scope.whole[group]]
 
 
 @declared
@@ -57,7 +63,7 @@ def _measured(scope: Scope) -> tuple[Channel, ...]:
             signal.shown,
             Expression.of(signal.name, str(scope.file)),
         )
-        for signal in (*scope.whole["outputs"], *scope.whole["reference_signals"])
+        for signal in _compared(scope)
     )
 
 
@@ -246,7 +252,7 @@ class Comparison:
         absent=None,
     )
     channels: tuple[Channel, ...] = key(
-        "compared signals", absent=_measured, otherwise="outputs and reference signals"
+        "compared signals", absent=_measured, otherwise="outputs, reference signals and aids"
     )
     tolerances: Mapping[str, float] = key(
         "relative standard deviation of parameters from recording to recording",

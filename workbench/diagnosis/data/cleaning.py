@@ -45,7 +45,7 @@ def outliers(values: Vector, signal: Signal, sound: Soundness, *, flat: bool = F
     ----------
     flat : whether an extreme that repeats itself may be right, since saturation is a candidate.
     """
-    within = ~saturated(values, signal)
+    within = ~(saturated(values, signal) | np.isnan(values))
     wrong = np.zeros(values.size, np.bool_)
     if not signal.exact and within.any():
         wrong[within] = _outliers(values[within], signal, sound, flat=flat)
@@ -170,6 +170,16 @@ def noise_in(values: Vector, signal: Signal) -> float:
     if signal.exact:
         return 0.0
     return max(deviation_of(values), float(signal.resolution / np.sqrt(12.0)))
+
+
+def noise_between(values: Vector, gaps: Mask, signal: Signal) -> float:
+    """Noise of what is measured at times: what is declared, or more if samples in a row say so.
+
+    Samples apart show motion, and lines between samples, as recorders draw them, less than noise.
+    """
+    rows = [values[first:end] for first, end in runs(~gaps) if end - first > _FEW]
+    shown = noise_in(np.concatenate(rows), signal) if rows else 0.0
+    return max(shown, signal.noise_at_scale)
 
 
 def deviation_of(values: Vector) -> float:

@@ -6,10 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.arrays import Vector
+from workbench.arrays import Matrix, Vector
 from workbench.diagnosis.data.cleaning import (
     Mask,
     bridge,
+    noise_between,
     noise_in,
     outliers,
     runs,
@@ -34,6 +35,7 @@ class CountedSamples:
 
     clean: Mapping[str, Vector]  # (n,) by signal, bridged where it is wrong
     wrong: Mapping[str, Mask]  # (n,) where
+    gaps: Mapping[str, Mask]  # (n,) the same of what is measured at times, or where it is missing
     deviation: Mapping[str, float]  # standard deviation of the noise of a sample, by signal
     excluded: Mapping[str, Mask]  # (n,) samples that do not count, by reason
     spans: Mask  # (n,) samples where states are restarted; if they count, they do for that
@@ -46,6 +48,12 @@ class CountedSamples:
         """(n,) samples that count."""
         usable: Mask = ~np.logical_or.reduce(list(self.excluded.values()))
         return usable
+
+    def measured(self, signals: Sequence[str], slopes: Matrix) -> Mask:
+        """(n, c) samples that channels have, which are formed of signals by slopes (c, s)."""
+        gaps = [self.gaps.get(name, np.zeros_like(self.spans)) for name in signals]
+        measured: Mask = (np.column_stack(gaps) @ np.abs(slopes).T) == 0.0
+        return measured
 
     @property
     def told(self) -> Mask:
@@ -75,8 +83,11 @@ def count(
     beyond = {name: saturated(case[name], system.signals[name]) for name in names}
     flat = not system.library.is_file()
     faulty = {name: outliers(case[name], system.signals[name], sound, flat=flat) for name in names}
-    wrong = {name: beyond[name] | faulty[name] for name in names}
+    wrong = {name: beyond[name] | faulty[name] | np.isnan(case[name]) for name in names}
     clean = {name: bridge(time, case[name], wrong[name]) for name in names}
+    # What is measured at times lacks what is wrong with it; all other signals count there.
+    gaps = {name: wrong[name] for name in names if name in case.aids}
+    others = [name for name in names if name not in gaps]
     applied = applied_at(clean, system, time)
     own = {
         exclusion.reason: excluded_by(exclusion, clean, system, time, h, applied)
@@ -88,8 +99,8 @@ def count(
         if exclusion.restarted:
             own[exclusion.reason] = np.zeros(time.size, np.bool_)
     excluded = {
-        FAULTY: np.logical_or.reduce(list(faulty.values())),
-        BEYOND: np.logical_or.reduce(list(beyond.values())),
+        FAULTY: np.logical_or.reduce([faulty[name] for name in others]),
+        BEYOND: np.logical_or.reduce([beyond[name] for name in others]),
         **own,
         LEADING: time < case.counts_from,
         "settling": time < time[0] + compare.settling,
@@ -97,10 +108,11 @@ def count(
     usable = ~np.logical_or.reduce(list(excluded.values()))
     blocks, seconds = blocks_of(usable, time, compare.block, h)
     refuse_too_short(case, system, seconds, excluded)
-    deviation = {n: noise_in(clean[n][~beyond[n]], system.signals[n]) for n in names}
+    deviation = {n: noise_in(clean[n][~beyond[n]], system.signals[n]) for n in others}
+    deviation |= {n: noise_between(case[n], gap, system.signals[n]) for n, gap in gaps.items()}
     lost = np.maximum(0.0, np.round(np.diff(time) / h) - 1.0)
     missing = int(lost[~uneven_steps(time, h)].sum())
-    return CountedSamples(clean, wrong, deviation, excluded, spans, applied, blocks, missing)
+    return CountedSamples(clean, wrong, gaps, deviation, excluded, spans, applied, blocks, missing)
 
 
 def refuse_too_few(cases: Sequence[Case], system: System, held_out: int = 0) -> None:
@@ -218,3 +230,11 @@ def blocks_of(
                 seconds += float(time[after] - time[k])
             k = after
     return np.array(blocks, dtype=np.int64).reshape(-1, 2), seconds
+
+
+def counts_in(blocks: NDArray[np.int64], mask: Mask) -> NDArray[np.int64]:
+    """Samples of each block (b, 2) where a mask (n, c) holds, (b, c)."""
+    total = np.zeros((len(mask) + 1, mask.shape[1]), np.int64)
+    np.cumsum(mask, axis=0, out=total[1:])
+    counts: NDArray[np.int64] = total[blocks[:, 1]] - total[blocks[:, 0]]
+    return counts

@@ -8,7 +8,7 @@ Source: L. Ljung, System Identification, 2nd ed. 1999, section 7.2.
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -35,7 +35,7 @@ class Motion:
     """A model about its design point."""
 
     states: tuple[str, ...]  # that outputs lead; a model may have none
-    # A, B, C, D: by states, measured inputs and measured outputs
+    # A, B, C, D: by states, measured inputs, and measured outputs with aids after them
     A: Matrix
     B: Matrix
     C: Matrix
@@ -87,7 +87,7 @@ class Lead:
 
     states: tuple[str, ...]  # that are corrected
     gain: Matrix  # (p, l) constant gain
-    # (l, l) covariance of predicted outputs, by what led the states and by inputs that outputs show
+    # covariance of predicted outputs and aids, by what led the states and by inputs that they show
     # at once
     ahead: Matrix
     noisy: bool  # whether an input has noise; else a gain only keeps the equation solvable
@@ -95,6 +95,7 @@ class Lead:
 
 def motion(fmu: FMU, system: System) -> Motion:
     """Linearise a model at the design point; the FMU is started anew."""
+    system = replace(system, outputs=(*system.outputs, *system.intermittent), intermittent=())
     states = corrected_states(fmu, system)
     model = linearised(fmu, system).of(states)
     at = [fmu.states.index(name) for name in states]
@@ -111,7 +112,7 @@ def motion(fmu: FMU, system: System) -> Motion:
 
 
 def led_by(motion: Motion, inputs: Vector, outputs: Vector, h: float) -> Lead:
-    """Stationary Kalman gain for the noise of the inputs alone.
+    """Stationary Kalman gain for the noise of the inputs alone, by outputs, which come first.
 
     Parameters
     ----------
@@ -126,9 +127,10 @@ def led_by(motion: Motion, inputs: Vector, outputs: Vector, h: float) -> Lead:
     # In units of noise and nominal sizes, so that the equation is well scaled.
     scale = motion.nominal
     Phi = transition * scale / scale[:, None]
-    C = motion.C * scale / outputs[:, None]
+    seen, shown = motion.C * scale, motion.D * inputs
+    C = seen[: outputs.size] / outputs[:, None]
     Q = process / np.outer(scale, scale)
-    D = motion.D * inputs / outputs[:, None]
+    D = shown[: outputs.size] / outputs[:, None]
     R = np.eye(len(C)) + D @ D.T
     try:
         P = solve_discrete_are(Phi.T, C.T, Q, R) if p else np.zeros((0, 0))
@@ -137,7 +139,7 @@ def led_by(motion: Motion, inputs: Vector, outputs: Vector, h: float) -> Lead:
         P, C = np.zeros((p, p)), np.zeros_like(C)
     innovation = C @ P @ C.T + R
     gain = np.linalg.solve(innovation, C @ P).T * scale[:, None] / outputs
-    ahead: Matrix = (innovation - np.eye(len(C))) * np.outer(outputs, outputs)
+    ahead: Matrix = seen @ P @ seen.T + shown @ shown.T
     return Lead(motion.states, gain, ahead, bool(np.any(inputs > 0.0)))
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from workbench.arrays import Matrix, Vector
 from workbench.diagnosis.data.cleaning import Mask, first_value, smooth
-from workbench.diagnosis.data.counting import CountedSamples, count
+from workbench.diagnosis.data.counting import CountedSamples, count, counts_in
 from workbench.diagnosis.data.motion import (
     Lead,
     Motion,
@@ -24,7 +24,7 @@ from workbench.diagnosis.data.motion import (
     random_walk,
 )
 from workbench.diagnosis.data.restarts import Restarts, restarts_of
-from workbench.diagnosis.data.whitening import whitening
+from workbench.diagnosis.data.whitening import WEIGHTLESS, whitening
 from workbench.diagnosis.effects.candidates import without_guesses
 from workbench.diagnosis.inference.thresholds import SOUND, Soundness
 from workbench.errors import InputError
@@ -38,7 +38,6 @@ from workbench.system.system import System
 _STARTING = 40  # samples at usual rates, of a first value
 _RELEASED = 0.1  # share of the greatest value
 _REACH = 3.0  # standard deviations of a quantity, beyond which a law goes no further with it
-_WEIGHTLESS = 1e6  # times its size, by which a silent channel may be wrong: 1e-12 of chi-squared
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +54,7 @@ class Samples:
     y: Matrix
     read: Matrix
     silent: Mask  # (c,) channels of signals that this one has not: their errors have no weight
+    measured: Mask  # (n, c) samples that a channel has: all, but of what is measured at times
     # (n,) samples whose errors are told: those that are not wrong and that no reason excludes
     told: Mask
     limits: Matrix  # (2, c) of what the sensors read
@@ -122,11 +122,21 @@ class Samples:
         Where a sensor saturates, so does what the model says that it reads; NaN of what is silent.
         """
         said = np.clip(self.y - errors, *self.limits)
-        by_channel = (self.read - said)[self.told] @ self.slopes.T
-        by_channel[:, self.silent] = np.nan
-        return np.array(
-            [np.sqrt(np.square(by_channel).mean(axis=0)), np.abs(by_channel).mean(axis=0)]
-        )
+        measured = self.measured[self.told]
+        by_channel = np.where(measured, (self.read - said)[self.told] @ self.slopes.T, 0.0)
+        counts = np.where(self.silent, np.nan, measured.sum(axis=0))
+        sums = np.array([np.square(by_channel).sum(axis=0), np.abs(by_channel).sum(axis=0)])
+        return np.array([np.sqrt(sums[0] / counts), sums[1] / counts])
+
+    @cached_property
+    def counts(self) -> NDArray[np.int64]:
+        """(b, c) samples of each block that a channel has."""
+        return counts_in(self.blocks, self.measured)
+
+    @property
+    def compared(self) -> Mask:
+        """(b, c) blocks in which a channel has samples."""
+        return (self.counts > 0) & ~self.silent
 
     @property
     def restarted(self) -> Mask:
@@ -168,20 +178,27 @@ class Samples:
         total = np.zeros((len(errors) + 1, len(self.slopes), *errors.shape[2:]))
         for c, slopes in enumerate(self.slopes):
             sum_ = sum(slope * errors[:, j] for j, slope in enumerate(slopes) if slope)
+            if not self.measured[:, c].all():
+                sum_ = (self.measured[:, c] * np.transpose(sum_)).T
             np.cumsum(sum_, axis=0, out=total[1:, c])
         first, end = self.blocks.T
-        means: Matrix = ((total[end] - total[first]).T / (end - first)).T
+        means: Matrix = ((total[end] - total[first]).T / np.maximum(1, self.counts.T)).T
         return means
 
 
 def compared(system: System, cases: Sequence[Case]) -> tuple[str, ...]:
-    """Signals that are compared: outputs, and what is only there to judge by, if a case has it."""
-    references = [
+    """Signals that are compared: outputs, and what only judges or aids, if a case has it."""
+    others = [
         signal.name
-        for signal in system.reference_signals
-        if any(signal.name in case for case in cases)
+        for signal in (*system.reference_signals, *system.intermittent)
+        if any(_has(case, signal.name) for case in cases)
     ]
-    return (*(output.name for output in system.outputs), *references)
+    return (*(output.name for output in system.outputs), *others)
+
+
+def _has(case: Case, name: str) -> bool:
+    """Whether a recording has some samples of a signal."""
+    return name in case and not np.isnan(case[name]).all()
 
 
 def channels(system: System, signals: Sequence[str]) -> tuple[Channel, ...]:
@@ -210,7 +227,7 @@ def prepare(
     restarting : whether samples count where states can be restarted.
     """
     time, h = case.time, float(np.median(np.diff(case.time)))
-    own = tuple(name for name in signals if name in case)
+    own = tuple(name for name in signals if _has(case, name))
     counted = count(case, system, (*case.inputs, *own), sound, restarting=restarting)
     clean, deviation, blocks = counted.clean, counted.deviation, counted.blocks
     formed, own_channels = channels(system, signals), channels(system, own)
@@ -220,9 +237,12 @@ def prepare(
     )
     gain, lead, ahead = _led(case, system, own, counted, model.motion)
     silent = np.array([signal not in own_channels for signal in formed])
+    measured = counted.measured(signals, slopes)
     scales = np.abs(slopes) @ [system.signals[name].scale for name in signals]
     white = whitening(system, counted, own, own_slopes, ahead)
     nothing = np.zeros(time.size)
+    # In place of a sample that is missing stands what is bridged, which does not count.
+    read = {name: np.where(np.isnan(case[name]), clean[name], case[name]) for name in own}
     driving = [
         smooth(time, clean[signal.name], signal.smoothed, h, sound.held) for signal in system.inputs
     ]
@@ -239,8 +259,9 @@ def prepare(
         u=np.ascontiguousarray(np.reshape(driving, (len(driving), time.size)).T),
         signals=signals,
         y=np.ascontiguousarray(np.column_stack([clean.get(name, nothing) for name in signals])),
-        read=np.column_stack([case[name] if name in own else nothing for name in signals]),
+        read=np.column_stack([read.get(name, nothing) for name in signals]),
         silent=silent,
+        measured=measured,
         told=counted.told,
         limits=np.array([system.signals[name].limits for name in signals]).T,
         gain=gain,
@@ -262,7 +283,7 @@ def _beside_silent(white: NDArray[np.float64], silent: Mask, scales: Vector) -> 
     """Whitening (b, c, c) of channels that are told, and of silent ones, which have no weight."""
     if not silent.any():
         return white
-    beside = np.tile(np.diag(1.0 / (_WEIGHTLESS * scales)), (len(white), 1, 1))
+    beside = np.tile(np.diag(1.0 / (WEIGHTLESS * scales)), (len(white), 1, 1))
     channels_told = np.flatnonzero(~silent)
     beside[:, channels_told[:, None], channels_told] = white
     return beside
@@ -285,8 +306,11 @@ def _led(
     if leading is None:
         inputs, outputs = (noise_of(part, deviation) for part in (case.inputs, case.outputs))
         lead = led_by(motion, inputs, outputs, h)
-        count = len(case.outputs)
-        ahead[:, :count, :count] = lead.ahead
+        predicted = (*case.outputs, *case.aids)
+        of, at = np.array(
+            [(predicted.index(name), j) for j, name in enumerate(signals) if name in predicted]
+        ).T
+        ahead[:, at[:, None], at] = lead.ahead[of[:, None], of]
         return np.zeros(time.size), lead, ahead
     effects = effects_on_led(motion, leading.output)
     moved = leading.ripple * np.hypot.reduce(effects * noise_of(case.inputs, deviation))

@@ -233,11 +233,15 @@ def fitting_recordings(
     no reading comes near, and readings that are no multiples of a step above noise have none.
     """
     for effect in effects:
-        parts = [case[effect.sensor] for case in cases if effect.sensor in case]
-        if not effect.sensor or not parts:
+        signals = [effect.sensor] if effect.sensor else effect.late
+        parts = [case[name] for case in cases for name in signals if name in case]
+        read = np.concatenate([part[~np.isnan(part)] for part in parts] or [np.zeros(0)])
+        if signals and not read.size:
+            continue  # nothing shows what no recording has
+        if not effect.sensor:
             yield effect
             continue
-        read, noise = np.concatenate(parts), system.signals[effect.sensor].noise_at_scale
+        noise = system.signals[effect.sensor].noise_at_scale
         if effect.size == LOSS:
             limits = np.quantile(np.abs(read), _LIMITS)
             yield replace(effect, shapes=((LIMIT, tuple(dict.fromkeys(map(float, limits)))),))

@@ -7,9 +7,10 @@ from scipy.optimize import nnls
 
 from workbench.arrays import Matrix, Vector
 from workbench.diagnosis.data.cleaning import Mask, deviation_of
-from workbench.diagnosis.data.counting import CountedSamples
+from workbench.diagnosis.data.counting import CountedSamples, counts_in
 from workbench.system.system import System
 
+WEIGHTLESS = 1e6  # times its size, by which a silent channel may be wrong: 1e-12 of chi-squared
 _NEAR = 5  # blocks, of which a jump and its ringing are one
 
 
@@ -49,9 +50,16 @@ def whitening(
     # Predicted outputs are uncertain too, by what led them.
     predicted = np.array([ahead[first:end].mean(axis=0) for first, end in blocks])
     covariance += slopes @ predicted @ slopes.T
+    # Channels share the noise of samples that both have.
+    counts = counts_in(blocks, counted.measured(signals, slopes))
+    size = np.maximum(1, np.maximum(counts[:, :, None], counts[:, None, :]))
     # A signal that rests within a step of its reading is wrong by the same in all samples.
     steps = np.array([system.signals[name].resolution ** 2 / 12.0 for name in signals])
-    covariance = covariance / size[:, None, None] + slopes * steps @ slopes.T
+    covariance = covariance / size + slopes * steps @ slopes.T
+    scales = np.abs(slopes) @ [system.signals[name].scale for name in signals]
+    for b, c in np.argwhere(counts == 0):
+        covariance[b, c, :] = covariance[b, :, c] = 0.0
+        covariance[b, c, c] = (WEIGHTLESS * scales[c]) ** 2
     return np.linalg.inv(np.linalg.cholesky(covariance))
 
 

@@ -287,8 +287,8 @@ def _size(variable: Variable, value: float) -> float:
 def _starts(model: FMU, system: System) -> Iterator[Effect]:
     """Starts of states that no output is; they must differ from the FMU's in all recordings."""
     for name, spread in zip(model.states, start_spreads(model, system), strict=True):
-        if name in system.signals or name not in model.defaults:
-            continue
+        if name in system.signals or name not in model.defaults or not spread:
+            continue  # a start that is exact has no error
         if isinstance(model, CoSimulation) and name not in _settable(model):
             continue
         unit = model.units.get(name, "")

@@ -57,7 +57,8 @@ class Residuals:
     balances: tuple[Balance, ...]  # that the system's plugin knows
     channels: tuple[Channel, ...]  # that are compared, and that it has
     block_time: Vector  # (b,) [s]
-    # before, after: (b, c) prediction errors of the nominal and of the last model, by channel
+    # before, after: (b, c) prediction errors of the nominal and of the last model, by channel, NaN
+    # where a channel has no sample
     before: Matrix
     after: Matrix
     sigma: Matrix  # (b, c) their standard deviation by noise
@@ -86,8 +87,9 @@ def residuals(
     ):
         measured = np.flatnonzero(~recording.silent)
         inverse = np.linalg.inv(recording.whitening[:, measured[:, None], measured])
+        compared = np.where(recording.compared[:, measured], 1.0, np.nan)
         unwhitened: list[Matrix] = [
-            np.einsum("bij,bj->bi", inverse, lin.residuals[k].errors[:, measured])
+            compared * np.einsum("bij,bj->bi", inverse, lin.residuals[k].errors[:, measured])
             for lin in (before, after)
         ]
         formed = channels(system, recording.signals)
@@ -101,7 +103,7 @@ def residuals(
                 block_time=case.time[recording.blocks.mean(axis=1).astype(int)],
                 before=unwhitened[0],
                 after=unwhitened[1],
-                sigma=np.sqrt(np.einsum("bij,bij->bi", inverse, inverse)),
+                sigma=compared * np.sqrt(np.einsum("bij,bij->bi", inverse, inverse)),
             )
         )
     return table
@@ -125,9 +127,11 @@ def dependences(simulations: ResidualModel, residuals: Sequence[Residuals]) -> l
         for (mark, residual), own in zip(pairs, influences, strict=True):
             if channel in residual.channels:
                 c = residual.channels.index(channel)
-                before.append(mark * residual.before[:, c] / residual.sigma[:, c])
-                after.append(mark * residual.after[:, c] / residual.sigma[:, c])
-                along.append(own)
+                sigma = residual.sigma[:, c]
+                known = np.isfinite(sigma)
+                before.append((mark * residual.before[:, c] / sigma)[known])
+                after.append((mark * residual.after[:, c] / sigma)[known])
+                along.append({name: values[known] for name, values in own.items()})
         for name in (name for name in influences[0] if all(name in own for own in along)):
             shares = (
                 _explained(errors, along, name, apart=name in turning) for errors in (before, after)

@@ -52,7 +52,7 @@ def errors_of(
         first, last = ([one.sizes for one in lin.residuals] for lin in (before, after))
     for k, recording in enumerate(simulations.recordings):
         sizes = [lin.residuals[k].sizes for lin in (before, after)]
-        samples = int(recording.told.sum())
+        samples = recording.measured[recording.told].sum(axis=0)
         for c, channel in enumerate(channels(simulations.system, recording.signals)):
             if recording.silent[c]:
                 continue
@@ -65,7 +65,7 @@ def errors_of(
                     channel=channel.name,
                     unit=channel.unit,
                     held_out=held_out,
-                    samples=samples,
+                    samples=int(samples[c]),
                     rms=rms,
                     mean_absolute=mean,
                     corrected=recording.corrected,

@@ -57,12 +57,7 @@ class WhitenedResiduals:
     sizes: Matrix
     # (b*c + q, p) derivatives of [errors, rest] in SI units, by delays and columns
     jacobian: Matrix
-
-    @property
-    def blocks(self) -> Vector:
-        """(c,) number of blocks, none of a silent channel."""
-        counts: Vector = len(self.errors) * ~np.isnan(self.sizes[0])
-        return counts
+    blocks: NDArray[np.int64]  # (c,) number of blocks in which a channel has samples
 
     @property
     def residual(self) -> Vector:
@@ -180,7 +175,8 @@ class Simulator:
             columns.append(np.append((late - errors).ravel() / step, np.zeros(rest.size)))
         rows = errors.size + rest.size
         jacobian = np.column_stack(columns) if columns else np.zeros((rows, 0))
-        return WhitenedResiduals(errors, rest, self._recordings[number].sizes(read_), jacobian)
+        own = self._recordings[number]
+        return WhitenedResiduals(errors, rest, own.sizes(read_), jacobian, own.compared.sum(axis=0))
 
     def derivatives(
         self,

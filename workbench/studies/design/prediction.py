@@ -422,7 +422,8 @@ class ExperimentPredictor:
         system, names = problem.system, set(problem.rivals.signals)
         if system.experiments:
             names |= {sensor.name for sensor in system.experiments.sensors}
-        references = tuple(s.name for s in system.reference_signals if s.name in names)
+        beside = (*system.reference_signals, *system.intermittent)
+        references = tuple(signal.name for signal in beside if signal.name in names)
         values = _values(problem, candidate, rival)
         return predict_recording(self._model, system, candidate, values, references, number)
 
