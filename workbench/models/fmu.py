@@ -884,7 +884,7 @@ class FMU(FMUInstance):
         ------
         NoFunctionError
         """
-        if self.remembers_steps or self.is_own:
+        if self.remembers_steps or self.is_own or self.interface != MODEL_EXCHANGE:
             return
         inputs, outputs = variables
 
