@@ -90,10 +90,15 @@ def test_two_commands_lead_from_an_fmu_and_logs_to_an_open_loop(tmp_path, fmu, a
     assert set(summary["cases"]) == {"day1", "day2"}
 
 
+def drafted(fmu: Path, log: Path) -> str:
+    """The system file that is written for an FMU and a log, unasked."""
+    folder = log.with_name("system")
+    main(["new", str(folder), "--fmu", str(fmu), "--recordings", str(log), "--yes"])
+    return (folder / "system.toml").read_text()
+
+
 def test_what_was_concluded_or_is_missing_is_said_in_the_file(tmp_path, fmu):
-    log = write_log(tmp_path / "log.csv", 3)
-    main(["new", str(tmp_path / "oven"), "--fmu", str(fmu), "--recordings", str(log), "--yes"])
-    text = (tmp_path / "oven" / "system.toml").read_text()
+    text = drafted(fmu, write_log(tmp_path / "log.csv", 3))
     assert "# QUESTION: draught drives the model, and no channel has its name; it stays at" in text
     assert "# [fit.offset] is 0, and the model states no range: add it with a range" in text
     assert "0.5 W/K in the model; a fifth to five times its value" in text
@@ -149,20 +154,15 @@ def test_kelvin_is_no_reading_of_a_variable_in_degrees_celsius(tmp_path, ice, ca
 
 
 def test_a_unit_that_nobody_states_is_asked_about_where_it_has_a_zero_of_its_own(tmp_path, ice):
-    log = ice_log(tmp_path / "log.csv", "time [s],room [degC],box")
-    main(["new", str(tmp_path / "box"), "--fmu", str(ice), "--recordings", str(log), "--yes"])
-    text = (tmp_path / "box" / "system.toml").read_text()
+    text = drafted(ice, ice_log(tmp_path / "log.csv", "time [s],room [degC],box"))
     assert "# QUESTION: box: no unit in the file, [degC] of the model is taken" in text
     assert "# QUESTION: room" not in text
 
 
 def test_a_signal_a_thousand_times_its_start_is_asked_about(tmp_path, ice):
-    log = ice_log(tmp_path / "log.csv", "time [s],room [degC],box [degC]", 2e4)
-    main(["new", str(tmp_path / "box"), "--fmu", str(ice), "--recordings", str(log), "--yes"])
-    text = (tmp_path / "box" / "system.toml").read_text()
-    assert (
-        "# QUESTION: box: its largest sample, 2.001e+04, is 5e+03 times the model's start" in text
-    )
+    text = drafted(ice, ice_log(tmp_path / "log.csv", "time [s],room [degC],box [degC]", 2e4))
+    question = "# QUESTION: box: its largest sample, 2.001e+04, is 5e+03 times the model's start"
+    assert question in text
 
 
 # --- a tank to begin with ---

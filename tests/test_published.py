@@ -508,24 +508,19 @@ def pumps(tmp_path, monkeypatch) -> Callable[..., Path]:
     return publish
 
 
-def test_each_machine_of_a_set_has_its_own_next_command(pumps, tmp_path, capsys):
-    system = str(pumps("a_1", "a_test", "b_1"))
-    out = tmp_path / "cases"
+@pytest.mark.parametrize(
+    ("names", "cases"),
+    [
+        (("a_1", "a_test", "b_1"), ["{0}/a_1 {0}/a_test --held-out a_test", "{0}/b_1"]),
+        (("a_1", "a_test"), ["{0} --held-out a_test"]),  # of a single machine the whole folder
+    ],
+)
+def test_each_machine_of_a_set_has_its_own_next_command(names, cases, pumps, tmp_path, capsys):
+    system, out = str(pumps(*names)), tmp_path / "cases"
     assert main(["prepare", system, "--from", str(tmp_path / "set"), "--out", str(out)]) == 0
     _, *commands = capsys.readouterr().out.splitlines()
     diagnose = f"next: workbench diagnose --system {system}"
-    assert commands == [
-        f"{diagnose} {out}/a_1 {out}/a_test --held-out a_test",
-        f"{diagnose} {out}/b_1",
-    ]
-
-
-def test_a_single_machine_has_one_command_with_the_whole_folder(pumps, tmp_path, capsys):
-    system = str(pumps("a_1", "a_test"))
-    out = tmp_path / "cases"
-    assert main(["prepare", system, "--from", str(tmp_path / "set"), "--out", str(out)]) == 0
-    (command,) = capsys.readouterr().out.splitlines()[1:]
-    assert command == f"next: workbench diagnose --system {system} {out} --held-out a_test"
+    assert commands == [f"{diagnose} {given.format(out)}" for given in cases]
 
 
 def test_cases_of_an_earlier_run_go_unless_somebody_changed_them(pumps, tmp_path):

@@ -181,14 +181,14 @@ def test_planted_film_leaves_with_the_energy_of_its_disc(effect, discs):
         assert energy[-1] > 0.2e6  # enough to tell energy from none
 
 
+def pads_of(planted: str, *discs: str) -> Pads:
+    """Pads of constant friction but for what is planted, before a stop."""
+    conditions = dataclasses.replace(SCENARIOS["03_dry_120_3.6"].conditions, discs=discs)
+    return Pads(plant(CONSTANT_PADS, [planted]), conditions, 1.0, 0.0, 1e-3)
+
+
 def test_a_wet_disc_is_no_wetter_for_a_planted_film():
-    pads = Pads(
-        plant(CONSTANT_PADS, ["water_film=0.2"]),
-        dataclasses.replace(SCENARIOS["03_dry_120_3.6"].conditions, discs=("wet", "dry", "wet")),
-        1.0,
-        0.0,
-        1e-3,
-    )
+    pads = pads_of("water_film=0.2", "wet", "dry", "wet")
     expected = [0.12, 0.8 * 0.30 + 0.2 * 0.12, 0.12]
     assert pads.friction(10.0, 35e3, 0.0) == pytest.approx(expected, rel=1e-12)
 
@@ -338,13 +338,7 @@ def test_twice_the_roller_loss_is_what_the_drive_does_not_give_back():
 
 
 def test_friction_steps_at_90_degrees_of_the_disc():
-    pads = Pads(
-        plant(CONSTANT_PADS, ["friction_step=-0.1"]),
-        dataclasses.replace(SCENARIOS["03_dry_120_3.6"].conditions, discs=("dry", "dry", "dry")),
-        1.0,
-        0.0,
-        1e-3,
-    )
+    pads = pads_of("friction_step=-0.1", "dry", "dry", "dry")
     pads.temperature = [80.0, 90.0, 100.0]
     # tanh(4) is 7e-4 short of 1, half of which is seen.
     assert pads.friction(10.0, 35e3, 0.0) == pytest.approx([0.30, 0.285, 0.27], abs=2e-5)

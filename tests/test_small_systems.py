@@ -23,7 +23,6 @@ from workbench.observers.operating import corrected_states
 from workbench.pages.columns import read_estimates
 from workbench.recordings.case import check_recording, read_cases
 from workbench.system.registry import load_system, open_model
-from workbench.system.system import System
 from workbench.system.units import quantity
 
 from .built import build_here, machine, write_case
@@ -71,12 +70,14 @@ def bottle(tmp_path_factory) -> Path:
     return folder
 
 
-def loaded(folder: Path) -> System:
-    return load_system(folder)
+def status_of(command: str, folder: Path, out: Path, name: str = "") -> int:
+    """Exit status of a command on a recording of a machine, or on all of them."""
+    given = [str(folder / "recordings" / name), "--system", str(folder), "--out", str(out)]
+    return main([command, *given, "--workers", "1"])
 
 
 def diagnosed(folder: Path, out: Path, effects: Sequence[str] = ()) -> Outcome:
-    system = loaded(folder)
+    system = load_system(folder)
     cases = read_cases([folder / "recordings"], system)
     return diagnose(system, cases, effects=effects, out=out, workers=1, report=lambda line: None)
 
@@ -108,9 +109,8 @@ def test_an_fmu_without_states_is_built_and_fit(balance, tmp_path, fmi):
 
 
 def test_estimators_find_the_stiffness_without_a_state(balance, tmp_path):
-    options = ["--system", str(balance), "--out", str(tmp_path), "--workers", "1"]
     # The pivot rubs, which the model lacks: bands cannot hold, and the status says so.
-    assert main(["simulate", str(balance / "recordings" / "00_pull"), *options]) == 1
+    assert status_of("simulate", balance, tmp_path, "00_pull") == 1
     estimates = read_estimates(tmp_path / "00_pull.npz")
     # The smoother is the reference: nothing there is only to judge by.
     for name in ("disturbance_observer", "parameter_estimator", "ekf", "ukf", "smoother"):
@@ -121,7 +121,7 @@ def test_estimators_find_the_stiffness_without_a_state(balance, tmp_path):
 
 def test_noise_of_an_input_that_the_output_shows_at_once_counts(balance):
     """Closed form: a deviation of 0.1 mm is one of 10 mN, by a stiffness of 100 N/m."""
-    system = loaded(balance)
+    system = load_system(balance)
     with open_model(system) as fmu:
         linearised = motion(fmu, system)
     lead = led_by(linearised, np.array([1e-4, 1e-4]), np.array([0.01]), 0.01)
@@ -132,7 +132,7 @@ def test_noise_of_an_input_that_the_output_shows_at_once_counts(balance):
 
 def test_what_was_built_unasked_has_the_name_of_the_model(balance, tmp_path):
     """In errors and files, and not that of the kept file, a hash that nobody knows."""
-    with open_model(loaded(balance)) as fmu:
+    with open_model(load_system(balance)) as fmu:
         assert str(fmu.event_error()).startswith("model Balance.Observer: an event of the model")
     recording = str(balance / "recordings" / "00_pull")
     main(["fit", recording, "--system", str(balance), "--parameter", "c", "--out", str(tmp_path)])
@@ -159,13 +159,12 @@ def test_states_of_an_extension_are_not_corrected(balance, tmp_path):
     build_here(extended / "package.mo", "Balance.Observer", file)
     with FMU(file) as fmu:
         assert fmu.states == ("pivot.late",)
-        assert corrected_states(fmu, loaded(balance)) == ()
-        assert corrected_states(fmu, loaded(extended)) == ("pivot.late",)
+        assert corrected_states(fmu, load_system(balance)) == ()
+        assert corrected_states(fmu, load_system(extended)) == ("pivot.late",)
 
 
 def test_observability_of_a_quantity_without_a_state(balance, tmp_path):
-    options = ["--system", str(balance), "--out", str(tmp_path), "--workers", "1"]
-    assert main(["observability", str(balance / "recordings" / "00_pull"), *options]) == 0
+    assert status_of("observability", balance, tmp_path, "00_pull") == 0
     assert pd.read_csv(tmp_path / "00_pull.csv")["Observer.bound_dc [N/m]"].median() < 0.5
 
 
@@ -174,8 +173,7 @@ def test_a_model_without_anything_to_estimate_is_refused(balance, capsys, tmp_pa
     known = BALANCE_FILE[: BALANCE_FILE.index("[estimated.c]")] + "[diagnosis.levels]\nc = {}\n"
     folder = written(tmp_path / "known", BALANCE, known)
     shutil.copytree(balance / "recordings", folder / "recordings")
-    options = ["--system", str(folder), "--out", str(tmp_path / "out"), "--workers", "1"]
-    assert main(["simulate", str(folder / "recordings"), *options]) == 2
+    assert status_of("simulate", folder, tmp_path / "out") == 2
     assert "expected something to estimate" in capsys.readouterr().err
     outcome = diagnosed(folder, tmp_path, ["DryFriction"])
     assert outcome.diagnosis.verdict == "found"
@@ -192,8 +190,7 @@ def test_a_correction_has_the_sign_by_which_the_output_shows_it(balance, tmp_pat
         {name: table[name] for name in ("time [s]",)}
         | {name: -table[name] for name in ("s [m]", "v [m/s]", "F [N]")},
     )
-    options = ["--system", str(folder), "--out", str(tmp_path), "--workers", "1"]
-    assert main(["simulate", str(folder / "recordings"), *options]) == 1  # as above
+    assert status_of("simulate", folder, tmp_path) == 1  # as above
     estimates = read_estimates(tmp_path / "00_press.npz")
     pressed = estimates["measured.F [N]"] < -8.0
     for name in ("disturbance_observer", "parameter_estimator"):
@@ -204,8 +201,7 @@ def test_a_correction_has_the_sign_by_which_the_output_shows_it(balance, tmp_pat
 
 
 def test_estimators_follow_a_leak_without_an_input(bottle, tmp_path):
-    options = ["--system", str(bottle), "--out", str(tmp_path), "--workers", "1"]
-    assert main(["simulate", str(bottle / "recordings" / "00_leak"), *options]) == 0
+    assert status_of("simulate", bottle, tmp_path, "00_leak") == 0
     estimates = read_estimates(tmp_path / "00_leak.npz")
     for name in ("disturbance_observer", "ekf", "ukf"):
         assert estimates[f"{name}.k [1/s]"].iloc[100:].mean() == pytest.approx(LEAK, rel=0.05)
@@ -220,7 +216,7 @@ def test_the_pore_is_named_and_not_the_wall(bottle, tmp_path):
 
 
 def test_a_single_recording_will_do(bottle, tmp_path):
-    system = loaded(bottle)
+    system = load_system(bottle)
     cases = read_cases([bottle / "recordings" / "01_leak"], system)
     diagnosis = diagnose(system, cases, out=tmp_path, workers=1, report=lambda line: None).diagnosis
     (cause,) = diagnosis.causes
@@ -229,7 +225,7 @@ def test_a_single_recording_will_do(bottle, tmp_path):
 
 
 def test_a_system_says_how_few_samples_will_do(bottle):
-    system = loaded(bottle)
+    system = load_system(bottle)
     case = read_cases([bottle / "recordings" / "00_leak"], system)[0].part(slice(12))
     check_recording(case.time, replace(system, fewest=12), "here, column 'time'")
     with pytest.raises(InputError, match="12 samples over 11 s; expected at least 20 samples"):
@@ -241,7 +237,7 @@ def test_what_is_before_only_leads_to_what_counts(bottle, tmp_path):
     shutil.copytree(bottle / "recordings" / "02_leak", case)
     toml = (case / "case.toml").read_text()
     (case / "case.toml").write_text(f'{toml}counts_from = "150 s"\n')
-    system = loaded(bottle)
+    system = load_system(bottle)
     outcome = diagnose(
         *(system, read_cases([bottle / "recordings" / "00_leak"], system)),
         held_out=read_cases([case], system),
@@ -270,6 +266,5 @@ def test_curvature_of_a_signal_sampled_slowly_is_no_noise():
 
 
 def test_observability_without_an_input(bottle, tmp_path):
-    options = ["--system", str(bottle), "--out", str(tmp_path), "--workers", "1"]
-    assert main(["observability", str(bottle / "recordings" / "00_leak"), *options]) == 0
+    assert status_of("observability", bottle, tmp_path, "00_leak") == 0
     assert (tmp_path / "00_leak.png").is_file()

@@ -245,22 +245,6 @@ def named(planted: dict[str, float], seed: int, everything: Path, folder: Path) 
 
 
 @pytest.mark.parametrize(
-    ("seed", "name", "size", "right"),
-    [
-        (5008, "pads[8]", 0.15, "WeakPads[8]"),
-        (5009, "reading[1]", 0.1, "PressureSensorGain[1]"),
-        pytest.param(5019, "pads[6]", 0.15, "WeakPads[6]", marks=pytest.mark.long),
-    ],
-)
-def test_faults_are_named_of_which_held_out_stops_say_nothing(
-    seed, name, size, right, everything, tmp_path
-):
-    """Among drawn tolerances, levels explain such stops as well as pads or a sensor do."""
-    cause = named({name: size}, seed, everything, tmp_path)
-    assert right in (cause.effect.name, *cause.confusable_with)
-
-
-@pytest.mark.parametrize(
     ("name", "size", "right", "told", "within"),
     # A film is gone in a twentieth of the stop, which shows it; a gradient has the look of bias and
     # resistances, by half of what is planted.
@@ -277,25 +261,34 @@ def test_water_and_a_wrong_track_file_are_named(
     assert_allclose(cause.parameters[told].value, size, rtol=within)
 
 
+FAULTS = {  # by the seed of the stops: what is planted, how much, and what it is called
+    # Among drawn tolerances, levels explain such stops as well as pads or a sensor do.
+    5008: ("pads[8]", 0.15, "WeakPads[8]"),
+    5009: ("reading[1]", 0.1, "PressureSensorGain[1]"),
+    5019: ("pads[6]", 0.15, "WeakPads[6]"),
+    # Of some deviations of the sheet; these are named alone.
+    5102: ("late[3]", 0.002, "LateSpeed[3]"),
+    5103: ("drag[5]", 400.0, "DraggingBrake[5]"),
+    5106: ("drying", 3000.0, "WaterFilm"),  # gone when brakes have hardly begun, as if they lagged
+    5108: ("zero[2]", 2000.0, "PressureSensorOffset[2]"),  # it shows while the train coasts
+    5109: ("accelerometer_bias", 0.12, "AccelerometerBias"),
+    5110: ("accelerometer_gain", 0.03, "AccelerometerGain"),
+    5111: ("glazing", 0.03, "Glazing"),
+    9607: ("reading[2]", 0.0528, "PressureSensorGain[2]"),  # beside what the brake asks for
+}
+QUICK = (5008, 5102, 5103, 9607)  # one of each kind: pads, clocks, forces, sensors
+
+
 @pytest.mark.parametrize(
-    ("seed", "name", "size", "right"),
-    [
-        (5102, "late[3]", 0.002, "LateSpeed[3]"),
-        (5103, "drag[5]", 400.0, "DraggingBrake[5]"),
-        (5108, "zero[2]", 2000.0, "PressureSensorOffset[2]"),  # it shows while the train coasts
-        (9607, "reading[2]", 0.0528, "PressureSensorGain[2]"),  # beside what the brake asks for
-        pytest.param(5109, "accelerometer_bias", 0.12, "AccelerometerBias", marks=pytest.mark.long),
-        pytest.param(5110, "accelerometer_gain", 0.03, "AccelerometerGain", marks=pytest.mark.long),
-        pytest.param(5111, "glazing", 0.03, "Glazing", marks=pytest.mark.long),
-        # Gone when brakes have hardly begun, as if all cylinders lagged.
-        pytest.param(5106, "drying", 3000.0, "WaterFilm", marks=pytest.mark.long),
-    ],
+    "seed", [pytest.param(k, marks=[pytest.mark.long] * (k not in QUICK)) for k in FAULTS]
 )
-def test_faults_of_some_deviations_of_the_sheet_are_named_alone(
-    seed, name, size, right, everything, tmp_path
+def test_faults_are_named_alone_or_with_what_explains_such_stops_as_well(
+    seed, everything, tmp_path
 ):
+    name, size, right = FAULTS[seed]
     cause = named({name: size}, seed, everything, tmp_path)
-    assert (cause.effect.name, cause.confusable_with) == (right, ())
+    alike = (cause.effect.name, *cause.confusable_with)
+    assert right in alike if seed < 5100 else alike == (right,)
 
 
 def test_a_sensor_is_read_at_rest_and_held_where_a_recording_shows_it(tmp_path):
