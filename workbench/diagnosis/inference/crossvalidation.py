@@ -62,8 +62,8 @@ class CrossValidation:
             pairs = zip(every, self._held_out(beside), strict=True)
             every = [own - other for own, other in pairs]
         return [
-            lasting(errors[:, told], span)
-            for errors, told in zip(every, self._told(fitted), strict=True)
+            lasting(errors[:, shown], span)
+            for errors, shown in zip(every, self._shown(fitted), strict=True)
         ]
 
     def _held_out(self, fitted: FittedModel) -> list[Matrix]:
@@ -90,13 +90,13 @@ class CrossValidation:
     def _counts(self, fitted: FittedModel, *, fast: bool) -> list[int]:
         """Number of means of which `squares` are, of each recording or part."""
         span = 1 if fast else fitted.linearised.lasting
-        told, parts = self._told(fitted), self._fit.parts if self._fit.unknowns.count == 1 else 1
-        blocks = [
-            len(recording.errors) for recording in fitted.linearised.residuals for _ in range(parts)
+        shown, parts = self._shown(fitted), self._fit.parts if self._fit.unknowns.count == 1 else 1
+        counts = [
+            len(recording.errors) // parts // span
+            for recording in fitted.linearised.residuals
+            for _ in range(parts)
         ]
-        return [
-            max(1, n // parts // span) * int(own.sum()) for n, own in zip(blocks, told, strict=True)
-        ]
+        return [max(1, n) * int(own.sum()) for n, own in zip(counts, shown, strict=True)]
 
     def worsened(self, before: FittedModel, after: FittedModel, *, fast: bool) -> list[str]:
         """Recordings that a fit predicts worse than another one does, and not to their noise.
@@ -114,7 +114,7 @@ class CrossValidation:
         before, after = (float(self.squares(model, fast=fast).mean()) for model in (less, best))
         return float(np.clip((before - after) / max(before - 1.0, 1e-9), 0.0, 1.0)), before
 
-    def _told(self, fitted: FittedModel) -> list[Mask]:
+    def _shown(self, fitted: FittedModel) -> list[Mask]:
         """Channels that are told, of each recording or part."""
         counted = [residuals.blocks > 0 for residuals in fitted.linearised.residuals]
         return counted * self._fit.parts if self._fit.unknowns.count == 1 else counted

@@ -42,9 +42,9 @@ class ShiftedLevel:
         way = "above" if away > 0.0 else "below"
         by = f"{abs(away / self.sheet):.0%}" if self.sheet else with_unit(abs(away), self.unit)
         declared = "" if self.declared is None else f", declared as ±{self.declared:.2g} of it"
-        told = f"{self.name} ({self.choice})" if self.choice not in ("all", "sensor") else self.name
+        what = f"{self.name} ({self.choice})" if self.choice not in ("all", "sensor") else self.name
         text = (
-            f"{told} is {with_unit(self.value, self.unit)}, {by} {way} its data sheet of "
+            f"{what} is {with_unit(self.value, self.unit)}, {by} {way} its data sheet of "
             f"{with_unit(self.sheet, self.unit)}{declared}"
         )
         if not self.hides:

@@ -433,8 +433,8 @@ def _since(channel: FileChannel, system: System) -> Clock | None:
             times = np.round((channel.values - held[0]) * _DAY, 6)
             start = round((float(held[0]) - zero) * _DAY, 3)
             reason = f"days as {name} counts them" if name in ("Excel", "MATLAB") else name
-            told = _by_1904(start) if name == "Excel" else ()
-            clock = Clock(channel.name, times, reason, start=start, unit="d", corrections=told)
+            other = _by_1904(start) if name == "Excel" else ()
+            clock = Clock(channel.name, times, reason, start=start, unit="d", corrections=other)
     if _DAYS_OF_YEAR.intersection(words(channel.name)) and held.max() <= 367.0:
         clock = Clock(channel.name, channel.values * _DAY, "days of a year", unit="d")
     if clock is None:

@@ -467,5 +467,5 @@ def unit_in_name(name: str, signal: Signal, system: System) -> str:
     """A unit at the end of a name, as in `p_bar`; one letter may mean anything."""
     _, _, last = name.replace(" ", "_").rpartition("_")
     unit = spell_unit(last)
-    told = len(last) > 1 and last != name and last.lower() not in _WORDS
-    return unit if told and conversion_to(unit, signal, system) else ""
+    is_apart = len(last) > 1 and last != name and last.lower() not in _WORDS
+    return unit if is_apart and conversion_to(unit, signal, system) else ""
