@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping
+from functools import cache
 from typing import Any, TypeVar, get_args, get_type_hints
 
 import numpy as np
@@ -32,12 +33,18 @@ def zeros(record: type[_Record], sizes: Mapping[str, int], **given: Any) -> _Rec
     >>> zeros(State, {"n": 1})
     State(x=array([0.]), P=array([[0., 0., 0.]]))
     """
-    for name, hint in get_type_hints(record, include_extras=True).items():
+    for name, hint in _declared(record).items():
         if name not in given:
             array, shape = get_args(hint)
             (dtype,) = get_args(get_args(array)[1])
             given[name] = np.zeros([_length(text, sizes) for text in shape.split(",")], dtype)
     return record(**given)
+
+
+@cache
+def _declared(record: type) -> dict[str, Any]:
+    """Fields of a record as declared; to read them takes longer than a short loop runs."""
+    return get_type_hints(record, include_extras=True)
 
 
 def _length(text: str, sizes: Mapping[str, int]) -> int:
