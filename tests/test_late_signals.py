@@ -73,7 +73,7 @@ def said(skews: Mapping[str, float], monkeypatch: pytest.MonkeyPatch) -> LateSig
         )
         return SimpleNamespace(linearised=errors, point=SimpleNamespace(sizes=sizes), active=active)
 
-    monkeypatch.setattr(timing, "fitted", lambda fit, start, active: model(0.0, active))
+    monkeypatch.setattr(timing, "fitted", lambda fit, start, active, **given: model(0.0, active))
     monkeypatch.setattr(timing, "replace", lambda point, **changes: point)
     nominal = model(1e6)
     return by_themselves(fit, nominal, nominal, clean=False)

@@ -129,7 +129,9 @@ def test_a_state_at_the_start_is_no_further_off_than_chance_makes_it(tmp_path):
             ModelSource(path, system, system.given), cases(system, [warm])
         ) as simulations:
             fit = Fit(simulations, effects)
-            point = fit.stepped(fit.linearise(fit.at(fit.unknowns.start()), []), np.ones(1), {})
+            point = fit.stepped(
+                fit.linearise(fit.at(fit.unknowns.start()), []), np.ones(1), {}
+            ).point
             steps[name] = point.deviations[0, list(fit.unknowns.local).index("Tc")]
     assert steps["free"] * of.spreads["Tc"] > 2.0 * Thresholds.furthest
     assert steps["known"] == pytest.approx(Thresholds.furthest)

@@ -12,7 +12,7 @@ Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 Tensor = NDArray[np.float64]
 
-_Record = TypeVar("_Record")
+_Record = TypeVar("_Record", bound=tuple[Any, ...])
 
 
 def zeros(record: type[_Record], sizes: Mapping[str, int], **given: Any) -> _Record:
@@ -42,7 +42,7 @@ def zeros(record: type[_Record], sizes: Mapping[str, int], **given: Any) -> _Rec
 
 
 @cache
-def _declared(record: type) -> dict[str, Any]:
+def _declared(record: Any) -> dict[str, Any]:
     """Fields of a record as declared; to read them takes longer than a short loop runs."""
     return get_type_hints(record, include_extras=True)
 

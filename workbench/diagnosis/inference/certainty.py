@@ -132,7 +132,7 @@ def _end(
     low, high = _bounds(fit, key)
     tried = float(np.clip(value + step, low, high))
     held = {key: tried}
-    start = fit.tried(fit.stepped(lin, lin.spread, held))
+    start = fit.tried(fit.stepped(lin, lin.spread, held).point)
     if start is None or tried == value:
         return None
     # Begun where the derivatives have the least, one step more is enough.

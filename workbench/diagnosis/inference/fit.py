@@ -45,6 +45,9 @@ _PARTS = 10
 _HALVED = 4  # times: after that a step is given up
 _ROUNDS = 8  # evaluations of a least chi-squared, at most
 _WORTH = 1.0  # of chi-squared: what noise moves it by
+# Times what derivatives promise that steps may gain, since laws bend: up to twice as much is seen.
+# A fit may begin with a guess, and gain as many times more.
+_BENT = 3.0
 _TURN = 0.5  # [rad] of a phase in one step, within which a sine is nearly straight
 
 _LOCAL = ""  # in place of an effect, of what differs between recordings
@@ -180,8 +183,7 @@ class Fit:
     def at(self, point: Point) -> LinearizedPoint:
         """Gather errors at a point; of derivatives, only what costs no simulation."""
         residuals = self._shown(self._simulations.at(self.unknowns.values(point)))
-        known = self._prior(point, [*point.sizes, *point.levels])
-        away = float(np.square(point.deviations).sum()) + known.c
+        away = self._away(point)
         slow, excess = slowness(residuals, self.lasting), self.decides.excess
         return LinearizedPoint(
             point, self.delays, tuple(residuals), self.lasting, slow, away, excess
@@ -381,8 +383,11 @@ class Fit:
         rounds: int,
         spread: Vector | None = None,
         held: Mapping[Key, float] = MappingProxyType({}),
+        sought: float = np.inf,
     ) -> LinearizedPoint:
         """Gauss-Newton over all unknowns, with channels weighed by what is wrong with them.
+
+        Derivatives serve for a last step, too, where they said what the one before it led to.
 
         Parameters
         ----------
@@ -391,30 +396,45 @@ class Fit:
         spread : (m,) for the first step, if not that of the point: an effect that has only just
             been put beside levels fitted without it makes all channels wrong.
         held : common unknowns that are not fitted, at these values.
+        sought : deviance that is of use: a fit ends where steps no longer promise to come near it.
 
         Returns
         -------
         best : the best point that was met; derivatives may be missing.
         """
-        best = self.linearise(best, active)
-        first = best.spread if spread is None else spread
-        point, halved = self.stepped(best, first, held), 0
-        worse = self.decides.worse
+        best = derived = self.linearise(best, active)
+        expected, halved = self.stepped(best, best.spread if spread is None else spread, held), 0
+        worse, bent = self.decides.worse, _BENT**2
+
+        def hopeless() -> bool:
+            return best.deviance - bent * (best.deviance - expected.deviance) > sought
+
+        if hopeless():
+            return best
+        point, bent = expected.point, _BENT
         for left in reversed(range(rounds)):
             tried = self.tried(point)
             fall = -np.inf if tried is None else best.deviance - tried.deviance
             better = fall > -worse
             if tried is not None and better:
-                best, halved = tried, 0
+                best = tried
             if abs(fall) < worse or halved == _HALVED:
                 return replace(best, settled=True)
             if left == 0:
                 break
-            if better:
-                best = self.linearise(best, active)
-                point = self.stepped(best, best.spread, held)
-            else:
+            if not better:
                 point, halved = between(best.point, point), halved + 1
+                continue
+            as_said = not halved and abs(best.deviance - expected.deviance) < worse
+            expected = self.stepped(best.derived_as(derived), best.spread, held)
+            if hopeless():
+                break
+            if not (as_said and best.deviance - expected.deviance < worse):
+                best = derived = self.linearise(best, active)
+                expected = self.stepped(best, best.spread, held)
+                if hopeless():
+                    break
+            point, halved = expected.point, 0
         return best
 
     def least(
@@ -442,7 +462,7 @@ class Fit:
         for _ in range(_ROUNDS):
             best = self.linearise(best, active)
             point = (
-                self.stepped(best, variance_factors, {})
+                self.stepped(best, variance_factors, {}).point
                 if fall > 0.0
                 else between(best.point, point)
             )
@@ -456,8 +476,13 @@ class Fit:
                 break
         return least, best
 
-    def stepped(self, lin: LinearizedPoint, spread: Vector, held: Mapping[Key, float]) -> Point:
-        """Where derivatives have the best point, beside what is held at values of its own."""
+    def stepped(
+        self, lin: LinearizedPoint, spread: Vector, held: Mapping[Key, float]
+    ) -> LinearizedPoint:
+        """Where derivatives have the best point, beside what is held at values of its own.
+
+        Its errors are those that derivatives lead to.
+        """
         joint, point = self.quadratics(replace(lin, variance_factors=spread)), lin.point
         at = np.array([{**point.sizes, **point.levels}[key] for key in joint.shared])
         reach = [
@@ -474,7 +499,17 @@ class Fit:
         changes = np.array(locals_[: self.unknowns.count])
         locked = enumerate(name for name, parameter in joint.shared if parameter == "amplitude")
         phases = {name: point.phases[name] + changes[:, count + j] for j, name in locked}
-        return Point(sizes, levels, point.deviations + changes[:, :count], phases)
+        new = Point(sizes, levels, point.deviations + changes[:, :count], phases)
+        residuals = tuple(
+            own.moved(system.J @ step + system.P @ local, spread)
+            for own, system, local in zip(lin.residuals, joint.systems, locals_, strict=True)
+        )
+        return replace(lin, point=new, residuals=residuals, away=self._away(new))
+
+    def _away(self, point: Point) -> float:
+        """Chi-squared of levels and deviations against what tolerances say of them."""
+        known = self._prior(point, [*point.sizes, *point.levels])
+        return float(np.square(point.deviations).sum()) + known.c
 
     def together(self, job: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
         """Results of a job that fits, by item."""

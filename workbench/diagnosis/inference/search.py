@@ -80,10 +80,11 @@ def forward_selection(
     interrupted : whether Ctrl-C ended it; before anything was found it ends the diagnosis.
     """
     sought = [effect for effect in catalogue if effect not in dropped]
+    straight: dict[str, float] = {}
     try:
         while True:
             best, trial = examine(fit, best, catalogue, report)
-            step = _step(fit, sought, best, trial, report)
+            step = _step(fit, sought, best, trial, straight, report)
             more = _terms_together(fit, sought, best, trial) if step is None else [step]
             if not more:
                 return best, trial, False
@@ -98,9 +99,19 @@ def forward_selection(
 
 
 def _step(
-    fit: Fit, catalogue: Sequence[Effect], best: FittedModel, trial: ScoreTest, report: Reporter
+    fit: Fit,
+    catalogue: Sequence[Effect],
+    best: FittedModel,
+    trial: ScoreTest,
+    straight: dict[str, float],
+    report: Reporter,
 ) -> Step | None:
-    """One more effect, or none if the data do not ask for it; of equals the usual one."""
+    """One more effect, or none if the data do not ask for it; of equals the usual one.
+
+    Parameters
+    ----------
+    straight : sizes up to which derivatives held in a step before, by effect; more are added.
+    """
     scores = tuple(score for score in trial.scores() if score.effect in catalogue)
     rivals: list[list[CandidateScore]] = []
     if len(best.active) < fit.decides.most:
@@ -109,7 +120,8 @@ def _step(
             rivals = _predicting(scores, best, fit.decides)
         # Of a run that nothing corrects, sizes are far from where derivatives point.
         ranked = [variants[0].effect for variants in rivals]
-        simulated = _misjudged(fit, best, scores, [] if fit.free else ranked)
+        unjudged = [s for s in scores if fit.free or s.effect not in ranked]
+        simulated = _misjudged(fit, best, unjudged, straight)
         rivals = [_starts(variants) for variants in rivals]
         for start in simulated:
             if start.effect in ranked:
@@ -183,7 +195,7 @@ def _misjudged(
     fit: Fit,
     best: FittedModel,
     scores: Sequence[CandidateScore],
-    judged: Collection[Effect],
+    straight: dict[str, float],
 ) -> list[CandidateScore]:
     """Effects of which the linearised score says nothing, each where its fit should begin.
 
@@ -193,20 +205,26 @@ def _misjudged(
 
     Parameters
     ----------
-    judged : effects that are fitted anyway.
+    straight : see `_step`.
     """
     if best.linearised.variance_factors.max() <= fit.decides.wrong:
         return []
     first: dict[str, CandidateScore] = {}
     for score in sorted(scores, key=lambda score: -score.gain):
-        if score.effect not in judged and not score.effect.order_locked:
+        if not score.effect.order_locked:
             first.setdefault(score.effect.name, score)
-    starts = fit.together(partial(_simulated_start, fit, best), list(first.values()))
+    starts = fit.together(partial(_simulated_start, fit, best, straight), list(first.values()))
     return [start for start in starts if start is not None]
 
 
-def _simulated_start(fit: Fit, best: FittedModel, score: CandidateScore) -> CandidateScore | None:
-    """The size at which errors are least of those that are tried; None where derivatives hold."""
+def _simulated_start(
+    fit: Fit, best: FittedModel, straight: dict[str, float], score: CandidateScore
+) -> CandidateScore | None:
+    """The size at which errors are least of those that are tried; None where derivatives hold.
+
+    Where they held for a larger size beside fewer effects, they do; not along runs that nothing
+    corrects, of which each switches elsewhere.
+    """
     lin, effect = best.linearised, score.effect
     low, high = fit.unknowns.bounds(effect, effect.size)
     at = lin.keys.index((variant(effect, score.shape), effect.size))
@@ -227,9 +245,11 @@ def _simulated_start(fit: Fit, best: FittedModel, score: CandidateScore) -> Cand
     ways = [way for way in (1.0, -1.0) if low < way * effect.matters < high]
     if len(ways) == 2 and score.size:
         ways = [float(np.sign(score.size))]
-    held = True
+    held, longest = True, weighed(now) / slope
     for way in ways:
-        size = float(np.clip(way * weighed(now) / slope, low, high))
+        size = float(np.clip(way * longest, low, high))
+        if not fit.free and abs(size) <= straight.get(f"{effect.name} {way:+.0f}", 0.0):
+            continue
         simulated = fit.tried(joined(best.point, replace(score, size=size)))
         linear = [own + size * change for own, change in zip(now, slopes, strict=True)]
         held = (
@@ -243,6 +263,8 @@ def _simulated_start(fit: Fit, best: FittedModel, score: CandidateScore) -> Cand
             )
             < fit.decides.near * abs(size) * slope
         )
+        if held:
+            straight[f"{effect.name} {way:+.0f}"] = abs(size)
     if held:
         return None
     if fit.free:
@@ -315,21 +337,30 @@ def _fits(
     fit: Fit, best: FittedModel, rivals: Sequence[Sequence[CandidateScore]]
 ) -> list[FittedModel]:
     """Fits with one more effect that gain by it, best first; one far behind is not finished."""
-    tried = fit.together(partial(_begun, fit, best), rivals)
-    begun = [start for start in tried if start is not None]
+    likeliest = _begun(fit, best, np.inf, rivals[0])
+    sought = np.inf if likeliest is None else _sought(fit, best, likeliest)
+    others = fit.together(partial(_begun, fit, best, sought), rivals[1:])
+    begun = [start for start in (likeliest, *others) if start is not None]
     if not begun:
         return []
     left = misfits(begun)
     near = left < fit.decides.behind * left.min()
     worth = [i for i, model in enumerate(begun) if near[i] and not model.linearised.settled]
+    sought = min(_sought(fit, best, model) for model in begun)
 
     def finished(model: FittedModel) -> FittedModel | None:
-        return differentiable(partial(fitted, fit, model.linearised, model.active))
+        return differentiable(partial(fitted, fit, model.linearised, model.active, sought=sought))
 
     ends = dict(zip(worth, fit.together(finished, [begun[i] for i in worth]), strict=True))
     every = [end for i, model in enumerate(begun) if (end := ends.get(i, model)) is not None]
     order = np.argsort(misfits(every)) if every else ()
     return [every[i] for i in order if _gains(fit, best, every[i])]
+
+
+def _sought(fit: Fit, before: FittedModel, rival: FittedModel) -> float:
+    """Deviance of fits with one more effect that may explain as well as one of them does."""
+    form = max(fit.decides.form, fit.decides.form_share * beyond(before, rival))
+    return rival.linearised.deviance + form
 
 
 def misfits(fits: Sequence[FittedModel]) -> Vector:
@@ -348,11 +379,13 @@ def _starts(variants: Sequence[CandidateScore]) -> list[CandidateScore]:
     return [*variants[:_VARIANTS], *halves]
 
 
-def _begun(fit: Fit, best: FittedModel, starts: Sequence[CandidateScore]) -> FittedModel | None:
+def _begun(
+    fit: Fit, best: FittedModel, sought: float, starts: Sequence[CandidateScore]
+) -> FittedModel | None:
     """First rounds of a fit with one more effect, from the first start that gains by it."""
     tried = []
     for start in starts:
-        if (model := extended(fit, best, start, BEGUN)) is None:
+        if (model := extended(fit, best, start, BEGUN, sought)) is None:
             continue
         if _gains(fit, best, model):
             return model
@@ -361,14 +394,18 @@ def _begun(fit: Fit, best: FittedModel, starts: Sequence[CandidateScore]) -> Fit
 
 
 def extended(
-    fit: Fit, before: FittedModel, rival: CandidateScore, rounds: int = ROUNDS
+    fit: Fit,
+    before: FittedModel,
+    rival: CandidateScore,
+    rounds: int = ROUNDS,
+    sought: float = np.inf,
 ) -> FittedModel | None:
     """Fit with one more effect, begun where it was fitted without; None: not even begun."""
     start, spread = fit.tried(joined(before.point, rival)), before.linearised.spread
     if start is None:
         return None
     active = (*before.active, rival.effect)
-    return differentiable(partial(fitted, fit, start, active, rounds, spread))
+    return differentiable(partial(fitted, fit, start, active, rounds, spread, sought))
 
 
 def differentiable(fitting: Callable[[], Result]) -> Result | None:
@@ -453,13 +490,21 @@ def leave_one_out_fits(
     known : fits by their effects, with all derivatives, which need not be made again.
     """
 
+    def linear(effect: Effect) -> Point:
+        """The best point without it, by derivatives; channels weighed by what is wrong there."""
+        lin, none = best.linearised, {(effect.name, effect.label): 0.0}
+        there = fit.stepped(lin, lin.spread, none)
+        return without(fit.stepped(lin, there.spread, none).point, effect)
+
     def refitted(effect: Effect) -> FittedModel:
         kept = tuple(other for other in best.active if other is not effect)
         if frozenset(kept) in known:
             return known[frozenset(kept)]
-        start = fit.tried(without(best.point, effect))
-        if start is None:  # without it, the others stand for more than the machine can do
+        starts = [fit.tried(point) for point in (without(best.point, effect), linear(effect))]
+        able = [start for start in starts if start is not None]
+        if not able:  # without it, the others stand for more than the machine can do
             return known[frozenset()]
+        start = min(able, key=lambda start: start.deviance)
         model = fitted(fit, start, kept)
         return replace(model, linearised=fit.linearise(model.linearised, kept))
 
@@ -482,9 +527,10 @@ def fitted(
     active: tuple[Effect, ...],
     rounds: int = ROUNDS,
     spread: Vector | None = None,
+    sought: float = np.inf,
 ) -> FittedModel:
     """Fit a set of effects, from a point that has them; see `Fit.refine`."""
-    lin = fit.refine(start, active, rounds, spread)
+    lin = fit.refine(start, active, rounds, spread, sought=sought)
     return FittedModel(active, lin.point, lin, lin.misfit)
 
 

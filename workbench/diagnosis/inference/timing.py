@@ -60,10 +60,12 @@ def by_themselves(
     if clean and len(best.active) < 2 and _fall(other, clocks, best) < needed:
         return None
     starts: dict[Key, float] = {}
+    # Beside causes that leave nothing, clocks have to explain as much.
+    sought = best.linearised.deviance + fit.decides.form if clean else np.inf
     while True:
         if not clocks:
             return None
-        model = _fitted(other, base, clocks, starts)
+        model = _fitted(other, base, clocks, starts, sought)
         explains = float(model.linearised.variance_factors.max()) < fit.decides.wrong
         if not explains and not starts and not clean:
             # By more than a machine's shortest time, derivatives point elsewhere.
@@ -78,12 +80,16 @@ def by_themselves(
 
 
 def _fitted(
-    fit: Fit, base: FittedModel, clocks: Sequence[Effect], starts: Mapping[Key, float]
+    fit: Fit,
+    base: FittedModel,
+    clocks: Sequence[Effect],
+    starts: Mapping[Key, float],
+    sought: float,
 ) -> FittedModel:
     """The nominal model with clocks, begun at where they start, or else in time."""
     keys = [(clock.name, clock.size) for clock in clocks]
     point = replace(base.point, sizes={key: starts.get(key, 0.0) for key in keys})
-    return fitted(fit, fit.at(point), tuple(clocks))
+    return fitted(fit, fit.at(point), tuple(clocks), sought=sought)
 
 
 def _fall(fit: Fit, clocks: Sequence[Effect], best: FittedModel) -> float:

@@ -71,8 +71,10 @@ def one_law(diagnosis: Diagnosis, problem: Problem, engine: Engine) -> str:
         return ""
     slots = {slot for cause in diagnosis.causes for slot in cause.effect.slots}
     able = _likeliest(Scan(problem, diagnosis.base, engine, slots).prospects)[:_BESIDE]
-    laws = estimated(problem, able, diagnosis.base, engine, diagnosis.best) if able else []
     less = description_length(diagnosis.base) - description_length(diagnosis.best)
+    # What a law gains is half of what the deviance falls by, or less.
+    sought = diagnosis.base.linearised.deviance - 2.0 * less
+    laws = estimated(problem, able, diagnosis.base, engine, sought) if able else []
     return laws[0].law.text if laws and laws[0].evidence >= less else ""
 
 

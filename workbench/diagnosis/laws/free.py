@@ -16,7 +16,7 @@ from workbench.diagnosis.effects.extension import ExtendedModel, build
 from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.linearized import LinearizedPoint
 from workbench.diagnosis.inference.quadratic import Key
-from workbench.diagnosis.inference.search import BEGUN, FittedModel, fitted, misfits
+from workbench.diagnosis.inference.search import FittedModel, fitted
 from workbench.diagnosis.inference.selection import anew
 from workbench.diagnosis.laws.places import Law
 from workbench.diagnosis.laws.scan import LawScore, effect_at
@@ -130,7 +130,7 @@ def estimated(
     prospects: Sequence[LawScore],
     about: FittedModel,
     engine: Engine,
-    rival: FittedModel | None = None,
+    sought: float = np.inf,
 ) -> list[FittedLaw]:
     """Fit free functions in full, best first.
 
@@ -139,7 +139,7 @@ def estimated(
 
     Parameters
     ----------
-    rival : that they are to outdo; one that is far behind it is not finished, as in the search.
+    sought : deviance that is of use; see `Fit.refine`.
     """
     with tempfile.TemporaryDirectory() as scratch:
         path = Path(scratch) / "Free.fmu"
@@ -152,7 +152,7 @@ def estimated(
         with ResidualModel(source, problem.cases, engine) as simulations:
             fit = Fit(simulations, [*about.active, *effects])
             engine.report("fitting free functions")
-            job = partial(_estimate, simulations, anew(fit, about.point, about.active), rival)
+            job = partial(_estimate, simulations, anew(fit, about.point, about.active), sought)
             tried = fit.together(job, list(zip(effects, able, strict=True)))
     fits = [smoothness for smoothness in tried if smoothness is not None]
     return sorted(fits, key=lambda smoothness: -smoothness.evidence)
@@ -195,12 +195,12 @@ def _compiled(
 def _estimate(
     simulations: ResidualModel,
     base: FittedModel,
-    rival: FittedModel | None,
+    sought: float,
     item: tuple[FreeFunction, LawScore],
 ) -> FittedLaw | None:
-    """Fit one function; None if it leads where the model has no solution, or stays far behind."""
+    """Fit one function; None if it leads where the model has no solution, or is of no use."""
     try:
-        return _fitted(simulations, base, rival, *item)
+        return _fitted(simulations, base, sought, *item)
     except (FMUError, np.linalg.LinAlgError):
         return None
 
@@ -208,7 +208,7 @@ def _estimate(
 def _fitted(
     simulations: ResidualModel,
     base: FittedModel,
-    rival: FittedModel | None,
+    sought: float,
     effect: FreeFunction,
     prospect: LawScore,
 ) -> FittedLaw | None:
@@ -222,13 +222,9 @@ def _fitted(
         active = (*base.active, effect)
         fit = Fit(simulations, active)
         start = _started(fit, best, keys, smoothness.coefficients)
-        if rival is not None:
-            begun = fitted(fit, start, active, BEGUN, start.spread)
-            left, least = misfits([begun, rival])
-            if left >= fit.decides.behind * least:
-                return None
-            start = begun.linearised
-        best = fitted(fit, start, active, spread=start.spread)
+        best = fitted(fit, start, active, spread=start.spread, sought=sought)
+        if best.linearised.deviance > sought and not best.linearised.settled:
+            break
         lin = fit.linearise(best.linearised, active)
         N, g = fit.quadratics(lin).reduced(keys)
         # Of the data alone, about no function: the prior is put in anew.
@@ -240,7 +236,7 @@ def _fitted(
         posterior: Matrix = np.asarray(np.linalg.inv(N + effect.precision), np.float64)
         laws.append(FittedLaw(prospect, 0.5 * (gained - float(spread)), now, posterior))
         smoothness = smoothest(N, g, most=prospect.most)
-    return max(laws, key=lambda smoothness: smoothness.evidence)
+    return max(laws, key=lambda smoothness: smoothness.evidence, default=None)
 
 
 def _started(

@@ -64,6 +64,17 @@ class WhitenedResiduals:
         """(b*c + q,) errors and rest in one vector."""
         return np.append(self.errors.ravel(), self.rest)
 
+    def moved(self, change: Vector, spread: Vector) -> "WhitenedResiduals":
+        """The same with other errors.
+
+        Parameters
+        ----------
+        change : (b*c + q,) of [errors, rest], errors in units of the roots of `spread`, (c,).
+        """
+        errors = change[: self.errors.size].reshape(self.errors.shape) * np.sqrt(spread)
+        rest = change[self.errors.size :]
+        return replace(self, errors=self.errors + errors, rest=self.rest + rest)
+
 
 class SimulatorSetup(NamedTuple):
     """What a simulator is made from: an FMU and the recordings."""
