@@ -203,6 +203,24 @@ def test_a_level_of_known_spread_hides_nothing(tmp_path):
     assert outcome.warnings == []
 
 
+def test_a_level_further_from_its_sheet_than_is_likely_is_said(tmp_path):
+    """The sheet says a fifth less than there is from block to casing, give or take 5 %.
+
+    Held to three times that, the level left errors for an effect to bend to, or for none.
+    """
+    library, file = machine("heater", sensor="")
+    library = library.replace('K(unit="W/K") = 2.0', 'K(unit="W/K") = 1.6')
+    of = declare(tmp_path, library, f"{file}[diagnosis.levels]\nK = {{ spread = 0.05 }}\n")
+    outcome = diagnosed(of, cases(of, [recorded(0.0, seed) for seed in range(3)]), tmp_path)
+    assert outcome.diagnosis.verdict == "nothing"
+    (level,) = outcome.diagnosis.shifted
+    assert (level.name, level.hides) == ("K", ())
+    assert level.value == pytest.approx(2.0, rel=0.02)
+    said = "25% above its data sheet of 1.6 W/K, declared as ±0.05 of it. Check the data sheet: "
+    assert f"{said}no effect explains it as this nuisance parameter does." in level.text
+    assert level.text in outcome.warnings
+
+
 # --- a law that stands for two ---
 
 

@@ -13,6 +13,7 @@ from workbench.arrays import Matrix, Vector
 from workbench.diagnosis.data.counting import FAULTY, MISSING
 from workbench.diagnosis.effects.extension import variables
 from workbench.diagnosis.inference.certainty import Certainty
+from workbench.diagnosis.inference.nuisance import remedy
 from workbench.diagnosis.inference.residuals import Dependence, Residuals
 from workbench.diagnosis.inference.rivals import Rivals
 from workbench.diagnosis.inference.sample_errors import Errors
@@ -230,8 +231,8 @@ class Outcome:
         diagnosis = self.diagnosis
         levels = {effect: name for name, effects in diagnosis.hidden.items() for effect in effects}
         hidden = {
-            effect: f"the level {name} has the same signature; give its spread in "
-            "[diagnosis.levels], or take it out there"
+            effect: f"the level {name} has the same signature; "
+            + remedy(free=self.system.comparison.levels[name].free)
             if name
             else "the start of the one recording has the same signature; fit several recordings"
             for effect, name in levels.items()

@@ -15,6 +15,7 @@ import numpy as np
 from workbench.arrays import Vector
 from workbench.diagnosis.data.clocks import apparent_lags, greatest_skew, own_clocks, reference
 from workbench.diagnosis.data.samples import standardised
+from workbench.diagnosis.effects.candidates import own_bounds
 from workbench.diagnosis.effects.catalogue import Effect, variant
 from workbench.diagnosis.effects.extension import sizes_by_component, variables
 from workbench.diagnosis.inference.linearized import (
@@ -39,6 +40,7 @@ from workbench.diagnosis.simulation.simulator import WhitenedResiduals
 from workbench.errors import FMUError, InputError
 from workbench.models.fmu import EventError
 from workbench.recordings.case import Case
+from workbench.system.units import BAND
 
 # A single recording is held out in tenths. R. Kohavi (1995), Proc. 14th IJCAI, 1137-1143.
 _PARTS = 10
@@ -81,6 +83,8 @@ class Fit:
         self.decides = decides or of_system(self._compare, len(effects))
         self.unknowns = Unknowns(simulations, effects, beside)
         self._hidden = slice(0)  # blocks that do not count
+        # levels that are further from their sheet than what is declared of them lets be likely
+        self.freed: frozenset[Key] = frozenset()
         if self.unknowns.count == 1 and not beside and self.parts < 2:
             recording, compare = simulations.recordings[0], self._compare
             raise InputError(
@@ -515,6 +519,15 @@ class Fit:
         """Results of a job that fits, by item."""
         return self._simulations.together(job, items)
 
+    def unlikely_levels(self, point: Point) -> frozenset[Key]:
+        """Levels further from their sheet than 95 of 100 are, by what is declared of them."""
+        expected = {key: self.unknowns.expected(key) for key in point.levels if key[1] != SENSOR}
+        return frozenset(
+            key
+            for key, (middle, sigma) in expected.items()
+            if key not in self.freed and abs(point.levels[key] - middle) > BAND * sigma
+        )
+
     def _reach(self, point: Point, key: Key) -> tuple[float, float]:
         """Least and greatest value after a step of a common unknown.
 
@@ -522,9 +535,12 @@ class Fit:
         """
         if key in point.levels:
             middle, sigma = self.unknowns.expected(key)
+            bounds = self._simulations.bounds.get(key[0], (-np.inf, np.inf))
+            if key in self.freed:
+                low, high = own_bounds(middle, bounds)
+                return middle + low, middle + high
             reach = self.decides.furthest_level * sigma
-            low, high = self._simulations.bounds.get(key[0], (-np.inf, np.inf))
-            return max(low, middle - reach), min(high, middle + reach)
+            return max(bounds[0], middle - reach), min(bounds[1], middle + reach)
         effect, old = self.unknowns.effects[key[0]], point.sizes[key]
         parameter = effect.size if key[1] == "amplitude" else key[1]
         low, high = self.unknowns.bounds(effect, parameter)

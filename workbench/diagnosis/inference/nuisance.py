@@ -33,6 +33,7 @@ class ShiftedLevel:
     # relative standard deviation by the system file; None where it declares none, or the sheet's
     # value is zero
     declared: float | None
+    free: bool  # whether nothing is expected of it, as [diagnosis.levels] gives no spread
     hides: tuple[str, ...]  # effects that these recordings cannot tell from it
 
     @property
@@ -48,14 +49,19 @@ class ShiftedLevel:
             f"{with_unit(self.sheet, self.unit)}{declared}"
         )
         if not self.hides:
-            return f"{text}. Check the data sheet: no effect explains it as this nuisance "
-            "parameter does."
+            return (
+                f"{text}. Check the data sheet: no effect explains it as this nuisance parameter "
+                "does."
+            )
         effects = " and ".join(self.hides)
-        return (
-            f"{text}; {effects} is indistinguishable from it. Give its spread in "
-            "[diagnosis.levels], or "
-            f"take it out there, and diagnose again."
-        )
+        return f"{text}; {effects} is indistinguishable from it. To do: {remedy(free=self.free)}."
+
+
+def remedy(*, free: bool) -> str:
+    """What has an effect considered that a level hides, of which a spread is known or not."""
+    if free:
+        return "give its spread in [diagnosis.levels], or take it out there, and diagnose again"
+    return "take it out of [diagnosis.levels], or measure it, and diagnose again"
 
 
 def hidden_effects(
@@ -64,7 +70,8 @@ def hidden_effects(
     """Effects that a nuisance parameter hides: by it, how much of it one unit of their size is.
 
     Of what recordings say of a size, all but that share of `twin` is lost when the parameter is
-    fitted beside all others; without it the size that matters would be significant.
+    fitted beside all others; without it the size that matters would be significant. What is
+    significant from less on than the spread of the parameter stands for is not hidden.
     """
     joint, N = trial.joint, trial.joint.total().N
     own: dict[str, list[int]] = {}
@@ -91,8 +98,11 @@ def hidden_effects(
                 taken = minimum(
                     Quadratic(N[np.ix_(known, known)], -N[known, column], 0.0, 0)
                 )  # N_kk^-1 N_kj
-                share = max((taken[known.index(j)] for j in at), key=abs)
-                hidden.setdefault(name, {})[effect.name] = float(share)
+                share = float(max((taken[known.index(j)] for j in at), key=abs))
+                least = fit.decides.significant / np.sqrt(max(left[column], 1e-300))
+                spreads = [fit.unknowns.expected(joint.shared[j])[1] for j in at] if name else []
+                if not np.isfinite(spreads).all() or abs(share) * least > max(spreads, default=0.0):
+                    hidden.setdefault(name, {})[effect.name] = share
     return hidden
 
 
@@ -129,5 +139,6 @@ def shifted_levels(
         if far or stands:
             unit = fit.unknowns.level_unit(key)
             known = declared / abs(sheet) if np.isfinite(declared) and sheet else None
-            shifted.append(ShiftedLevel(*key, float(value), sheet, unit, known, hides))
+            free = not np.isfinite(fit.unknowns.expected(key)[1])
+            shifted.append(ShiftedLevel(*key, float(value), sheet, unit, known, free, hides))
     return tuple(shifted)

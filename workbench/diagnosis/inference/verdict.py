@@ -18,6 +18,7 @@ from workbench.diagnosis.inference.discrepancy import (
 from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.linearized import Point
 from workbench.diagnosis.inference.nuisance import ShiftedLevel, hidden_effects, shifted_levels
+from workbench.diagnosis.inference.quadratic import Key
 from workbench.diagnosis.inference.score_test import CandidateScore
 from workbench.diagnosis.inference.search import (
     BEGUN,
@@ -213,6 +214,9 @@ def conclude(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnos
 
 def _concluded(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnosis:
     chosen, astray = _selected(fit, catalogue, report)
+    if (unlikely := fit.unlikely_levels(chosen.best.point)) and not chosen.interrupted:
+        report(f"further from the data sheet: {', '.join(sorted(name for name, _ in unlikely))}")
+        chosen, astray = _beyond_sheet(fit, catalogue, (chosen, astray), unlikely, report)
     chosen, outside = _within_bounds(fit, catalogue, chosen, report)
     verdict: Verdict = "unexplained" if astray or outside else _verdict(fit, chosen)
     late = None
@@ -510,6 +514,30 @@ def _selected(
         fit.count_restarted(astray, counting=False)
         restarted = [k for k in restarted if k not in astray]
     return chosen, ()
+
+
+def _beyond_sheet(
+    fit: Fit,
+    catalogue: Sequence[Effect],
+    likely: tuple[Selection, Sequence[int]],
+    unlikely: frozenset[Key],
+    report: Reporter,
+) -> tuple[Selection, Sequence[int]]:
+    """What recordings need if levels may be further from their sheets than is likely.
+
+    A sheet may be wrong. Then effects bend to what a level does not reach, or nothing explains it.
+    Levels are freed where that explains significantly more without another effect, or all where
+    much was wrong, with no more effects.
+    """
+    before, fit.freed = fit.freed, fit.freed | unlikely
+    chosen, astray = _selected(fit, catalogue, report)
+    was, now = likely[0].best, chosen.best
+    whole = _clean(fit, chosen) and not _clean(fit, likely[0])
+    fewer = len(now.active) <= len(was.active) if whole else {*now.active} <= {*was.active}
+    if fewer and beyond(was, now) > fit.decides.fall:
+        return chosen, astray
+    fit.freed = before
+    return likely
 
 
 def _strongest_first(fit: Fit, chosen: Selection, catalogue: Sequence[Effect]) -> Sequence[Effect]:
