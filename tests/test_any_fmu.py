@@ -530,12 +530,37 @@ def test_inputs_of_whole_numbers_act_in_whole_simulations(build):
 
 
 @pytest.mark.parametrize("saves", [True, False])
-def test_the_check_says_that_kalman_filters_need_a_saved_state_for_events(saves, build, capsys):
-    path = build("THERMOSTAT", saves=saves)
+@pytest.mark.parametrize("kind", ["THERMOSTAT", "DELAY", "arrays"])
+def test_the_check_says_of_each_use_what_commands_do(kind, saves, build, arrays, capsys):
+    """Events, a delay, states that are arrays; whatever has no Co-Simulation has no solver."""
+    if kind == "arrays":
+        path, u, y = arrays(), "u[2]", "y[2]"
+    else:
+        flags = ["-DDELAY=100.0"] * (kind == "DELAY")
+        what = "RELAYS" if flags else kind
+        path, u, y = build(what, saves=saves, flags=flags), "Ta", "T"
     assert main(["fmu", "check", str(path), "--instantiations", "3", "--json"]) == 1
     possible = json.loads(capsys.readouterr().out)["result"]["uses"]
-    assert possible["ekf and ukf on recordings"] == ([] if saves else ["smoothness"])
-    assert possible["other observers on recordings"] == ["smoothness"]
+    assert not possible["fit and diagnosis"]
+    assert possible["tools that use its own solver"] == ["Co-Simulation"]
+    assert bool(possible["tools that roll back"]) != (saves and kind != "arrays")
+    system = load_system(path.parent)
+    time = system.sample_time * np.arange(200.0)
+    measured = along("THERMOSTAT", time) if kind == "THERMOSTAT" else 291.0 + 0.0 * time
+    uses = {
+        "open_loop": "open loop",
+        "ekf": "ekf and ukf on recordings",
+        "mhe": "other observers on recordings",
+    }
+    with FMU(path) as fmu:
+        assert Simulation(fmu, [u], [y], [1.0]).run(Drive(time, np.zeros((200, 1))), {}).size
+        for name, use in uses.items():
+            try:
+                estimator(fmu, name).run(time, np.full((200, 1), 280.0), measured[:, None])
+                runs = True
+            except (FMUError, InputError):
+                runs = False
+            assert runs != bool(possible[use]), use
 
 
 def bouncing(folder: Path, library: Path) -> Path:

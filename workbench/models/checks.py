@@ -60,6 +60,7 @@ class CheckResult:
     unit: str = "1"
     reason: str = ""  # of a failure or of what was not checked, for whom has to act on it
     unknown: bool = False  # whether the check was begun and the FMU did not answer
+    avoided: bool = False  # whether the workbench does not use what failed
 
 
 def is_fit(findings: Iterable[CheckResult]) -> bool:
@@ -72,6 +73,8 @@ SAMPLE = 5000.0
 
 # The questions: findings without an answer. Bits are either the same or not, hence limits of 0.
 START = CheckResult("start", limit=1, unit="instances")
+# Filters correct states one by one.
+SCALARS = CheckResult("scalar states", limit=0, unit="elements of arrays")
 # The step of most observers takes the model for smooth: it would pass over a jump.
 EVENTS = CheckResult("smoothness", limit=0, unit="event indicators")
 RESET = CheckResult("reset and replay", limit=0.0)
@@ -93,14 +96,15 @@ TIME_DERIVATIVES = CheckResult("time of states and derivatives", limit=SAMPLE, u
 TIME_STEP = CheckResult("time of states and step", limit=SAMPLE, unit="us")
 
 # Every estimator sets states and steps by the Jacobian. Kalman filters go through events where they
-# can roll back. What makes many instances are tuning, fit and diagnosis, the last two of which
-# simulate through events.
-_OBSERVING = (START, EVENTS, RESET, INJECTION, DERIVATIVES)
-_KALMAN = "ekf and ukf on recordings"
+# can roll back, also where they are tuned and beside a rig. What makes many instances are tuning,
+# fit and diagnosis, the last two of which simulate through events.
+_OBSERVING = (START, SCALARS, EVENTS, RESET, INJECTION, DERIVATIVES)
+_OTHERS = "other observers on recordings"
+_ROLLING_BACK, _SOLVING = "tools that roll back", "tools that use its own solver"
 _USES = {
-    "open loop": (START, RESET),
-    _KALMAN: _OBSERVING,
-    "other observers on recordings": _OBSERVING,
+    "open loop": (START, RESET, INJECTION),
+    "ekf and ukf on recordings": _OBSERVING,
+    _OTHERS: _OBSERVING,
     "tuning": (*_OBSERVING, INSTANCES, LOADS, MEMORY),
     "fit and diagnosis": (START, RESET, INJECTION, DERIVATIVES, INSTANCES, LOADS, MEMORY),
     "observers beside a running rig": (
@@ -110,8 +114,8 @@ _USES = {
         TIME_DERIVATIVES,
         TIME_STEP,
     ),
-    "tools that roll back": (START, ROLLBACK, SERIALISATION, ROLLBACK_CS),
-    "tools that use its own solver": (START, INTERFACES),
+    _ROLLING_BACK: (START, ROLLBACK, SERIALISATION, ROLLBACK_CS),
+    _SOLVING: (START, INTERFACES),
 }
 
 
@@ -120,14 +124,20 @@ def uses(findings: Iterable[CheckResult]) -> dict[str, list[str]]:
 
     Exported observers are made of Modelica classes, not of FMUs.
     """
-    findings = list(findings)
-    failed = {finding.name for finding in findings if finding.passed is False}
-    possible = {
-        use: [question.name for question in questions if question.name in failed]
-        for use, questions in _USES.items()
-    }
-    if any(finding.name == ROLLBACK.name and finding.passed for finding in findings):
-        possible[_KALMAN] = [name for name in possible[_KALMAN] if name != EVENTS.name]
+    by_name = {finding.name: finding for finding in findings}
+    failed = {f.name for f in by_name.values() if f.passed is False and not f.avoided}
+    rolls_back = any(by_name[question.name].passed for question in (ROLLBACK, ROLLBACK_CS))
+    possible = {}
+    for use, questions in _USES.items():
+        wrong = [question.name for question in questions if question.name in failed]
+        if by_name[ROLLBACK.name].passed and use != _OTHERS:
+            wrong = [name for name in wrong if name != EVENTS.name]
+        # What it does not offer has not failed, and nobody can use it.
+        if use == _ROLLING_BACK and not rolls_back:
+            wrong = wrong or [ROLLBACK.name]
+        if use == _SOLVING and by_name[INTERFACES.name].reason.endswith(_ALONE):
+            wrong = wrong or [CO_SIMULATION]
+        possible[use] = wrong
     return possible
 
 
@@ -277,6 +287,7 @@ def _limit(limits: Limits) -> None:
 
 
 COMMUNICATION_STEPS = 100
+_ALONE = "the FMU has no Co-Simulation"
 
 
 @dataclass(frozen=True)
@@ -535,7 +546,7 @@ def check(
     findings: dict[str, CheckResult] = {}
     for attempted, questions, needs in _CHECKS:
         failed = next((n.name for n in needs if not findings[n.name].passed), None)
-        obstacle = f"needs '{failed}'" if failed else _obstacle(questions[0], description)
+        obstacle = _obstacle(questions[0], description) or (failed and f"needs '{failed}'")
         begin(questions[0].name)
         if obstacle:
             results = [replace(q, reason=f"not tried: {obstacle}") for q in questions]
@@ -573,7 +584,7 @@ def _obstacle(question: CheckResult, description: Description) -> str:
     if question in several and exchange.one_instance_per_process:
         return "the FMU allows one instance per process; give each worker process one"
     if question in (ROLLBACK_CS, INTERFACES) and simulation is None:
-        return "the FMU has no Co-Simulation"
+        return _ALONE
     if question is INTERFACES and not description.states:
         return "the FMU has no continuous states, so nothing is integrated"
     if question is INTERFACES and description.event_indicators:
@@ -591,19 +602,20 @@ def _obstacle(question: CheckResult, description: Description) -> str:
 def _start(path: Path, instantiations: int) -> Iterator[CheckResult]:
     with FMU(path) as fmu:
         fmu.start({})
-        scalar = set(fmu.states) <= set(real_variables(fmu).names)
-        rates = fmu.derivatives() if scalar else np.zeros(0)
-    if not scalar:
-        reason = "states are arrays; export the model with scalar variables"
-    elif not np.isfinite(rates).all():
+        arrays = sum(not fmu.is_real(name) for name in fmu.states)
+        rates = fmu.derivatives()
+    if not np.isfinite(rates).all():
         name = fmu.states[int(np.argmin(np.isfinite(rates)))]
         reason = f"the derivative of '{name}' is not finite with the FMU's start values"
     else:
         reason = ""
     yield replace(START, passed=not reason, value=1, reason=reason)
+    reason = "only open loop, fit and diagnosis go on; export the model with scalar variables"
+    yield replace(SCALARS, passed=not arrays, value=arrays, reason=reason if arrays else "")
     count, timed = fmu.description.event_indicators, float(fmu.next_event[0])
-    smooth = not count and timed == np.inf
+    smooth = not fmu.has_events
     reason = "" if timed == np.inf else f"a time event at {timed:g} s; "
+    reason += "rates or outputs follow from earlier steps, too; " * fmu.remembers_steps
     reason += "only open loop, fit, diagnose go through events, and filters ekf and ukf if the FMU "
     reason += "saves its state; replace jumps by smooth functions"
     yield replace(EVENTS, passed=smooth, value=count, reason="" if smooth else reason)
@@ -639,10 +651,11 @@ def _inject(path: Path, instantiations: int) -> Iterator[CheckResult]:
         wanted = fmu.get_states() + 0.01 * excitation.nominal
         fmu.set_states(wanted)
         by_vector = np.abs(fmu.get_states() - wanted)
-        by_reference = np.abs(fmu.get(fmu.variables(fmu.states)) - wanted)
+        by_reference = np.abs(fmu.get_typed(fmu.typed(fmu.states)) - wanted)
         ignored = np.array_equal(np.concatenate([fmu.derivatives(), fmu.get(shown)]), before)
+        ignored = ignored and not fmu.remembers_steps  # they may follow later
         # A model may only integrate its inputs; then its own Jacobian or structure says so.
-        if ignored and fmu.has_directional_derivatives:
+        if ignored and fmu.has_directional_derivatives and all(map(fmu.is_real, fmu.states)):
             ignored = bool(fmu.state_jacobian().any())
         elif ignored:
             known = [fmu.description.dependencies.get(rate) for rate in fmu.description.rates]
@@ -713,6 +726,7 @@ def _serialise(path: Path, instantiations: int) -> Iterator[CheckResult]:
 def _differentiate(path: Path, instantiations: int) -> Iterator[CheckResult]:
     with FMU(path) as fmu:
         excitation = excite(fmu)
+        avoided = not fmu.has_directional_derivatives
         fmu.has_directional_derivatives = True  # even if they were found wrong
         outputs = continuous_variables(fmu, fmu.outputs)
         stated = fmu.linearise(excitation.inputs, outputs)
@@ -753,8 +767,11 @@ def _differentiate(path: Path, instantiations: int) -> Iterator[CheckResult]:
     reason = (
         f"d {unknowns[i]} / d {known} is {jacobian[i, j]:.6g} by the FMU, {differences[i, j]:.6g} "
         "by differences; switch directional derivatives off in the export"
+        + ". The workbench does not use them"
+        * avoided
     )
-    yield replace(DERIVATIVES, passed=passed, value=error[i, j], reason="" if passed else reason)
+    finding = replace(DERIVATIVES, passed=passed, value=error[i, j], avoided=avoided)
+    yield replace(finding, reason="" if passed else reason)
 
 
 def _compare_interfaces(path: Path, instantiations: int) -> Iterator[CheckResult]:
@@ -816,14 +833,14 @@ def _integrate(fmu: FMU, excitation: Excitation, start: Vector, end: float) -> M
 _Attempt = Callable[[Path, int], Iterator[int | CheckResult]]
 # What is run, the questions it answers, and those whose answers it rests on.
 _CHECKS: tuple[tuple[_Attempt, tuple[CheckResult, ...], tuple[CheckResult, ...]], ...] = (
-    (_start, (START, EVENTS), ()),
+    (_start, (START, SCALARS, EVENTS), ()),
     (_reset, (RESET,), (START,)),
     (_inject, (INJECTION,), (START,)),
     (_roll_back, (ROLLBACK,), (START,)),
     (_serialise, (SERIALISATION,), (START, ROLLBACK)),
     (_roll_back_co_simulation, (ROLLBACK_CS,), (START,)),
-    (_differentiate, (DERIVATIVES,), (START, INJECTION)),
-    (_compare_interfaces, (INTERFACES,), (START, INJECTION)),
+    (_differentiate, (DERIVATIVES,), (START, SCALARS, INJECTION)),
+    (_compare_interfaces, (INTERFACES,), (START, SCALARS, INJECTION)),
     (endure, (INSTANCES, LOADS, MEMORY), (START,)),
-    (time_calls, (TIME_GET, TIME_SET, TIME_DERIVATIVES, TIME_STEP), (START,)),
+    (time_calls, (TIME_GET, TIME_SET, TIME_DERIVATIVES, TIME_STEP), (START, SCALARS)),
 )
