@@ -409,7 +409,7 @@ class StateNoise:
         otherwise="2e-4 of its nominal value",
     )
     spread: float | None = key(
-        "standard deviation at the start, where no output shows it",
+        "standard deviation at the start, where no output shows it: in a library, none of its name",
         unit=lambda scope, _: unit_in_model(scope, scope.own["name"]),
         absent=None,
         otherwise="its nominal value, without one its start value, 1 at least; or that of any "
