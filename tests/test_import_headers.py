@@ -95,6 +95,24 @@ def test_columns_of_fixed_places_may_be_empty(tmp_path):
     assert np.isnan(group.channels[1].values).sum() == 40
 
 
+@pytest.mark.parametrize(("every", "lost"), [(2, 1), (58, 2)])
+def test_rows_may_end_before_empty_cells_where_that_is_a_habit(tmp_path, every, lost):
+    """Rows without a level, and a last one that is cut; one of 60 alone is an accident."""
+    rows = [f"{k}.0,4.{k % 9}" + (f",{900 + k}.5" if (k + 1) % every else "") for k in range(60)]
+    recorded = read_recorded_file(
+        table(tmp_path / "a.csv", ["time [s],inflow [l/s],h [mm]", *rows[:-1], "59.0,4"])
+    )
+    (group,) = recorded.groups
+    assert [c.name for c in group.channels] == ["time", "inflow", "h"]
+    short = [k for k in range(59) if not (k + 1) % every]
+    habit = len(short) > 1
+    times = np.array([k for k in range(59) if habit or k not in short])
+    assert_allclose(group.channels[0].values, times)
+    gaps = np.isnan(group.channels[2].values)
+    assert_allclose(times[gaps], short if habit else [])
+    assert recorded.notes[0].startswith(f"{lost} lines that are no samples were left out")
+
+
 def test_channels_may_be_rows(tmp_path):
     signals = {"time [s]": range(60), "inflow [l/s]": range(60, 120), "h [mm]": range(900, 960)}
     lines = [";".join([name, *map(str, values)]) for name, values in signals.items()]

@@ -514,9 +514,14 @@ def _going_on(clock: Clock, where: str) -> Clock:
         fault += ": times begin anew"
         remedy = f"part the file before sample {late + 2}, where another recording begins"
     elif held.size > 1 and count >= 0.3 * held.size and not (np.diff(held) < 0).any():
-        rate = (held.size - 1) / (held[-1] - held[0]) if held[-1] > held[0] else math.nan
         fault += ": stamps are coarser than samples"
-        remedy = f"say the rate, about --sample-rate '{rate:.4g} Hz', or export more digits"
+        # From the first sample of one stamp to that of another: both ends may be cut.
+        first = np.flatnonzero(np.diff(held) > 0) + 1
+        about = ""
+        if first.size > 1:
+            rate = (first[-1] - first[0]) / (held[first[-1]] - held[first[0]])
+            about = f", about --sample-rate '{rate:.4g} Hz'"
+        remedy = f"say the rate{about}, or export more digits"
     raise InputError(
         where=f"{where}, '{clock.channel}'" if clock.channel else where,
         found=fault,

@@ -900,9 +900,10 @@ def stated_begin(head: Sequence[str]) -> float:
 def _clock_beside(head: Sequence[str]) -> float:
     """A time of day that a line of a preamble states by itself [s]; 0 without one."""
     for line in head:
-        if re.match(r"\W*(start ?|begin ?)?(time|zeit|uhrzeit)\b", line, re.IGNORECASE):
-            for match in _WORD.finditer(line):
-                stamp = read_stamps("", [match[0].strip()]) if is_stamp(match[0].strip()) else None
+        if label := re.match(r"\W*(start ?|begin ?)?(time|zeit|uhrzeit)\b", line, re.IGNORECASE):
+            words = (line[label.end() :], *(match[0] for match in _WORD.finditer(line)))
+            for text in (word.strip(" -.:=\t") for word in words):
+                stamp = read_stamps("", [text]) if is_stamp(text) else None
                 if stamp is not None and math.isfinite(stamp.shown):
                     return stamp.shown
     return 0.0

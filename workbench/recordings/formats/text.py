@@ -21,6 +21,7 @@ _COMMENT = re.compile(r"(?!\"#\")\s*\"?(#+|%+|//+|!+|\*+)\s*")
 _BEFORE_UNIT = re.compile(r"(?<=[^\s\])])\s+(?=[\[(])")  # between a name and its unit
 _SAMPLED = 200  # lines from the middle of a file, which tell how it is laid out
 _FOLDED = 5  # lines over which a name in quotation marks may go
+_HABIT = 0.05  # of rows; fewer that end early are no habit of a writer
 _UNEVEN = 0.9  # of lines with as many cells as most have; fewer, and columns are at fixed places
 
 
@@ -37,6 +38,7 @@ def read(path: Path, raw: bytes) -> Contents:
     lines = text.rstrip("\n").split("\n")
     separator = _separator(path, lines)
     rows, numbers, broken = _rows(lines, separator)
+    rows, padded = (rows, 0) if separator == " " else _filled(rows)
     table = find_table(rows, numbers, str(path))
     if lines[0].startswith("LabVIEW Measurement"):
         table = _of_labview(table)
@@ -68,6 +70,8 @@ def read(path: Path, raw: bytes) -> Contents:
         first = next((number for number in below if number not in kept), 0)
         at = f", the first in line {first}" if first else ""
         notes.append(f"{broken} lines that are no samples were left out{at}")
+    if padded:
+        notes.append(f"{padded} lines end before the last column: the cells they lack are empty")
     words.append(f"samples from line {table.lines[0]}")
     return Contents(", ".join(words), groups, notes, (cut,) if cut else ())
 
@@ -170,6 +174,31 @@ def _rows(lines: Sequence[str], separator: str) -> tuple[list[list[str]], list[i
         rows.append(cells)
         numbers.append(number)
     return rows, numbers, broken
+
+
+def _filled(rows: list[list[str]]) -> tuple[list[list[str]], int]:
+    """Rows with the empty cells that some writers leave out at their ends, and how many had none.
+
+    Where the longest rows of numbers have as many cells as the names above them. A few short rows
+    are accidents, and may end within a number; so may the last one.
+    """
+    numeric = [i for i, row in enumerate(rows) if len(row) > 1 and _are_numbers(row)]
+    width = max((len(rows[i]) for i in numeric), default=0)
+    short = [i for i in numeric if len(rows[i]) < width and i < len(rows) - 1]
+    habit = len(short) >= _HABIT * len(numeric)
+    names = rows[numeric[0] - 1] if short and habit and numeric[0] else []
+    if len(names) != width or not all(map(str.strip, names)) or any(map(is_number, names)):
+        return rows, 0
+    filled = list(rows)
+    for i in short:
+        filled[i] = rows[i] + [""] * (width - len(rows[i]))
+    return filled, len(short)
+
+
+def _are_numbers(row: Sequence[str]) -> bool:
+    """Whether a row begins with a number or a time, as most of its cells are."""
+    kinds = [is_number(cell) or is_stamp(cell.strip()) for cell in row]
+    return kinds[0] and 2 * sum(kinds) >= len(kinds)
 
 
 def _split_quoted(line: str, below: Sequence[str], separator: str) -> tuple[list[str], int]:
