@@ -2,6 +2,7 @@
 
 import argparse
 import os
+from collections.abc import Callable
 from pathlib import Path
 from typing import TypeAlias
 
@@ -49,6 +50,25 @@ def share(text: str) -> float:
     return value
 
 
+def add_number(
+    parser: argparse.ArgumentParser,
+    usage: str,
+    number: Callable[[str], float],
+    default: float,
+    text: str,
+) -> None:
+    """Add an option with a number, such as `--budget GENERATIONS`, whose help says its default."""
+    option, metavar = usage.split()
+    text = text if "(default" in text else f"{text} (default: %(default)s)"
+    parser.add_argument(option, type=number, default=default, metavar=metavar, help=text)
+
+
+def add_repeated(parser: argparse.ArgumentParser, usage: str, text: str) -> None:
+    """Add an option that may be given several times, such as `--case NAME`."""
+    option, _, metavar = usage.partition(" ")
+    parser.add_argument(option, action="append", default=[], metavar=metavar, help=text)
+
+
 def add_isolated(parser: argparse.ArgumentParser) -> None:
     """Add the option --isolated, which `main` reads before the command is run."""
     parser.add_argument(
@@ -71,13 +91,8 @@ def add_system(parser: argparse.ArgumentParser) -> None:
 
 def add_workers(parser: argparse.ArgumentParser) -> None:
     """Add how many processes work."""
-    parser.add_argument(
-        "--workers",
-        type=positive,
-        default=os.cpu_count() or 1,
-        metavar="N",
-        help="processes (default: one per processor, %(default)s)",
-    )
+    text = "processes (default: one per processor, %(default)s)"
+    add_number(parser, "--workers N", positive, os.cpu_count() or 1, text)
 
 
 def add_run(parser: argparse.ArgumentParser) -> None:
@@ -144,9 +159,7 @@ def add_pdf(parser: argparse.ArgumentParser) -> None:
 
 def add_seed(parser: argparse.ArgumentParser, of: str) -> None:
     """Add the seed, the same of which gives the same numbers."""
-    parser.add_argument(
-        "--seed", type=count, default=1, metavar="N", help=f"of {of} (default: %(default)s)"
-    )
+    add_number(parser, "--seed N", count, 1, f"of {of}")
 
 
 def add_effects(parser: argparse.ArgumentParser, purpose: str) -> None:
@@ -178,21 +191,17 @@ def add_reference(parser: argparse.ArgumentParser, purpose: str) -> None:
 
 def add_recording_options(parser: argparse.ArgumentParser) -> None:
     """Add options of recordings without a case.toml, which `recording_options` reads."""
-    parser.add_argument(
-        "--condition",
-        action="append",
-        default=[],
-        metavar="NAME=VALUE",
-        help="test condition of log files, as in case.toml, such as load='2 kN' or "
+    add_repeated(
+        parser,
+        "--condition NAME=VALUE",
+        "test condition of log files, as in case.toml, such as load='2 kN' or "
         "surface=new,worn; "
         "'unknown' if nobody knows; may be repeated",
     )
-    parser.add_argument(
-        "--column",
-        action="append",
-        default=[],
-        metavar="SIGNAL=CHANNEL",
-        help="channel of a signal, or of time, in log files. Add its unit if the file has none or "
+    add_repeated(
+        parser,
+        "--column SIGNAL=CHANNEL",
+        "channel of a signal, or of time, in log files. Add its unit if the file has none or "
         "a wrong one, such as 'time=Zeit [ms]'; may be repeated",
     )
     parser.add_argument(
@@ -218,11 +227,9 @@ def add_models(parser: argparse.ArgumentParser) -> None:
 
 def add_map(parser: argparse.ArgumentParser) -> None:
     """Add the option --map, which `model_names` reads."""
-    parser.add_argument(
-        "--map",
-        action="append",
-        default=[],
-        metavar="OURS=THEIRS",
-        help="the FMU's own name of a variable, such as p=pressure; may be repeated "
+    add_repeated(
+        parser,
+        "--map OURS=THEIRS",
+        "the FMU's own name of a variable, such as p=pressure; may be repeated "
         "(also in case.toml, [model.names])",
     )

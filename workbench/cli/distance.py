@@ -34,25 +34,21 @@ def add(commands: arguments.Commands, text: str) -> argparse.ArgumentParser:
     )
     arguments.add_recordings(parser, out="results/distance")
     arguments.add_system(parser)
-    parser.add_argument(
-        "--ask",
-        action="append",
-        default=[],
-        metavar="NAME=VALUE",
-        help="what the stop is asked for, or a condition, by the names of the system file; the "
+    arguments.add_repeated(
+        parser,
+        "--ask NAME=VALUE",
+        "what the stop is asked for, or a condition, by the names of the system file; the "
         "rest is usual; may be repeated",
     )
-    numbers = {
-        ("--safety", "K", arguments.count, 9): "safety level down to one stop in 10^K; 0: none "
-        "(default: %(default)s)",
-        ("--samples", "N", arguments.positive, 4000): "stops of the distribution (default: "
-        "%(default)s)",
-        ("--plain", "N", arguments.count, 0): "check the safety level by this many independent "
-        "random stops. 1e5 take minutes, 1e7 hours; Ctrl-C keeps the finished ones (default: "
-        "%(default)s)",
-    }
-    for (option, metavar, number, default), text in numbers.items():
-        parser.add_argument(option, type=number, default=default, metavar=metavar, help=text)
+    level = "safety level down to one stop in 10^K; 0: none"
+    arguments.add_number(parser, "--safety K", arguments.count, 9, level)
+    drawn = "stops of the distribution"
+    arguments.add_number(parser, "--samples N", arguments.positive, 4000, drawn)
+    plain = (
+        "check the safety level by this many independent random stops. 1e5 take minutes, 1e7 "
+        "hours; Ctrl-C keeps the finished ones"
+    )
+    arguments.add_number(parser, "--plain N", arguments.count, 0, plain)
     arguments.add_model(parser)
     arguments.add_seed(parser, "all that is drawn")
     arguments.add_run(parser)

@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING
 from workbench.cli.arguments import (
     Commands,
     add_model,
+    add_number,
     add_recordings,
+    add_repeated,
     add_run,
     add_seed,
     add_system,
@@ -49,17 +51,17 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
     add_system(parser)
     add_model(parser)
     repeated = {
-        ("--parameter", "NAME"): "parameter to fit, or state whose start is, or a pattern such as "
+        "--parameter NAME": "parameter to fit, or state whose start is, or a pattern such as "
         "'motor.*'; may be repeated (default: [fit] of the system file)",
-        ("--range", "NAME=LOW to HIGH"): "bounds of a parameter, such as 'R=0.1 Ohm to 5 Ohm'; may "
+        "--range NAME=LOW to HIGH": "bounds of a parameter, such as 'R=0.1 Ohm to 5 Ohm'; may "
         "be repeated (default: [fit], else min and max of the model)",
-        ("--prior", "NAME=VALUE +- SPREAD"): "what is known of a parameter, such as 'R=2 Ohm +- "
+        "--prior NAME=VALUE +- SPREAD": "what is known of a parameter, such as 'R=2 Ohm +- "
         "0.1 Ohm'; may be repeated",
-        ("--by-recording", "NAME"): "a parameter of which each recording has a value of its own; "
+        "--by-recording NAME": "a parameter of which each recording has a value of its own; "
         "may be repeated",
     }
-    for (option, metavar), text in repeated.items():
-        parser.add_argument(option, action="append", default=[], metavar=metavar, help=text)
+    for usage, text in repeated.items():
+        add_repeated(parser, usage, text)
     parser.add_argument(
         "--held-out",
         nargs="+",
@@ -73,20 +75,10 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         default="linear",
         help="sum of squares, or soft_l1, which outliers move little (default: %(default)s)",
     )
-    parser.add_argument(
-        "--starts",
-        type=positive,
-        default=3,
-        metavar="N",
-        help="local fits, the first from the model's own values (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--generations",
-        type=count,
-        default=20,
-        metavar="N",
-        help="of differential evolution, where starts disagree (default: %(default)s; 0: none)",
-    )
+    starts = "local fits, the first from the model's own values"
+    add_number(parser, "--starts N", positive, 3, starts)
+    evolved = "of differential evolution, where starts disagree (default: %(default)s; 0: none)"
+    add_number(parser, "--generations N", count, 20, evolved)
     parser.add_argument(
         "--intervals",
         choices=("auto", "profile", "covariance"),

@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from workbench.cli.arguments import Commands, above_zero, add_isolated, nearby, positive
+from workbench.cli.arguments import Commands, above_zero, add_isolated, add_number, nearby, positive
 from workbench.cli.extras import require_compiler
 from workbench.cli.output import CommandResult, Output, warn
 from workbench.errors import InputError
@@ -94,13 +94,8 @@ def _add_check(jobs: Commands) -> None:
         epilog="example:\n  workbench fmu check my_model.fmu --json > fitness.json",
     )
     checking.add_argument("fmu", type=Path, metavar="FILE", help="the FMU")
-    checking.add_argument(
-        "--instantiations",
-        type=positive,
-        default=2000,
-        metavar="N",
-        help="instances to make, one after the other (default: %(default)s)",
-    )
+    instances = "instances to make, one after the other"
+    add_number(checking, "--instantiations N", positive, 2000, instances)
     checking.add_argument(
         "--limit",
         type=above_zero,

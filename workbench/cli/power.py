@@ -73,13 +73,7 @@ def _add_sets(parser: argparse.ArgumentParser) -> None:
         ("--pairs", 30, "sets with two of the effects, at the largest size"),
         ("--sets", 8, "sets of --thresholds, of all kinds alike"),
     ):
-        parser.add_argument(
-            option,
-            type=arguments.count,
-            default=default,
-            metavar="N",
-            help=f"{text} (default: %(default)s)",
-        )
+        arguments.add_number(parser, f"{option} N", arguments.count, default, text)
     sizes = parser.add_mutually_exclusive_group()
     sizes.add_argument(
         "--sizes",
@@ -107,12 +101,10 @@ def _add_sets(parser: argparse.ArgumentParser) -> None:
         help="recorded sets, each with a truth.json of its faults, in place of sets of the "
         "simulated rig",
     )
-    parser.add_argument(
-        "--case",
-        action="append",
-        default=[],
-        metavar="NAME",
-        help="recording of a set, may be repeated (default: the usual ones of the system). "
+    arguments.add_repeated(
+        parser,
+        "--case NAME",
+        "recording of a set, may be repeated (default: the usual ones of the system). "
         "Without a plugin: a folder of recordings, whose inputs drive the system's own model",
     )
     parser.add_argument(

@@ -64,12 +64,10 @@ def add(commands: arguments.Commands, text: str) -> argparse.ArgumentParser:
         help="use model-based gains, from the linearised models, for comparison with tuned ones "
         "with",
     )
-    parser.add_argument(
-        "--estimator",
-        action="append",
-        default=[],
-        metavar="NAME",
-        help="run this one, may be repeated (default: the standard ones of the system)",
+    arguments.add_repeated(
+        parser,
+        "--estimator NAME",
+        "run this one, may be repeated (default: the standard ones of the system)",
     )
     arguments.add_workers(parser)
     parser.add_argument(

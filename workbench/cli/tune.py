@@ -68,14 +68,9 @@ def add(commands: arguments.Commands, text: str) -> argparse.ArgumentParser:
 
 
 def _add_search(parser: argparse.ArgumentParser) -> None:
-    numbers = {
-        ("--budget", "GENERATIONS", 100): "most generations to search (default: %(default)s)",
-        ("--population", "N", 15): "candidates per gain (default: %(default)s)",
-    }
-    for (option, metavar, default), text in numbers.items():
-        parser.add_argument(
-            option, type=arguments.positive, default=default, metavar=metavar, help=text
-        )
+    budget = "most generations to search"
+    arguments.add_number(parser, "--budget GENERATIONS", arguments.positive, 100, budget)
+    arguments.add_number(parser, "--population N", arguments.positive, 15, "candidates per gain")
     arguments.add_seed(parser, "the search")
     parser.add_argument(
         "--scale-error",
@@ -112,13 +107,8 @@ def _add_work(parser: argparse.ArgumentParser) -> None:
         metavar="ADDRESS",
         help="scheduler of a Dask cluster to work on instead; needs the extra [cluster]",
     )
-    parser.add_argument(
-        "--timeout",
-        type=arguments.positive,
-        default=60,
-        metavar="SECONDS",
-        help="a candidate that takes longer ends its worker (default: %(default)s)",
-    )
+    limit = "a candidate that takes longer ends its worker"
+    arguments.add_number(parser, "--timeout SECONDS", arguments.positive, 60, limit)
     parser.add_argument("--resume", action="store_true", help="go on from the last checkpoint")
     parser.add_argument(
         "--live", action="store_true", help="draw convergence.png anew every 5 s while searching"

@@ -15,8 +15,10 @@ from typing import TYPE_CHECKING, Any
 
 from workbench.cli.arguments import (
     Commands,
+    add_number,
     add_out,
     add_reference,
+    add_repeated,
     add_seed,
     add_system,
     add_workers,
@@ -54,12 +56,8 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
     )
     add_out(rig, "results/rig")
     rig.add_argument("--list", action="store_true", help="list scenarios and effects, and end")
-    rig.add_argument(
-        "--case",
-        action="append",
-        default=[],
-        metavar="NAME",
-        help="scenario, may be repeated (default: the fourteen standard ones)",
+    add_repeated(
+        rig, "--case NAME", "scenario, may be repeated (default: the fourteen standard ones)"
     )
     rig.add_argument(
         "--next",
@@ -68,12 +66,8 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         help="make the best experiment of a result of 'workbench next' in place of scenarios",
     )
     add_seed(rig, "tolerances and noise")
-    rig.add_argument(
-        "--effect",
-        action="append",
-        default=[],
-        metavar="NAME=VALUE",
-        help="inject an effect, or change one of the pads; may be repeated",
+    add_repeated(
+        rig, "--effect NAME=VALUE", "inject an effect, or change one of the pads; may be repeated"
     )
     rig.add_argument(
         "--pads",
@@ -82,13 +76,8 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         help="friction of dry pads: with speed, temperature and force, or constant as in the "
         "nominal model (default: %(default)s)",
     )
-    numbers = {
-        ("--rate", "HZ", 200): "of the recording, a divisor of 1000 (default: %(default)s)",
-        ("--truth-every", "N", 1): "write the truth of every Nth sample only (default: "
-        "%(default)s)",
-    }
-    for (option, metavar, default), meaning in numbers.items():
-        rig.add_argument(option, type=positive, default=default, metavar=metavar, help=meaning)
+    add_number(rig, "--rate HZ", positive, 200, "of the recording, a divisor of 1000")
+    add_number(rig, "--truth-every N", positive, 1, "write the truth of every Nth sample only")
     add_reference(rig, "that makes the recordings")
     add_system(rig)
     add_workers(rig)
