@@ -17,7 +17,10 @@ from scipy.integrate import solve_ivp
 
 from workbench.arrays import Vector
 from workbench.diagnosis.data.motion import ModelSource
+from workbench.diagnosis.effects.catalogue import Effect
 from workbench.diagnosis.inference.fit import Fit
+from workbench.diagnosis.inference.score_test import ScoreTest
+from workbench.diagnosis.inference.search import examine, fitted
 from workbench.diagnosis.inference.thresholds import Thresholds
 from workbench.diagnosis.simulation.residual_model import ResidualModel
 from workbench.errors import InputError
@@ -249,3 +252,29 @@ def test_a_law_that_stands_for_two_gives_way_to_them(tmp_path):
     assert sizes["Radiation"]["s"].low <= S <= sizes["Radiation"]["s"].high
     # Block means of noise keep their size; of some sixty a recording, four sigma are a third.
     assert diagnosis.gain.after == pytest.approx(1.0, abs=0.33)
+
+
+def test_what_may_be_there_moves_what_was_found_as_far_as_a_fit_beside_it(tmp_path):
+    """A draught is found; radiation, too little to be a cause, would take some of its size."""
+    effects, path = library_effects(of := heated_block(tmp_path / "block")), tmp_path / "all.fmu"
+    build_everything(of, effects, path)
+    draught, radiation = effects
+    moved, away = {}, {}
+    for s in (0.0, S):
+        rng = np.random.default_rng(1)
+        powers = rng.uniform(0.0, 90.0, 20)
+        frames = [heated(powers, lambda T, s=s: DRAUGHT * T + s * T * abs(T), 5.0, rng)]
+        with ResidualModel(ModelSource(path, of, of.given), cases(of, frames)) as simulations:
+            fit = Fit(simulations, effects)
+
+            def size(*active: Effect, fit: Fit = fit) -> tuple[float, ScoreTest]:
+                zero = {(effect.name, effect.size): 0.0 for effect in active}
+                start = fit.at(replace(fit.unknowns.start(), sizes=zero))
+                best, trial = examine(fit, fitted(fit, start, active), effects, lambda _: None)
+                return best.point.sizes[draught.name, draught.size], trial
+
+            (alone, trial), (beside, _) = size(draught), size(draught, radiation)
+            moved[s] = trial.moved()[trial.joint.known.index((draught.name, draught.size))]
+            away[s] = abs(beside - alone)
+    assert moved[0.0] == 0.0
+    assert moved[S] == pytest.approx(away[S], rel=0.1)

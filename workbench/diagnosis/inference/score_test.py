@@ -169,6 +169,28 @@ class ScoreTest:
         known: Matrix = covariance(add([*stops, prior]).N)[:count, :count]
         return known
 
+    def moved(self) -> Vector:
+        """(p,) How far known unknowns move beside a candidate that is no cause, at most.
+
+        Of those that matter and are significant. What forms of laws may fake is no cause, but may
+        be there; then what was found stands for a part of it.
+        """
+        count, furthest = len(self._known), np.zeros(len(self._known))
+        stops, prior = self._select({})
+        alone = minimum(add([*stops, prior]))[:count]
+        for effect, shape in self._candidates:
+            if effect.order_locked:
+                continue
+            at = self.joint.shared.index((variant(effect, shape), effect.size))
+            stops, prior = self._select({at: np.ones(len(self._stops))}, effect.name)
+            total = add([*stops, prior])
+            best, sigma = minimum(total), float(np.sqrt(covariance(total.N)[-1, -1]))
+            low, high = self._fit.unknowns.bounds(effect, effect.size)
+            least = max(effect.matters, self._fit.decides.significant * sigma)
+            if low <= best[-1] <= high and abs(best[-1]) > least:
+                furthest = np.maximum(furthest, np.abs(best[:count] - alone))
+        return furthest
+
     def scores(self) -> list[CandidateScore]:
         """All candidates, best first."""
         scores = [self._score(effect, shape) for effect, shape in self._candidates]

@@ -641,7 +641,7 @@ def _apart_by_starts(fit: Fit, effect: Effect) -> list[str]:
 def _cause(fit: Fit, chosen: Selection, effect: Effect, *, noise_alone: bool) -> Cause:
     """A cause with intervals, which what is left widens, or the form that noise may hide."""
     best, trial, unknowns = chosen.best, chosen.trial, fit.unknowns
-    sigma = np.sqrt(np.diag(trial.covariance()))
+    sigma = np.hypot(np.sqrt(np.diag(trial.covariance())), trial.moved())
     fast, form_share = effect.order_locked, _FORM
     if noise_alone:
         more = hidden_by_noise(fit, best, effect)
