@@ -2,7 +2,7 @@
 
 import argparse
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TypeAlias
 
@@ -69,14 +69,19 @@ def add_repeated(parser: argparse.ArgumentParser, usage: str, text: str) -> None
     parser.add_argument(option, action="append", default=[], metavar=metavar, help=text)
 
 
+def add_flags(parser: "argparse._ActionsContainer", flags: Mapping[str, str]) -> None:
+    """Add options that are given or not, each with its help."""
+    for option, text in flags.items():
+        parser.add_argument(option, action="store_true", help=text)
+
+
 def add_isolated(parser: argparse.ArgumentParser) -> None:
     """Add the option --isolated, which `main` reads before the command is run."""
-    parser.add_argument(
-        "--isolated",
-        action="store_true",
-        help="sandbox for untrusted FMUs, on Linux: no network, and no writing except to results "
-        "and temporary files. A line says what this system supports",
+    text = (
+        "sandbox for untrusted FMUs, on Linux: no network, and no writing except to results "
+        "and temporary files. A line says what this system supports"
     )
+    add_flags(parser, {"--isolated": text})
 
 
 def add_system(parser: argparse.ArgumentParser) -> None:
@@ -150,11 +155,8 @@ def add_out(parser: argparse.ArgumentParser, folder: str) -> None:
 
 def add_pdf(parser: argparse.ArgumentParser) -> None:
     """Add whether the page is printed."""
-    parser.add_argument(
-        "--pdf",
-        action="store_true",
-        help="also print the page, as a report to sign (report.pdf); needs Chromium",
-    )
+    text = "also print the page, as a report to sign (report.pdf); needs Chromium"
+    add_flags(parser, {"--pdf": text})
 
 
 def add_seed(parser: argparse.ArgumentParser, of: str) -> None:

@@ -52,9 +52,7 @@ def add(commands: arguments.Commands, text: str) -> argparse.ArgumentParser:
     )
     arguments.add_model(parser)
     arguments.add_effects(parser, "consider")
-    parser.add_argument(
-        "--list", action="store_true", help="list the effects of the library, and end"
-    )
+    arguments.add_flags(parser, {"--list": "list the effects of the library, and end"})
     arguments.add_platforms(parser, "the extended FMU", "native")
     flags = {
         "--certainty": "also fit profile intervals of the sizes, correlations of their errors, and "
@@ -63,8 +61,7 @@ def add(commands: arguments.Commands, text: str) -> argparse.ArgumentParser:
         "--propose": "if something is missing that no effect explains, infer a law for it: where "
         "it acts, on what it depends, its form (into OUT/proposed)",
     }
-    for option, text in flags.items():
-        parser.add_argument(option, action="store_true", help=text)
+    arguments.add_flags(parser, flags)
     arguments.add_run(parser)
     return parser
 

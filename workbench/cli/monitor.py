@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from workbench.cli.arguments import Commands, add_out, add_run, add_system, share
+from workbench.cli.arguments import Commands, add_flags, add_out, add_run, add_system, share
 from workbench.cli.extras import require_compiler
 from workbench.cli.output import CommandResult, Output, read_result
 from workbench.errors import InputError
@@ -58,8 +58,7 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         "--fleet": "watch many machines, one task for each. HISTORY may be a URL that fsspec "
         "reads, such as s3://bucket/fleet (extra [cluster])",
     }
-    for option, text in flags.items():
-        parser.add_argument(option, action="store_true", help=text)
+    add_flags(parser, flags)
     parser.add_argument(
         "--cluster",
         metavar="ADDRESS",

@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from workbench.cli.arguments import Commands, add_recording_options, nearby
+from workbench.cli.arguments import Commands, add_flags, add_recording_options, nearby
 from workbench.cli.output import CommandResult, Output
 from workbench.errors import InputError
 
@@ -42,9 +42,7 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
         "--recordings", nargs="+", type=Path, default=[], metavar="FILE", help="log file"
     )
     add_recording_options(parser)
-    parser.add_argument(
-        "--yes", action="store_true", help="take what is proposed without a question"
-    )
+    add_flags(parser, {"--yes": "take what is proposed without a question"})
     return parser
 
 

@@ -58,31 +58,22 @@ def add(commands: arguments.Commands, text: str) -> argparse.ArgumentParser:
         help="gains.toml of 'workbench tune', for the estimator that it names (default: gains "
         "tuned for the system's models, else model-based gains)",
     )
-    parser.add_argument(
-        "--untuned",
-        action="store_true",
-        help="use model-based gains, from the linearised models, for comparison with tuned ones "
-        "with",
+    untuned = (
+        "use model-based gains, from the linearised models, for comparison with tuned ones with"
     )
+    arguments.add_flags(parser, {"--untuned": untuned})
     arguments.add_repeated(
         parser,
         "--estimator NAME",
         "run this one, may be repeated (default: the standard ones of the system)",
     )
     arguments.add_workers(parser)
-    parser.add_argument(
-        "--live",
-        action="store_true",
-        help="show each run in a window as it goes, one after the other",
-    )
-    parser.add_argument(
-        "--csv",
-        action="store_true",
-        help="write data as NAME.csv, too, however large (otherwise up to about 20 MB in all)",
-    )
-    parser.add_argument(
-        "--figures", action="store_true", help="write figures of the page as NAME.png and NAME.svg"
-    )
+    flags = {
+        "--live": "show each run in a window as it goes, one after the other",
+        "--csv": "write data as NAME.csv, too, however large (otherwise up to about 20 MB in all)",
+        "--figures": "write figures of the page as NAME.png and NAME.svg",
+    }
+    arguments.add_flags(parser, flags)
     arguments.add_pdf(parser)
     arguments.add_isolated(parser)
     return parser

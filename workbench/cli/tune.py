@@ -93,11 +93,8 @@ def _add_search(parser: argparse.ArgumentParser) -> None:
         help="score by an estimator of whole recordings, such as smoother, what no sensor measures "
         "(default: by what is measured)",
     )
-    parser.add_argument(
-        "--full-evaluation",
-        action="store_true",
-        help="do not drop candidates that have lost; the result is the same",
-    )
+    every = "do not drop candidates that have lost; the result is the same"
+    arguments.add_flags(parser, {"--full-evaluation": every})
 
 
 def _add_work(parser: argparse.ArgumentParser) -> None:
@@ -109,10 +106,11 @@ def _add_work(parser: argparse.ArgumentParser) -> None:
     )
     limit = "a candidate that takes longer ends its worker"
     arguments.add_number(parser, "--timeout SECONDS", arguments.positive, 60, limit)
-    parser.add_argument("--resume", action="store_true", help="go on from the last checkpoint")
-    parser.add_argument(
-        "--live", action="store_true", help="draw convergence.png anew every 5 s while searching"
-    )
+    flags = {
+        "--resume": "go on from the last checkpoint",
+        "--live": "draw convergence.png anew every 5 s while searching",
+    }
+    arguments.add_flags(parser, flags)
     parser.add_argument(
         "--out",
         type=Path,
