@@ -115,7 +115,7 @@ def test_of_a_law_with_many_minima_some_starts_end_elsewhere_and_none_lower(fits
 
 def test_a_fit_that_sits_in_a_wrong_minimum_is_told(fits):
     fit = fits["Ripple"]
-    wrong = begun(fit, "Ripple", 0.5 * TEETH)
+    wrong = begun(fit, "Ripple", 0.4 * TEETH)
     assert abs(wrong.point.sizes["Ripple", "k"] - TEETH) > 1.0
     certainty = assess(fit, wrong, lambda _: None)
     assert certainty.lower > 100.0
