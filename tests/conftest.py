@@ -61,7 +61,10 @@ def pytest_collection_finish() -> None:
 
 # What workers of pools import most. Else the first pool of a session, which may need nothing,
 # would decide that all later ones import everything anew: 1.7 s of a processor for each worker.
-MOST = ("workbench.observers.report", "workbench.observers.simulation", "workbench.diagnosis.laws")
+MOST = (
+    *("workbench.observers.report", "workbench.observers.simulation", "workbench.diagnosis.laws"),
+    *("workbench.models.loops_ready", "scipy.signal"),
+)
 
 
 @pytest.fixture(scope="session", autouse=True)

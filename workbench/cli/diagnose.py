@@ -17,7 +17,10 @@ from workbench.runtime.resources import own_version
 if TYPE_CHECKING:
     from workbench.diagnosis import Outcome, Problem
 
-WORKERS_NEED = ("workbench.diagnosis", "workbench.diagnosis.laws")
+WORKERS_NEED = (
+    *("workbench.diagnosis", "workbench.diagnosis.laws"),
+    *("workbench.models.loops_ready", "scipy.signal"),
+)
 
 
 def add(commands: arguments.Commands, text: str) -> argparse.ArgumentParser:

@@ -10,7 +10,7 @@ from workbench.runtime.files import locked_folder
 
 _UNITS = {"distance": "m", "deceleration": "m/s2", "response": "s", "asked": "SI"}
 
-WORKERS_NEED = ("workbench.studies.distance",)
+WORKERS_NEED = ("workbench.studies.distance", "workbench.models.loops_ready")
 
 
 def add(commands: arguments.Commands, text: str) -> argparse.ArgumentParser:

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from workbench.system.parts import FittedParameter
     from workbench.system.system import System
 
-WORKERS_NEED = ("workbench.studies.fit",)
+WORKERS_NEED = ("workbench.studies.fit", "workbench.models.loops_ready")
 
 
 def add(commands: Commands, text: str) -> argparse.ArgumentParser:

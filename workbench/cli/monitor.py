@@ -16,7 +16,7 @@ from workbench.runtime.files import locked_folder
 if TYPE_CHECKING:
     from workbench.studies.monitoring import MonitoringResult
 
-WORKERS_NEED = ("workbench.studies.monitoring",)
+WORKERS_NEED = ("workbench.studies.monitoring", "workbench.models.loops_ready")
 
 
 def add(commands: Commands, text: str) -> argparse.ArgumentParser:

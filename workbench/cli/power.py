@@ -24,7 +24,10 @@ if TYPE_CHECKING:
     from workbench.system.system import System
 
 _SIGMAS = [2.0, 4.0, 6.0, 10.0, 20.0]  # from what nobody finds to what nobody may miss
-WORKERS_NEED = ("workbench.studies.power", "workbench.studies.power.report")
+WORKERS_NEED = (
+    *("workbench.studies.power", "workbench.studies.power.report"),
+    *("workbench.models.loops_ready", "scipy.signal"),
+)
 
 
 def add(commands: arguments.Commands, text: str) -> argparse.ArgumentParser:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from workbench.runtime.cluster import DaskPool
     from workbench.tuning import Evaluator, Problem
 
-WORKERS_NEED = ("workbench.tuning",)
+WORKERS_NEED = ("workbench.tuning", "workbench.models.loops_ready")
 
 
 def add(commands: arguments.Commands, text: str) -> argparse.ArgumentParser:

@@ -6,8 +6,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from workbench.diagnosis import Outcome, Residuals
 from workbench.diagnosis.inference.best_estimate import bands, best_estimate
 from workbench.diagnosis.outcome import (
@@ -23,7 +21,7 @@ from workbench.diagnosis.page import write_diagnosis_page
 from workbench.observers.report import write_estimates, write_numbers
 from workbench.pages.answer import Answer, Measure, percentage, with_answer
 from workbench.pages.figures import PICTURES, CaseFigure, draw_case
-from workbench.recordings.csv import csv_text
+from workbench.recordings.csv import rows_text
 from workbench.runtime.files import write_json, write_whole
 
 
@@ -108,15 +106,13 @@ def _write_recording(residuals: Residuals, span: int, path: Path) -> None:
 
 
 def _write_tables(summary: Mapping[str, Any], out: Path) -> None:
-    import pandas as pd
-
     nested = ("shape", "shape_units")
     rows = [
         {**candidate, **{k: json.dumps(candidate[k]) for k in nested}}
         for candidate in summary["candidates"]
     ]
-    write_whole(out / "candidates.csv", csv_text(pd.DataFrame(rows)))
-    write_whole(out / "dependences.csv", csv_text(pd.DataFrame(summary["dependences"])))
+    write_whole(out / "candidates.csv", rows_text(rows))
+    write_whole(out / "dependences.csv", rows_text(summary["dependences"]))
     errors = [
         {
             **{key: error[key] for key in ("recording", "channel", "unit", "held_out", "samples")},
@@ -130,17 +126,18 @@ def _write_tables(summary: Mapping[str, Any], out: Path) -> None:
         }
         for error in summary["errors"]
     ]
-    write_whole(out / "errors.csv", csv_text(pd.DataFrame(errors)))
+    write_whole(out / "errors.csv", rows_text(errors))
     names, cosines = summary["confusability"]["effects"], summary["confusability"]["cosines"]
-    cells = {"effect": names, **dict(zip(names, np.transpose(cosines), strict=True))}
-    write_whole(out / "confusability.csv", csv_text(pd.DataFrame(cells)))
+    cells = [
+        {"effect": name, **dict(zip(names, map(float, own), strict=True))}
+        for name, own in zip(names, cosines, strict=True)
+    ]
+    write_whole(out / "confusability.csv", rows_text(cells))
     if (gain := summary["gain"]) is not None:
         rows = [{"recording": name, **recording} for name, recording in gain["recordings"].items()]
         total = {key: gain[key] for key in ("before", "after", "low", "high")}
-        write_whole(
-            out / "gain.csv",
-            csv_text(pd.DataFrame([*rows, {"recording": "all recordings", **total}])),
-        )
+        every = [*rows, {"recording": "all recordings", **total}]
+        write_whole(out / "gain.csv", rows_text(every))
 
 
 def diagnosed(summary: Mapping[str, Any]) -> Answer:
