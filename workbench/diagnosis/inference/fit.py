@@ -50,6 +50,9 @@ _WORTH = 1.0  # of chi-squared: what noise moves it by
 # Times what derivatives promise that steps may gain, since laws bend: up to twice as much is seen.
 # A fit may begin with a guess, and gain as many times more.
 _BENT = 3.0
+# Share of what no step is worth that a last one may promise by derivatives of the one before it: a
+# hundredth of chi-squared is a tenth of a standard deviation.
+_EVEN = 0.02
 _TURN = 0.5  # [rad] of a phase in one step, within which a sine is nearly straight
 
 _LOCAL = ""  # in place of an effect, of what differs between recordings
@@ -433,7 +436,7 @@ class Fit:
             expected = self.stepped(best.derived_as(derived), best.spread, held)
             if hopeless():
                 break
-            if not (as_said and best.deviance - expected.deviance < worse):
+            if not (as_said and best.deviance - expected.deviance < _EVEN * worse):
                 best = derived = self.linearise(best, active)
                 expected = self.stepped(best, best.spread, held)
                 if hopeless():
