@@ -83,6 +83,7 @@ _ACCESSORS = {
 _STATUSES: Mapping[int | str, str] = {2: "discard", 3: "error", 4: "fatal", 5: "pending"}
 _WARNING, _LOGGED = 1, 3  # status of FMI; messages that an error shows
 _SAME_STEP = 1e-4  # by which sample times may differ: what rounding of time stamps leaves
+_STEP = float(np.finfo(float).eps) ** (1 / 3)  # of differences, relative
 _SAME_RATE = 1e-4  # of its change, by which iterations within a model may change a rate
 _MOST_ITERATIONS = 100  # of discrete states at one event; models need some
 
@@ -990,7 +991,7 @@ class FMU(FMUInstance):
         return result.T
 
     def _difference(self, unknowns: NDArray[np.uint32], knowns: Variables) -> Matrix:
-        """Central differences; the step balances truncation and rounding (cube root of eps)."""
+        """Central differences."""
         probe = Variables((), unknowns, np.zeros(unknowns.size))
         centre = self.get(knowns).copy()
 
@@ -998,10 +999,20 @@ class FMU(FMUInstance):
             self._inject(knowns, values)
             return self.get(probe).copy()
 
-        steps = np.finfo(float).eps ** (1 / 3) * np.maximum(np.abs(centre), 1e-3)
+        steps = self.difference_steps(knowns.names, centre)
         jacobian = central_differences(evaluate, centre, steps)
         self._inject(knowns, centre)
         return jacobian
+
+    def difference_steps(self, names: Sequence[str], values: Vector) -> Vector:
+        """Steps of differences about values, (k,): truncation and rounding are alike.
+
+        A value far below its nominal one, such as zero, does not say its size.
+        """
+        sizes = {v.name: abs(v.nominal or 1.0) for v in self.description.variables}
+        nominal = np.array([sizes[name] for name in names])
+        steps: Vector = _STEP * np.maximum(np.abs(values), 1e-3 * nominal)
+        return steps
 
     def _inject(self, variables: Variables, values: Vector) -> None:
         """Set states through the state vector, anything else by reference."""

@@ -93,6 +93,7 @@ class Instance(NamedTuple):
     # u, y: (m,) inputs, (l,) outputs
     u: Vector
     y: Vector
+    least: Vector  # (n + q,) steps of differences at zero
     jacobian: Matrix  # (n + q, n + l) derivatives of [dx; y] (columns) by [x; last q inputs] (rows)
     seed: Vector  # (1,) one
     # inputs, outputs, unknowns, knowns: value references of u and y, of columns and rows of the
@@ -157,6 +158,7 @@ def instance(
         dx=np.zeros(n),
         u=np.zeros(m + q),
         y=np.zeros(k),
+        least=fmu.difference_steps([*fmu.states, *corrections], np.zeros(n + q)),
         jacobian=np.zeros((n + q, n + k)),
         seed=np.ones(1),
         inputs=fmu.references([*inputs, *corrections]),
@@ -397,7 +399,7 @@ def _differences(model):  # type: ignore[no-untyped-def]
     first = m - (rows - n)  # of the corrections
     for j in range(rows):
         centre = model.x[j] if j < n else model.u[first + j - n]
-        step = 6e-6 * max(abs(centre), 1e-3)
+        step = max(6e-6 * abs(centre), model.least[j])
         for side in (1.0, -1.0, 0.0):
             if j < n:
                 model.x[j] = centre + side * step

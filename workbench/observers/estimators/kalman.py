@@ -467,8 +467,9 @@ def forecast(model, settings, state, h, u, y):  # type: ignore[no-untyped-def]
     assign(step.inputs, u)
     status = status or measure(model, u)
     if layout.columns > model.x.size:
-        status = status or put(model, state.z) or read(model)
-        status = status or linearise(model, layout.columns)
+        # Differences leave other outputs behind, which are read after them.
+        status = status or put(model, state.z)
+        status = status or linearise(model, layout.columns) or read(model)
     return status
 
 

@@ -133,7 +133,7 @@ def expand(model, settings, state, k):  # type: ignore[no-untyped-def]
     assign_rows(data.F[k], step.F)
     if layout.columns > n:
         status = status or measure(model, data.reached[k])
-        status = status or put(model, arrived) or read(model) or linearise(model, layout.columns)
+        status = status or put(model, arrived) or linearise(model, layout.columns) or read(model)
     for j in range(layout.seen.size):
         at = layout.seen[j]
         if at >= 0:
