@@ -1057,7 +1057,7 @@ def test_co_simulation_with_steps_of_one_size_goes_in_those_or_is_refused(tmp_pa
         even = simulation.run(Drive(np.arange(4.0), np.ones((4, 1))), {})
         np.testing.assert_allclose(even[:, 0], [1, 2, 3, 4])
         with pytest.raises(
-            FMUError, match=r"steps of one size only.*after 0\.25 s comes one of 0\.3"
+            FMUError, match=r"steps of one size only.*of 0\.25 s, and samples are 0\.3 s apart"
         ):
             simulation.run(Drive(np.array([0.0, 1.0, 1.3]), np.ones((3, 1))), {})
 

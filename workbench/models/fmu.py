@@ -1123,27 +1123,27 @@ class CoSimulation(FMU):
     def step(self, h: float) -> Vector:
         """Advance by h [s] with inputs held; returns the new states, (n,).
 
-        An FMU that takes steps of one size only goes in those of its default experiment, where they
-        fit into h.
+        An FMU that takes steps of one size only goes in those of its default experiment, or of the
+        first h.
 
         Raises
         ------
         FMUError
-            If the FMU refuses the step, or asks to end; if it takes one size only, and h is another
-            than before.
+            If the FMU refuses the step, or asks to end; if it takes one size only, and h is no
+            multiple of it.
         """
         parts = 1
         if not self.description.interfaces[CO_SIMULATION].variable_steps:
-            parts = max(1, round(h / (self.description.step or h)))
-            length = h / parts
-            if self._length and abs(length - self._length) > _SAME_STEP * self._length:
+            # That of its default experiment, else that of the first sample.
+            self._length = self._length or self.description.step or h
+            parts = round(h / self._length)
+            if abs(h - parts * self._length) > _SAME_STEP * h:
                 raise FMUError(
                     f"{self.called}: it takes steps of one size only "
-                    "(canHandleVariableCommunicationStepSize is not true), and after "
-                    f"{self._length:.6g} s comes one of {length:.6g} s. Record at equal steps, or "
-                    "export the model with steps of any size"
+                    "(canHandleVariableCommunicationStepSize is not true), of "
+                    f"{self._length:.6g} s, and samples are {h:.6g} s apart, which is no multiple "
+                    "of it. Record at such steps, or export the model with steps of any size"
                 )
-            self._length = self._length or length
         tail: tuple[object, ...] = ()
         event, end, early = (ctypes.c_bool() for _ in range(3))
         reached = ctypes.c_double()

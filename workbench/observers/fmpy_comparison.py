@@ -13,6 +13,7 @@ import numpy as np
 from workbench.arrays import Matrix, Vector
 from workbench.errors import FMUError, InputError
 from workbench.models.description import (
+    CO_SIMULATION,
     MODEL_EXCHANGE,
     Description,
     Variable,
@@ -125,8 +126,10 @@ class _Problem:
         if stop is None or stop <= self._begin:
             stop = self._begin + _DURATION
         self._step = (stop - self._begin) / _INTERVALS
-        self.time = self._begin + self._step * np.arange(_INTERVALS + 1)
         self._alone = MODEL_EXCHANGE not in description.interfaces
+        if self._alone and not description.interfaces[CO_SIMULATION].variable_steps:
+            self._step = description.step or self._step  # FMPy steps from sample to sample
+        self.time = self._begin + self._step * np.arange(_INTERVALS + 1)
         self._inputs = [
             v
             for v in description.variables
