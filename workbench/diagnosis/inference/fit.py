@@ -53,6 +53,7 @@ _BENT = 3.0
 # Share of what no step is worth that a last one may promise by derivatives of the one before it: a
 # hundredth of chi-squared is a tenth of a standard deviation.
 _EVEN = 0.02
+_ROUNDED = 1e-9  # of a level that is held
 _TURN = 0.5  # [rad] of a phase in one step, within which a sine is nearly straight
 
 _LOCAL = ""  # in place of an effect, of what differs between recordings
@@ -522,13 +523,19 @@ class Fit:
         """Results of a job that fits, by item."""
         return self._simulations.together(job, items)
 
-    def unlikely_levels(self, point: Point) -> frozenset[Key]:
-        """Levels further from their sheet than 95 of 100 are, by what is declared of them."""
+    def unlikely_levels(self, point: Point, *, clean: bool) -> frozenset[Key]:
+        """Levels further from their sheet than 95 of 100 are, by what is declared of them.
+
+        Parameters
+        ----------
+        clean : whether nothing is wrong with the fit: then only those that it holds.
+        """
+        far = (1.0 - _ROUNDED) * self.decides.furthest_level if clean else BAND
         expected = {key: self.unknowns.expected(key) for key in point.levels if key[1] != SENSOR}
         return frozenset(
             key
             for key, (middle, sigma) in expected.items()
-            if key not in self.freed and abs(point.levels[key] - middle) > BAND * sigma
+            if key not in self.freed and abs(point.levels[key] - middle) > far * sigma
         )
 
     def _reach(self, point: Point, key: Key) -> tuple[float, float]:

@@ -214,7 +214,8 @@ def conclude(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnos
 
 def _concluded(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnosis:
     chosen, astray = _selected(fit, catalogue, report)
-    if (unlikely := fit.unlikely_levels(chosen.best.point)) and not chosen.interrupted:
+    unlikely = fit.unlikely_levels(chosen.best.point, clean=_clean(fit, chosen))
+    if unlikely and not chosen.interrupted:
         report(f"further from the data sheet: {', '.join(sorted(name for name, _ in unlikely))}")
         chosen, astray = _beyond_sheet(fit, catalogue, (chosen, astray), unlikely, report)
     chosen, outside = _within_bounds(fit, catalogue, chosen, report)
