@@ -61,6 +61,9 @@ fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean a, fmi2Real b, fmi2R
 fmi2Status fmi2EnterInitializationMode(fmi2Component c) { return fmi2OK; }
 fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
     Room *m = c;
+#ifdef RANDOM /* heat capacity, of each start */
+    m->r[C] *= 1.0 + 0.1 * rand() / RAND_MAX;
+#endif
     m->past[0][0] = m->time, m->past[0][1] = m->r[T], m->steps = 1;
     return fmi2OK;
 }

@@ -524,6 +524,14 @@ def test_a_model_that_remembers_steps_is_led_step_by_step_alone(saves, build):
     np.testing.assert_allclose(simulated[:, 0], exact, atol=1e-6)
 
 
+def test_a_run_that_draws_random_numbers_is_refused(build):
+    with FMU(build("RELAYS", flags=["-DRANDOM"])) as fmu:
+        with pytest.raises(FMUError, match="gives other results when it is repeated"):
+            run(fmu, "open_loop", 100.0)
+        with pytest.raises(EventError, match="follow from earlier steps"):
+            run(fmu, "ukf", 100.0)
+
+
 def test_a_switch_in_code_that_remembers_is_refused_along_a_recording(build):
     """A thermostat that no event tells: filters and simulations would switch it off their way."""
     folder = build("FUSE", flags=["-DHIDDEN"]).parent

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from workbench.arrays import Matrix, Vector
+from workbench.errors import FMUError
 from workbench.models.description import MODEL_EXCHANGE
 from workbench.models.fmu import FMU, CoSimulation, EventError
 from workbench.models.hybrid import CoSimulationRun, HybridSimulation
@@ -136,6 +137,8 @@ class OpenLoop(Estimator):
         self._eventful = False
         try:
             estimate = super().run(time, u, y)
+            if self.fmu.remembers_steps:
+                self._require_same(estimate, super().run(time, u, y))
         except EventError:
             self._eventful = True
             return super().run(time, u, y)
@@ -144,6 +147,14 @@ class OpenLoop(Estimator):
         self.start(u[0], y[0])
         self._state.accurate[0] = 1.0
         return self.advance(np.diff(time, prepend=time[0]), u, y)
+
+    def _require_same(self, estimate: Estimate, again: Estimate) -> None:
+        """Refuse a model that draws random numbers, which looks as one that remembers steps."""
+        if not np.array_equal(estimate.values, again.values, equal_nan=True):
+            raise FMUError(
+                f"{self.fmu.called}: the same run gives other results when it is repeated. Export "
+                "it without random numbers, or with a fixed seed that a reset restores"
+            )
 
     def _begin(self, u: Vector, y: Vector) -> None:
         if self.fmu.interface == MODEL_EXCHANGE:
