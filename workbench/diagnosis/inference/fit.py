@@ -50,9 +50,9 @@ _WORTH = 1.0  # of chi-squared: what noise moves it by
 # Times what derivatives promise that steps may gain, since laws bend: up to twice as much is seen.
 # A fit may begin with a guess, and gain as many times more.
 _BENT = 3.0
-# Share of what no step is worth that a last one may promise by derivatives of the one before it: a
-# hundredth of chi-squared is a tenth of a standard deviation.
-_EVEN = 0.02
+# Share of what no step is worth that a last one may promise by derivatives of the one before it:
+# so much of chi-squared is a fiftieth of a standard deviation.
+_EVEN = 0.001
 _ROUNDED = 1e-9  # of a level that is held
 _TURN = 0.5  # [rad] of a phase in one step, within which a sine is nearly straight
 
