@@ -92,6 +92,9 @@ fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean n, fmi2Boole
 #ifdef MOVES /* a window that cools it at the end of a step, which is no event */
     if (m->r[T] > 295.0) m->r[T] -= 0.2;
 #endif
+#ifdef LATER /* a heat loss that steps change, from 50 s on */
+    if (m->time > 50.0) m->r[G] = m->r[T] - 241.0;
+#endif
     if (m->steps < MOST) m->past[m->steps][0] = m->time, m->past[m->steps++][1] = m->r[T];
 #ifdef LATE /* an output that follows at the end of a step alone */
     m->r[P] = m->r[T] - m->r[TA];

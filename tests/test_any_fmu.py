@@ -524,6 +524,14 @@ def test_a_model_that_remembers_steps_is_led_step_by_step_alone(saves, build):
     np.testing.assert_allclose(simulated[:, 0], exact, atol=1e-6)
 
 
+def test_rates_that_the_end_of_a_later_step_changes_are_refused(build):
+    with (
+        FMU(build("RELAYS", flags=["-DLATER"])) as fmu,
+        pytest.raises(FMUError, match=r"changes the derivative of 'T' without an event at 60 s"),
+    ):
+        run(fmu, "open_loop", 100.0)
+
+
 def test_a_run_that_draws_random_numbers_is_refused(build):
     with FMU(build("RELAYS", flags=["-DRANDOM"])) as fmu:
         with pytest.raises(FMUError, match="gives other results when it is repeated"):

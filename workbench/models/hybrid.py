@@ -26,6 +26,7 @@ TOLERANCE = 1e-8
 _LOOKS = 4
 # Between two samples; a model that needs more comes to rest by ever more events (Zeno).
 _MOST_EVENTS = 10_000
+_SAME_RATE = 1e-4  # of a rate, by which iterations within a model may change it
 _PILED = 500  # events from which on the pace of the last so many tells whether that comes
 
 
@@ -205,10 +206,20 @@ class HybridSimulation:
             at = self._first_event(t_before, t, x_at)
             self._t, self._x = at or t, x_at(at or t)
             self._place(self._t, self._x)
+            rates = self._fmu.derivatives() if self._fmu.remembers_steps else None
             if self._fmu.complete_step() or at is not None:
                 self._handle_event()
                 return
+            if rates is not None:
+                self._require_rates(rates)
             t_before = t
+
+    def _require_rates(self, rates: Vector) -> None:
+        """Refuse rates that the end of a step changed without an event, (n,) before it."""
+        off = np.abs(self._fmu.derivatives() - rates)
+        if (off > _SAME_RATE * np.abs(rates)).any():
+            name = self._fmu.states[int(off.argmax())]
+            raise self._error(f"changes the derivative of '{name}' without an event")
 
     def _path(self, end: float):  # type: ignore[no-untyped-def]
         """Steps to the end: the time of each, and the states within it."""
