@@ -18,6 +18,7 @@ from workbench import case_from_frame
 from workbench.diagnosis import build_everything, read_effects
 from workbench.diagnosis.data.motion import ModelSource
 from workbench.diagnosis.inference.certainty import assess
+from workbench.diagnosis.inference.crossvalidation import CrossValidation
 from workbench.diagnosis.inference.discrepancy import autocovariance, share_by_form
 from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.search import FittedModel
@@ -120,6 +121,23 @@ def test_a_fit_that_sits_in_a_wrong_minimum_is_told(fits):
     certainty = assess(fit, wrong, lambda _: None)
     assert certainty.lower > 100.0
     assert "sizes may be others" in certainty.sentence
+
+
+def test_a_fit_to_others_leaves_open_what_the_derivatives_say(fits):
+    """Closed form for each pull, by the other one alone: m N^-1 m' of the means m of a block."""
+    fit = fits["Bend"]
+    best = begun(fit, "Bend", BEND)
+    left_open = CrossValidation(fit).left_open(best, fast=True)
+    pulls = [1.0 - np.cos(2.0 * np.pi / p * 0.01 * np.arange(1500)) for p in (4.0, 5.0)]
+    means = [
+        np.column_stack([u * np.exp(BEND * u), u]).reshape(-1, 1500 // len(own), 2).mean(axis=1)
+        for u, own in zip(pulls, left_open, strict=True)
+    ]
+    for m, other, own in zip(means, means[::-1], left_open, strict=True):
+        expected = np.einsum("gp,pq,gq->g", m, np.linalg.inv(other.T @ other), m)
+        expected *= best.linearised.variance_factors[0]  # what is wrong with the noise
+        # Noise is told from each pull, to a few parts of a hundred.
+        assert_allclose(own[:, 0], expected, rtol=0.1, atol=1e-3 * expected.max())
 
 
 # --- errors that go on in time, against closed forms ---

@@ -775,10 +775,26 @@ def test_what_remains_where_an_effect_does_nothing_says_nothing_of_its_form():
     class Recorded(CrossValidation):
         """Fits in which nothing is fitted, so that each stop is held out as it is."""
 
+        unsure = 0.0  # variance of each mean, by the fit to the other stop
+
         def _errors(self, fitted: FittedModel) -> list[np.ndarray]:
             return [recording.errors for recording in fitted.linearised.residuals]
 
+        def _fitted(self, fitted: FittedModel) -> list[np.ndarray]:
+            return [np.ones((10, 1))] * 2
+
+        def left_open(self, fitted: FittedModel, *, fast: bool) -> list[np.ndarray]:
+            return [np.full((10, 1), self.unsure)] * 2
+
     validation = Recorded(SimpleNamespace(unknowns=SimpleNamespace(count=2)))
-    left, without = validation.where_acting(model(5.0, 9.0), model(1.0, 9.0), fast=True)
-    assert (left, without) == (pytest.approx(0.0), pytest.approx(24.0))
+
+    def left(remains: float) -> tuple[float, float]:
+        return validation.where_acting(model(5.0, 9.0), model(remains, 9.0), fast=True)
+
+    assert left(1.0) == (pytest.approx(0.0), pytest.approx(24.0))
+    # Of ten means of a law that is wrong by a fifth, noise leaves up to 3.6 in 95 of 100 sets.
+    assert left(1.5) == (pytest.approx(0.04 * 24.0), pytest.approx(24.0))
+    assert left(3.0) == (pytest.approx(8.0), pytest.approx(24.0))
+    validation.unsure = 3.5
+    assert left(4.0) == (pytest.approx(16.0 - 1.0 - 3.5), pytest.approx(24.0))
     assert validation.squares(model(1.0, 9.0), fast=True).mean() == pytest.approx(41.0)

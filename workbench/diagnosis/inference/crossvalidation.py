@@ -4,6 +4,7 @@ Each recording is left out in turn; of a single recording, each of its parts. So
 (1974), J. R. Stat. Soc. B 36, 111-147.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -12,9 +13,10 @@ from scipy.special import chdtri
 
 from workbench.arrays import Matrix, Vector
 from workbench.diagnosis.data.cleaning import Mask
+from workbench.diagnosis.inference.discrepancy import WRONG
 from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.linearized import lasting
-from workbench.diagnosis.inference.quadratic import Quadratic, add, minimum
+from workbench.diagnosis.inference.quadratic import Quadratic, add, covariance, minimum
 from workbench.diagnosis.inference.search import FittedModel
 
 _ROUNDS = 3  # of a fit without one part, which begins where all parts were fitted
@@ -41,23 +43,71 @@ class CrossValidation:
     ) -> tuple[float, float]:
         """Mean squares beyond noise that two fits leave, each by how far they differ there.
 
-        What remains where an effect does nothing says nothing of its form.
+        What remains where an effect does nothing says nothing of its form, and no more does an
+        error of a held-out recording that a fit to the others leaves open, as where it alone shows
+        the effect. At least, the form leaves what a fit to all recordings does. A law is wrong by
+        `WRONG` at most, unless more remains than noise leaves of that in 95 of 100 sets.
         """
         before, after = (self._of_means(model, fast=fast) for model in (less, best))
         weights = self._of_means(best, fast=fast, beside=less)
         total = max(sum(weight.sum() for weight in weights), 1e-9)
-        left, without = (
-            sum((weight * (own - 1.0)).sum() for weight, own in zip(weights, squares, strict=True))
-            for squares in (after, before)
-        )
-        return float(left / total), float(without / total)
+
+        def mean(squares: Sequence[Matrix]) -> float:
+            pairs = zip(weights, squares, strict=True)
+            return float(sum((weight * own).sum() for weight, own in pairs) / total)
+
+        remains, unsure = mean(after), mean(self.left_open(best, fast=fast))
+        fitted = mean(self._of_means(best, fast=fast, errors=self._fitted(best)))
+        left, explained = max(remains - unsure, fitted) - 1.0, mean(before) - 1.0
+        by_form = WRONG**2 * explained
+        count = total / max(mean(weights), 1e-9)  # of means that have a weight
+        if remains <= (1.0 + unsure + by_form) * float(chdtri(count, 0.05)) / count:
+            left = min(left, by_form)
+        return left, explained
+
+    def _fitted(self, fitted: FittedModel) -> list[Matrix]:
+        """Whitened errors of each recording, or part, as fitted to all of them."""
+        errors = [residuals.errors for residuals in fitted.linearised.residuals]
+        if self._fit.unknowns.count > 1:
+            return errors
+        return [errors[0][self._fit.blocks_of(part)] for part in range(self._fit.parts)]
+
+    def left_open(self, fitted: FittedModel, *, fast: bool) -> list[Matrix]:
+        """Variance of the means of each recording by what a fit to the others is unsure of.
+
+        Of a single recording, each part is fitted anew, and nothing is known of that.
+        """
+        span = 1 if fast else fitted.linearised.lasting
+        if self._fit.unknowns.count == 1:
+            return [np.zeros_like(own) for own in self._of_means(fitted, fast=fast)]
+        joint = self._fit.quadratics(self._fit.linearise(fitted.linearised, fitted.active))
+        stops, shown = joint.stops(), self._shown(fitted)
+        total, variances = add([*stops, joint.prior]), []
+        for stop, system, own in zip(stops, joint.systems, shown, strict=True):
+            slopes = system.slopes.reshape(-1, system.channels, len(joint.shared))[:, own]
+            count = len(slopes) // span * span
+            means = slopes[:count].reshape(-1, span, *slopes.shape[1:]).mean(axis=1)
+            spread = covariance(total.N - stop.N)
+            factors = fitted.linearised.variance_factors[own]
+            variances.append(span * factors * np.einsum("gcp,pq,gcq->gc", means, spread, means))
+        return variances
 
     def _of_means(
-        self, fitted: FittedModel, *, fast: bool, beside: FittedModel | None = None
+        self,
+        fitted: FittedModel,
+        *,
+        fast: bool,
+        beside: FittedModel | None = None,
+        errors: list[Matrix] | None = None,
     ) -> list[Matrix]:
-        """Squares of means of each recording; of the difference to another fit, if there is one."""
+        """Squares of means of each recording; of the difference to another fit, if there is one.
+
+        Parameters
+        ----------
+        errors : in place of those of recordings that are held out.
+        """
         span = 1 if fast else fitted.linearised.lasting
-        every = self._held_out(fitted)
+        every = self._held_out(fitted) if errors is None else errors
         if beside is not None:
             pairs = zip(every, self._held_out(beside), strict=True)
             every = [own - other for own, other in pairs]

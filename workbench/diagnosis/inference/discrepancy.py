@@ -26,8 +26,8 @@ from workbench.diagnosis.inference.quadratic import Joint, Key, covariance
 from workbench.diagnosis.inference.search import FittedModel
 from workbench.system.units import BAND
 
-_WRONG = 0.2  # share of its effect by which a law may be wrong in form, at most
-_SHARES = (np.arange(20) + 0.5) / 20.0 * _WRONG
+WRONG = 0.2  # share of its effect by which a law may be wrong in form, at most
+_SHARES = (np.arange(20) + 0.5) / 20.0 * WRONG
 _SHAPES = 2  # of a smooth law that a fitted size does not take: slope and bend
 
 
@@ -90,9 +90,7 @@ def correlated_deviations(fit: Fit, best: FittedModel) -> dict[Key, float]:
     joint = fit.quadratics(fit.linearise(best.linearised, best.active))
     errors, slopes = [], []
     for system in joint.systems:
-        follows, _ = system.follows()
-        beside = (system.J + system.P @ follows)[: system.blocks]  # (b*c, p)
-        slopes.append(beside.reshape(-1, system.channels, len(joint.shared)))
+        slopes.append(system.slopes.reshape(-1, system.channels, len(joint.shared)))
         errors.append(system.r[: system.blocks].reshape(-1, system.channels))
     scores = np.zeros((len(joint.shared),) * 2)
     for c in range(joint.systems[0].channels):

@@ -140,6 +140,13 @@ class RecordingSystem:
         return errors[: self.blocks].reshape(-1, self.channels)
 
     @property
+    def slopes(self) -> Matrix:
+        """(b*c, p) derivatives of the errors of blocks by z, where l follows."""
+        follows, _ = self.follows()
+        slopes: Matrix = (self.J + self.P @ follows)[: self.blocks]
+        return slopes
+
+    @property
     def _free(self) -> NDArray[np.bool_]:
         """(q,) Which entries of l are free."""
         return np.ones(self.P.shape[1], np.bool_) if self.held is None else np.isnan(self.held)
