@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
-from scipy.optimize import minimize_scalar
+from scipy.optimize import curve_fit, minimize_scalar
 
 from workbench import case_from_frame
 from workbench.diagnosis import build_everything, read_effects
@@ -21,7 +21,7 @@ from workbench.diagnosis.inference.certainty import assess
 from workbench.diagnosis.inference.crossvalidation import CrossValidation
 from workbench.diagnosis.inference.discrepancy import autocovariance, share_by_form
 from workbench.diagnosis.inference.fit import Fit
-from workbench.diagnosis.inference.search import FittedModel
+from workbench.diagnosis.inference.search import FittedModel, fitted
 from workbench.diagnosis.inference.selection import anew
 from workbench.diagnosis.inference.verdict import Interval
 from workbench.diagnosis.simulation.residual_model import ResidualModel
@@ -138,6 +138,41 @@ def test_a_fit_to_others_leaves_open_what_the_derivatives_say(fits):
         expected *= best.linearised.variance_factors[0]  # what is wrong with the noise
         # Noise is told from each pull, to a few parts of a hundred.
         assert_allclose(own[:, 0], expected, rtol=0.1, atol=1e-3 * expected.max())
+
+
+def test_a_fit_ends_at_the_least_squares_of_an_independent_solver(fits):
+    """Its last step may go by earlier derivatives: it moves less than a tenth of the tolerance."""
+    fit = fits["Bend"]
+    best = begun(fit, "Bend", 0.5 * BEND)
+    t, rng = 0.01 * np.arange(1500), np.random.default_rng(1)
+    u = np.concatenate([1.0 - np.cos(2.0 * np.pi / period * t) for period in (4.0, 5.0)])
+    y = SCALE * u + np.expm1(BEND * u) + NOISE * rng.standard_normal(u.size)
+    size = u.size // sum(len(own.errors) for own in best.linearised.residuals)
+
+    def law(u: np.ndarray, b: float, c: float) -> np.ndarray:
+        return (c * u + np.expm1(b * u)).reshape(-1, size).mean(axis=1)
+
+    (b, c), spread = curve_fit(law, u, y.reshape(-1, size).mean(axis=1), (BEND, SCALE))
+    (bend,), (scale,) = best.point.sizes.values(), best.point.levels.values()
+    # Both pulls weigh what their own noise says, which differs by a few parts of a hundred.
+    assert abs(bend - b) < 0.1 * np.sqrt(spread[0, 0])
+    assert abs(scale - c) < 0.1 * np.sqrt(spread[1, 1])
+
+
+def test_a_fit_ends_where_it_cannot_come_near_what_is_sought(fits):
+    """A bend fits the data of a ripple, and leaves many times what the ripple does."""
+    fit = fits["Ripple"]
+    right = begun(fit, "Ripple", TEETH)
+    bend, sought = fit.unknowns.effects["Bend"], right.linearised.deviance
+    start = fit.at(replace(right.point, sizes={("Bend", bend.label): 0.1}))
+    whole = fitted(fit, start, (bend,)).linearised
+    assert whole.settled
+    assert whole.deviance > sought + 100.0
+    ended = fitted(fit, start, (bend,), sought=sought).linearised
+    assert not ended.settled
+    # What can be reached is.
+    reached = fitted(fit, start, (bend,), sought=whole.deviance).linearised
+    assert reached.deviance == pytest.approx(whole.deviance)
 
 
 # --- errors that go on in time, against closed forms ---
