@@ -510,7 +510,8 @@ class Fit:
         new = Point(sizes, levels, point.deviations + changes[:, :count], phases)
         residuals = tuple(
             own.moved(system.J @ step + system.P @ local, spread)
-            for own, system, local in zip(lin.residuals, joint.systems, locals_, strict=True)
+            # Systems of other recordings may count beside those that are simulated.
+            for own, system, local in zip(lin.residuals, joint.systems, locals_, strict=False)
         )
         return replace(lin, point=new, residuals=residuals, away=self._away(new))
 

@@ -162,8 +162,9 @@ def arrow_step(model, settings, state, h, u, y, estimate):  # type: ignore[no-un
     assign(state.inputs, u)
     status = status or measure(model, u)
     if layout.columns > model.x.size:
-        status = status or put(model, state.z) or read(model)
-        status = status or slopes_of_fed(model, settings, state)
+        # Differences leave other outputs behind, which are read after them.
+        status = status or put(model, state.z)
+        status = status or slopes_of_fed(model, settings, state) or read(model)
     if status:
         return status
     measurement_update(model, settings, state, y, fade, estimate)
