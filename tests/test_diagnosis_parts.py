@@ -788,8 +788,9 @@ def test_what_remains_where_an_effect_does_nothing_says_nothing_of_its_form():
 
     validation = Recorded(SimpleNamespace(unknowns=SimpleNamespace(count=2)))
 
-    def left(remains: float) -> tuple[float, float]:
-        return validation.where_acting(model(5.0, 9.0), model(remains, 9.0), fast=True)
+    def left(remains: float, *, whole: bool = True) -> tuple[float, float]:
+        before, after = model(5.0, 9.0), model(remains, 9.0)
+        return validation.where_acting(before, after, fast=True, whole=whole)
 
     assert left(1.0) == (pytest.approx(0.0), pytest.approx(24.0))
     # Of ten means of a law that is wrong by a fifth, noise leaves up to 3.6 in 95 of 100 sets.
@@ -797,4 +798,5 @@ def test_what_remains_where_an_effect_does_nothing_says_nothing_of_its_form():
     assert left(3.0) == (pytest.approx(8.0), pytest.approx(24.0))
     validation.unsure = 3.5
     assert left(4.0) == (pytest.approx(16.0 - 1.0 - 3.5), pytest.approx(24.0))
+    assert left(4.0, whole=False) == (pytest.approx(15.0), pytest.approx(24.0))
     assert validation.squares(model(1.0, 9.0), fast=True).mean() == pytest.approx(41.0)

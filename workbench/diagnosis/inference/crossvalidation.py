@@ -39,7 +39,7 @@ class CrossValidation:
         return np.array([squares.mean() for squares in self._of_means(fitted, fast=fast)])
 
     def where_acting(
-        self, less: FittedModel, best: FittedModel, *, fast: bool
+        self, less: FittedModel, best: FittedModel, *, fast: bool, whole: bool
     ) -> tuple[float, float]:
         """Mean squares beyond noise that two fits leave, each by how far they differ there.
 
@@ -47,6 +47,10 @@ class CrossValidation:
         error of a held-out recording that a fit to the others leaves open, as where it alone shows
         the effect. At least, the form leaves what a fit to all recordings does. A law is wrong by
         `WRONG` at most, unless more remains than noise leaves of that in 95 of 100 sets.
+
+        Parameters
+        ----------
+        whole : whether the best fit explains all; beside a part of it, all that remains counts.
         """
         before, after = (self._of_means(model, fast=fast) for model in (less, best))
         weights = self._of_means(best, fast=fast, beside=less)
@@ -56,9 +60,12 @@ class CrossValidation:
             pairs = zip(weights, squares, strict=True)
             return float(sum((weight * own).sum() for weight, own in pairs) / total)
 
-        remains, unsure = mean(after), mean(self.left_open(best, fast=fast))
+        remains, explained = mean(after), mean(before) - 1.0
+        if not whole:
+            return remains - 1.0, explained
+        unsure = mean(self.left_open(best, fast=fast))
         fitted = mean(self._of_means(best, fast=fast, errors=self._fitted(best)))
-        left, explained = max(remains - unsure, fitted) - 1.0, mean(before) - 1.0
+        left = max(remains - unsure, fitted) - 1.0
         by_form = WRONG**2 * explained
         count = total / max(mean(weights), 1e-9)  # of means that have a weight
         if remains <= (1.0 + unsure + by_form) * float(chdtri(count, 0.05)) / count:

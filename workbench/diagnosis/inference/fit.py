@@ -48,7 +48,6 @@ _HALVED = 4  # times: after that a step is given up
 _ROUNDS = 8  # evaluations of a least chi-squared, at most
 _WORTH = 1.0  # of chi-squared: what noise moves it by
 # Times what derivatives promise that steps may gain, since laws bend: up to twice as much is seen.
-# A fit may begin with a guess, and gain as many times more.
 _BENT = 3.0
 # Share of what no step is worth that a last one may promise by derivatives of the one before it:
 # so much of chi-squared is a fiftieth of a standard deviation.
@@ -412,18 +411,17 @@ class Fit:
         """
         best = derived = self.linearise(best, active)
         expected, halved = self.stepped(best, best.spread if spread is None else spread, held), 0
-        worse, bent = self.decides.worse, _BENT**2
+        worse, point = self.decides.worse, expected.point
 
-        def hopeless() -> bool:
-            return best.deviance - bent * (best.deviance - expected.deviance) > sought
+        def hopeless(fall: float) -> bool:
+            """Whether steps that shrink as this one does, to the last one, lead nowhere near."""
+            step = best.deviance - expected.deviance
+            return step < fall and best.deviance - _BENT * step / (1.0 - step / fall) > sought
 
-        if hopeless():
-            return best
-        point, bent = expected.point, _BENT
         for left in reversed(range(rounds)):
             tried = self.tried(point)
             fall = -np.inf if tried is None else best.deviance - tried.deviance
-            better = fall > -worse
+            promised, better = best.deviance - expected.deviance, fall > -worse
             if tried is not None and better:
                 best = tried
             if abs(fall) < worse or halved == _HALVED:
@@ -433,14 +431,12 @@ class Fit:
             if not better:
                 point, halved = between(best.point, point), halved + 1
                 continue
-            as_said = not halved and abs(best.deviance - expected.deviance) < worse
+            off = np.inf if halved else abs(promised - fall)
             expected = self.stepped(best.derived_as(derived), best.spread, held)
-            if hopeless():
-                break
-            if not (as_said and best.deviance - expected.deviance < _EVEN * worse):
+            if off >= worse or best.deviance - expected.deviance >= _EVEN * worse:
                 best = derived = self.linearise(best, active)
                 expected = self.stepped(best, best.spread, held)
-                if hopeless():
+                if hopeless(fall):
                     break
             point, halved = expected.point, 0
         return best

@@ -247,7 +247,7 @@ def _concluded(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagn
         fast = any(effect.order_locked for effect in best.active)
         noise_alone = chosen.validation.noise_alone(best, fast=fast)
         causes = [
-            _cause(fit, chosen, effect, noise_alone=noise_alone)
+            _cause(fit, chosen, effect, noise_alone=noise_alone, whole=verdict == "found")
             for effect in _strongest_first(fit, chosen, catalogue)
         ]
         # Beside others, a part that bends as far as its effect allows stands for another law.
@@ -639,7 +639,7 @@ def _apart_by_starts(fit: Fit, effect: Effect) -> list[str]:
     return [e.name for e in others if e.sensor and e.size == LAG and e.model != effect.model]
 
 
-def _cause(fit: Fit, chosen: Selection, effect: Effect, *, noise_alone: bool) -> Cause:
+def _cause(fit: Fit, chosen: Selection, effect: Effect, *, noise_alone: bool, whole: bool) -> Cause:
     """A cause with intervals, which what is left widens, or the form that noise may hide."""
     best, trial, unknowns = chosen.best, chosen.trial, fit.unknowns
     sigma = np.hypot(np.sqrt(np.diag(trial.covariance())), trial.moved())
@@ -647,7 +647,9 @@ def _cause(fit: Fit, chosen: Selection, effect: Effect, *, noise_alone: bool) ->
     if noise_alone:
         more = hidden_by_noise(fit, best, effect)
     else:
-        left, explained = chosen.validation.where_acting(chosen.less[effect], best, fast=fast)
+        left, explained = chosen.validation.where_acting(
+            chosen.less[effect], best, fast=fast, whole=whole
+        )
         form_share = max(_FORM, share_by_form(left, explained))
         more = correlated_deviations(fit, best)
     parameters = {}
