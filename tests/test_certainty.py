@@ -141,7 +141,7 @@ def test_a_fit_to_others_leaves_open_what_the_derivatives_say(fits):
 
 
 def test_a_fit_ends_at_the_least_squares_of_an_independent_solver(fits):
-    """Its last step may go by earlier derivatives: it moves less than a tenth of the tolerance."""
+    """Begun at half of the size, with the scale of a straight gauge."""
     fit = fits["Bend"]
     best = begun(fit, "Bend", 0.5 * BEND)
     t, rng = 0.01 * np.arange(1500), np.random.default_rng(1)

@@ -49,9 +49,6 @@ _ROUNDS = 8  # evaluations of a least chi-squared, at most
 _WORTH = 1.0  # of chi-squared: what noise moves it by
 # Times what derivatives promise that steps may gain, since laws bend: up to twice as much is seen.
 _BENT = 3.0
-# Share of what no step is worth that a last one may promise by derivatives of the one before it:
-# so much of chi-squared is a fiftieth of a standard deviation.
-_EVEN = 0.001
 _ROUNDED = 1e-9  # of a level that is held
 _TURN = 0.5  # [rad] of a phase in one step, within which a sine is nearly straight
 
@@ -394,8 +391,6 @@ class Fit:
     ) -> LinearizedPoint:
         """Gauss-Newton over all unknowns, with channels weighed by what is wrong with them.
 
-        Derivatives serve for a last step, too, where they said what the one before it led to.
-
         Parameters
         ----------
         best : where to begin.
@@ -409,7 +404,7 @@ class Fit:
         -------
         best : the best point that was met; derivatives may be missing.
         """
-        best = derived = self.linearise(best, active)
+        best = self.linearise(best, active)
         expected, halved = self.stepped(best, best.spread if spread is None else spread, held), 0
         worse, point = self.decides.worse, expected.point
 
@@ -421,7 +416,7 @@ class Fit:
         for left in reversed(range(rounds)):
             tried = self.tried(point)
             fall = -np.inf if tried is None else best.deviance - tried.deviance
-            promised, better = best.deviance - expected.deviance, fall > -worse
+            better = fall > -worse
             if tried is not None and better:
                 best = tried
             if abs(fall) < worse or halved == _HALVED:
@@ -431,13 +426,10 @@ class Fit:
             if not better:
                 point, halved = between(best.point, point), halved + 1
                 continue
-            off = np.inf if halved else abs(promised - fall)
-            expected = self.stepped(best.derived_as(derived), best.spread, held)
-            if off >= worse or best.deviance - expected.deviance >= _EVEN * worse:
-                best = derived = self.linearise(best, active)
-                expected = self.stepped(best, best.spread, held)
-                if hopeless(fall):
-                    break
+            best = self.linearise(best, active)
+            expected = self.stepped(best, best.spread, held)
+            if hopeless(fall):
+                break
             point, halved = expected.point, 0
         return best
 

@@ -527,15 +527,15 @@ def _beyond_sheet(
     """What recordings need if levels may be further from their sheets than is likely.
 
     A sheet may be wrong. Then effects bend to what a level does not reach, or nothing explains it.
-    Levels are freed where that explains significantly more without another effect, or all where
-    much was wrong, with no more effects.
+    Levels are freed where that leaves nothing wrong: if nothing was before, by significantly more
+    without another effect, else with no more effects. What no effect explains may move any level.
     """
     before, fit.freed = fit.freed, fit.freed | unlikely
     chosen, astray = _selected(fit, catalogue, report)
     was, now = likely[0].best, chosen.best
-    whole = _clean(fit, chosen) and not _clean(fit, likely[0])
-    fewer = len(now.active) <= len(was.active) if whole else {*now.active} <= {*was.active}
-    if fewer and beyond(was, now) > fit.decides.fall:
+    clean = _clean(fit, likely[0])
+    fewer = {*now.active} <= {*was.active} if clean else len(now.active) <= len(was.active)
+    if _clean(fit, chosen) and fewer and beyond(was, now) > fit.decides.fall:
         return chosen, astray
     fit.freed = before
     return likely
