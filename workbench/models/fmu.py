@@ -156,7 +156,8 @@ _LOGGING: WeakValueDictionary[int, "FMUInstance"] = WeakValueDictionary()
 
 def _log_formatted(environment: int | None, *arguments: Any) -> None:
     """Hand a message to the instance of its environment; to the last one if an FMU says none."""
-    instances = dict(_LOGGING)
+    # As items: by keys, one that is collected meanwhile would be an error.
+    instances = dict(_LOGGING.items())
     if instances:
         instances.get(environment or 0, instances[max(instances)])._note(*arguments)
 
