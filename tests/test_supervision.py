@@ -300,6 +300,32 @@ def test_who_asks_for_an_end_while_temporary_files_are_made_or_removed_leaves_no
     assert left(home) == []
 
 
+BESIDE_THREADS = """\
+import os, signal, sys, time
+from pathlib import Path
+from workbench.runtime.supervision import supervised
+
+
+def work():
+    tasks, deadline = Path(f"/proc/{os.getppid()}/task"), time.monotonic() + 10.0
+    while len(others := [t for t in tasks.iterdir() if int(t.name) != os.getppid()]) < 1:
+        assert time.monotonic() < deadline
+    masks = [(t / "status").read_text().partition("SigBlk:")[2].split()[0] for t in others]
+    return sum(not int(mask, 16) >> (signal.SIGTERM - 1) & 1 for mask in masks)
+
+
+sys.exit(supervised(work))
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="no system of /proc")
+def test_a_request_to_end_reaches_no_thread_beside_the_one_that_removes_files(home):
+    """One that took it as it ends would end the process before its files are removed."""
+    (home / "work.py").write_text(BESIDE_THREADS)
+    run = python("work.py", cwd=home)
+    assert (run.returncode, run.stderr) == (0, "")
+
+
 @contextmanager
 def waiting(folder: Path, hostile_path: Path) -> "Iterator[Popen[str]]":
     """A check that waits for a model, in the middle of its work."""

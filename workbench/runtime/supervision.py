@@ -228,7 +228,9 @@ def supervised(
             return _worked(work, status_pipe, secret)
         os.close(status_pipe)
         _control(_ADOPT, 1)
-        with _passing_on(child), _watching(child, Watch(heart, limit)) as ended:
+        # The thread that watches starts while requests wait, and so takes none: one that it took as
+        # it ends would end this process, which has files to remove.
+        with _watching(child, Watch(heart, limit)) as ended, _passing_on(child):
             _, ending = os.waitpid(child, 0)
         stuck = ended.is_set()
         _end_the_rest(child)
