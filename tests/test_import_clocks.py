@@ -353,6 +353,42 @@ def test_stamps_coarser_than_samples_tell_the_rate(tmp_path, tank):
         clock(path, tank)
 
 
+def rows_at_events(path: Path, rows: Sequence[tuple[float, float | str, float | str]]) -> Path:
+    lines = [f"{time},{inflow},{level}" for time, inflow, level in rows]
+    path.write_text("\n".join(["time [s],inflow [l/s],h [mm]", *lines]))
+    return path
+
+
+def test_of_rows_of_one_time_the_last_values_are_kept(tmp_path, tank):
+    """As simulations write events: the level, which moves elsewhere, is the same in both rows."""
+    steps = [(QUARTER * k, 1.0 + (k > 30), 20.0 + 0.01 * k**2) for k in range(60)]
+    event = [(27450.0, 1.0, 29.3), (27450.0, 2.0, 29.3)]
+    recorded = read_recorded_file(rows_at_events(tmp_path / "a.csv", sorted([*steps, *event])))
+    proposed = propose([recorded], tank, {})
+    (own,) = proposed.clocks.values()
+    assert "1 rows have the time of the row before" in own.reason
+    held = merge([recorded], proposed, tank)
+    assert held.time.size == 61
+    assert held.signals["inflow"][held.time == 27450.0] == pytest.approx(2e-3)
+    assert not held.doubts  # the inflow stays as it is set; a line to its jump would be told
+
+
+def test_rows_of_one_time_that_hold_other_channels_are_all_read(tmp_path, tank):
+    often = [(QUARTER * k, 1.0 + k % 3, "") for k in range(60)]
+    seldom = [(QUARTER * k, "", 20.0 + k) for k in range(0, 60, 2)]
+    rows = sorted([*often, *seldom], key=lambda row: row[0])
+    recorded = read_recorded_file(rows_at_events(tmp_path / "a.csv", rows))
+    held = merge([recorded], propose([recorded], tank, {}), tank)
+    assert_allclose(held.signals["inflow"], 1e-3 * (1.0 + np.arange(0, 60, 2) % 3))
+    assert_allclose(held.signals["h"], 1e-3 * (20.0 + np.arange(0, 60, 2)))
+
+
+def test_a_row_of_the_time_before_in_which_all_moves_is_refused(tmp_path, tank):
+    rows = [(QUARTER * min(k, 40), 1.0 + k % 7, 20.0 + k) for k in range(42)]
+    with pytest.raises(InputError, match="36000 s after 36000 s in sample 42"):
+        clock(rows_at_events(tmp_path / "a.csv", rows), tank)
+
+
 COUNTED = [str(900 * k) for k in range(60)]
 
 

@@ -153,10 +153,13 @@ def test_kelvin_is_no_reading_of_a_variable_in_degrees_celsius(tmp_path, ice, ca
     assert "[degC], which the workbench does not convert" in capsys.readouterr().err
 
 
-def test_a_unit_that_nobody_states_is_asked_about_where_it_has_a_zero_of_its_own(tmp_path, ice):
+def test_a_unit_that_nobody_states_is_asked_about_where_it_has_a_zero_of_its_own(
+    tmp_path, ice, capsys
+):
     text = drafted(ice, ice_log(tmp_path / "log.csv", "time [s],room [degC],box"))
     assert "# QUESTION: box: no unit in the file, [degC] of the model is taken" in text
     assert "# QUESTION: room" not in text
+    assert "warning" not in capsys.readouterr().err  # [degC] as it is contradicts no file
 
 
 def test_a_signal_a_thousand_times_its_start_is_asked_about(tmp_path, ice):

@@ -57,6 +57,8 @@ _MIDNIGHT = 0.5  # of a day, by which times go back at its end
 _UNITS_APART = (60.0, 3600.0, 86400.0, 1e3, 1e6, 1e9)
 _DAYS_OF_YEAR = frozenset(("doy", "yday", "jday"))
 _TWO_PARTS = re.compile(r"\d{1,4}:\d\d")
+_COARSE = 0.3  # of all rows: more that repeat a time are samples of one coarse stamp
+_BY_CHANCE = 1e-3  # that a channel which moves from row to row stays in all rows of one time
 _FACTOR = 1.5  # by which two clocks of one recording do not differ
 
 
@@ -116,22 +118,23 @@ def _read_clock(
         own = (*group.channels, *group.left)
         channel_of_time = next((channel for channel in own if channel.name == named.channel), None)
         if channel_of_time is not None:
-            return _going_on(_named_clock(channel_of_time, named, system, where), where)
+            return _going_on(_named_clock(channel_of_time, named, system, where), group, where)
     if group.time is not None:
         time, said = group.time, "the file says it"
         own_clock = Clock("", time.values, said, start=time.start, zoned=time.zoned)
         beside = [c for channel in group.channels if (c := _candidate(channel, group, system))]
-        going = [clock for clock in beside if clock.certain and _increases(clock.times)]
-        _refuse_contradiction([_going_on(own_clock, where), *going], where)
+        going = [clock for clock in beside if clock.certain and _goes_on(clock.times, group)]
+        own_clock = _going_on(own_clock, group, where)
+        _refuse_contradiction([own_clock, *going], where)
         return own_clock
     if (weeks := _weeks_of_gps(group)) is not None:
-        return _going_on(weeks, where)
+        return _going_on(weeks, group, where)
     # Stamps are often coarser than a counted time beside them.
     channels = sorted(group.channels, key=lambda channel: channel.stamp)
     clocks = [clock for channel in channels if (clock := _candidate(channel, group, system))]
-    if going := [clock for clock in clocks if clock.certain and _increases(clock.times)]:
+    if going := [clock for clock in clocks if clock.certain and _goes_on(clock.times, group)]:
         _refuse_contradiction(going, where)
-        return _beside_stated(going[0], group.step, where)
+        return _beside_stated(_going_on(going[0], group, where), group.step, where)
     for channel in channels:
         if channel.doubt:
             raise InputError(
@@ -150,12 +153,13 @@ def _read_clock(
         )
     back = [c for c in clocks if c.certain and is_time(c.channel) and _goes_back(c.times)]
     if back:  # segments, between which a stated rate knows no gap
-        return _going_on(back[0], where)
+        return _going_on(back[0], group, where)
     if math.isfinite(group.step):
         said = f"every {group.step:g} s, as the file says"
         return Clock("", count * group.step, said, certain=False, counted=True)
     if clocks:
-        return _going_on(next((c for c in clocks if _increases(c.times)), clocks[0]), where)
+        first = next((c for c in clocks if _goes_on(c.times, group)), clocks[0])
+        return _going_on(first, group, where)
     raise _no_time(group, system, where)
 
 
@@ -482,6 +486,7 @@ def _unit_reason(unit: str) -> str:
 def _likely_units(values: Vector, system: System) -> list[str]:
     """The units in which times step as those of usual recordings."""
     steps = np.diff(values[np.isfinite(values)])
+    steps = steps[steps != 0.0]
     usual = float(np.median(steps)) if steps.size else 0.0
     scales = {unit: conversion(unit, "s") for unit in _UNSTATED}
     ratios = {u: usual * s.factor / system.sample_time for u, s in scales.items() if s}
@@ -493,27 +498,74 @@ def _increases(times: Vector) -> bool:
     return held.size > 1 and bool((np.diff(held) > 0).all())
 
 
+def _goes_on(times: Vector, group: Group) -> bool:
+    """Whether times go on, but for rows of one time that hold one sample, or an event."""
+    return _increases(times) or _rows_of_one_time(times, group) > 0
+
+
+def _rows_of_one_time(times: Vector, group: Group) -> int:
+    """How many rows have the time of the row before, where all of them may have it; else 0.
+
+    Loggers write channels of several rates into rows of their own, or a row twice. Simulations
+    write a row before an event and one after it: what moves between all other rows stays there.
+    If all channels move between rows of one time, the stamps are coarser than the samples.
+    """
+    rows = np.flatnonzero(np.isfinite(times))
+    steps = np.diff(times[rows])
+    again = steps == 0.0
+    if not again.any() or again.all() or (steps < 0.0).any():
+        return 0
+    jumps, chance = np.zeros(steps.size, dtype=bool), 1.0
+    for channel in group.channels:
+        values = channel.values[rows]
+        moves = np.diff(values)
+        within, between = (moves[kind & np.isfinite(moves)] for kind in (again, ~again))
+        if not within.size or not between.size or _is_clock(channel, moves, steps):
+            continue
+        jumps |= again & np.isfinite(moves) & (moves != 0.0)
+        if not within.any():
+            chance = min(chance, float((between == 0.0).mean()) ** within.size)
+    event = again.mean() < _COARSE and chance < _BY_CHANCE
+    return int(again.sum()) if event or not jumps.any() else 0
+
+
+def _is_clock(channel: FileChannel, moves: Vector, steps: Vector) -> bool:
+    """Whether a channel moves as the times do, or counts parts of them."""
+    if channel.stamp or is_time(channel.name):
+        return True
+    known = np.isfinite(moves) & (steps > 0.0)
+    rates = moves[known] / steps[known]
+    usual = float(np.median(rates)) if rates.size else 0.0
+    return usual != 0.0 and float(np.isclose(rates, usual, rtol=1e-3).mean()) > 0.9
+
+
 def _goes_back(times: Vector) -> bool:
     return bool((np.diff(times[np.isfinite(times)]) < 0).any())
 
 
-def _going_on(clock: Clock, where: str) -> Clock:
+def _going_on(clock: Clock, group: Group, where: str) -> Clock:
     """The clock, if it goes on from sample to sample."""
     if _increases(clock.times):
         return clock
+    if again := _rows_of_one_time(clock.times, group):
+        said = f"{again} rows have the time of the row before; of one time, the last value is kept"
+        return replace(clock, reason=f"{clock.reason}; {said}")
     held = clock.times[np.isfinite(clock.times)]
     late = int(np.argmin(np.diff(held) > 0)) if held.size > 1 else -1
     fault = f"{held[late + 1]:.9g} s after {held[late]:.9g} s" if late >= 0 else "no times"
     count = int((np.diff(held) <= 0).sum()) if held.size > 1 else 0
     fault += f" in sample {late + 2}" + (f", and {count - 1} more" if count > 1 else "")
-    remedy = "if samples are evenly spaced say how, --sample-rate '200 Hz'; else export more digits"
+    remedy = (
+        "if samples are evenly spaced say how, --sample-rate '200 Hz'; else export more digits, "
+        "and results of a simulation without rows at its events"
+    )
     if held.size > 1 and (np.diff(held) < 0).all():
         fault += ": the newest sample stands first"
         remedy = "sort the rows by their time"
     elif held.size > 1 and (held[1:][np.diff(held) <= 0] <= held[0]).all() and held[0] < held[-1]:
         fault += ": times begin anew"
         remedy = f"part the file before sample {late + 2}, where another recording begins"
-    elif held.size > 1 and count >= 0.3 * held.size and not (np.diff(held) < 0).any():
+    elif held.size > 1 and count >= _COARSE * held.size and not (np.diff(held) < 0).any():
         fault += ": stamps are coarser than samples"
         # From the first sample of one stamp to that of another: both ends may be cut.
         first = np.flatnonzero(np.diff(held) > 0) + 1
@@ -521,7 +573,10 @@ def _going_on(clock: Clock, where: str) -> Clock:
         if first.size > 1:
             rate = (first[-1] - first[0]) / (held[first[-1]] - held[first[0]])
             about = f", about --sample-rate '{rate:.4g} Hz'"
-        remedy = f"say the rate{about}, or export more digits"
+        remedy = (
+            f"say the rate{about}, or export more digits, and results of a simulation without rows "
+            "at its events"
+        )
     raise InputError(
         where=f"{where}, '{clock.channel}'" if clock.channel else where,
         found=fault,

@@ -46,6 +46,7 @@ class _Track:
     step: float
     missing: int
     censored: Vector  # times at which the file says only a bound; nothing goes across them
+    jumps: bool  # whether it moves between rows of one time
 
 
 def merge(
@@ -122,6 +123,12 @@ def merge(
         for text in clock.corrections
     ]
     doubts = *damaged, *proposal.contradictions, *mended, *_mixed_groups(files, proposal)
+    mended += [
+        f"{track.signal.name}: it jumps between rows of one time, and is taken to move in a "
+        "straight line from the sample before; if it is set and stays, add held = true to it"
+        for track in tracks
+        if track.jumps and track.signal.hold == 0.0 and track.signal in system.inputs
+    ]
     zoned = bool(begun) and all(c.zoned for c in proposal.clocks.values() if math.isfinite(c.start))
     return MergedRecording(time[known], signals, zero, tuple(notes), doubts, zoned)
 
@@ -178,9 +185,13 @@ def _track(signal: Signal, assigned: Assignment, proposal: ProposedMapping, star
             expected=f"samples of {signal.label}",
             remedy="name another channel",
         )
-    step = float(np.median(np.diff(times[held])))
+    steps = np.diff(times[held])
+    step = float(np.median(steps[steps != 0.0]))
     bounds = times[list(assigned.channel.censored)]
-    return _Track(signal, times[held], values[held], step, int((~held).sum()), bounds)
+    last = np.append(np.diff(times[held]) != 0.0, True)  # of rows of one time
+    jumps = bool((np.diff(values[held])[~last[:-1]] != 0.0).any())
+    missing = int((~held).sum())
+    return _Track(signal, times[held][last], values[held][last], step, missing, bounds, jumps)
 
 
 def _at(track: _Track, time: Vector, limit: float) -> tuple[Vector, np.ndarray]:

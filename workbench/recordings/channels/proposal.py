@@ -303,7 +303,9 @@ def _contradictions(
         ways = [
             conversion_to(unit, signal, system) for unit in (channel.unit, channel.channel.unit)
         ]
-        if channel.channel.unit and ways[0] != ways[1]:
+        # Values of a unit with a zero of its own, as degC, are taken as they are: [1].
+        plain = channel.unit == "1" and _has_zero(channel.channel.unit)
+        if channel.channel.unit and ways[0] != ways[1] and not plain:
             yield _contradiction(
                 files[channel.file], channel.label, channel.unit, channel.channel.unit
             )
@@ -317,6 +319,12 @@ def _contradictions(
             and conversion(clock.unit, "s") != conversion(stated, "s")
         ):
             yield _contradiction(files[i], clock.channel, clock.unit, stated)
+
+
+def _has_zero(unit: str) -> bool:
+    """Whether a unit is one of temperatures whose zero is not that of kelvin."""
+    scale = conversion(unit, "K")
+    return scale is not None and scale.zero != 0.0
 
 
 def _contradiction(file: RecordedFile, channel: str, unit: str, stated: str) -> str:
