@@ -160,14 +160,15 @@ FORMS = [
     *("%d/%b/%Y:%H:%M:%S", "%m/%d/%Y %p %I:%M:%S", "%a %d.%m.%Y %H:%M", "%Y-%jT%H:%M:%S"),
     *("%a, %d %b %Y %H:%M:%S GMT", "%Y-%m-%dT%H:%M:%S+00:00[Europe/London]"),
     *("%Y-%m-%d %H:%M:%S IST", "DT#%Y-%m-%d-%H:%M:%S"),
-    *("%Y%m%d%H%M%S000", "%a %b %d %H:%M:%S UTC %Y"),
+    *("%Y%m%d%H%M%S000", "%a %b %d %H:%M:%S UTC %Y", "%m/%d/%y %I:%M:%S{half}"),
 ]
 
 
 @pytest.mark.parametrize("form", FORMS)
 def test_dates_of_any_order_are_read_as_times_go_on(tmp_path, tank, form):
-    path = table(tmp_path / "a.csv", local(datetime(2024, 3, 1, tzinfo=UTC), 300, form))
-    read_clock = clock(path, tank)
+    stamps = local(datetime(2024, 3, 1, tzinfo=UTC), 300, form)
+    stamps = [stamp.format(half="ap"[k // 48 % 2]) for k, stamp in enumerate(stamps)]
+    read_clock = clock(table(tmp_path / "a.csv", stamps), tank)
     assert_allclose(read_clock.times, QUARTER * np.arange(300))
     assert iso(read_clock.start).startswith("2024-03-01")
 
@@ -176,6 +177,8 @@ def test_dates_of_any_order_are_read_as_times_go_on(tmp_path, tank, form):
     ("names", "form"),
     [
         ("Year;Month;Day;Hour;Minute;Second", "%Y;%m;%d;%H;%M;%S"),
+        ("YY;MM;DD;hh;mm;ss", "%Y;%m;%d;%H;%M;%S"),
+        ("Datum;Sekunde", "%d.%m.%Y %H:%M;%S"),
         ("Year;DOY;HHMM", "%Y;%j;%H%M"),
         ("Date;Time", "%Y%m%d;%H%M%S"),
         ("Date;Time", "%m/%d/%Y;%I:%M:%S %p"),
@@ -218,8 +221,33 @@ def test_hours_to_12_go_on_from_12_to_1(tmp_path, tank):
     assert_allclose(read_clock.times, QUARTER * np.arange(200))
     assert "hours count to 12" in read_clock.reason
     dated = table(tmp_path / "b.csv", local(begin, 200, "%Y-%m-%d %I:%M:%S"))
-    with pytest.raises(InputError, match=r"found .* after"):
+    with pytest.raises(InputError, match=r"12 without AM or PM.*export them to 24"):
         clock(dated, tank)
+
+
+def test_parts_of_a_second_before_the_year_count(tmp_path, tank):
+    stamps = local(datetime(2024, 3, 1, tzinfo=UTC), 60, "%a %b %d %H:%M:%S.250 %Y")
+    stamps[1::2] = [stamp.replace(".250", ".750") for stamp in stamps[1::2]]
+    read_clock = clock(table(tmp_path / "a.csv", stamps), tank)
+    assert_allclose(read_clock.times, QUARTER * np.arange(60) + 0.5 * (np.arange(60) % 2))
+
+
+def test_times_go_on_behind_a_leap_second(tmp_path, tank):
+    """That of 2016, in UTC: the minute has 61 seconds."""
+    stamps = [f"2016-12-31T23:59:{k:02d}Z" for k in range(61)]
+    stamps += [f"2017-01-01T00:00:{k:02d}Z" for k in range(60)]
+    read_clock = clock(table(tmp_path / "a.csv", stamps), tank)
+    assert_allclose(read_clock.times, np.arange(121))
+    assert "a leap second" in read_clock.corrections[0]
+    rounded = [f"2024-03-01 10:{k:02d}:60" for k in range(59)]  # by a logger that rounds
+    assert_allclose(clock(table(tmp_path / "b.csv", rounded), tank).times, 60.0 * np.arange(59))
+
+
+def test_rows_that_were_mixed_are_to_be_sorted(tmp_path, tank):
+    stamps = local(datetime(2024, 3, 1, tzinfo=UTC), 60, "%Y-%m-%d %H:%M")
+    stamps[30:32] = stamps[31:29:-1]
+    with pytest.raises(InputError, match=r"-?\d+ s after \d+ s in sample 32.*sort the rows"):
+        clock(table(tmp_path / "a.csv", stamps), tank)
 
 
 def test_an_hour_that_may_be_missing_is_told(tmp_path, tank):

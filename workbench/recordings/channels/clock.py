@@ -142,7 +142,7 @@ def _read_clock(
                 found=channel.doubt,
                 expected="times that go on in one way",
                 remedy=f"say the order of days, --column '{TIME}={channel.name} [YMD]', or [DMY] "
-                "or [MDY]",
+                "or [MDY]; where hours count to 12, export them to 24",
             )
     if group.step_doubt:
         raise InputError(
@@ -463,7 +463,8 @@ def _weeks_of_gps(group: Group) -> Clock | None:
     first = float(week.values[0])
     start = 7.0 * _DAY * first + _GPS if first >= 1024.0 else math.nan
     reason = f"weeks of GPS, with {within.name}"
-    return Clock(within.name, times, reason, start=start, zoned=True)
+    unit = within.unit if parts else "s" if factor == 1.0 else "ms"
+    return Clock(within.name, times, reason, start=start, unit=unit, zoned=True)
 
 
 def _by_1904(start: float) -> tuple[str, ...]:
@@ -565,6 +566,8 @@ def _going_on(clock: Clock, group: Group, where: str) -> Clock:
     elif held.size > 1 and (held[1:][np.diff(held) <= 0] <= held[0]).all() and held[0] < held[-1]:
         fault += ": times begin anew"
         remedy = f"part the file before sample {late + 2}, where another recording begins"
+    elif held.size > 1 and count < 0.1 * held.size and np.unique(held).size == held.size:
+        remedy = "sort the rows by their time if they were mixed, or part the file there"
     elif held.size > 1 and count >= _COARSE * held.size and not (np.diff(held) < 0).any():
         fault += ": stamps are coarser than samples"
         # From the first sample of one stamp to that of another: both ends may be cut.

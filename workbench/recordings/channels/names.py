@@ -18,7 +18,7 @@ _TIME_WORDS = frozenset(
     "time t zeit timestamp zeitstempel datum date datetime uhrzeit temps tiempo tempo elapsed "  # noqa: SIM905
     "clock epoch unix tick ticks utc messzeit relativzeit reltime datenum doy yday jday jd mjd "
     "julian filetime gps hhmm hhmmss ts "
-    "unixtime posixtime epochtime".split()
+    "unixtime posixtime epochtime 日時 日付 日期 时间 時間 時刻".split()
 )
 # A value that is asked for is no measurement: words, and what tells within one, as in German.
 _ASKED = frozenset(("set", "sp", "cmd", "req", "dmd", "ref", "reference"))

@@ -72,7 +72,9 @@ _NAME_ROW = re.compile(
     r"((channel|kanal|signal|trace|sensor)[ _]?)?(names?|bezeichnung)\W*|kanal|channel|signal",
     re.IGNORECASE,
 )
-_UNIT_ROW = re.compile(r"(y[ _]|v)?(units?|unit[ _]label|einheit(en)?)\W*", re.IGNORECASE)
+_UNIT_ROW = re.compile(
+    r"(y[ _]|v|eng(ineering)?[ _]?)?(units?|unit[ _]label|einheit(en)?)\W*", re.IGNORECASE
+)
 _TIME_NAME = re.compile(r"(time|zeit|date|datum)", re.IGNORECASE)
 _RULE = re.compile(r"[-=_+]+")  # of a table that is drawn
 _REMARK = re.compile(r"comments?|remarks?|notes?|kommentar|bemerkung", re.IGNORECASE)
@@ -95,7 +97,8 @@ _WORDS = re.compile(r"[^\W\d_]+")
 _LETTERS = frozenset("abcdefghijklmnopqrstuvwxyz")  # that count columns: Time A, Time B; t1 has one
 # What recorders write into a row of units above record numbers, dates and times.
 _NO_UNIT = re.compile(
-    r"(ts|rn|no|nr|num|number|#|date|time|datum|zeit|date ?& ?time|id|index|text|sequence)\.?"
+    r"(ts|rn|no|nr|num|number|#|date|time|datum|zeit|date ?& ?time|id|index|text|sequence"
+    r"|yr|mo|dy|hr|mn)\.?"  # parts of a date, of buoys
     r"|[A-Z]\d{4,}",  # of Graphtec's alarms
     re.IGNORECASE,
 )
@@ -105,7 +108,8 @@ _PARTS_OF_TAGS = {
     **dict.fromkeys(
         ("kanal", "sensor", "point", "measurement", "_field", "messstelle", "varname"), "tag"
     ),
-    **dict.fromkeys(("value", "wert", "_value", "messwert", "val", "varvalue"), "value"),
+    **dict.fromkeys(("series", "metric", "entity_id"), "tag"),  # of Grafana and Home Assistant
+    **dict.fromkeys(("value", "wert", "_value", "messwert", "val", "varvalue", "state"), "value"),
     **dict.fromkeys(("unit", "units", "einheit", "uom"), "unit"),
 }
 # Columns that hold parts of a second beside time stamps, and digits of these.
@@ -117,9 +121,9 @@ _PARTS = {
 }
 # Columns that hold parts of a date, by their names in small letters.
 _PARTS_OF_TIME = {
-    **dict.fromkeys(("year", "yr", "yyyy", "jahr"), "year"),
-    **dict.fromkeys(("month", "mon", "mm", "monat"), "month"),
-    **dict.fromkeys(("day", "dd", "tag"), "day"),
+    **dict.fromkeys(("year", "yr", "yyyy", "yy", "jahr"), "year"),
+    **dict.fromkeys(("month", "mon", "mo", "mm", "monat"), "month"),
+    **dict.fromkeys(("day", "dd", "dy", "tag"), "day"),
     **dict.fromkeys(("doy", "yday", "jday", "day of year", "julian day", "day_rtm"), "yday"),
     **dict.fromkeys(("hour", "hours", "hr", "hh", "stunde"), "hour"),
     **dict.fromkeys(("minute", "minutes", "min", "mi", "mn"), "minute"),
@@ -136,6 +140,9 @@ _WORD = re.compile(r"[\d./:-][\d./:T\s-]{6,}[\d](\.\d+)?(\s*[AP]M\b)?|[\d./:-]{8
 _AT_MIDNIGHT = re.compile(r"[T\s]+(0?0:00(:00([.,]0+)?)?|12:00(:00)?\s*AM)$", re.IGNORECASE)
 _WHOLE_SECONDS = re.compile(
     r"(?P<whole>.*\d:\d\d:\d\d|\d+)(?P<half>(\s*[AP]\.?M\.?)?)", re.IGNORECASE
+)
+_WHOLE_MINUTES = re.compile(
+    r"(?P<whole>(.*[T\s])?\d{1,2}:\d\d)(?P<half>(\s*[AP]\.?M\.?)?)", re.IGNORECASE
 )
 _LAST_WORD = re.compile(r"(.*?)([^\W_]*)$")  # header.stamp.nsec, tv_usec
 
@@ -173,7 +180,10 @@ def find_table(rows: Sequence[Sequence[str]], lines: Sequence[int], where: str) 
         samples = _samples(rows, lines, lambda row: _is_data(_without_units(row)))
     width = Counter(len(rows[i]) for i in samples).most_common(1)[0][0] if samples else 0
     # A line of a preamble may hold numbers, too, but not several one after the other.
-    first = next((i for i, j in zip(samples, samples[2:], strict=False) if j == i + 2), None)
+    # Between samples of slow channels, those of fast ones may have a time alone.
+    known = sorted({*samples, *(i for i, row in enumerate(rows) if _is_time_alone(row, width))})
+    runs = (i for i, j in zip(known, known[2:], strict=False) if j == i + 2)
+    first = next((i for i in runs if samples), None)
     if first is None or width < 2:
         raise InputError(
             where=where,
@@ -183,6 +193,9 @@ def find_table(rows: Sequence[Sequence[str]], lines: Sequence[int], where: str) 
         )
     _refuse_scales(rows[:first], lines, width, where)
     names, units = _header(rows[:first], width)
+    own = len(_trim(names)) - 1
+    if len(units) == own > 0 and _TIME_NAME.match(names[0]) and conversion(units[0], "s") is None:
+        units = ["", *units]  # between spaces, dates and times have none
     head = tuple(" ".join(filter(None, row)) for row in rows[:first])
     kept = [i for i in samples if i >= first]
     body = [list(rows[i][:width]) for i in kept]
@@ -331,6 +344,12 @@ def _is_data(row: Sequence[str]) -> bool:
     held = [cell.strip() for cell in row if not is_missing(cell)]
     count = sum(is_number(cell) or is_stamp(cell) for cell in held)
     return count >= min(2, max(1, len(row) - 1)) and 3 * count > len(held)
+
+
+def _is_time_alone(row: Sequence[str], width: int) -> bool:
+    """Whether a row of a table has a time or a number in its first cell, and nothing else."""
+    text = row[0].strip() if len(row) == width > 1 else ""
+    return bool(text) and not any(map(str.strip, row[1:])) and (is_number(text) or is_stamp(text))
 
 
 def _header(above: Sequence[Sequence[str]], width: int) -> tuple[list[str], list[str]]:
@@ -702,6 +721,7 @@ def _join_date_parts(
     at: dict[str, int] = {}
     for i, (name, _) in enumerate(labels):
         part = _PARTS_OF_TIME.get(name.casefold())
+        part = "minute" if name == "mm" and "hour" in at else part  # MM DD hh mm
         if part and part not in at and all(_FIGURES.fullmatch(cell) for cell in columns[i] if cell):
             at[part] = i
     dates = (
@@ -776,10 +796,17 @@ def _with_parts(
     """The same columns, with times of whole seconds and their parts of a second as one.
 
     The times are time stamps, or seconds of a counter whose name differs by `sec` for `nsec` alone.
+    Seconds may stand beside stamps of whole minutes.
     """
     stamps = [i for i, cells in enumerate(columns) if _mostly(cells, is_stamp)]
     stamped = len(stamps) == 1 and not has_fraction(columns[stamps[0]])
     for i, (name, unit) in enumerate(labels):
+        if stamped and _PARTS_OF_TIME.get(name.casefold()) == "second":
+            moments = columns[stamps[0]]
+            if joined := _join_seconds(moments, columns[i]):
+                left = [k for k in range(len(columns)) if k not in (stamps[0], i)]
+                label = f"{labels[stamps[0]][0]} {name}", ""
+                return [label, *(labels[k] for k in left)], [joined, *(columns[k] for k in left)]
         begin, last = _LAST_WORD.findall(name.casefold().strip("[]()"))[0]
         if f"{begin}{last}" in ("time", "zeit"):  # Time [ms]
             last = unit.casefold()
@@ -801,6 +828,17 @@ def _with_parts(
             label = f"time {labels[at][0]} {name}", "s"
         return [label, *(labels[k] for k in left)], [joined, *(columns[k] for k in left)]
     return labels, columns
+
+
+def _join_seconds(moments: list[str], seconds: list[str]) -> list[str] | None:
+    """Stamps of whole minutes with their seconds behind them; None where they are not such."""
+    joined = []
+    for moment, part in zip(moments, seconds, strict=True):
+        match = _WHOLE_MINUTES.fullmatch(moment)
+        if match is None or not _FIGURES.fullmatch(part) or float(part.replace(",", ".")) >= 60.0:
+            return None
+        joined.append(f"{match['whole']}:{_two_figures(part)}{match['half']}")
+    return joined
 
 
 def _repeats(cells: Sequence[str]) -> bool:

@@ -18,7 +18,7 @@ import numpy as np
 from workbench.arrays import Vector
 from workbench.recordings.formats.contents import FileChannel
 
-_HALF = r"(?P<half>[AaPp])\.?[Mm]\.?"
+_HALF = r"(?P<half>[AaPp])(\.?[Mm]\.?)?"
 _PARTS_OF_DAY = r"(?P<h>\d{1,2}):(?P<m>\d\d)(:(?P<s>\d\d)((?P<dot>[.,:])(?P<f>\d{1,12}))?)?"
 _CLOCK = rf"{_PARTS_OF_DAY}(\s*{_HALF})?"
 # Behind a date, hours and minutes may be parted by other signs, and stand alone with AM or PM.
@@ -209,7 +209,7 @@ def has_day_alone(cells: Sequence[str]) -> bool:
 def has_fraction(cells: Sequence[str]) -> bool:
     """Whether times of a column have parts of a second."""
     matches = (_match(cell.strip()) for cell in cells)
-    return any(match is not None and match.groupdict().get("f") for match in matches)
+    return any(_of_second(match)["f"] for match in matches)
 
 
 def _first_day(cells: Sequence[str]) -> re.Match[str] | None:
@@ -295,10 +295,10 @@ def _by_date(
             days = _days(matches, reading)
         except ValueError:  # a 31st of February
             continue
-        whole = days + clocks
+        whole, leap = _with_leap_second(matches, days + clocks, parts)
         zoned = bool(zones) and not local
         channel = _channel(name, texts, known, (whole, parts, shift), zone, zoned=zoned)
-        readings[reading] = replace(channel, corrections=(*said, *channel.corrections))
+        readings[reading] = replace(channel, corrections=(*said, *leap, *channel.corrections))
     return _choose_reading(name, texts, readings, matches)
 
 
@@ -375,9 +375,11 @@ def _choose_reading(
         return None
     order, channel = next(iter(left.items()))
     others = [other for key, other in left.items() if key != order]
-    if not others:
+    if not others and (going or not _twelve_hours(matches)):
         return channel
-    if all(np.array_equal(channel.values, other.values, equal_nan=True) for other in others):
+    if going and all(
+        np.array_equal(channel.values, other.values, equal_nan=True) for other in others
+    ):
         # The day is not known, the times are; points are German, the day first.
         points = all(match is None or match["mark"] == "." for match in matches)
         compact = all(match is None or match["mark"] == "" for match in matches)  # as YYMMDD
@@ -606,7 +608,7 @@ def _clock(match: re.Match[str]) -> int:
 
 def _fractions(matches: Sequence[re.Match[str] | None]) -> Vector:
     """Parts of a second, (n,); behind a colon they count milliseconds where digits differ."""
-    digits = [(match.groupdict() if match else {}) for match in matches]
+    digits = [_of_second(match) for match in matches]
     held = [own for own in digits if own.get("f")]
     if not held:
         return np.zeros(len(matches))
@@ -615,6 +617,12 @@ def _fractions(matches: Sequence[re.Match[str] | None]) -> Vector:
     if colons and max(widths) <= 3 < 3 * len(widths):
         return np.array([int(own["f"]) * 1e-3 if own.get("f") else 0.0 for own in digits])
     return np.array([float(f"0.{own['f']}") if own.get("f") else 0.0 for own in digits])
+
+
+def _of_second(match: re.Match[str] | None) -> dict[str, str]:
+    """Parts of a second, `f`, also before the year, and what stands before them, `dot`."""
+    parts = match.groupdict() if match else {}
+    return {"f": parts.get("f") or parts.get("cf") or "", "dot": parts.get("dot") or ""}
 
 
 def _counted_frames(
@@ -639,6 +647,17 @@ def _counted_frames(
         rate = 0
     said = [f"behind the last colon are frames, {rate} in a second"] if rate else []
     return frames / rate if rate else parts, said
+
+
+def _with_leap_second(
+    matches: Sequence[re.Match[str] | None], whole: np.ndarray, parts: Vector
+) -> tuple[np.ndarray, list[str]]:
+    """Whole seconds, (n,), a second later behind a 60th second that the next minute repeats."""
+    leaps = [k for k, match in enumerate(matches) if match and match.groupdict().get("s") == "60"]
+    after = leaps[-1] + 1 if leaps else len(matches)
+    if after >= whole.size or (whole + parts)[after] > (whole + parts)[after - 1]:
+        return whole, []
+    return whole + (np.arange(whole.size) >= after), ["a leap second: later times go on behind it"]
 
 
 def _from_first(times: Vector, known: np.ndarray) -> Vector:

@@ -18,6 +18,7 @@ from workbench.recordings.formats.stamps import is_stamp
 
 _SEPARATORS = {";": "semicolons", "\t": "tabs", "|": "bars", ",": "commas", " ": "spaces"}
 _COMMENT = re.compile(r"(?!\"#\")\s*\"?(#+|%+|//+|!+|\*+)\s*")
+_RECEIVED = re.compile(r"(?P<time>\d\d:\d\d:\d\d\.\d{1,6}) -> ")
 _BEFORE_UNIT = re.compile(r"(?<=[^\s\])])\s+(?=[\[(])")  # between a name and its unit
 _SAMPLED = 200  # lines from the middle of a file, which tell how it is laid out
 _FOLDED = 5  # lines over which a name in quotation marks may go
@@ -36,6 +37,10 @@ def read(path: Path, raw: bytes) -> Contents:
     text, encoding = _decode(path, raw)
     text = text.replace("\r\r\n", "\n").replace("\r\n", "\n").replace("\r", "\n")
     lines = text.rstrip("\n").split("\n")
+    # Monitors of serial ports put a time before what they receive.
+    if 2 * sum(_RECEIVED.match(line) is not None for line in lines) > len(lines):
+        mark = _separator(path, [_RECEIVED.sub("", line) for line in lines])
+        lines = [_RECEIVED.sub(rf"\g<time>{mark}", line) for line in lines]
     separator = _separator(path, lines)
     rows, numbers, broken = _rows(lines, separator)
     rows, padded = (rows, 0) if separator == " " else _filled(rows)
@@ -78,7 +83,8 @@ def read(path: Path, raw: bytes) -> Contents:
 
 def _cut_line(table: Cells) -> str:
     """That the last line ends within a number, in words; empty: it does not."""
-    column = [row[-1] for row in table.rows]
+    last = max((k for k, cell in enumerate(table.rows[-1]) if cell.strip()), default=-1)
+    column = [row[last] for row in table.rows]
     if not is_cut(column):
         return ""
     return (
@@ -186,6 +192,8 @@ def _filled(rows: list[list[str]]) -> tuple[list[list[str]], int]:
     width = max((len(rows[i]) for i in numeric), default=0)
     short = [i for i in numeric if len(rows[i]) < width and i < len(rows) - 1]
     habit = len(short) >= _HABIT * len(numeric)
+    if habit and rows and len(rows[-1]) in {len(rows[i]) for i in short} and _are_numbers(rows[-1]):
+        short.append(len(rows) - 1)  # as long as others
     names = rows[numeric[0] - 1] if short and habit and numeric[0] else []
     if len(names) != width or not all(map(str.strip, names)) or any(map(is_number, names)):
         return rows, 0
