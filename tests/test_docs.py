@@ -203,6 +203,21 @@ def test_the_readme_says_what_the_table_says():
     assert f"the Kalman filters up to {max(observers[2:]):.2f} %" in text
 
 
+def test_answers_in_the_readme_are_those_of_pages_that_are_run():
+    readme = ROOT / "README.md"
+    printed = {
+        line
+        for page in RUN
+        if page != readme
+        for block in blocks(page)
+        if block.kind == "text"
+        for line in block.code.split("\n")
+    }
+    answers = [block.code.strip() for block in blocks(readme) if block.kind == "text"]
+    assert len(answers) == 2
+    assert set(answers) <= printed
+
+
 def test_the_readme_says_of_machines_what_the_page_says():
     page, readme = (
         re.findall(r"^\| (.*) \|$", (ROOT / name).read_text(), re.M)

@@ -5,6 +5,7 @@ Recordings are made by SciPy from equations of their own; the FMU is used as one
 
 import re
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 
 import fmpy
@@ -44,18 +45,27 @@ def behind(signal: np.ndarray, h: float, tau: float) -> np.ndarray:
 
 
 def record(
-    folder: Path, seed: int, area=0.5, outlet=1e-3, gain=0.0, zero=0.0, late=0.0, lag=0.0, top=9.0
+    folder: Path,
+    seed: int,
+    area=0.5,
+    outlet=1e-3,
+    apart=0.0,
+    gain=0.0,
+    zero=0.0,
+    late=0.0,
+    lag=0.0,
+    top=9.0,
 ) -> Path:
-    """Four recordings of 200 s, of which each starts at another level."""
+    """Four recordings of 200 s; each starts at another level, outlets are `apart` from the next."""
     rng = np.random.default_rng(seed)
     time = np.arange(0.0, 200.25, 0.5)
     for number in range(4):
         inflow = np.repeat(rng.uniform(2e-3, 7e-3, 5), 80)[: time.size - 1]
-        level = [rng.uniform(0.5, 1.5)]
+        level, own = [rng.uniform(0.5, 1.5)], outlet * (1.0 + (number - 1.5) * apart)
         for flow in inflow:
 
-            def rate(_t, x, flow=flow):
-                return [(flow - outlet * np.sqrt(2.0 * 9.81 * x[0])) / area]
+            def rate(_t, x, flow=flow, own=own):
+                return [(flow - own * np.sqrt(2.0 * 9.81 * x[0])) / area]
 
             level.append(solve_ivp(rate, (0.0, 0.5), [level[-1]], rtol=1e-8, atol=1e-10).y[0, -1])
         flows = np.append(inflow, inflow[-1])
@@ -134,6 +144,29 @@ def test_parameters_that_act_alike_are_named_together(tank, tmp_path):
     (cause,) = outcome.diagnosis.causes
     assert {cause.effect.name, *cause.confusable_with} == {"c", "g"}
     assert "another value of" in outcome.summary()
+
+
+def test_a_parameter_that_differs_between_recordings_is_told_and_then_allowed_for(tank, tmp_path):
+    outcome = diagnosed(tank, tmp_path, seed=1, apart=0.02)
+    differing = outcome.diagnosis.differing
+    assert differing is not None
+    # c acts as the root of 2 g h, so that g differs by twice as much and explains the same.
+    assert (differing.name, differing.deviation) in (
+        ("c", pytest.approx(0.02 * np.std(range(4), ddof=1), rel=0.1)),
+        ("g", pytest.approx(0.04 * np.std(range(4), ddof=1), rel=0.1)),
+    )
+    assert differing.text in outcome.warnings
+    tolerances = {**tank.comparison.tolerances, differing.name: round(differing.deviation, 2)}
+    allowing = replace(tank, comparison=replace(tank.comparison, tolerances=tolerances))
+    assert quietly(allowing, tmp_path / "recordings").diagnosis.verdict == "nothing"
+
+
+def test_an_input_that_is_held_and_not_said_to_be_is_named_beside_the_delay(tank, tmp_path):
+    (inflow,) = tank.inputs
+    straight = replace(tank, inputs=(replace(inflow, held=False),))
+    recordings = record(tmp_path / "recordings", seed=1)
+    warnings = quietly(straight, recordings, "InputDelay[inflow]").warnings
+    assert any("write held = true in [inputs.inflow]" in warning for warning in warnings)
 
 
 @pytest.mark.long

@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from workbench.arrays import Matrix, Vector
+from workbench.diagnosis.data.clocks import DELAY, held_otherwise
 from workbench.diagnosis.data.counting import FAULTY, MISSING
+from workbench.diagnosis.effects.candidates import LAG
 from workbench.diagnosis.effects.extension import variables
 from workbench.diagnosis.inference.certainty import Certainty
 from workbench.diagnosis.inference.nuisance import remedy
@@ -216,6 +218,9 @@ class Outcome:
                 if name in named
             ),
         ]
+        shifted += [text for cause in diagnosis.causes if (text := _held(self.system, cause))]
+        if diagnosis.differing is not None:
+            shifted.append(diagnosis.differing.text)
         if diagnosis.noise_alone or diagnosis.gain is None:
             return [*limits, *shifted]
         return [
@@ -479,6 +484,20 @@ class Outcome:
             channel.name: {"before": float(b), "after": float(a)}
             for channel, b, a in zip(self.channels, before, after, strict=True)
         }
+
+
+def _held(system: System, cause: Cause) -> str:
+    """How inputs that are held otherwise would explain a cause that is a delay or a lag."""
+    names, size = {cause.effect.name, *cause.confusable_with}, cause.parameters[cause.effect.label]
+    if cause.effect.size not in (DELAY, LAG):
+        return ""
+    keys = held_otherwise(system, names, size.low, size.high)
+    writing = " and ".join(f"{key} in [inputs.{name}]" for name, key in keys.items())
+    return (
+        "Inputs that are held otherwise between samples, which are "
+        f"{with_unit(system.sample_time, 's')} apart, explain {cause.effect.name} as well. If they "
+        f"are, write {writing}, and diagnose again."
+    ) * bool(keys)
 
 
 def _late(late: LateSignals) -> str:

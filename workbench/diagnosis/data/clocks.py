@@ -5,7 +5,7 @@ an output is read as late as its logger reads it, and a motion that is led follo
 at that time.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import replace
 
 import numpy as np
@@ -62,6 +62,27 @@ def delays(system: System) -> tuple[Effect, ...]:
         separation = f"a second sensor of {signal.label}, with a clock that is known"
         effects.append(replace(clock, size=DELAY, text=text, separation=separation))
     return tuple(effects)
+
+
+def held_otherwise(system: System, effects: Set[str], low: float, high: float) -> dict[str, str]:
+    """Inputs that would act so much later if they were held otherwise, and the key that says so.
+
+    A sample that acts until the next one acts half a sample time later, on average, than one on a
+    straight line to it; one that acts since the sample before, half a sample time earlier.
+
+    Parameters
+    ----------
+    effects : names of those that explain the same; if inputs are among them, no others are meant.
+    low, high : ends of the interval of a delay or a lag of inputs behind outputs [s].
+    """
+    half, words = 0.5 * system.sample_time, {1.0: "true", 0.0: "false", -1.0: '"before"'}
+    late = [s for s in system.inputs if {f"InputDelay[{s.name}]", f"InputLag[{s.name}]"} & effects]
+    return {
+        signal.name: f"held = {word}"
+        for signal in late or system.inputs
+        for hold, word in words.items()
+        if hold != signal.hold and low <= (hold - signal.hold) * half <= high
+    }
 
 
 def _clock(system: System, kind: str, name: str, signals: tuple[str, ...]) -> Effect:

@@ -176,6 +176,12 @@ class Unknowns:
         # An amplitude has no sign: its phase has.
         return (0.0, high) if parameter == "cosine" else (low, high)
 
+    def nominal(self, effect: Effect, size: str) -> float:
+        """Size of an effect in the model that is diagnosed, SI; zero of what it lacks."""
+        name = variables(effect, size)[0]
+        usual = self._simulations.nominal[name] if effect.parameter else 0.0
+        return float(self._simulations.given.get(name, usual))
+
     def start(self) -> Point:
         """The nominal model."""
         levels: dict[Key, float] = {(name, SENSOR): 0.0 for name in self.modes}
@@ -237,9 +243,8 @@ class Unknowns:
                 start = 0.0
                 if names[0] in self.starting:
                     start = values[names[0]]
-                elif part in effect.sizes:  # in the model that is diagnosed
-                    nominal = self._simulations.nominal[names[0]] if effect.parameter else 0.0
-                    start = self._simulations.given.get(names[0], nominal)
+                elif part in effect.sizes:
+                    start = self.nominal(effect, part)
                 values |= dict.fromkeys(names, start + float(value))
         return values
 

@@ -10,6 +10,10 @@ import numpy as np
 from workbench.arrays import Matrix, Vector
 from workbench.diagnosis.effects.candidates import LAG, SHARES
 from workbench.diagnosis.effects.catalogue import Effect
+from workbench.diagnosis.inference.between_recordings import (
+    DifferingParameter,
+    differing_parameter,
+)
 from workbench.diagnosis.inference.discrepancy import (
     correlated_deviations,
     hidden_by_noise,
@@ -164,6 +168,9 @@ class Diagnosis:
     # whether causes leave no more than noise on held-out recordings; if not, what they leave widens
     # their intervals
     noise_alone: bool
+    # parameter that explains most of what remains if each recording has its own value; None: none
+    # does, or nothing remains
+    differing: DifferingParameter | None
     # signals that are late by themselves, as the system file does not say of any logger, and that
     # explain clearly more; it is then unexplained
     late: LateSignals | None
@@ -265,6 +272,7 @@ def _concluded(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagn
     if verdict == "unexplained" and late is None:
         report("candidates that come nearest")
         nearest = (outside,) if outside else _nearest(fit, chosen, objections)
+    remains = not noise_alone or (verdict == "unexplained" and late is None)
     part_of = verdict == "partly explained" or best.names in [
         candidate.effects for candidate in nearest
     ]
@@ -276,6 +284,7 @@ def _concluded(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagn
         partial=best.names if part_of else (),
         nearest=nearest,
         noise_alone=noise_alone,
+        differing=differing_parameter(fit, best, chosen.trial.joint) if remains else None,
         late=late,
         base=base,
         best=best,
