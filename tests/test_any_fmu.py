@@ -22,7 +22,7 @@ from workbench.diagnosis.effects.candidates import candidates
 from workbench.diagnosis.simulation.residual_model import ResidualModel
 from workbench.errors import FMUError, InputError
 from workbench.models.added import CONSTANT, RateTerm, write_extended
-from workbench.models.fmu import FMU, CoSimulation, EventError
+from workbench.models.fmu import FMU, CoSimulation, EventError, NoFunctionError
 from workbench.models.simulation import Drive, Simulation
 from workbench.observers import choose, estimators_of
 from workbench.observers.contract import Estimator
@@ -487,15 +487,17 @@ CONTINUOUS_POWER = VARIABLES.replace('variability="discrete"><Real/>', "><Real/>
 @pytest.mark.parametrize(
     ("flag", "said"),
     [
-        ("-DLATE", "a step was said to be over"),
-        ("-DUNREAD", "outputs are read before derivatives"),
+        ("-DLATE", "once a step is said to be over, without an event"),
+        ("-DUNREAD", "before derivatives are read"),
     ],
 )
 def test_outputs_that_follow_other_calls_alone_are_refused(flag, said, build):
     """They were those of the sample before, or of a point within the step."""
-    path = build("TIMETABLE", variables=CONTINUOUS_POWER, flags=[flag])
-    with pytest.raises(FMUError, match=rf"' is .* once {said}"):
-        FMU(path)
+    x, u = 291.0 + np.arange(3.0)[:, None], np.full((3, 1), 280.0)
+    with FMU(build("TIMETABLE", variables=CONTINUOUS_POWER, flags=[flag])) as fmu:
+        fmu.start({})
+        with pytest.raises(NoFunctionError, match=rf"' is .* {said}"):
+            fmu.require_function(["Ta"], ["P"], np.arange(3.0), x, u)
 
 
 @pytest.mark.parametrize("saves", [False, True])
@@ -549,11 +551,17 @@ def test_a_switch_in_code_that_remembers_is_refused_along_a_recording(build):
     frame = {"time [s]": time, "Ta [K]": 280.0 + noise[0], "T [K]": inside}
     case = wb.case_from_frame(system, pd.DataFrame(frame))
     settings = wb.FitSettings(starts=1, profiles=False)
-    with pytest.raises(FMUError, match=r"'der\(T\)' is .* the model remembers what came before"):
+    said = r"'der\(T\)' is .* the model remembers calls, and no event tells it"
+    with pytest.raises(FMUError, match=said):
         wb.fit(system, [case], ["G"], settings=settings, workers=1, report=lambda line: None)
-    simulation = prepare(system, {"open_loop": estimators_of(system)["open_loop"]})
-    with pytest.raises(FMUError, match="the model remembers what came before"):
-        simulation.run(case)
+    with pytest.raises(FMUError, match=said):
+        wb.diagnose(system, [case, case], effects=["G"], workers=1, report=lambda line: None)
+    with pytest.raises(FMUError, match=said):
+        wb.tune(system, "ekf", [case], workers=1, report=lambda line: None)
+    for name in ("open_loop", "ekf"):
+        run = wb.observe(system, case, name)
+        assert re.search(said, run.message)
+        assert np.isnan(run.estimate).all()
 
 
 def test_inputs_of_whole_numbers_act_in_whole_simulations(build):

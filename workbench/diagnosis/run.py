@@ -40,9 +40,9 @@ from workbench.models.fmu import FMU, EventError
 from workbench.models.modelica import Library
 from workbench.observers.estimators.disturbance import DisturbanceObserver
 from workbench.observers.estimators.kalman import ExtendedKalmanFilter
-from workbench.observers.observability import require_function
 from workbench.observers.replay import replay
 from workbench.observers.score import score
+from workbench.observers.trajectory import require_function
 from workbench.runtime.engine import Engine
 from workbench.runtime.files import write_whole
 from workbench.runtime.progress import ProgressReporter
@@ -74,7 +74,8 @@ def diagnose(
     refuse_too_few(problem.cases, problem.system, len(problem.held_out))
     if problem.library is None:
         with open_model(problem.system) as fmu:
-            require_function(fmu, problem.system, problem.cases)
+            for case in problem.cases:
+                require_function(fmu, problem.system, case)
     with tempfile.TemporaryDirectory() as scratch:
         problem, everything = _with_model(problem, Path(scratch), engine.report)
         try:

@@ -33,7 +33,13 @@ from workbench.models.description import (
     Description,
     read_description,
 )
-from workbench.models.fmu import FMU, CoSimulation, Variables, central_differences
+from workbench.models.fmu import (
+    FMU,
+    CoSimulation,
+    NoFunctionError,
+    Variables,
+    central_differences,
+)
 from workbench.models.fmu_cache import cache_folder
 from workbench.models.trial import ContainedError, NoAnswerError, describe_end, run_trial, unpacked
 from workbench.models.trial_calls import limit_processor, limit_sizes
@@ -77,6 +83,7 @@ START = CheckResult("start", limit=1, unit="instances")
 SCALARS = CheckResult("scalar states", limit=0, unit="elements of arrays")
 # The step of most observers takes the model for smooth: it would pass over a jump.
 EVENTS = CheckResult("smoothness", limit=0, unit="event indicators")
+FUNCTION = CheckResult("function of states", limit=0)
 RESET = CheckResult("reset and replay", limit=0.0)
 INJECTION = CheckResult("state injection", limit=0.0)
 ROLLBACK = CheckResult("rollback", limit=0.0)
@@ -98,15 +105,18 @@ TIME_STEP = CheckResult("time of states and step", limit=SAMPLE, unit="us")
 # Every estimator sets states and steps by the Jacobian. Kalman filters go through events where they
 # can roll back, also where they are tuned and beside a rig. What makes many instances are tuning,
 # fit and diagnosis, the last two of which simulate through events.
-_OBSERVING = (START, SCALARS, EVENTS, RESET, INJECTION, DERIVATIVES)
+_OBSERVING = (START, SCALARS, EVENTS, FUNCTION, RESET, INJECTION, DERIVATIVES)
 _OTHERS = "other observers on recordings"
 _ROLLING_BACK, _SOLVING = "tools that roll back", "tools that use its own solver"
 _USES = {
-    "open loop": (START, RESET, INJECTION),
+    "open loop": (START, FUNCTION, RESET, INJECTION),
     "ekf and ukf on recordings": _OBSERVING,
     _OTHERS: _OBSERVING,
     "tuning": (*_OBSERVING, INSTANCES, LOADS, MEMORY),
-    "fit and diagnosis": (START, RESET, INJECTION, DERIVATIVES, INSTANCES, LOADS, MEMORY),
+    "fit and diagnosis": (
+        *(START, FUNCTION, RESET, INJECTION, DERIVATIVES),
+        *(INSTANCES, LOADS, MEMORY),
+    ),
     "observers beside a running rig": (
         *_OBSERVING,
         TIME_GET,
@@ -288,6 +298,7 @@ def _limit(limits: Limits) -> None:
 
 COMMUNICATION_STEPS = 100
 _ALONE = "the FMU has no Co-Simulation"
+_VISITS, _OFF = 10, 0.01  # points that are visited twice, and shares of nominal values they are off
 
 
 @dataclass(frozen=True)
@@ -621,6 +632,26 @@ def _start(path: Path, instantiations: int) -> Iterator[CheckResult]:
     yield replace(EVENTS, passed=smooth, value=count, reason="" if smooth else reason)
 
 
+def _revisit(path: Path, instantiations: int) -> Iterator[CheckResult]:
+    with FMU(path) as fmu:
+        excitation, reason = excite(fmu), ""
+        # About the excited point, the inputs jumping half way.
+        shares = np.array([_OFF, -_OFF] * (_VISITS // 2))
+        x = excitation.states + shares[:, None] * excitation.nominal
+        u = np.where(
+            np.arange(_VISITS)[:, None] < _VISITS // 2, excitation.first, excitation.second
+        )
+        time = np.linspace(0.0, step_size(fmu) * _VISITS, _VISITS) + fmu.start_time
+        outputs = [name for name in fmu.outputs if fmu.is_real(name)]
+        fmu.start({})
+        if not fmu.is_function:
+            try:
+                fmu.require_function(excitation.inputs.names, outputs, time, x, u)
+            except NoFunctionError as error:
+                reason = str(error)
+        yield replace(FUNCTION, passed=not reason, value=int(bool(reason)), reason=reason)
+
+
 def _reset(path: Path, instantiations: int) -> Iterator[CheckResult]:
     with FMU(path) as fmu:
         everything = real_variables(fmu)
@@ -834,9 +865,10 @@ _Attempt = Callable[[Path, int], Iterator[int | CheckResult]]
 # What is run, the questions it answers, and those whose answers it rests on.
 _CHECKS: tuple[tuple[_Attempt, tuple[CheckResult, ...], tuple[CheckResult, ...]], ...] = (
     (_start, (START, SCALARS, EVENTS), ()),
-    (_reset, (RESET,), (START,)),
-    (_inject, (INJECTION,), (START,)),
-    (_roll_back, (ROLLBACK,), (START,)),
+    (_revisit, (FUNCTION,), (START,)),
+    (_reset, (RESET,), (START, FUNCTION)),
+    (_inject, (INJECTION,), (START, FUNCTION)),
+    (_roll_back, (ROLLBACK,), (START, FUNCTION)),
     (_serialise, (SERIALISATION,), (START, ROLLBACK)),
     (_roll_back_co_simulation, (ROLLBACK_CS,), (START,)),
     (_differentiate, (DERIVATIVES,), (START, SCALARS, INJECTION)),

@@ -34,7 +34,13 @@ from workbench.models.description import (
     Variable,
     read_description,
 )
-from workbench.models.trial import PROXY, derivatives_hold, remembers_steps, require_trial
+from workbench.models.trial import (
+    PROXY,
+    built_here,
+    derivatives_hold,
+    remembers_steps,
+    require_trial,
+)
 from workbench.runtime.files import TemporaryFolder, own_umask
 
 _FUNCTIONS = {
@@ -84,7 +90,7 @@ _STATUSES: Mapping[int | str, str] = {2: "discard", 3: "error", 4: "fatal", 5: "
 _WARNING, _LOGGED = 1, 3  # status of FMI; messages that an error shows
 _SAME_STEP = 1e-4  # by which sample times may differ: what rounding of time stamps leaves
 _STEP = float(np.finfo(float).eps) ** (1 / 3)  # of differences, relative
-_SAME_RATE = 1e-4  # of its change, by which iterations within a model may change a rate
+SAME_RATE = 1e-4  # of its size, by which iterations within a model may change a rate
 _MOST_ITERATIONS = 100  # of discrete states at one event; models need some
 
 _CLASSES = {
@@ -870,45 +876,68 @@ class FMU(FMUInstance):
             self.event_signs[:] = self.event_indicators() > 0.0
         return update
 
-    def require_function(
-        self, variables: tuple[Variables, Variables], time: Vector, x: Matrix, u: Matrix
-    ) -> None:
-        """Refuse rates and outputs that are others if points are visited in the opposite order.
+    @property
+    def is_function(self) -> bool:
+        """Whether nothing is to be shown by `require_function`.
 
-        As of a hysteresis in code, which no event tells; the model is left at the first point.
+        FMUs that were built here have no memory, and a Co-Simulation has its own.
+        """
+        return self.interface != MODEL_EXCHANGE or built_here(self.description)
+
+    def require_function(
+        self, inputs: Sequence[str], outputs: Sequence[str], time: Vector, x: Matrix, u: Matrix
+    ) -> None:
+        """Refuse rates and outputs that follow from more than time, states and inputs.
+
+        Each point is visited twice, in opposite orders, from where the model was started; at each,
+        outputs are read before rates, after them, and where the step is said to be over.
 
         Parameters
         ----------
-        variables : inputs and outputs.
+        inputs, outputs : names, of any types that hold numbers.
         time, x, u : (k,) of the FMU [s], (k, n) states, (k, m) inputs.
 
         Raises
         ------
         NoFunctionError
         """
-        if self.remembers_steps or self.is_own or self.interface != MODEL_EXCHANGE:
-            return
-        inputs, outputs = variables
+        able = [i for i, name in enumerate(inputs) if self.is_continuous(name)]
+        driven, shown = self.variables([inputs[i] for i in able]), self.typed(outputs)
+        names = [*self.description.rates, *outputs]
 
-        def visit(k: int) -> Vector:
+        def read() -> Vector:
+            return np.concatenate([self.derivatives(), self.get_typed(shown)])
+
+        def visit(k: int, *, ends: bool) -> Matrix:
             self.set_time(time[k])
-            self.set(inputs, u[k])
+            self.set(driven, u[k, able])
             self.set_states(x[k])
-            values = np.concatenate([self.derivatives(), self.get(outputs)])
-            self.complete_step()
-            return values
-
-        forth = np.array([visit(k) for k in range(time.size)])
-        back = np.array([visit(k) for k in reversed(range(time.size))])[::-1]
-        sizes = np.maximum(np.abs(forth), np.ptp(forth, axis=0))
-        names = [*self.description.rates, *outputs.names]
-        for k, i in np.argwhere(np.abs(back - forth) > _SAME_RATE * sizes):
-            raise NoFunctionError(
-                f"{self.called}: '{names[i]}' is {forth[k, i]:.6g} at {time[k]:.6g} s of its time, "
-                f"or {back[k, i]:.6g} at the same states and inputs if it was at later ones "
-                "before: the model remembers what came before, and no event tells it. Export it "
-                "with events where it switches, and with states for what it remembers"
+            unread = self.get_typed(shown)
+            values = read()
+            unread = np.concatenate([values[: x.shape[1]], unread])
+            return np.array(
+                [values, unread, values if not ends or self.complete_step() else read()]
             )
+
+        forth = again = np.array([visit(k, ends=True) for k in range(time.size)])
+        ends = not self.remembers_steps
+        if not ends:  # steps go on in time alone
+            self.start({})
+            again = np.array([visit(k, ends=False) for k in range(time.size)])
+        back = np.array([visit(k, ends=ends) for k in reversed(range(time.size))])[::-1]
+        for first, other, then in (
+            (forth[:, 0], forth[:, 1], "before derivatives are read"),
+            (forth[:, 0], forth[:, 2], "once a step is said to be over, without an event"),
+            (again[:, 0], back[:, 0], "there if it was at later points before"),
+        ):
+            sizes = np.maximum(np.abs(first), np.ptp(first, axis=0))
+            for k, i in np.argwhere(np.abs(other - first) > SAME_RATE * sizes):
+                raise NoFunctionError(
+                    f"{self.called}: '{names[i]}' is {first[k, i]:.6g} at {time[k]:.6g} s of its "
+                    f"time, or {other[k, i]:.6g} {then}: the model remembers calls, and no event "
+                    "tells it. Export it with events where it switches, with states for what it "
+                    "remembers, and without random numbers"
+                )
 
     def complete_step(self) -> bool:
         """Say that a step of integration is over; returns whether a step event is due.

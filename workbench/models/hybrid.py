@@ -17,7 +17,13 @@ from scipy.integrate import RK45, Radau
 from workbench.arrays import Matrix, Vector
 from workbench.errors import FMUError
 from workbench.models.explicit_steps import Samples, State, go_on
-from workbench.models.fmu import FMU, CoSimulation, TypedVariables, central_differences
+from workbench.models.fmu import (
+    FMU,
+    SAME_RATE,
+    CoSimulation,
+    TypedVariables,
+    central_differences,
+)
 from workbench.models.native import Instance, instance
 
 # Of a step, relative to the state and to its nominal value: far below what a sensor resolves.
@@ -26,7 +32,6 @@ TOLERANCE = 1e-8
 _LOOKS = 4
 # Between two samples; a model that needs more comes to rest by ever more events (Zeno).
 _MOST_EVENTS = 10_000
-_SAME_RATE = 1e-4  # of a rate, by which iterations within a model may change it
 _PILED = 500  # events from which on the pace of the last so many tells whether that comes
 
 
@@ -217,7 +222,7 @@ class HybridSimulation:
     def _require_rates(self, rates: Vector) -> None:
         """Refuse rates that the end of a step changed without an event, (n,) before it."""
         off = np.abs(self._fmu.derivatives() - rates)
-        if (off > _SAME_RATE * np.abs(rates)).any():
+        if (off > SAME_RATE * np.abs(rates)).any():
             name = self._fmu.states[int(off.argmax())]
             raise self._error(f"changes the derivative of '{name}' without an event")
 

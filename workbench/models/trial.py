@@ -69,15 +69,19 @@ def require_trial(description: Description, interface: str, folder: Path) -> Non
     FMUError
         If it answers a call with an error.
     """
-    built, borne, *_ = _marks(description, interface)
-    if description.sha256 in _packaged() or fmu_cache.is_known(built):
+    if built_here(description):
         return
-    limits = usual_limits()
+    borne, limits = _marks(description, interface)[0], usual_limits()
     if not fmu_cache.is_known(borne) and (
         refused := run_trial(description, interface, folder, limits)
     ):
         raise FMUError(refused)
     limit_memory(limits.memory)
+
+
+def built_here(description: Description) -> bool:
+    """Whether an FMU came with the workbench, or was compiled by it."""
+    return description.sha256 in _packaged() or fmu_cache.is_known(description.sha256)
 
 
 @contextmanager
@@ -91,24 +95,23 @@ def unpacked(description: Description, interface: str) -> Iterator[Path]:
 
 def derivatives_hold(description: Description) -> bool:
     """Whether an FMU that was tried has the directional derivatives that differences show."""
-    return not fmu_cache.is_known(_marks(description, MODEL_EXCHANGE)[2])
+    return not fmu_cache.is_known(_marks(description, MODEL_EXCHANGE)[1])
 
 
 def remembers_steps(description: Description) -> bool:
     """Whether rates and outputs of an FMU that was tried follow from earlier steps, too."""
-    return fmu_cache.is_known(_marks(description, MODEL_EXCHANGE)[3])
+    return fmu_cache.is_known(_marks(description, MODEL_EXCHANGE)[2])
 
 
-def _marks(description: Description, interface: str) -> tuple[str, str, str, str]:
+def _marks(description: Description, interface: str) -> tuple[str, str, str]:
     """Names under which an FMU is remembered.
 
-    That was built here; that bore its calls; whose directional derivatives are wrong; that
-    remembers steps.
+    That bore its calls; whose directional derivatives are wrong; that remembers steps.
     """
     # Co-Simulation brings a solver, which Model Exchange does not run.
     kind = "cs" if interface == CO_SIMULATION else "model-exchange"
     mark = description.sha256
-    return mark, f"{mark}-{kind}", f"{mark}-differences", f"{mark}-memory"
+    return f"{mark}-{kind}", f"{mark}-differences", f"{mark}-memory"
 
 
 @cache
@@ -179,12 +182,13 @@ def run_trial(description: Description, interface: str, folder: Path, limits: Li
         raise ContainedError(
             f"{where}: wrote to a file that another had opened, which destroys results. {tried}"
         )
+    borne, contradicted, remembers = _marks(description, interface)
     if last["contradicted"]:
-        fmu_cache.remember(_marks(description, interface)[2])
+        fmu_cache.remember(contradicted)
     if last["remembers"]:
-        fmu_cache.remember(_marks(description, interface)[3])
+        fmu_cache.remember(remembers)
     if not last["partly"]:
-        fmu_cache.remember(_marks(description, interface)[1])
+        fmu_cache.remember(borne)
     return f"{where}: {last['refused']}. {tried}" if last["refused"] else ""
 
 
@@ -235,8 +239,6 @@ def _task(description: Description, interface: str, folder: Path, limits: Limits
         "exchange": exchange,
         "states": len(description.states),
         "nominal": [abs(nominal.get(name) or 1.0) for name in description.states],
-        "rates": list(description.rates),
-        "shown": [name for name in description.names("output") if name in continuous],
         "reals": list(references.values()),
         "inputs": inputs,
         "outputs": outputs,

@@ -25,9 +25,6 @@ _STEP, _LEAST = 6e-6, 1e-3  # relative step of differences, cube root of eps; an
 _EPSILON = sys.float_info.epsilon
 _BENDS, _WRONG = 0.01, 0.1  # shares of a derivative: more is a bend, or no derivative of that rate
 _MOVED, _SAME = 0.01, 1e-4  # iterations within models end at 1e-6, calls that add up do not
-_BACK = "time, states and inputs were set to others and back"
-_UNREAD = "outputs are read before derivatives"
-_OVER = "a step was said to be over, without an event"
 _OK, _WARNING, _DISCARD, _FATAL = 0, 1, 2, 4
 _STATUS = {_DISCARD: "discard", 3: "error", _FATAL: "fatal", 5: "pending"}
 _DIE_WITH_PARENT, _ADOPT = 1, 36  # PR_SET_PDEATHSIG, PR_SET_CHILD_SUBREAPER
@@ -324,7 +321,7 @@ class _Function:
         call.reals("Get", task["inputs"], self._held)
         self._begun, self._given = list(self._states), list(self._held)
 
-    def at(self, share: float, time: float, *, only_shown: bool = False) -> list[float]:
+    def at(self, share: float, time: float) -> list[float]:
         """Values at a time [s], where states and inputs are off by a share of their sizes."""
         self._call("SetTime", _DOUBLE(time))
         self._held[:] = [u + share * max(abs(u), 1.0) for u in self._given]
@@ -333,11 +330,11 @@ class _Function:
         self._states[:] = [x + share * max(abs(x), size) for x, size in nominal]
         if self._begun:
             self._call("SetContinuousStates", self._states, _SIZE(len(self._begun)))
-        return self.read(only_shown=only_shown)
+        return self.read()
 
-    def read(self, *, only_shown: bool = False) -> list[float]:
-        """Values where it is; rates are those of before where nobody is to evaluate them."""
-        if self._begun and not only_shown:
+    def read(self) -> list[float]:
+        """Values where it is."""
+        if self._begun:
             rate = "GetContinuousStateDerivatives" if self._call.three else "GetDerivatives"
             self._call(rate, self._rates, _SIZE(len(self._begun)))
         self._call.reals("Get", self._task["outputs"], self._shown)
@@ -350,38 +347,6 @@ class _Function:
             arguments = ctypes.c_int(0), ctypes.byref(event), ctypes.byref(end)
             self._call("CompletedIntegratorStep", *arguments)
         return bool(event.value or end.value)
-
-
-def _require_function(call: _Calls, task: dict[str, Any]) -> None:
-    """Refuse rates and outputs that change where time, states and inputs are set off and back.
-
-    Or where outputs are read before rates, or a step is said to be over, without an event.
-    """
-    time = task["time"] + 1e-3 * _ROUNDS
-    try:
-        function = _Function(call, task)
-        before, moved = function.at(_MOVED, time), function.at(-_MOVED, time)  # at rest, much is 0
-        shown = function.at(_MOVED, time, only_shown=True)
-        again = function.at(_MOVED, time)
-        function.at(-_MOVED, time + 1e-3)
-        after = function.at(_MOVED, time)
-        later = after if function.end_step() else function.read()
-    except _RefusedError:  # nobody else moves them so
-        return
-    shown[: task["states"]] = again[: task["states"]]
-    names = [*task["rates"], *task["shown"]]
-    for name, a, b, *others, e in zip(
-        names, before, moved, again, after, shown, later, strict=True
-    ):
-        back, read = max(others[:2], key=lambda c: abs(c - a)), others[2]
-        for other, then in ((back, _BACK), (read, _UNREAD), (e, _OVER)):
-            if abs(other - a) > _SAME * max(abs(a), abs(b - a)):
-                raise _RefusedError(
-                    f"'{name}' is {a:.6g}, and {other:.6g} once {then}: the model remembers calls, "
-                    "which no integrator and no observer can follow. Export it with equations that "
-                    "follow from states and inputs alone",
-                    3,
-                )
 
 
 def _remembers_steps(call: _Calls, task: dict[str, Any]) -> bool:
@@ -403,6 +368,8 @@ def _remembers_steps(call: _Calls, task: dict[str, Any]) -> bool:
                 if k < len(way) and function.end_step():
                     return False
         before, after, fresh = values[-3:]
+        if fresh != function.read():  # which remembers calls, and is refused for that
+            return False
         for b, a, other in zip(before, after, fresh, strict=True):
             if abs(other - a) > _SAME * max(abs(a), abs(b - a)):
                 return True
@@ -463,7 +430,6 @@ def _try(task: dict[str, Any], tell: Callable[[str], None]) -> tuple[str, bool, 
         if call.component is not None and task["exchange"]:
             if call.three:
                 _require_counts(call, task)
-            _require_function(call, task)
             remembers = _remembers_steps(call, task)
     except _RefusedError as error:
         if call.component is None or error.status != _DISCARD or task["exchange"]:

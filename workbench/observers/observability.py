@@ -18,13 +18,14 @@ from numpy.typing import NDArray
 
 from workbench.arrays import Matrix, Vector
 from workbench.errors import FMUError, InputError
-from workbench.models.fmu import FMU, NoFunctionError
+from workbench.models.fmu import FMU
 from workbench.observers.estimators.disturbance import DisturbanceObserver
 from workbench.observers.estimators.open_loop import OpenLoop
 from workbench.observers.operating import settle, start_spreads
 from workbench.observers.replay import quantities_with_rules, replay
 from workbench.observers.run import Ending, Run
 from workbench.observers.score import judged_window
+from workbench.observers.trajectory import driving_names, states_that_follow, trajectory
 from workbench.recordings.case import Case
 from workbench.system.parts import OperatingPoint
 from workbench.system.registry import open_model
@@ -126,7 +127,6 @@ def remaining(scaled: Matrix) -> Matrix:
 WINDOW = 0.5  # [s] the time within which a control has to react
 STRIDE = 0.1  # [s] from one window to the next
 _SECOND = 200  # samples of the linear test at least, which are a second at 200 Hz
-_POINTS = 200  # of a recording at which it is linearised to tell quantities apart
 _NOTHING = 1e-6  # of a state's size: what rounding and differences leave where nothing moves it
 _PART = 0.1  # share of a direction that counts as part of it
 _TOGETHER = 0.3  # correlation of what acts together; of four of which one sum is known, a third
@@ -277,15 +277,6 @@ class Information:
 
 
 @dataclass(frozen=True)
-class Trajectory:
-    """Where a recording leads a model: measured states, and others as the model has them."""
-
-    samples: NDArray[np.int_]  # (k,) places in the recording, some of many
-    x: Matrix  # (k, n) states
-    u: Matrix  # (k, m + q) measured inputs, and corrections, which are zero
-
-
-@dataclass(frozen=True)
 class CaseObservability:
     """Tests of several models along one recording."""
 
@@ -407,44 +398,6 @@ def window_test(
     )
 
 
-def trajectory(fmu: FMU, system: System, case: Case) -> Trajectory | None:
-    """Lead a model along a recording, at nominal quantities; None where samples are missing.
-
-    Raises
-    ------
-    FMUError
-        If it fails there, or its rates follow from more than time, states and inputs.
-    """
-    held = [output.name for output in system.outputs if output.name in fmu.states]
-    kept = np.unique(np.linspace(0, case.time.size - 1, _POINTS).astype(int))
-    u = np.column_stack([case.u[kept], np.zeros((kept.size, len(system.estimated)))])
-    values = np.column_stack([case[name][kept] for name in held]) if held else u[:, :0]
-    if not np.isfinite(values).all() or not np.isfinite(u).all():
-        return None
-    fmu.begin_at(case.model_time)
-    x = _states_that_follow(fmu, system, case.time[kept], held, values, u)
-    time = fmu.start_time + case.time[kept] - case.time[0]
-    shown = [output.name for output in system.outputs if output.name not in fmu.states]
-    fmu.require_function((fmu.variables(_inputs(system)), fmu.variables(shown)), time, x, u)
-    return Trajectory(kept, x, u)
-
-
-def require_function(fmu: FMU, system: System, cases: Sequence[Case]) -> None:
-    """Refuse a model that remembers along recordings what came before; none that they cannot lead.
-
-    Raises
-    ------
-    NoFunctionError
-    """
-    for case in () if fmu.is_own else cases:
-        try:
-            trajectory(fmu, system, case)
-        except NoFunctionError:
-            raise
-        except (InputError, FMUError, np.linalg.LinAlgError):
-            return
-
-
 def information(fmu: FMU, system: System, case: Case) -> Information | None:
     """Fisher information of a whole recording on states and quantities; None where none is told.
 
@@ -508,26 +461,7 @@ def follow(fmu: FMU, system: System, case: Case, run: Run) -> tuple[Matrix, Matr
     ]
     u = np.column_stack([case.u, *corrections])
     fmu.begin_at(case.model_time)
-    return _states_that_follow(fmu, system, case.time, held, values, u), u
-
-
-def _states_that_follow(
-    fmu: FMU, system: System, time: Vector, held: Sequence[str], values: Matrix, u: Matrix
-) -> Matrix:
-    """States, (n, k), of a model of which some are held at values, (n, h), and others follow."""
-    places = [fmu.states.index(name) for name in held]
-    fmu.start(dict(zip(held, values[0], strict=True)))
-    inputs = fmu.variables(_inputs(system))
-    x = np.tile(fmu.get_states(), (time.size, 1))
-    x[:, places] = values
-    if len(fmu.states) > len(held):
-        for k, h in enumerate(np.diff(time)):
-            fmu.set_time(fmu.start_time + time[k] - time[0])
-            fmu.set_states(x[k])
-            fmu.set(inputs, u[k])
-            x[k + 1] = fmu.step(h)
-            x[k + 1, places] = values[k + 1]
-    return x
+    return states_that_follow(fmu, system, case.time, held, values, u), u
 
 
 def linearise_along(fmu: FMU, system: System, time: Vector, x: Matrix, u: Matrix) -> SampledModel:
@@ -540,7 +474,7 @@ def linearise_along(fmu: FMU, system: System, time: Vector, x: Matrix, u: Matrix
     u : (n, m + q) measured inputs, corrections.
     """
     fmu.start({})
-    inputs = fmu.variables(_inputs(system))
+    inputs = fmu.variables(driving_names(system))
     names = [output.name for output in system.outputs]
     unseen = fmu.variables([name for name in names if name not in fmu.states])
     n, count = x.shape
@@ -587,7 +521,3 @@ def linearise_along(fmu: FMU, system: System, time: Vector, x: Matrix, u: Matrix
         C=slopes[:, :, kept],
         R=sensors**2 + ((slopes[:, :, driven] * noise) ** 2).sum(axis=2),
     )
-
-
-def _inputs(system: System) -> list[str]:
-    return [*(signal.name for signal in system.inputs), *system.corrections]

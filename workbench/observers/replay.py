@@ -11,6 +11,7 @@ from workbench.errors import FMUError
 from workbench.observers import Estimate, Estimator, Gains
 from workbench.observers.gains_file import usual_gains
 from workbench.observers.run import Ending, Run
+from workbench.observers.trajectory import require_function
 from workbench.recordings.case import Case
 from workbench.system.plugins import find_plugin, load
 from workbench.system.registry import open_model
@@ -40,6 +41,7 @@ def replay(case: Case, estimator: Estimator) -> Run:
     try:
         estimator.set_conditions(case.conditions)
         for model in estimator.models:
+            require_function(model, system, case)
             model.begin_at(case.model_time)
         estimate = estimator.run(case.time, case.u, case.y)
         seconds = time.perf_counter() - begin

@@ -12,12 +12,12 @@ import numpy as np
 
 from workbench.arrays import Vector
 from workbench.errors import FMUError, InputError
-from workbench.models.fmu import FMU, EventError, NoFunctionError
+from workbench.models.fmu import FMU, EventError
 from workbench.observers import Estimator, Gains, label
 from workbench.observers.estimators.open_loop import OpenLoop
 from workbench.observers.estimators.smoother import Smoother
 from workbench.observers.gains_file import read_gains, usual_gains
-from workbench.observers.observability import guesses, information, trajectory
+from workbench.observers.observability import guesses, information
 from workbench.observers.operating import HiddenAtDesignError
 from workbench.observers.replay import replay, run_on_model
 from workbench.observers.run import (
@@ -35,6 +35,7 @@ from workbench.observers.score import (
     scored_column,
     with_readings,
 )
+from workbench.observers.trajectory import trajectory
 from workbench.observers.trust import (
     Contradiction,
     contradiction_lines,
@@ -361,8 +362,6 @@ class Simulation:
             )
             doubts = (unit, unchecked if self.system.estimated else "", assumed)
             return {"doubts": tuple(filter(None, doubts))}
-        except NoFunctionError:  # no estimate of it may be relied on
-            raise
         except (InputError, FMUError, np.linalg.LinAlgError):
             return {"doubts": tuple(filter(None, (unit, assumed)))}
         return {

@@ -19,11 +19,11 @@ from workbench.models.fmu import FMU
 from workbench.observers import estimators_of
 from workbench.observers.estimators.kalman import ExtendedKalmanFilter
 from workbench.observers.estimators.open_loop import OpenLoop
-from workbench.observers.observability import Trajectory
 from workbench.observers.operating import shown_states, start_spreads
 from workbench.observers.replay import replay
 from workbench.observers.run import Ending, Run
 from workbench.observers.score import judged_window
+from workbench.observers.trajectory import Trajectory
 from workbench.pages.views import rounded
 from workbench.recordings.case import Case
 from workbench.system.system import System

@@ -12,6 +12,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from workbench.errors import InputError
+from workbench.observers.trajectory import require_function
 from workbench.recordings.case import Case
 from workbench.runtime.engine import Engine, Reporter
 from workbench.runtime.pool import Pool
@@ -28,6 +29,7 @@ from workbench.studies.distance.past import PastFit, fit_past_stops, places
 from workbench.studies.distance.rare_events import PlainSampling, Tail
 from workbench.studies.distance.recorded import RecordedStop, Stop, asked_stop, read_stop
 from workbench.studies.distance.standard import NominalRate
+from workbench.system.registry import open_model
 from workbench.system.stopping import SPEED
 from workbench.system.system import System
 
@@ -98,6 +100,9 @@ def distance_of_stop(
             expected="two stops or more, which say what the model leaves",
             remedy="give more recordings of this machine",
         )
+    with open_model(system) as fmu:
+        for case in cases:
+            require_function(fmu, system, case)
     engine.report(f"fit to {len(cases)} stops")
     past = fit_past_stops(system, cases, engine)
     with Pool(engine.workers, open_forecaster, system) as pool:

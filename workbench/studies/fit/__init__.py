@@ -21,8 +21,8 @@ from workbench.errors import FMUError, InputError, unknown_name
 from workbench.models.description import MODEL_EXCHANGE, Description, read_description
 from workbench.models.fmu import FMU
 from workbench.models.simulation import Drive, Simulation
-from workbench.observers.observability import require_function
 from workbench.observers.operating import ShownStart, shown_states, start_spreads
+from workbench.observers.trajectory import require_function
 from workbench.recordings.case import Case
 from workbench.runtime.engine import Engine
 from workbench.runtime.pool import Pool
@@ -134,7 +134,8 @@ def fit(
     entries = resolve_parameters(system, description, parameters)
     with open_model(system) as fmu:
         spreads = dict(zip(fmu.states, start_spreads(fmu, system), strict=True))
-        require_function(fmu, system, cases)
+        for case in (*cases, *held_out):
+            require_function(fmu, system, case)
         runs = [_run(case, system, fmu) for case in (*cases, *held_out)]
     unknowns = _unknowns(entries, description, system, runs[: len(cases)], spreads)
     workers = min(engine.workers, max(len(cases), len(unknowns)))

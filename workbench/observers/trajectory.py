@@ -1,0 +1,148 @@
+"""Where a recording leads a model, and whether the model is a function of where it is there."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.arrays import Matrix, Vector
+from workbench.errors import FMUError, InputError
+from workbench.models.fmu import FMU, NoFunctionError
+from workbench.models.hybrid import HybridSimulation
+from workbench.models.simulation import needs_simulation
+from workbench.recordings.case import Case
+from workbench.system.system import System
+
+_POINTS = 200  # of a recording, along which a model is led
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """Where a recording leads a model: measured states, and others as the model has them."""
+
+    samples: NDArray[np.int_]  # (k,) places in the recording, some of many
+    x: Matrix  # (k, n) states
+    u: Matrix  # (k, m + q) measured inputs, and corrections, which are zero
+
+
+def trajectory(fmu: FMU, system: System, case: Case) -> Trajectory | None:
+    """Lead a model along a recording, at nominal quantities; None where samples are missing.
+
+    Raises
+    ------
+    FMUError
+        If it fails there.
+    """
+    kept = _kept(case)
+    held = _held(fmu, system)
+    u = np.column_stack([case.u[kept], np.zeros((kept.size, len(system.estimated)))])
+    values = np.column_stack([case[name][kept] for name in held]) if held else u[:, :0]
+    if not np.isfinite(values).all() or not np.isfinite(u).all():
+        return None
+    fmu.begin_at(case.model_time)
+    return Trajectory(kept, states_that_follow(fmu, system, case.time[kept], held, values, u), u)
+
+
+def require_function(fmu: FMU, system: System, case: Case) -> None:
+    """Refuse a model whose rates and outputs follow from other calls, along a recording.
+
+    As a hysteresis in code, or a random draw, which no event tells. Samples that are missing are
+    between their neighbours. A model that cannot be led is at its own start, but for what is
+    measured.
+
+    Raises
+    ------
+    NoFunctionError
+    """
+    if fmu.is_function:
+        return
+    kept, held = _kept(case), _held(fmu, system)
+    time = case.time[kept]
+    u = _filled(case.time, case.u)[kept]
+    values = _filled(case.time, np.column_stack([case.time, *(case[name] for name in held)]))
+    values = values[kept, 1:]
+    inputs = [signal.name for signal in system.inputs]
+    outputs = [output.reading for output in system.outputs]
+    fmu.begin_at(case.model_time)
+    begin = dict(zip(held, values[0], strict=True))
+    try:
+        x = _led(fmu, system, begin, (time, u, values))
+        fmu.start(begin)
+        fmu.require_function(inputs, outputs, fmu.start_time + time - time[0], x, u)
+    except NoFunctionError:
+        raise
+    except (InputError, FMUError, np.linalg.LinAlgError):
+        pass  # the run says why
+    fmu.take_warning()  # of a run alone
+
+
+def _led(
+    fmu: FMU, system: System, begin: dict[str, float], samples: tuple[Vector, Matrix, Matrix]
+) -> Matrix:
+    """States at samples (k, n); those of the start where the model cannot be led."""
+    time, u, values = samples
+    inputs = [signal.name for signal in system.inputs]
+    try:
+        if not needs_simulation(fmu, inputs, [output.reading for output in system.outputs]):
+            corrections = np.zeros((time.size, len(system.estimated)))
+            driven_by = np.column_stack([u, corrections])
+            return states_that_follow(fmu, system, time, list(begin), values, driven_by)
+        fmu.start(begin)
+        simulation = HybridSimulation(fmu, fmu.typed(inputs), np.array(system.holds))
+        simulation.begin(u[0])
+        at = fmu.start_time + time - time[0]
+        x = np.array([simulation.advance(t, row) for t, row in zip(at, u, strict=True)])
+    except (InputError, FMUError, np.linalg.LinAlgError):
+        fmu.start(begin)
+        x = np.tile(fmu.get_states(), (time.size, 1))
+    x[:, [fmu.states.index(name) for name in begin]] = values
+    return x
+
+
+def _kept(case: Case) -> NDArray[np.int_]:
+    return np.unique(np.linspace(0, case.time.size - 1, _POINTS).astype(int))
+
+
+def _held(fmu: FMU, system: System) -> list[str]:
+    """States that outputs show by name."""
+    return [output.name for output in system.outputs if output.name in fmu.states]
+
+
+def _filled(time: Vector, columns: Matrix) -> Matrix:
+    """Columns, (n, k), with straight lines where samples are missing; 0 where all are."""
+    filled = np.zeros_like(columns)
+    for column, values in zip(filled.T, columns.T, strict=True):
+        known = np.isfinite(values)
+        if known.any():
+            column[:] = np.interp(time, time[known], values[known])
+    return filled
+
+
+def driving_names(system: System) -> list[str]:
+    """Names of what drives a model: measured inputs, and corrections."""
+    return [*(signal.name for signal in system.inputs), *system.corrections]
+
+
+def states_that_follow(
+    fmu: FMU, system: System, time: Vector, held: Sequence[str], values: Matrix, u: Matrix
+) -> Matrix:
+    """States, (n, k), of a model of which some are held at values, (n, h), and others follow.
+
+    Parameters
+    ----------
+    u : (n, m + q) of `driving_names`.
+    """
+    places = [fmu.states.index(name) for name in held]
+    fmu.start(dict(zip(held, values[0], strict=True)))
+    inputs = fmu.variables(driving_names(system))
+    x = np.tile(fmu.get_states(), (time.size, 1))
+    x[:, places] = values
+    if len(fmu.states) > len(held):
+        for k, h in enumerate(np.diff(time)):
+            fmu.set_time(fmu.start_time + time[k] - time[0])
+            fmu.set_states(x[k])
+            fmu.set(inputs, u[k])
+            x[k + 1] = fmu.step(h)
+            x[k + 1, places] = values[k + 1]
+    return x
