@@ -65,7 +65,8 @@ _REMEDIES = (
     (r"`spatialDistribution`", f"write it as volumes in a row, or {_EXPORT}"),
     (
         r"unresolved Flat reference",
-        "correct the name; a component whose condition is false has no variables",
+        "correct the name, or the index, for which write a number or a parameter; a component "
+        "whose condition is false has no variables",
     ),
     (r"without elements", "give the array one element at least, or remove it"),
     (r"unresolved|not found|undefined", "correct the name"),
@@ -74,14 +75,24 @@ _REMEDIES = (
 
 
 _DECLARED = re.compile(r"\b(package|end|extends|constrainedby)\s+[\w.]+")
+_BUILT_IN = frozenset(
+    "abs sign sqrt div mod rem ceil floor integer sin cos tan asin acos atan atan2 sinh cosh tanh "  # noqa: SIM905
+    "exp log log10 min max sum product size fill zeros ones identity diagonal linspace transpose "
+    "cross skew symmetric scalar vector matrix cat delay smooth homotopy semiLinear noEvent".split()
+)  # functions that need no declaration (spec 3.7 and 10.3)
 _CALLED = re.compile(r"([A-Za-z_][\w.]*)\s*\(")
 # The front end takes 15 s for so many turns of a function, and time grows by their square.
 _MOST_TURNS = 10_000
 _LOOP = re.compile(r"\bfor\s+\w+\s+in\s+((?:\d+\s*:\s*){1,2})(\w+)\s+loop\b|\b(?:end\s+)?for\b")
 _COUNT = re.compile(r"\bInteger\s+(\w+)[^;=]*=\s*(\d+)\s*[;\"]")
-_MAYBE_MISREAD = re.compile(r"\bterminate\s*\(|\bhomotopy\s*\(\s*simplified\b|,\s*\w+\s+in\b")
+# An index of a connection that is no number, parameter or sum of such: its value is lost.
+_CONNECTED = r"\bconnect\s*\([^;]*?\[[^\];]*?(?P<index>\bend\b|\bif\b|\w+\s*[(\[])"
+_MAYBE_MISREAD = re.compile(
+    rf"\bterminate\s*\(|\bhomotopy\s*\(\s*simplified\b|,\s*\w+\s+in\b|{_CONNECTED}"
+)
 _MISREAD = re.compile(
     r"\bterminate\s*\(|\bhomotopy\s*\(\s*simplified\b|[([{}\])]|\bfor\b|,(?=\s*\w+\s+in\b)"
+    rf"|{_CONNECTED}"
 )
 
 
@@ -814,8 +825,9 @@ def _refuse_stale_constants(library: Library, lineage: Sequence[str]) -> None:
 def _refuse_misread(library: Library, reached: Iterable[str]) -> None:
     """Refuse what the front end drops or turns round.
 
-    These are terminate(...) in an if-equation, homotopy(simplified = ..., actual = ...), and
-    {a for i in u, j in v}.
+    These are terminate(...) in an if-equation, homotopy(simplified = ..., actual = ...),
+    {a for i in u, j in v}, connect(a[end], b), der(f, x) of a function f, and functions of one's
+    own that have the name of one of the language.
 
     The first iterator of an array constructor is the innermost (spec 10.4.1.1); the front end
     takes it for the outermost.
@@ -829,6 +841,26 @@ def _refuse_misread(library: Library, reached: Iterable[str]) -> None:
             function = None
             with contextlib.suppress(InputError):  # a part of a component, whose name a class has
                 function = library.classes.get(library.resolve(called, name))
+            if function is not None and "der" in function.prefixes:
+                raise InputError(
+                    where=function.where,
+                    found=f"the partial derivative of a function, '{called} = der(...)'",
+                    expected="functions that are written in Modelica, as the Modelica front end "
+                    "takes the function itself",
+                    remedy="write the derivative as a function of its own",
+                )
+            if (
+                function is not None
+                and called in _BUILT_IN
+                and function.where.startswith(tuple(f"{path}:" for path in own))
+            ):
+                raise InputError(
+                    where=f"{file}:{line}",
+                    found=f"'{called}(...)' in {name}, and a function {function.name}",
+                    expected="functions with other names than those of the language, as the "
+                    "Modelica front end takes those",
+                    remedy=f"give {function.name} another name, or call it with its package",
+                )
             if function is not None and function.kind == "function":
                 waiting += [function.name] * (function.name not in waiting)
         _refuse_long_loops(text, file, int(line))
@@ -844,6 +876,14 @@ def _refuse_misread(library: Library, reached: Iterable[str]) -> None:
                     found="homotopy(simplified = ..., actual = ...)",
                     expected="'actual' first, as the Modelica front end takes the first argument",
                     remedy="write homotopy(actual = ..., simplified = ...)",
+                )
+            if word.startswith("connect"):
+                raise InputError(
+                    where=where,
+                    found=f"'{match['index']}' in an index of '{' '.join(word.split())}'",
+                    expected="numbers, parameters and their sums, as the Modelica front end takes "
+                    "another element then",
+                    remedy="write the number, or a parameter with its value",
                 )
             if word.startswith("terminate"):
                 raise InputError(
@@ -951,21 +991,35 @@ def _refuse_values(modifier: Modifier) -> None:
         _refuse_values(_inside(given))
 
 
-def _refuse_lost_modifiers(modifier: Modifier, aliases: Mapping[str, Class]) -> None:
+def _refuse_lost_modifiers(
+    modifier: Modifier, aliases: Mapping[str, Class], part: str = ""
+) -> None:
     """Refuse modifiers of a class that is redeclared, and of the one that stood in its place.
+
+    Redeclarations within a part of what is modified are lost, too.
 
     Parameters
     ----------
+    part : whose elements the modifiers are of; empty where they are of the whole.
     aliases : replaceable classes with modifiers, which hold for what comes in their place, too
         (spec 7.3.2), by their own names.
     """
     for name, given in modifier.inner.items():
         new = given.redeclared
+        if new is not None and part:
+            raise InputError(
+                where=new.where,
+                found=f"a redeclaration of '{name}' within '{part}'",
+                expected="redeclarations in what is declared or extended itself, as the Modelica "
+                "front end drops others",
+                remedy=f"declare '{part}' replaceable, and redeclare it as a class that extends "
+                "its own with this redeclaration",
+            )
         if new is not None and new.prefixes & KINDS:
             own = new.modifier.inner if "function" not in new.prefixes else {}
             if own or name in aliases:
                 raise _lost_modifiers(name, new.where, new.type if own else aliases[name].name)
-        _refuse_lost_modifiers(_inside(given), aliases)
+        _refuse_lost_modifiers(_inside(given), aliases, name)
 
 
 def _lost_modifiers(name: str, where: str, of: str) -> InputError:

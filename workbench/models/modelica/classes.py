@@ -58,7 +58,8 @@ class Class:
 
     name: str  # dotted, from the library's on
     kind: str  # model, package, type, ..
-    prefixes: frozenset[str]  # such as partial, expandable, replaceable
+    # such as partial, expandable, replaceable; `der` of a function that is derived of another
+    prefixes: frozenset[str]
     constraint: str  # of a replaceable class, named as written there; empty without `constrainedby`
     constraining: Modifier  # what modifies the constraint
     description: str

@@ -288,6 +288,7 @@ class Reader(Cursor):
         name = f"{enclosing}.{short}" if enclosing else short
         outer, self._owner = self._owner, name
         if self.took("="):
+            prefixes |= {"der"} & {self.token.text}  # the derivative of another function
             extends = self._alias()
             description = self.string()
             body = _Body(extends=extends)
