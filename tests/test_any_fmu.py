@@ -28,8 +28,11 @@ from workbench.observers import choose, estimators_of
 from workbench.observers.contract import Estimator
 from workbench.observers.fmpy_comparison import RIGHT, compare_with_fmpy
 from workbench.observers.gains_file import usual_gains
+from workbench.observers.operating import start_spreads, walks
 from workbench.observers.replay import replay
 from workbench.observers.simulation import prepare
+from workbench.observers.trajectory import Trajectory
+from workbench.observers.trust import size_doubt
 from workbench.recordings.case import read_case
 from workbench.studies.distance.forecast import stopping_of
 from workbench.studies.distance.simulation import DrivingInputs, StopSimulation
@@ -158,6 +161,30 @@ def test_the_open_loop_goes_through_events(what, build):
     with FMU(build(what)) as fmu:
         estimated = run(fmu, "open_loop", 3600.0)
     assert estimated == pytest.approx(along(what, 10.0 * np.arange(estimated.size)), abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("attributes", "size", "said"),
+    [
+        ('start="1e-9"', 1e-9, True),
+        ('start="2e5"', 2e5, True),
+        ('start="0" nominal="300"', 300.0, False),
+        ('start="20"', 1.0, False),
+    ],
+)
+def test_the_size_of_a_state_follows_what_the_fmu_tells(attributes, size, said, build):
+    """A charge of 1e-9 C had a walk of 2e-4 C, and differences by six times of what it is."""
+    folder = build("RELAYS", variables=VARIABLES.replace('start="291"', attributes)).parent
+    system = load_system(folder)
+    with FMU(folder / "Room.fmu") as fmu:
+        assert walks(fmu, system) == pytest.approx([2e-4 * size])
+        assert start_spreads(fmu, system) == pytest.approx([20.0 if "20" in attributes else size])
+        assert fmu.difference_steps(["T"], np.zeros(1)) < 1e-8 * size
+        path = Trajectory(np.arange(2), np.full((2, 1), 291.0), np.zeros((2, 1)))
+        doubt = size_doubt(fmu, system, path)
+    assert ("T is up to 291, taken for 1e-09" in doubt) == (size == 1e-9)
+    with open_model(system) as fmu:  # whose scale of 10 K says more than a start
+        assert (walks(fmu, system) == pytest.approx([2e-4 * size])) != said
 
 
 def test_a_time_event_that_stays_due_is_told(build):

@@ -91,6 +91,7 @@ _WARNING, _LOGGED = 1, 3  # status of FMI; messages that an error shows
 _SAME_STEP = 1e-4  # by which sample times may differ: what rounding of time stamps leaves
 _STEP = float(np.finfo(float).eps) ** (1 / 3)  # of differences, relative
 SAME_RATE = 1e-4  # of its size, by which iterations within a model may change a rate
+ALIKE = 1e3  # times: what a start or a scale says of a size is rougher than factors of ten
 _MOST_ITERATIONS = 100  # of discrete states at one event; models need some
 
 _CLASSES = {
@@ -568,6 +569,7 @@ class FMU(FMUInstance):
     next_event : (1,) time of the next time event [s], of the last start; infinite for none.
     warned : (1,) calls that it answered with a warning.
     rate_references : (n,) value references of the derivatives of the states.
+    scales : typical size of signals that a system declares, in the FMU's units; see `sizes`.
 
     Raises
     ------
@@ -641,6 +643,7 @@ class FMU(FMUInstance):
         )
         self.remembers_steps = self.needs_completed_steps and remembers_steps(self.description)
         self._variants: list[FMU] = []
+        self.scales: Mapping[str, float] = {}
 
     def states_derivatives(self, unknowns: NDArray[np.uint32]) -> bool:
         """Whether the FMU states directional derivatives of these variables, by value reference.
@@ -689,6 +692,7 @@ class FMU(FMUInstance):
     def variant(self, parameters: Mapping[str, float]) -> "FMU":
         """Another instance with some parameters changed, which is closed with this one."""
         other = type(self)(self.path, self.names, {**self._given, **parameters})
+        other.scales = self.scales
         self._variants.append(other)
         return other
 
@@ -964,7 +968,26 @@ class FMU(FMUInstance):
         """Typical sizes of the states at the present point, (n,)."""
         sizes = np.ones(len(self.states))
         self._states("nominals", sizes)
-        return np.where(np.isfinite(sizes) & (sizes != 0.0), np.abs(sizes), 1.0)
+        said = np.isfinite(sizes) & (sizes != 0.0) & (sizes != 1.0)  # which FMI has for unknown
+        return np.where(said, np.abs(sizes), self.sizes(self.states))
+
+    def sizes(self, names: Sequence[str]) -> Vector:
+        """Typical sizes of variables, (k,): their nominal values.
+
+        Of those without, 1, as FMI says, unless the scale of a signal of this name, or the start,
+        is off that by orders of magnitude: 1 would make a charge of 1e-9 C unknown to 1 C.
+        """
+        return np.array([self._size(self._described[name]) for name in names])
+
+    @cached_property
+    def _described(self) -> dict[str, Variable]:
+        return {variable.name: variable for variable in self.description.variables}
+
+    def _size(self, variable: Variable) -> float:
+        if variable.nominal:
+            return abs(variable.nominal)
+        said = self.scales.get(variable.name) or abs(self.defaults.get(variable.name, 0.0))
+        return said if said and not 1.0 / ALIKE <= said <= ALIKE else 1.0
 
     def event_indicators(self) -> Vector:
         """Values whose change of sign is a state event, (z,)."""
@@ -1039,9 +1062,7 @@ class FMU(FMUInstance):
 
         A value far below its nominal one, such as zero, does not say its size.
         """
-        sizes = {v.name: abs(v.nominal or 1.0) for v in self.description.variables}
-        nominal = np.array([sizes[name] for name in names])
-        steps: Vector = _STEP * np.maximum(np.abs(values), 1e-3 * nominal)
+        steps: Vector = _STEP * np.maximum(np.abs(values), 1e-3 * self.sizes(names))
         return steps
 
     def _inject(self, variables: Variables, values: Vector) -> None:

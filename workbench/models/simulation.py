@@ -224,8 +224,8 @@ class Simulation:
         return dict(zip(names, map(float, read), strict=True))
 
     def size(self, name: str, value: float) -> float:
-        """Of what size a variable is: as its value, or where that is zero its nominal value."""
-        return abs(value) or abs(self._variables[name].nominal or 1.0)
+        """Of what size a variable is: as its value, or where that is zero as is usual."""
+        return abs(value) or float(self.fmu.sizes([name])[0])
 
     @cached_property
     def limits(self) -> dict[str, tuple[float, float]]:

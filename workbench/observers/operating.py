@@ -110,14 +110,13 @@ def linearised(fmu: FMU, system: System) -> LinearModel:
             C[j, fmu.states.index(name)] = 1.0
         else:
             C[j], D[j] = linear.C[unseen.index(name)], linear.D[unseen.index(name)]
-    nominal = {v.name: abs(v.nominal or 1.0) for v in fmu.description.variables}
     return LinearModel(
         fmu.states,
         linear.A,
         linear.B,
         C,
         D,
-        np.array([nominal[name] for name in fmu.states]),
+        fmu.sizes(fmu.states),
     )
 
 
@@ -153,22 +152,22 @@ def walks(fmu: FMU, system: System) -> Vector:
 
     2e-4 of a nominal value in a second is what a good model of a machine leaves out.
     """
-    nominal = {v.name: abs(v.nominal or 1.0) for v in fmu.description.variables}
-    return np.array([system.walks.get(name, 2e-4 * nominal[name]) for name in fmu.states])
+    sizes = zip(fmu.states, fmu.sizes(fmu.states), strict=True)
+    return np.array([system.walks.get(name, 2e-4 * size) for name, size in sizes])
 
 
 def start_spreads(fmu: FMU, system: System) -> Vector:
     """Standard deviation of the states at the start, (n,), where no sample shows them [unit].
 
-    Declared, or the nominal value, which says of what size a state is; where the model states none,
-    1 or the size of its start, whichever is larger. Never more than that of any value between the
-    limits that the model has. A walk says nothing of a start.
+    Declared, or the size of a state, or of its start if that is larger and no nominal value is
+    stated. Never more than that of any value between the limits that the model has. A walk says
+    nothing of a start.
     """
     variables = {variable.name: variable for variable in fmu.description.variables}
     spreads = []
-    for name in fmu.states:
-        # FMI's nominal value of 1 would make a pressure of 1e5 Pa sure to a pascal.
-        size = abs(variables[name].nominal or max(1.0, abs(fmu.defaults.get(name, 0.0))))
+    for name, size in zip(fmu.states, fmu.sizes(fmu.states), strict=True):
+        if not variables[name].nominal:
+            size = max(size, abs(fmu.defaults.get(name, 0.0)))
         low, high = variables[name].minimum, variables[name].maximum
         if low is not None and high is not None:
             size = min(size, (high - low) / np.sqrt(12.0))

@@ -84,4 +84,9 @@ def open_file(path: Path, system: System, given: Mapping[str, float] | None = No
     if given is None:
         parameters = read_description(path).renamed(system.names).names("parameter")
         given = {name: value for name, value in system.given.items() if name in parameters}
-    return open_fmu(path, system.names, given)
+    fmu = open_fmu(path, system.names, given)
+    fmu.scales = {
+        **{name: signal.scale for name, signal in system.signals.items()},
+        **{quantity.correction: quantity.spread for quantity in system.estimated},
+    }
+    return fmu

@@ -88,7 +88,7 @@ def steps(fmu: FMU, stiff: NDArray[np.intp], inputs: int) -> Steps:
         Steps,
         {"n": n, "p": p, "m": inputs},
         stiff=stiff,
-        nominal=np.array([abs(nominal.get(name) or 1.0) for name in fmu.states]),
+        nominal=fmu.sizes(fmu.states),
         age=np.full(1, _KEPT),
         most=np.array([_MOST_PARTS if sharp else _FEWEST]),
     )

@@ -149,12 +149,11 @@ def model_step(fmu: FMU, walk: Vector, inputs: int, size: int, columns: int = 0)
     columns : see `Step`; 0: of rates alone.
     """
     n = len(fmu.states)
-    nominal = {v.name: abs(v.nominal or 1.0) for v in fmu.description.variables}
     return zeros(
         Step,
         {"n": n, "m": inputs + 1, "s": size, "k": _MOST + 2},
         walk=np.ascontiguousarray(walk),
-        least=_SMALLEST * np.array([nominal[name] for name in fmu.states]),
+        least=_SMALLEST * fmu.sizes(fmu.states),
         columns=columns or n,
         weight=np.ones(1),
         lasted=np.ones(1),
