@@ -244,9 +244,15 @@ def test_a_dropout_is_found_in_what_is_read_in_steps(heater, step):
 
 def test_the_ends_of_a_clear_swing_are_no_spikes(heater):
     sensor, time = heater.signals["T"], np.arange(3000)
-    noise = np.random.default_rng(3).standard_normal(time.size)
+    rng = np.random.default_rng(3)
+    noise = rng.standard_normal(time.size)
     swing = np.sin(2.0 * np.pi / 24.3 * time)
     assert not outliers(NOISE * (200.0 * swing + noise), sensor, SOUND).any()
+    # A road under a wheel: swings of all periods down to 11 samples, the shortest the least.
+    rates = np.arange(0.3, 18.0, 0.35)
+    phases = 2.0 * np.pi * (0.005 * np.outer(time, rates) + rng.uniform(size=rates.size))
+    road = np.sin(phases) @ (1.0 / (1.0 + rates**1.3))
+    assert not outliers(NOISE * (600.0 * road + noise), sensor, SOUND).any()
     values = NOISE * (20.0 * swing + noise)
     values[[100, 731, 1502]] += NOISE * np.array([60.0, -60.0, 60.0])
     assert list(np.flatnonzero(outliers(values, sensor, SOUND))) == [100, 731, 1502]

@@ -15,9 +15,9 @@ from workbench.system.parts import Signal
 ALONG = 2.0  # standard deviations, of a line through few samples: noise alone scatters by one
 _ABREAST = 11  # samples of the running median
 _FEW = 6  # samples; three fourth differences have no median to speak of
-# Samples on each side where there are so many, and the order of the curve through them: where up to
-# seven are off the median in a swing of 24 samples a period, it is within a hundredth of its size.
-_BESIDE, _ORDER = 4, 5
+# Order of differences: of a swing of 12 samples a period they leave a fiftieth, of a sample beside
+# others 20 times what it is off, and 30 standard deviations of noise.
+_ORDER = 6
 # Share of equal samples, beyond what rounding makes, from which a channel does repeat itself.
 _OFTEN = 0.2
 _MOVED = 0.5  # of what second differences say: noise comes below in a thousandth of 20 samples
@@ -60,7 +60,7 @@ def _outliers(values: Vector, signal: Signal, sound: Soundness, *, flat: bool) -
     # The wide window knows the noise, the narrow one that a structure rings.
     noise = np.maximum(median_filter(away, 20 * _ABREAST + 1), median_filter(away, 2 * _ABREAST))
     scale = np.maximum(1.4826 * noise, deviation_of(values))
-    wrong = _out_and_back(values, away > sound.spike * scale, sound.spike * scale)
+    wrong = _out_and_back(values, away > sound.spike * scale, scale, sound)
     same = np.diff(values) == 0.0
     alike = _alike(signal)
     if same.mean() < min(_OFTEN + alike, 1.0 - alike):
@@ -88,12 +88,13 @@ def _alike(signal: Signal) -> float:
     return signal.resolution / (2.0 * math.sqrt(math.pi) * signal.noise) if signal.noise else 0.0
 
 
-def _out_and_back(values: Vector, mask: Mask, jump: Vector) -> Mask:
+def _out_and_back(values: Vector, mask: Mask, scale: Vector, sound: Soundness) -> Mask:
     """Of samples off a running median, those that leave the lines on both sides of them.
 
     A signal that turns fast is off the median too, but comes or goes along a line; or, at the end
-    of a swing, along a curve through the samples on both sides.
+    of a swing, along a curve, which differences of high order leave nothing of.
     """
+    jump = sound.spike * scale
     padded = np.pad(values, 2, constant_values=np.nan)  # at an end, one side has to do
     before = (values - (2.0 * padded[1:-3] - padded[:-4])) / jump
     after = (values - (2.0 * padded[3:-1] - padded[4:])) / jump
@@ -101,21 +102,23 @@ def _out_and_back(values: Vector, mask: Mask, jump: Vector) -> Mask:
     for first, end in runs(mask):
         sides = [side for side in (before[first], after[end - 1]) if np.isfinite(side)]
         leaves = min(sides, default=0.0) > 1.0 or max(sides, default=0.0) < -1.0
-        kept[first:end] = leaves and _off_curve(values, first, end) > jump[first:end].min()
+        kept[first:end] = (
+            leaves and _rough(values, first, end) > sound.held * scale[first:end].min()
+        )
     return kept
 
 
-def _off_curve(values: Vector, first: int, end: int) -> float:
-    """How far samples are off the curve through those beside them; infinite with none on a side."""
-    room = values.size - (end - first) - 2 * _BESIDE
-    if first == 0 or end == values.size or room < 0:
+def _rough(values: Vector, first: int, end: int) -> float:
+    """Largest difference of high order about samples, as noise of which size makes it.
+
+    Infinite at an end, of which it hardly depends.
+    """
+    if first == 0 or end == values.size:
         return np.inf
-    begin = min(max(first - _BESIDE, 0), room)
-    at = np.arange(begin, begin + end - first + 2 * _BESIDE)
-    beside = (at < first) | (at >= end)
-    middle = at - 0.5 * (first + end - 1)
-    curve = np.polynomial.Polynomial.fit(middle[beside], values[at[beside]], _ORDER)
-    return float(np.abs(values[first:end] - curve(middle[~beside])).max())
+    near = values[max(first - _ORDER, 0) : end + _ORDER]
+    return float(
+        np.abs(np.diff(near, _ORDER)).max(initial=0.0) / math.sqrt(math.comb(2 * _ORDER, _ORDER))
+    )
 
 
 def bridge(time: Vector, values: Vector, wrong: Mask) -> Vector:
