@@ -168,6 +168,24 @@ def test_a_signal_a_thousand_times_its_start_is_asked_about(tmp_path, ice):
     assert question in text
 
 
+def test_the_whole_name_and_outputs_go_before_parts_of_names(tmp_path):
+    """Libraries of mechanics have many variables whose last part is v."""
+    pendulum = build_text(
+        tmp_path,
+        "model Swing connector Flange output Real v; end Flange; Flange left; Flange right; "
+        'output Real v(unit="m/s", start=1.0, fixed=true); parameter Real d(unit="1/s") = 0.3; '
+        "equation der(v) = -d*v; left.v = 2.0*v; right.v = 3.0*v; end Swing;",
+    )
+    rows = [f"{1709290800000 + 100 * k},{1e2 * np.exp(-0.03 * k):.3f}" for k in range(90)]
+    log = tmp_path / "log.csv"
+    log.write_text("\n".join(["timestamp,v [cm/s]", *rows]))
+    content = tomllib.loads(drafted(pendulum, log))
+    assert list(content["outputs"]) == ["v"]
+    assert content["sample_time"] == "0.1 s"  # in ms since 1970; it was 100 s
+    assert content["diagnosis"]["block"] == "0.2 s"  # 90 samples have 45 of two, not 18 of five
+    assert "QUESTION" not in (tmp_path / "system" / "system.toml").read_text()
+
+
 # --- a tank to begin with ---
 
 

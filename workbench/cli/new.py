@@ -104,6 +104,7 @@ def _from_fmu(options: argparse.Namespace, output: Output) -> CommandResult:
     )
     output.result(f"next: workbench simulate --system {folder}{which}")
     output.result(f"      workbench fit --system {folder}")
+    output.result(f"      workbench diagnose --system {folder}")
     result = {
         "written": [nearby(path), nearby(fmu)],
         "signals": {signal.name: signal.channel.channel for signal in draft.signals},

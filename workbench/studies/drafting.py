@@ -27,11 +27,10 @@ from workbench.recordings.channels import (
     merge,
     propose_recordings,
 )
+from workbench.recordings.channels.clock import usual_step
 from workbench.recordings.channels.matching import USUAL_UNITS, PlacedChannel, meaning_doubt
 from workbench.recordings.channels.names import (
     EXACT,
-    WITHIN,
-    WORDS,
     is_asked,
     is_time,
     likeness_to,
@@ -45,6 +44,7 @@ from workbench.system.units import check_unit
 _TYPICAL = 10.0  # times its nominal value, or a tenth, is what a variable's largest sample may be
 _NOISELESS = 1e-4  # of its range: below the error of usual sensors; only a simulation is finer
 _LIVE = 30  # parameters that are proposed for a fit; more are listed in a comment
+_BLOCK, _BLOCKS = 5, 40  # samples of a usual block, and blocks that a diagnosis needs
 _REACH = 5.0  # times a parameter, and a fifth, where the model states no range
 
 
@@ -144,7 +144,7 @@ def _match(
         if not _is_time(place.channel):
             places.setdefault(place.channel.name, place)
     signals: dict[str, DraftSignal] = {}
-    pairs: list[tuple[int, str, DraftSignal]] = []  # likeness, variable, what it would be
+    pairs: list[tuple[int, str, DraftSignal]] = []  # rank, variable, what it would be
     reasons: dict[str, str] = {}
     for variable in description.variables:
         own = names[variable.name]
@@ -172,23 +172,26 @@ def _match(
             if is_asked(place.channel.name) and role == "outputs" and likeness != EXACT:
                 continue
             signal, why = _candidate(own, variable, role, place, likeness)
+            # The whole name goes before parts of it, and an output before what is within.
+            whole = likeness_to(place.channel.name, "", [variable.name, own]) == EXACT
+            rank = 2 * (likeness + whole) + (variable.causality != "local")
             if signal:
-                pairs.append((likeness, own, signal))
+                pairs.append((rank, own, signal))
             elif likeness:
                 reasons[own] = why
-    for level in (EXACT, WORDS, WITHIN, 0):
+    for level in sorted({rank for rank, *_ in pairs}, reverse=True):
         taken = {signal.channel.channel for signal in signals.values()}
         open_pairs = [
             signal
-            for likeness, own, signal in pairs
-            if likeness == level and own not in signals and signal.channel.channel not in taken
+            for rank, own, signal in pairs
+            if rank == level and own not in signals and signal.channel.channel not in taken
         ]
         for signal in open_pairs:
             rivals = [s.channel.channel for s in open_pairs if s.name == signal.name]
             claims = [s.name for s in open_pairs if s.channel.channel == signal.channel.channel]
             if len(rivals) == len(claims) == 1:
                 signals[signal.name] = signal
-            elif level:
+            elif level > 1:
                 choice = listed([repr(name) for name in (rivals if len(rivals) > 1 else claims)])
                 reasons[signal.name] = (
                     f"it may be {choice}"
@@ -333,10 +336,10 @@ def _provisional(
     """Content of a system file that recordings can be read with: sizes and noise are not known."""
     steps = [group.step for group in files[0].groups if math.isfinite(group.step)]
     steps += [
-        float(np.nanmedian(np.abs(np.diff(channel.values))))
+        usual_step(channel)
         for group in files[0].groups
         for channel in group.channels
-        if _is_time(channel) and channel.values.size > 2 and not channel.stamp
+        if _is_time(channel) and not channel.stamp
     ]
     content: dict[str, Any] = {
         "title": description.name or description.path.stem,
@@ -401,6 +404,7 @@ def system_text(draft: Draft, fmu: str) -> str:
         lines += _signal_table(draft, signal)
     lines += _missing(draft)
     lines += _states(draft)
+    lines += _blocks(min(map(np.size, times)), step)
     return "\n".join([*lines, *_candidates(model)]) + "\n"
 
 
@@ -504,6 +508,15 @@ def _states(draft: Draft) -> list[str]:
         "# [states.NAME] spread says how far from there one may begin; else its nominal value, or",
         "# its start value if the model states none.",
     ]
+
+
+def _blocks(samples: int, step: float) -> list[str]:
+    """Shorter blocks than usual where the shortest recording has too few of those."""
+    size = samples // _BLOCKS
+    if not 0 < size < _BLOCK:
+        return []
+    why = f"a {_BLOCKS}th of the shortest recording, the least that a diagnosis compares"
+    return ["", "[diagnosis]", _entry("block", f"{size * step:.6g} s", why)]
 
 
 def _candidates(model: Description) -> list[str]:

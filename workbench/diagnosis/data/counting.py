@@ -157,7 +157,8 @@ def refuse_too_short(
             where=str(case.source),
             found=f"{seconds:.3g} s are compared; excluded samples: {lost}",
             expected=f"{compare.least:g} s or more, because less does not tell noise from cause",
-            remedy="leave this recording out, or repair it",
+            remedy="leave this recording out, or repair it; a short one that is whole needs "
+            "shorter blocks, [diagnosis] block in the system file",
         )
 
 

@@ -118,7 +118,10 @@ def _read_clock(
         own = (*group.channels, *group.left)
         channel_of_time = next((channel for channel in own if channel.name == named.channel), None)
         if channel_of_time is not None:
-            return _going_on(_named_clock(channel_of_time, named, system, where), group, where)
+            clock = _candidate(channel_of_time, group, system) if not named.unit else None
+            if clock is None or not clock.certain:
+                clock = _named_clock(channel_of_time, named, system, where)
+            return _going_on(clock, group, where)
     if group.time is not None:
         time, said = group.time, "the file says it"
         own_clock = Clock("", time.values, said, start=time.start, zoned=time.zoned)
@@ -446,6 +449,27 @@ def _since(channel: FileChannel, system: System) -> Clock | None:
     steps = np.abs(np.diff(clock.times[np.isfinite(clock.times)]))
     ratio = float(np.median(steps)) / system.sample_time
     return clock if 1.0 / _LIKE < ratio < _LIKE else None
+
+
+def usual_step(channel: FileChannel) -> float:
+    """Median step of times that are numbers [s], by their unit, or by the date that they count to.
+
+    NaN where there are too few of them. Numbers that nothing tells are taken as seconds.
+    """
+    held = channel.values[np.isfinite(channel.values)]
+    if held.size < 3:
+        return math.nan
+    own_unit = channel.unit or (spell_unit(words(channel.name)[-1]) if channel.name else "")
+    scale = conversion(own_unit, "s") if channel.unit or len(words(channel.name)) > 1 else None
+    counts = [(0.0, 10.0**-k) for k in (0, 3, 6, 9)] + [*_EPOCHS.values()]
+    counts += [(zero * _DAY, _DAY) for zero, _, _ in _DAYS.values()]
+    dated = (
+        factor
+        for zero, factor in counts
+        if _UNIX[0] <= held.min() * factor - zero and held.max() * factor - zero <= _UNIX[1]
+    )
+    factor = scale.factor if scale else next(dated, 1.0)
+    return factor * float(np.median(np.abs(np.diff(held))))
 
 
 def _weeks_of_gps(group: Group) -> Clock | None:
