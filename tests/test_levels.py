@@ -278,3 +278,6 @@ def test_what_may_be_there_moves_what_was_found_as_far_as_a_fit_beside_it(tmp_pa
             away[s] = abs(beside - alone)
     assert moved[0.0] == 0.0
     assert moved[S] == pytest.approx(away[S], rel=0.1)
+    # Of one degree of freedom, by which the rate of false alarms is: no size is there for nothing.
+    (score,) = trial.scores()
+    assert score.gain == pytest.approx((score.size / score.sigma) ** 2, rel=1e-6)

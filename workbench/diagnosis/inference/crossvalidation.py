@@ -158,11 +158,12 @@ class CrossValidation:
     def worsened(self, before: FittedModel, after: FittedModel, *, fast: bool) -> list[str]:
         """Recordings that a fit predicts worse than another one does, and not to their noise.
 
-        Parts of a single recording are none.
+        What the others leave open of a recording is no failure. Parts of a single one are none.
         """
         if self._fit.unknowns.count == 1:
             return []
-        was, now = self.squares(before, fast=fast), self.squares(after, fast=fast)
+        unsure = np.array([own.mean() for own in self.left_open(after, fast=fast)])
+        was, now = self.squares(before, fast=fast), self.squares(after, fast=fast) - unsure
         worse = now > np.maximum(was, self.chance(after, fast=fast))
         return [name for name, rises in zip(self._fit.tests, worse, strict=True) if rises]
 

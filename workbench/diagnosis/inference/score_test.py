@@ -83,10 +83,11 @@ def signatures(candidates: Sequence[Candidate]) -> list[Key]:
 class ScoreTest:
     """All candidates about one point.
 
-    Each may be present at a size that does not matter, as part of the baseline: a candidate must
-    explain what all others together, too small to matter, do not. Where levels can stand for one,
-    their spread says already how much of it does not matter. On held-out stops it is judged
-    alone, since what companions cost, by their size, shows only where they are fitted.
+    The others may be present at a size that does not matter: a candidate must explain what all of
+    them together, too small to matter, do not. That it is there at all is significant at the rate
+    of false alarms; whether it matters, its size says. Where levels can stand for one, their
+    spread says already how much of it does not matter. On held-out stops it is judged alone, since
+    what companions cost, by their size, shows only where they are fitted.
     """
 
     def __init__(
@@ -113,9 +114,7 @@ class ScoreTest:
         self._without, self._prior = predictive_deviance(*alone), alone[1]
         base = self._select({})
         total = add([*base[0], base[1]])
-        best = minimum(total)
-        self._reference, self._away = total.at(best), self._far(best)
-        self._lacking = [form.at(minimum(form)) for form in _without_each(total, base[0])]
+        self._reference = total.at(minimum(total))
 
     @property
     def wrong(self) -> float:
@@ -209,13 +208,15 @@ class ScoreTest:
         best = minimum(total)
         sigma = float(np.sqrt(covariance(total.N)[-1, -1]))
         size = float(best[-1])
+        absent, *absent_without = (_fixed(f, 0.0) for f in (total, *_without_each(total, stops)))
+        none = minimum(absent)
         if not low <= size <= high:
             # What its bounds allow of it: the rest of the unknowns do their best beside that.
             size = float(np.clip(size, low, high))
             stops, prior = [_fixed(stop, size) for stop in stops], _fixed(prior, size)
             total = add([*stops, prior])
             best = minimum(total)
-        lacking = [form.at(minimum(form)) for form in _without_each(total, stops)]
+        without = zip(absent_without, _without_each(total, stops), strict=True)
         alone, own_prior = self._select(own, alone=True)
         own_prior.N[-1, -1] += (_LARGEST * effect.matters) ** -2
         single = float(minimum(add([*alone, own_prior]))[-1])
@@ -228,9 +229,9 @@ class ScoreTest:
             size=size,
             sigma=sigma,
             units={name: self._fit.unknowns.unit(effect, name) for name in (effect.size, *shape)},
-            gain=self._reference - total.at(best),
-            by_levels=self._away - self._far(best),
-            least=float(np.min(np.subtract(self._lacking, lacking))),
+            gain=absent.at(none) - total.at(best),
+            by_levels=self._far(none) - self._far(best),
+            least=min(a.at(minimum(a)) - form.at(minimum(form)) for a, form in without),
             held_out=self._without - predictive_deviance(alone, own_prior),
             phases=phases,
         )

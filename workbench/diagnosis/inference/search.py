@@ -569,7 +569,8 @@ def _rivals(
 
     While much is wrong, all is weighed against that, and little is significant: then a hint makes
     a rival, and its fit decides. Phases of an effect that turns explain something of any noise.
-    What levels could stand for must be there without any one of the stops, too.
+    What levels could stand for must be there without any one of the stops, too. Stops held out have
+    no unknown of their own but phases: what an effect predicts of them is told by its odds.
 
     Parameters
     ----------
@@ -582,10 +583,11 @@ def _rivals(
     for score in scores:
         phases = len(score.phases) if score.effect.order_locked else 0
         needed = 0.0 if hinted else decides.fall_of(1 + phases)
+        odds = needed if hinted or phases else decides.tied
         if score.like_levels:
             shown = score.gain > needed and score.least > min(needed, decides.immaterial**2)
         else:
-            shown = min(score.gain, score.held_out.sum()) > needed
+            shown = score.gain > needed and score.held_out.sum() > odds
         significant = abs(score.size) > clear * score.sigma and shown
         if significant and abs(score.size) >= score.effect.matters:
             able.setdefault(score.effect.name, []).append(score)

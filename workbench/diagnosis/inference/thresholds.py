@@ -39,10 +39,11 @@ class Thresholds:
     Attributes
     ----------
     significant : standard deviations of a size; the largest of all candidates' by chance.
-    fall : of chi-squared on held-out recordings; likewise, its square.
+    fall : of chi-squared; likewise, its square.
     immaterial : standard deviations from zero to a size that matters, of a second effect too small
         to; of one effect alone, what is significant.
-    tied : chi-squared by which fits are equals: odds that chance turns at the rate.
+    tied : chi-squared by which fits are equals, or held-out recordings are foretold no better: odds
+        that chance turns at the rate.
     wrong : variance of errors that last, over noise, from which on much is wrong. Chance makes 1.5
         of a hundred means, and 4.3 of five; laws that differ a little in form may make as much.
     form : chi-squared that a candidate may owe to its form, since laws are simplified.
@@ -118,7 +119,7 @@ def thresholds(candidates: int, rate: float = RATE, left: float = Thresholds.lef
     Notes
     -----
     A size is normal about zero. Fitted, its square is by what chi-squared falls, of one degree of
-    freedom (S. S. Wilks, 1938, Ann. Math. Stat. 9, 60-62); on held-out recordings it falls by less.
+    freedom (S. S. Wilks, 1938, Ann. Math. Stat. 9, 60-62).
     An immaterial second effect exceeds what matters at the rate. Of two fits with as many unknowns,
     a difference D of chi-squared stands for odds of exp(D/2).
 

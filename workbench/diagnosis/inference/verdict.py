@@ -240,9 +240,10 @@ def _concluded(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagn
     if best.active and late is None and not outside:
         report("held-out recordings")
         gain = _gain(fit, chosen)
-        if not chosen.interrupted and (verdict == "unexplained" or len(best.active) > 1):
+        if not chosen.interrupted:
             worse, left = _objections(fit, chosen, gain, whole=verdict == "found")
-            objections = [*worse, *left]
+            alone = verdict == "found" and len(best.active) == 1
+            objections = [*worse, *([] if alone else left)]
             before, after = gain.before**2 - 1.0, gain.after**2 - 1.0
             removed = (before - after) / max(before, 1e-9)
             part = not worse and not astray and removed > _MOST
