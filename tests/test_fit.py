@@ -143,6 +143,11 @@ def test_a_product_that_alone_is_told_is_named_with_its_direction(system, cases)
     assert not outcome["a"].identified
     assert outcome["a"].low is None
     assert outcome["C"].identified
+    # What the recordings do not show of the product's parts is no uncertainty of anything else.
+    alone = fitted(system, cases[:1], "a", given)
+    for value in (v for v in alone.values if v.name != "a"):
+        (beside,) = (v for v in outcome.values if v.label == value.label)
+        assert beside.deviation == pytest.approx(value.deviation, rel=0.05)
 
 
 def test_a_parameter_that_no_output_shows_is_named(system, cases):

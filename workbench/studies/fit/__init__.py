@@ -651,6 +651,10 @@ class _Judgement:
         left, alike, right = np.linalg.svd(weighted / norms, full_matrices=False)
         parted = np.where(alike < _ROUNDING * alike[0], 0.0, alike)
         _, singular, axes = np.linalg.svd(left * parted @ right * norms, full_matrices=False)
+        # A direction that is not shown at all is no uncertainty of what is hardly a part of it, by
+        # the noise of derivatives.
+        shown, size = np.count_nonzero(parted), np.abs(axes)
+        axes[shown:] *= (size >= _SHARE * size.max(axis=1, keepdims=True))[shown:]
         floor = max(singular[0] * np.finfo(float).eps, np.finfo(float).tiny)
         inverse = axes.T / np.maximum(singular, floor) ** 2 @ axes
         covariance = inverse
