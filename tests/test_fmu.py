@@ -38,6 +38,8 @@ from workbench.observers.fmpy_comparison import (
     compare_with_fmpy,
 )
 
+from .hostile_fmus import rewritten
+
 INPUTS = ["pB", "tauR", "dmuWR", "dmuDC", "correctionW", "correctionR"]
 
 
@@ -320,3 +322,19 @@ def test_co_simulation_in_python_runs_as_in_fmpy(tmp_path):
     path = tmp_path / "Spring.fmu"
     assert MODEL_EXCHANGE not in read_description(path).interfaces
     assert compare_with_fmpy(path).verdict == RIGHT
+
+
+def test_another_name_of_an_input_is_read_and_not_set(root, tmp_path):
+    """FMI 3.0 declares it beside the first one, as Dymola does for inputs of parts."""
+
+    def change(folder: Path) -> None:
+        file = folder / "modelDescription.xml"
+        entry = r'(<Float64 name="pB"[^>]*?)/>'
+        alias = r'\1><Alias name="cylinder.p" description="Pressure"/></Float64>'
+        file.write_text(re.sub(entry, alias, file.read_text()))
+
+    original = root / "fmus/fmi3/MinimalObserver.fmu"
+    read = read_description(rewritten(original, tmp_path / "aliased.fmu", change))
+    assert read.names("input") == read_description(original).names("input")
+    (alias,) = [variable for variable in read.variables if variable.name == "cylinder.p"]
+    assert (alias.causality, alias.unit, alias.text) == ("local", "Pa", "Pressure")

@@ -547,3 +547,15 @@ def test_no_fmu_is_built_around_one_of_fmi_3(tank, tmp_path):
         assert rate_terms(model, tank) == ()
     with pytest.raises(InputError, match=re.escape("expected Model Exchange of FMI 2.0")):
         write_extended(path, tmp_path / "Extended.fmu", [], {}, {})
+
+
+def test_an_extended_fmu_without_units_is_valid(tmp_path):
+    inner = build_text(
+        tmp_path,
+        "model Plain output Real x(start=1, fixed=true); parameter Real k=1; "
+        "equation der(x) = -k*x; end Plain;",
+    )
+    write_extended(inner, tmp_path / "extended.fmu", (), {}, {"k": 2.0})
+    assert validate_fmu(str(tmp_path / "extended.fmu")) == []
+    run = fmpy.simulate_fmu(str(tmp_path / "extended.fmu"), stop_time=1.0)
+    assert run["x"][-1] == pytest.approx(np.exp(-2.0), rel=1e-3)  # of FMPy's integrator, 1e-4

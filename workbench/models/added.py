@@ -186,13 +186,14 @@ def _described(
         exchange.remove(part)
     exchange.set("modelIdentifier", _IDENTIFIER)
     exchange.set("canSerializeFMUstate", "false")
-    if (units := root.find("UnitDefinitions")) is None:
-        units = ElementTree.Element("UnitDefinitions")
-        root.insert(list(root).index(exchange) + 1, units)
-    known = {unit.get("name") for unit in units}
+    units = root.find("UnitDefinitions")
+    own_units = ElementTree.Element("UnitDefinitions") if units is None else units
+    known = {unit.get("name") for unit in own_units}
     asked = [unit for term in terms for unit in (term.unit, term.state_unit)]
     for unit in dict.fromkeys(unit for unit in asked if unit not in {*known, ""}):
-        ElementTree.SubElement(units, "Unit", name=unit)
+        ElementTree.SubElement(own_units, "Unit", name=unit)
+    if units is None and len(own_units):  # an empty one is not valid
+        root.insert(list(root).index(exchange) + 1, own_units)
     for variable in variables:
         if (value := parameters.get(variable.get("name", ""))) is not None:
             next(iter(variable.iterfind("Real"))).set("start", repr(float(value)))

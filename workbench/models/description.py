@@ -446,12 +446,14 @@ def _variable(variable: "fmpy.model_description.ModelVariable") -> Variable:
     minimum, maximum = limit("min"), limit("max")
     if minimum is not None and maximum is not None and minimum > maximum:
         raise _WrongError(f"the range of '{name}', from {minimum:g} to {maximum:g}")
+    # Another name in FMI 3.0, <Alias>: it is read under that, and set under the first alone.
+    alias = getattr(variable, "alias", None) is not None and variable.causality != "independent"
     return Variable(
         name=name,
         reference=variable.valueReference,
         type=variable.type,
         real=real,
-        causality=variable.causality,
+        causality="local" if alias else variable.causality,
         variability=variable.variability or "continuous",
         unit=variable.unit or (declared.unit if declared else None),
         start=None if variable.start is None else str(variable.start),

@@ -146,6 +146,12 @@ def _match(
     signals: dict[str, DraftSignal] = {}
     pairs: list[tuple[int, str, DraftSignal]] = []  # rank, variable, what it would be
     reasons: dict[str, str] = {}
+    # Of variables that are one, an input is meant before an output, and that before others.
+    order = {"output": 1, "input": 2}
+    meant = {
+        v.reference: v.name
+        for v in sorted(reversed(description.variables), key=lambda v: order.get(v.causality, 0))
+    }
     for variable in description.variables:
         own = names[variable.name]
         role = {"input": "inputs", "output": "outputs"}.get(variable.causality, "")
@@ -175,6 +181,8 @@ def _match(
             # The whole name goes before parts of it, and an output before what is within.
             whole = likeness_to(place.channel.name, "", [variable.name, own]) == EXACT
             rank = 2 * (likeness + whole) + (variable.causality != "local")
+            if not whole and variable.name != meant[variable.reference] and not variable.of:
+                continue
             if signal:
                 pairs.append((rank, own, signal))
             elif likeness:
