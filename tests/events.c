@@ -114,7 +114,7 @@ fmi2Status fmi2GetDerivatives(fmi2Component c, fmi2Real x[], size_t n) {
     m->r[P] = m->r[T] - m->r[TA];
 #endif
 #ifdef LOST /* above its table */
-    if (m->r[T] > 292.0) x[0] = NAN;
+    if (m->r[T] > LOST) x[0] = NAN;
 #endif
 #ifdef WARNS /* above its table: 1 by a message and a status, 2 by a status alone, 3 by a message alone */
     if (m->r[T] > 292.0) {

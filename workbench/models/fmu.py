@@ -955,7 +955,8 @@ class FMU(FMUInstance):
             return False
         before = self.get_states()
         event = super().complete_step()
-        moved = np.flatnonzero(self.get_states() != before)
+        after = self.get_states()
+        moved = np.flatnonzero((after != before) & (np.isfinite(after) | np.isfinite(before)))
         if moved.size and not event:
             raise FMUError(
                 f"{self.called}: it changes '{self.states[moved[0]]}' at the end of a step "

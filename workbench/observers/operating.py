@@ -82,11 +82,11 @@ def settle(
     return x, u
 
 
-class HiddenAtDesignError(InputError):
-    """A design point at which what is estimated moves no output, or not in its own way."""
+class DesignPointError(InputError):
+    """A design point where what is estimated moves no output in its own way, or a model fails."""
 
     @classmethod
-    def of(cls, fmu: FMU, hidden: str) -> "HiddenAtDesignError":
+    def of(cls, fmu: FMU, hidden: str) -> "DesignPointError":
         """Name what is hidden."""
         return cls(
             where=fmu.place,
@@ -110,6 +110,13 @@ def linearised(fmu: FMU, system: System) -> LinearModel:
             C[j, fmu.states.index(name)] = 1.0
         else:
             C[j], D[j] = linear.C[unseen.index(name)], linear.D[unseen.index(name)]
+    if not all(np.isfinite(part).all() for part in (linear.A, linear.B, C, D)):
+        raise DesignPointError(
+            where=fmu.place,
+            found="derivatives that are no finite numbers at the design point",
+            expected="a model that can be linearised there",
+            remedy="choose another [points.design], or run 'workbench fmu check' on the model",
+        )
     return LinearModel(
         fmu.states,
         linear.A,

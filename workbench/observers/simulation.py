@@ -18,7 +18,7 @@ from workbench.observers.estimators.open_loop import OpenLoop
 from workbench.observers.estimators.smoother import Smoother
 from workbench.observers.gains_file import read_gains, usual_gains
 from workbench.observers.observability import guesses, information
-from workbench.observers.operating import HiddenAtDesignError
+from workbench.observers.operating import DesignPointError
 from workbench.observers.replay import replay, run_on_model
 from workbench.observers.run import (
     Ending,
@@ -436,7 +436,7 @@ def prepare(
         for place, (name, estimator) in enumerate(kinds.items(), 1):
             try:
                 gains[name] = gains_for(estimator, models[estimator.role], system, tuned)
-            except HiddenAtDesignError as error:
+            except DesignPointError as error:
                 if leave_out is None or (place == len(kinds) and not gains):
                     raise
                 leave_out(name, error)

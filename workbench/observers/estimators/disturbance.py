@@ -46,7 +46,7 @@ from workbench.observers.layout import (
     stick,
 )
 from workbench.observers.operating import (
-    HiddenAtDesignError,
+    DesignPointError,
     LinearModel,
     corrected_states,
     linearised,
@@ -308,7 +308,7 @@ class DisturbanceObserver(Estimator):
         except LinAlgError:
             estimated = (*names, *(quantity.name for quantity in system.estimated))
             hidden = " and ".join(_hidden(A, C, estimated)) or "a state or quantity"
-            raise HiddenAtDesignError.of(fmu, hidden) from None
+            raise DesignPointError.of(fmu, hidden) from None
         gain = process[:, None] * (covariance @ C.T) / measurement
         L = np.hstack([gain, np.zeros_like(gain)])
         source = "stationary Kalman gain of the linearised model"
@@ -381,5 +381,5 @@ def effects(fmu: FMU, system: System, model: LinearModel) -> Vector:
     moves = np.vstack([model.B, model.D]).any(axis=0) & (effect != 0.0)
     if not moves.all():
         hidden = [system.estimated[i].name for i in np.flatnonzero(~moves)]
-        raise HiddenAtDesignError.of(fmu, " and ".join(hidden))
+        raise DesignPointError.of(fmu, " and ".join(hidden))
     return effect
