@@ -164,6 +164,23 @@ def test_of_a_process_that_a_model_has_doubled_one_tells_the_results(hostile_pat
 
 
 @linux_only
+@pytest.mark.parametrize("limit", ["d", "v"])
+def test_memory_that_is_short_is_told_before_libraries_hang(limit, home):
+    """OpenBLAS tries again for minutes to get what it needs, where 150 MB are allowed."""
+    run = subprocess.run(
+        ["bash", "-c", f"ulimit -{limit} 150000; {sys.executable} -m workbench systems"],
+        cwd=home,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=60,
+    )
+    assert run.returncode == 1
+    assert "memory is short: 146 MB are allowed, and a command takes 350 MB" in run.stderr
+
+
+@linux_only
 def test_a_recording_that_does_not_fit_is_refused_before_the_work(home):
     (home / "long").mkdir()
     shutil.copy(CASE / "case.toml", home / "long")

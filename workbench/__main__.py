@@ -15,7 +15,7 @@ from workbench.cli.pdf import browser, print_page
 from workbench.errors import FMUError, InputError, WorkerError
 from workbench.runtime.pool import preload
 from workbench.runtime.resources import own_version
-from workbench.runtime.supervision import confine, run_program, supervised
+from workbench.runtime.supervision import confine, run_program, short_memory, supervised
 
 _CONFINED = "import sys; from workbench.__main__ import run_confined; sys.exit(run_confined())"
 
@@ -59,6 +59,8 @@ def main(arguments: Sequence[str] | None = None, *, confined: bool = False) -> i
     options = parser.parse_args(given)
     output = Output(getattr(options, "json", False), getattr(options, "quiet", False))
     isolated = getattr(options, "isolated", False) and not confined
+    if short := short_memory():
+        return output.fail(command, 1, f"error: {short}")
     try:
         if isolated:
             folders = json.dumps([str(folder) for folder in _written(options)])
@@ -84,7 +86,10 @@ def main(arguments: Sequence[str] | None = None, *, confined: bool = False) -> i
     except (FMUError, WorkerError, OSError) as error:
         # OSError: of the machine, such as a full temporary folder.
         return output.fail(command, 1, error)
-    except MemoryError:
+    except (MemoryError, ImportError) as error:
+        # The linker's words for a library that memory is too short for.
+        if isinstance(error, ImportError) and "failed to map segment" not in str(error):
+            raise
         return output.fail(
             command,
             1,

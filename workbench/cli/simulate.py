@@ -16,7 +16,7 @@ from workbench.cli.output import CommandResult, Output, warn
 from workbench.errors import InputError
 from workbench.runtime.files import locked_folder, write_json
 from workbench.runtime.pool import preload
-from workbench.runtime.supervision import memory_limit
+from workbench.runtime.supervision import STARTUP, memory_limit
 
 if TYPE_CHECKING:
     from workbench.observers.live import LiveWindow
@@ -103,11 +103,12 @@ def _require_memory(cases: Sequence[Case]) -> None:
         return
     for case in cases:
         needed = _NUMBERS * 8 * case.time.size * (1 + len(case.signals))
-        if needed > limit:
+        if needed + STARTUP > limit:
             raise InputError(
                 where=str(case.source),
                 found=f"{case.time.size} samples, whose run takes about {needed >> 20} MB",
-                expected=f"what fits into {limit >> 20} MB of memory",
+                expected=f"what fits into {limit >> 20} MB of memory beside the program's "
+                f"{STARTUP >> 20} MB",
                 remedy="cut the recording into parts",
             )
 

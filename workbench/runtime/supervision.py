@@ -38,6 +38,8 @@ _REQUESTS = tuple(
     if hasattr(signal, name)  # Windows has not all
 )
 _PATIENCE = 10  # [s] from a request to end until the end; results are written in less
+# [byte] of numpy, SciPy, numba and their threads before any work, at two processors
+STARTUP = 350 << 20
 
 
 @dataclass(frozen=True)
@@ -145,8 +147,22 @@ def memory_limit() -> int | None:
     if resource is None or sys.platform != "linux":
         return None
     machine = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    _, hard = resource.getrlimit(resource.RLIMIT_DATA)
-    return machine if hard == resource.RLIM_INFINITY else min(machine, hard)
+    (_, data), (space, _) = map(resource.getrlimit, (resource.RLIMIT_DATA, resource.RLIMIT_AS))
+    return min(size for size in (machine, data, space) if size != resource.RLIM_INFINITY)
+
+
+def short_memory() -> str:
+    """Say that a command has too little memory to start; empty where it has enough.
+
+    Libraries of linear algebra that get none try again for minutes, or end the process.
+    """
+    limit = memory_limit()
+    if limit is None or limit >= STARTUP:
+        return ""
+    return (
+        f"memory is short: {limit >> 20} MB are allowed, and a command takes {STARTUP >> 20} MB to "
+        "start. Allow more (ulimit -d, ulimit -v, or limits of the service)"
+    )
 
 
 def limit_memory(size: int) -> tuple[int, int] | None:
@@ -457,8 +473,11 @@ def _end_the_rest(group: int) -> None:
 def _describe_end(status: int) -> str:
     """Say how a process ended that did not come to its end."""
     how = f"killed by {signal.Signals(-status).name}" if status < 0 else f"ended, status {status},"
+    machine, limit = (os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"), memory_limit())
+    scarce = limit is not None and limit < machine
+    by = f", or as memory was short, of which {(limit or 0) >> 20} MB are allowed" * scarce
     return (
-        f"the command was {how} before it was done: by a model's own code, or from outside. "
+        f"the command was {how} before it was done: by a model's own code, or from outside{by}. "
         "'workbench fmu check FILE' tries a model call by call"
     )
 
