@@ -243,6 +243,11 @@ def test_times_go_on_behind_a_leap_second(tmp_path, tank):
     assert_allclose(clock(table(tmp_path / "b.csv", rounded), tank).times, 60.0 * np.arange(59))
 
 
+def test_two_digits_of_a_year_go_on_from_99_to_00(tmp_path, tank):
+    stamps = local(datetime(1999, 12, 31, 20, tzinfo=UTC), 60, "%d.%m.%y %H:%M")
+    assert_allclose(clock(table(tmp_path / "a.csv", stamps), tank).times, QUARTER * np.arange(60))
+
+
 def test_rows_that_were_mixed_are_to_be_sorted(tmp_path, tank):
     stamps = local(datetime(2024, 3, 1, tzinfo=UTC), 60, "%Y-%m-%d %H:%M")
     stamps[30:32] = stamps[31:29:-1]

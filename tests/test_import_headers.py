@@ -1,6 +1,7 @@
 """Names and units as recorders write them above samples, and cells that are no numbers."""
 
 import datetime
+import json
 import struct
 import tomllib
 import zipfile
@@ -136,6 +137,25 @@ def test_a_row_for_each_value_is_read_by_tags(tmp_path, names):
         "inflow": "l/s",
     }
     assert channels["h"].values.size == 30
+
+
+@pytest.mark.parametrize("form", ["json", "parquet"])
+def test_rows_of_one_value_in_other_formats_are_read_by_tags(tmp_path, form):
+    rows = [
+        {"time": f"2024-03-05 10:00:{k:02d}", "tag": tag, "value": size + k, "unit": unit}
+        for k in range(60)
+        for tag, size, unit in (("h", 950.5, "mm"), ("inflow", 4.5, "l/s"))[k % 2 :]
+    ]
+    path = tmp_path / f"a.{form}"
+    if form == "json":
+        path.write_text(json.dumps(rows))
+    else:
+        pq.write_table(pa.Table.from_pylist(rows), path)
+    groups = read_recorded_file(path).groups
+    held = {c.name: c for group in groups for c in group.channels if not c.stamp}
+    assert {name: c.unit for name, c in held.items()} == {"h": "mm", "inflow": "l/s"}
+    assert_allclose(held["h"].values, 950.5 + np.arange(0, 60, 2))
+    assert_allclose(groups[0].channels[0].values, np.arange(0, 60, 2))
 
 
 def test_slow_channels_have_empty_cells_between_their_samples(tmp_path):

@@ -18,6 +18,7 @@ from importlib import import_module
 from pathlib import Path
 
 from workbench.errors import InputError
+from workbench.recordings.formats.cells import by_tag
 from workbench.recordings.formats.contents import Contents, FileChannel, Group, RecordedFile
 from workbench.recordings.formats.json_text import is_json
 from workbench.recordings.formats.json_text import read as read_as_json
@@ -95,6 +96,7 @@ def read_recorded_file(path: Path) -> RecordedFile:
     if packed:
         raw = _unpack(path, raw)
     words, groups, notes, doubts = _reader(path, raw)(path, raw)
+    groups = [own for group in groups for own in by_tag(group)]
     if not any(group.channels for group in groups):
         raise InputError(
             where=str(path),

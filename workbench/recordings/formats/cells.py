@@ -501,6 +501,43 @@ def parted(table: Cells) -> list[tuple[str, Cells]]:
     return tables
 
 
+def by_tag(group: Group) -> list[Group]:
+    """Groups of one signal each, where rows hold one value of one that a column names; else it."""
+    at = {_PARTS_OF_TAGS.get(name_and_unit(c.name)[0].casefold()): c for c in group.channels}
+    texts = {_PARTS_OF_TAGS.get(c.name.casefold()): c.texts for c in group.left}
+    value, tags = at.get("value"), texts.get("tag", ())
+    called = list(dict.fromkeys(filter(None, tags)))
+    if value is None or not 1 < len(called) <= len(tags) / _FEWEST:
+        return [group]
+    groups = []
+    for tag in called:
+        rows = [k for k, own in enumerate(tags) if own == tag]
+        units = {texts["unit"][k] for k in rows} if "unit" in texts else {value.unit}
+        unit = spell_unit(units.pop()) if len(units) == 1 else ""
+        own_value = replace(_rows_of(value, rows), name=tag, unit=unit)
+        channels = (own_value if c is value else _rows_of(c, rows) for c in group.channels)
+        own_group = replace(
+            group,
+            name=tag,
+            channels=tuple(channels),
+            time=_rows_of(group.time, rows) if group.time else None,
+            within=(*group.within, tag),
+            left=(),
+        )
+        groups.append(own_group)
+    return groups
+
+
+def _rows_of(channel: FileChannel, rows: list[int]) -> FileChannel:
+    """Some samples of a channel."""
+    return replace(
+        channel,
+        values=channel.values[rows],
+        texts=tuple(channel.texts[k] for k in rows) if channel.texts else (),
+        censored=tuple(np.flatnonzero(np.isin(rows, channel.censored)).tolist()),
+    )
+
+
 def _by_clock(table: Cells) -> list[tuple[str, Cells]]:
     """A table for each column of times, with the columns behind it, where these differ."""
     labels = [_label(table, i) for i in range(len(table.names))]

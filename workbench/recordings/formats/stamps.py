@@ -579,7 +579,8 @@ def _day(parts: tuple[str, ...], order: str) -> date:
 
 
 def _full(year: str) -> int:
-    return int(year) + (2000 if len(year) <= 2 else 0)
+    """A year of four digits; of two, it is from 1969 to 2068, as POSIX has it."""
+    return int(year) + (0 if len(year) > 2 else 2000 if int(year) < 69 else 1900)
 
 
 def _offset(match: re.Match[str] | None) -> float:
