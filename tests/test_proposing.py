@@ -2,8 +2,11 @@
 
 import json
 import math
+import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -22,6 +25,7 @@ from workbench.diagnosis.effects.extension import ExtendedModel, build, variable
 from workbench.diagnosis.effects.slots import read_slots
 from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.laws.forms import SIGNED, ClosedForm, candidates
+from workbench.diagnosis.laws.free import _written
 from workbench.diagnosis.laws.outcome import _falls, worse_everywhere
 from workbench.diagnosis.laws.periods import strongest_period
 from workbench.diagnosis.laws.places import (
@@ -34,7 +38,7 @@ from workbench.diagnosis.laws.places import (
     places,
     turning,
 )
-from workbench.diagnosis.laws.scan import watching
+from workbench.diagnosis.laws.scan import _probe, watching
 from workbench.diagnosis.laws.splines import COEFFICIENTS, Knots, kernel, smoothest
 from workbench.diagnosis.laws.writing import extended_library
 from workbench.diagnosis.problem import Problem
@@ -73,7 +77,7 @@ def test_forms_of_signed_quantities_are_what_they_are_called(name, law):
     """But for kinks, which are rounded over a hundredth of the range: half of that at most."""
     (form,) = (form for form in SIGNED if form.name == name)
     shape = {form.shape: 1.5} if form.shape else {}
-    text = form.expression.format(q="q", Q="4.0", w="0.04").replace("^", "**")
+    text = form.expression.format(q="q", Q="4.0", w="0.04", shape=form.shape).replace("^", "**")
     values = eval(text, {"sqrt": np.sqrt, "tanh": np.tanh, "q": Q, **shape})
     assert_allclose(4.0 * values, law, atol=0.04)
 
@@ -406,6 +410,25 @@ def test_slots_tell_where_a_law_may_act(outlet_place):
         ("nominal", "m3/s"),
         ("h", "m"),
     ]
+
+
+@pytest.mark.parametrize("taken", ["d", "s", "x", "n", "threshold"])
+def test_names_of_generated_classes_are_not_those_of_their_slot(taken, outlet_place):
+    slot = replace(outlet_place.slot, inputs=("nominal", taken))
+    inputs = tuple(
+        replace(own, name=new) for own, new in zip(outlet_place.inputs, slot.inputs, strict=True)
+    )
+    place = replace(outlet_place, slot=slot, inputs=inputs)
+    law = Law(place, Carrier("1.0", "m3/s", "adds to flow"), LawInfluence("value", inputs[1:]))
+    knots = Knots(0.5, 1.5)
+    free = _written("Free", SimpleNamespace(law=law, knots=knots))
+    forms = [form.written for form in candidates(law, knots, 2e-3, 3e-3)]
+    for written in (_probe(place), free, *forms):
+        declared = re.findall(r"Real (\w+)\(", " ".join(written.declarations))
+        assert declared
+        assert taken not in declared
+        for name in declared:  # each is what the class acts by
+            assert re.search(rf"\b{name}\b", " ".join([written.change, *written.equations]))
 
 
 def test_bounds_of_a_size_follow_from_its_function_and_are_widened(outlet_place):

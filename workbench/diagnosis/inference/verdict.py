@@ -258,8 +258,14 @@ def _concluded(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagn
             _cause(fit, chosen, effect, noise_alone=noise_alone, whole=verdict == "found")
             for effect in _strongest_first(fit, chosen, catalogue)
         ]
-        # Beside others, a part that bends as far as its effect allows stands for another law.
-        if verdict == "partly explained" and len(causes) > 1 and (bent := _at_bounds(causes)):
+        # Beside others, a part that bends as far as its effect allows stands for another law. Of
+        # several, each is needed on held-out recordings, whatever its interval.
+        bent: list[str] = []
+        if len(causes) > 1:
+            bent = _at_bounds(causes) if verdict == "partly explained" else []
+        elif not noise_alone:
+            bent = _untold(causes)
+        if bent:
             objections += bent
             verdict, causes, gain = "unexplained", [], None
     if causes:
@@ -420,6 +426,16 @@ def _at_bounds(causes: Sequence[Cause]) -> list[str]:
         for cause in causes
         for name, interval in cause.parameters.items()
         if interval.limit and interval.open
+    ]
+
+
+def _untold(causes: Sequence[Cause]) -> list[str]:
+    """Causes whose size may as well be zero, in words."""
+    sizes = {cause.effect.name: cause.parameters.get(cause.effect.label) for cause in causes}
+    return [
+        f"beside what remains, {name} may as well be nothing"
+        for name, size in sizes.items()
+        if size is not None and size.low <= 0.0 <= size.high
     ]
 
 

@@ -29,7 +29,7 @@ class Form:
 
     name: str
     text: str  # for people, of `{q}`
-    expression: str  # in Modelica, of {q}, {Q} the largest, {w} what is rounded, and the shape
+    expression: str  # in Modelica, of {q}, {Q} the largest, {w} what is rounded, and {shape}
     shape: str = ""  # name of its parameter; empty if it has none
     unit: str = "{unit}"  # of the shape, {unit} of the quantity
     # of the shape to begin with, over the range of the quantity; of a power the exponents
@@ -38,32 +38,32 @@ class Form:
 
 FORMS = (
     Form("Linear", "in proportion to it", "{q}/{Q}"),
-    Form("Power", "with a power of it", "(({q}/{Q})^2 + 1e-9)^(0.5*n)", "n", "1", (0.5, 2.0)),
+    Form("Power", "with a power of it", "(({q}/{Q})^2 + 1e-9)^(0.5*{shape})", "n", "1", (0.5, 2.0)),
     Form(
         name="Saturation",
         text="with it, ever less",
-        expression="1.0 - exp(-{q}/scale)",
+        expression="1.0 - exp(-{q}/{shape})",
         shape="scale",
         values=(0.05, 0.2, 0.6),
     ),
     Form(
         name="Growth",
         text="exponentially with it",
-        expression="exp(({q} - {Q})/scale)",
+        expression="exp(({q} - {Q})/{shape})",
         shape="scale",
         values=(0.1, 0.3),
     ),
     Form(
         name="Threshold",
         text="in proportion to what of it is above a threshold",
-        expression="0.5*({q} - threshold + sqrt(({q} - threshold)^2 + {w}^2))/{Q}",
+        expression="0.5*({q} - {shape} + sqrt(({q} - {shape})^2 + {w}^2))/{Q}",
         shape="threshold",
         values=(0.2, 0.4, 0.6, 0.8),
     ),
     Form(
         name="Step",
         text="by a step at a threshold",
-        expression="0.5*(1.0 + tanh(({q} - threshold)/{w}))",
+        expression="0.5*(1.0 + tanh(({q} - {shape})/{w}))",
         shape="threshold",
         values=(0.2, 0.4, 0.6, 0.8),
     ),
@@ -80,14 +80,15 @@ SIGNED = (
     Form(
         name="DeadZone",
         text="in proportion to what of it is beyond a dead zone",
-        expression="({q} + 0.5*(sqrt(({q} - zone)^2 + {w}^2) - sqrt(({q} + zone)^2 + {w}^2)))/{Q}",
+        expression="({q} + 0.5*(sqrt(({q} - {shape})^2 + {w}^2)"
+        " - sqrt(({q} + {shape})^2 + {w}^2)))/{Q}",
         shape="zone",
         values=(0.1, 0.3, 0.6),
     ),
     Form(
         name="Limiter",
         text="with it up to a limit to both sides",
-        expression="tanh({q}/limit)",
+        expression="tanh({q}/{shape})",
         shape="limit",
         values=(0.1, 0.3, 1.0),
     ),
@@ -129,12 +130,12 @@ class ClosedForm:
     def written(self) -> LawClass:
         """Its class."""
         lines, shapes = self._shape()
-        sizes = ("cosine", "sine") if self._turns else ("s",)
+        sizes = ("cosine", "sine") if self._turns else (self.law.place.own("s"),)
         known = _bounded(self.law.carrier.unit, *self._reach())
         text = {"cosine": "Part of cosine", "sine": "Part of sine"}
         about = "Size, at the largest that was seen"
         declared, equations = clock(self.law.influence)
-        times = f"({self._expression()})" if self._turns else f"s*({self._expression()})"
+        times = f"({self._expression()})" if self._turns else f"{sizes[0]}*({self._expression()})"
         return LawClass(
             name=self.name,
             about=f"{MARK}: {self.text}",
@@ -181,6 +182,7 @@ class ClosedForm:
             q="" if influence is None else influence.expression,
             Q=number(max(abs(knots.low), abs(knots.high))),
             w=number(_ROUNDED * (knots.high - knots.low)),
+            shape=self.law.place.own(self.form.shape),
         )
 
     def _shape(self) -> tuple[tuple[str, ...], dict[str, tuple[float, ...]]]:
@@ -201,8 +203,9 @@ class ClosedForm:
         low, high = (0.1, 6.0) if powers else (min(values) / 20.0, 2.0 * sizes.high)
         unit = form.unit.format(unit="" if influence is None else influence.unit)
         known = _bounded(unit, low / self.room, high * self.room)
-        line = f'parameter Real {form.shape}({known}) = {number(values[0])} "Of its form";'
-        return (line,), {form.shape: values}
+        shape = self.law.place.own(form.shape)
+        line = f'parameter Real {shape}({known}) = {number(values[0])} "Of its form";'
+        return (line,), {shape: values}
 
 
 def candidates(

@@ -98,9 +98,9 @@ def _written(name: str, prospect: LawScore) -> LawClass:
         declared_ = f"parameter Real c0({unit_of(law.carrier.unit)}) = 0.0;"
         change = f"{law.carrier.expression}*c0"
         return LawClass(name, about, law.place, (declared_,), (), change)
-    last = COEFFICIENTS - 3
+    last, place = COEFFICIENTS - 3, law.place.own("x")
     declared, equations = clock(law.influence)
-    terms = " + ".join(f"c{k}*({_bump(k - 1)})" for k in range(COEFFICIENTS))
+    terms = " + ".join(f"c{k}*({_bump(place, k - 1)})" for k in range(COEFFICIENTS))
     inside = f"({law.influence.expression} - ({number(knots.low)}))/{number(knots.step)}"
     return LawClass(
         name=name,
@@ -112,16 +112,16 @@ def _written(name: str, prospect: LawScore) -> LawClass:
                 for k in range(COEFFICIENTS)
             ),
             *declared,
-            'Real x(unit="1") "Place among the knots";',
+            f'Real {place}(unit="1") "Place among the knots";',
         ),
-        equations=(*equations, f"x = noEvent(max(0.0, min({number(last)}, {inside})));"),
+        equations=(*equations, f"{place} = noEvent(max(0.0, min({number(last)}, {inside})));"),
         change=f"{law.carrier.expression}*({terms})",
     )
 
 
-def _bump(knot: int) -> str:
-    """Cubic B-spline about a knot, of x."""
-    away = f"abs(x - ({number(knot)}))"
+def _bump(place: str, knot: int) -> str:
+    """Cubic B-spline about a knot, of a place among them."""
+    away = f"abs({place} - ({number(knot)}))"
     return f"(noEvent(max(0.0, 2.0 - {away}))^3 - 4.0*noEvent(max(0.0, 1.0 - {away}))^3)/6.0"
 
 

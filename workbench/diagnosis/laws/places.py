@@ -53,6 +53,13 @@ class Place:
             return self.slot.inputs[self.slot.outputs.index(self.output.name)]
         return f"unchanged.{self.output.name}"
 
+    def own(self, name: str) -> str:
+        """A name for what a generated class declares, which its slot does not have."""
+        taken = {*self.slot.inputs, *self.slot.outputs, *self.slot.counts, *self.slot.handed}
+        while name in taken:
+            name += "_"
+        return name
+
     def at(self, watched: Mapping[str, Vector], name: str) -> Vector:
         """An input or output along a recording."""
         return watched[f"{self.slot.name}.{name}"]

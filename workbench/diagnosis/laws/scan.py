@@ -76,8 +76,9 @@ def effect_at(name: str, library: Library, place: Place, size: str) -> Effect:
 
 
 def _probe(place: Place) -> LawClass:
-    declared = f"parameter Real {_SIZE}({unit_of(place.output.unit)}) = 0.0;"
-    return LawClass(place.name, "Probe", place, (declared,), (), _SIZE)
+    size = place.own(_SIZE)
+    declared = f"parameter Real {size}({unit_of(place.output.unit)}) = 0.0;"
+    return LawClass(place.name, "Probe", place, (declared,), (), size)
 
 
 class Scan:
@@ -115,7 +116,7 @@ class Scan:
         )
         with tempfile.TemporaryDirectory() as scratch:
             extended = extended_library(library, map(_probe, where), Path(scratch))
-            probes = [effect_at(place.name, library, place, _SIZE) for place in where]
+            probes = [effect_at(place.name, library, place, place.own(_SIZE)) for place in where]
             effects = [*about.active, *probes]
             path = Path(scratch) / "Probes.fmu"
             text = ExtendedModel(extended, base, "Probes", effects, "With probes").source()
@@ -152,7 +153,9 @@ class Scan:
             part = every[first : first + each]
             bases = [self._basis(law) for law in part]
             columns = [
-                Variation(variables(self._fit.unknowns.effects[law.place.name], _SIZE))
+                Variation(
+                    variables(self._fit.unknowns.effects[law.place.name], law.place.own(_SIZE))
+                )
                 for law, (_, basis) in zip(part, bases, strict=True)
                 for _ in range(basis[0].shape[1])
             ]
@@ -198,7 +201,7 @@ class Scan:
             return []
         waves = [self._waves(law, period) for law, period in every]
         columns = [
-            Variation(variables(self._fit.unknowns.effects[law.place.name], _SIZE))
+            Variation(variables(self._fit.unknowns.effects[law.place.name], law.place.own(_SIZE)))
             for law, _ in every
             for _ in range(2)
         ]
