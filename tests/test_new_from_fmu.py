@@ -14,8 +14,9 @@ from workbench.__main__ import main
 from workbench.api import diagnose
 from workbench.diagnosis import Outcome
 from workbench.errors import InputError
+from workbench.observers import choose
 from workbench.recordings.case import read_cases
-from workbench.system.registry import load_system
+from workbench.system.registry import load_system, open_model
 from workbench.system.template import SEEPAGE, write_system
 
 pytest.importorskip("casadi", reason="needs the extra [compiler]")
@@ -88,6 +89,18 @@ def test_two_commands_lead_from_an_fmu_and_logs_to_an_open_loop(tmp_path, fmu, a
     assert main([*command, "--workers", "1"]) == 0
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert set(summary["cases"]) == {"day1", "day2"}
+
+
+def test_an_estimator_that_acts_by_quantities_alone_is_left_out_without_any(tmp_path, fmu):
+    log = write_log(tmp_path / "log.csv", 3)
+    drafted(fmu, log)
+    system = load_system(log.with_name("system"))
+    assert "parameter_estimator" not in choose(system, [])
+    (estimator,) = choose(system, ["parameter_estimator"]).values()
+    with open_model(system) as model:
+        gains = estimator.default_gains(model, system)
+        with pytest.raises(InputError, match=r"no table \[estimated.NAME\]"):
+            estimator(model, system, gains)
 
 
 def drafted(fmu: Path, log: Path) -> str:

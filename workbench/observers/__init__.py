@@ -32,14 +32,19 @@ def estimators_of(system: System) -> dict[str, type[Estimator]]:
 
 
 def choose(system: System, names: Sequence[str]) -> dict[str, type[Estimator]]:
-    """Estimators by name, in the order of tables; the standard ones if none is named."""
+    """Estimators by name, in the order of tables; the standard ones if none is named.
+
+    Of these, such as correct a model by its quantities alone are left out if there are none.
+    """
     known = estimators_of(system)
+    idle = {name for name, estimator in known.items() if estimator.by_quantities}
+    idle = set() if system.estimated else idle
     for name in names:
         _refuse_unknown(name, known, f"estimator '{name}'")
     return {
         name: estimator
         for name, estimator in known.items()
-        if (name in names if names else estimator.standard)
+        if (name in names if names else estimator.standard and name not in idle)
     }
 
 

@@ -100,6 +100,8 @@ class Estimator(ABC):
     coarse_steps: ClassVar[bool] = False
     # whether it goes through events of a model that saves its state
     passes_events: ClassVar[bool] = False
+    # whether its feedback acts by estimated quantities alone, so that it does nothing without them
+    by_quantities: ClassVar[bool] = False
     # whether samples may be missing, so that it takes aids as outputs, too
     aided: ClassVar[bool] = False
     # what it weighs models by, in columns and figures; none if it runs on one model
@@ -113,6 +115,13 @@ class Estimator(ABC):
         self.fmu = fmu
         self.system = system = self.fed(system)
         check_model(system, fmu.description)
+        if self.by_quantities and not system.estimated:
+            raise InputError(
+                where=str(system.source),
+                found="no table [estimated.NAME]",
+                expected=f"quantities of the model, by which the {self.label} corrects it",
+                remedy="add one (docs/system-file.md), or choose ekf or disturbance_observer",
+            )
         self.gains = gains
         inputs = [signal.name for signal in system.inputs]
         unseen = [output.name for output in system.outputs if output.name not in fmu.states]

@@ -204,6 +204,8 @@ def _case_lines(system: System, done: Sequence[CaseObservability]) -> list[str]:
         for quantity in system.estimated
     )
     hidden = [name for name in last.states if name not in first.states]
+    if not (system.estimated or hidden):
+        return []
     header += "".join(f"{name:>11}" for name in hidden)
     span = first.span
     lines = [

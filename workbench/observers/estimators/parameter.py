@@ -127,6 +127,7 @@ class ParameterEstimator(Estimator):
     """
 
     name = "parameter_estimator"
+    by_quantities = True
     label = "parameter estimator"
     coarse_steps = True
     role = FULL

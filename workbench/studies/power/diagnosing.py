@@ -20,6 +20,7 @@ from workbench.diagnosis.inference.verdict import conclude
 from workbench.diagnosis.laws import one_law
 from workbench.diagnosis.simulation.residual_model import ResidualModel
 from workbench.diagnosis.simulation.simulator import WhitenedResiduals
+from workbench.errors import InputError
 from workbench.models.modelica import read_library
 from workbench.recordings.case import Case
 from workbench.runtime.engine import ALONE, silent
@@ -30,6 +31,14 @@ _NONE: Mapping[Key, tuple[float, Sequence[Case]]] = {}
 
 def library_effects(system: System) -> tuple[Effect, ...]:
     """Effects of a system's library, which a diagnosis may find."""
+    if not system.library.is_file():
+        raise InputError(
+            where=str(system.source),
+            found=f"no Modelica library {system.library.name} beside it",
+            expected="a library, whose effects are injected into its own model",
+            remedy="put package.mo beside the system file, or give it with --library. The power of "
+            "a diagnosis of an FMU alone is not measured",
+        )
     return catalogue(system, read_library(system.library))
 
 
