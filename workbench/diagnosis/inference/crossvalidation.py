@@ -159,11 +159,16 @@ class CrossValidation:
         """Recordings that a fit predicts worse than another one does, and not to their noise.
 
         What the others leave open of a recording is no failure. Parts of a single one are none.
+        One effect alone may be a little wrong in form: of errors whose size nobody knows it must
+        fail by odds that chance does not turn, (now/was)^(n/2) of n means. Of several, which bend
+        to much, each recording must agree.
         """
         if self._fit.unknowns.count == 1:
             return []
         unsure = np.array([own.mean() for own in self.left_open(after, fast=fast)])
         was, now = self.squares(before, fast=fast), self.squares(after, fast=fast) - unsure
+        if len(after.active) == 1:
+            was *= np.exp(self._fit.decides.tied / np.array(self._counts(after, fast=fast)))
         worse = now > np.maximum(was, self.chance(after, fast=fast))
         return [name for name, rises in zip(self._fit.tests, worse, strict=True) if rises]
 
