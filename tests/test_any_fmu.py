@@ -874,6 +874,19 @@ def test_a_model_that_waits_for_clocks_is_refused(tmp_path):
             FMU(tmp_path / "Clocked.fmu")
 
 
+def test_a_clock_that_follows_time_within_a_model_is_refused(tmp_path):
+    """FMI has such clocks as inputs alone: whoever ticks this one, it is not the FMU."""
+    text = machine_file("arrays_fmu/modelDescription.xml")
+    clock = (
+        '<Clock name="own" valueReference="5" causality="local" intervalVariability="countdown"/>'
+    )
+    with zipfile.ZipFile(tmp_path / "Clocked.fmu", "w") as archive:
+        clocked = text.replace("</ModelVariables>", f"{clock}</ModelVariables>")
+        archive.writestr("modelDescription.xml", clocked)
+    with pytest.raises(InputError, match="found a clock 'own' that follows time and is no input"):
+        FMU(tmp_path / "Clocked.fmu")
+
+
 def recorded(folder: Path, outside: str = "Ta", inside: str = "T") -> Path:
     """A recording of ten minutes at 280 K outside; returns its folder."""
     case = folder / "cases" / "one"
@@ -1164,6 +1177,14 @@ def arrays(tmp_path) -> Callable[..., Path]:
         return tmp_path / "Arrays.fmu"
 
     return make
+
+
+def test_elements_of_arrays_move_in_a_straight_line_between_samples(arrays):
+    """der(x) = t - x from 1, so that x = t - 1 + 2 exp(-t); held inputs lag by half a step."""
+    time = 0.5 * np.arange(9.0)
+    with FMU(arrays()) as fmu:
+        simulated = Simulation(fmu, ["u[1]"], ["y[1]"], [0.0]).run(Drive(time, time[:, None]), {})
+    np.testing.assert_allclose(simulated[:, 0], time - 1.0 + 2.0 * np.exp(-time), atol=1e-6)
 
 
 def test_the_open_loop_and_a_diagnosis_read_and_set_elements_of_arrays(arrays):

@@ -382,6 +382,10 @@ def _refuse_impossible(
     for variable in description.modelVariables:
         if any(length < 1 for length in variable.shape or ()):
             raise _WrongError(f"an array '{variable.name}' of the shape {variable.shape}")
+        timed = variable.intervalVariability not in (None, "triggered")
+        if variable.type == "Clock" and timed and variable.causality != "input":
+            # FMI 3.0.2, section 2.2.8.3: clocks that follow time are inputs, which importers tick.
+            raise _WrongError(f"a clock '{variable.name}' that follows time and is no input")
     for unknown in description.outputs:
         if unknown.variable.causality != "output":
             raise _WrongError(

@@ -787,6 +787,11 @@ class FMU(FMUInstance):
             for v in self.description.variables
         )
 
+    def moves(self, name: str) -> bool:
+        """Whether a variable may go on in a straight line; one of whole numbers jumps."""
+        variable = self._described[name]
+        return variable.variability == "continuous" and variable.floats
+
     # --- the extended-FMI pattern ---
 
     def begin_at(self, time: float | None) -> None:

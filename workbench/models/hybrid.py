@@ -60,10 +60,9 @@ class HybridSimulation:
 
     def __init__(self, fmu: FMU, inputs: TypedVariables, holds: Vector) -> None:
         self._fmu, self._inputs = fmu, inputs
-        variability = {v.name: v.variability for v in fmu.description.variables}
-        moving = [variability[name] == "continuous" for name in inputs.real.names]
-        self._continuous_at = inputs.real_at[moving]
-        self._continuous = fmu.variables([inputs.names[i] for i in self._continuous_at])
+        moving = [i for i, name in enumerate(inputs.names) if fmu.moves(name)]
+        self._continuous_at = np.array(moving, np.intp)
+        self._continuous = fmu.typed([inputs.names[i] for i in moving])
         self._holds = np.where(holds == 0.0, 1.0, holds)
         self._holds[self._continuous_at] = holds[self._continuous_at]
         self._t = float(fmu.time[0])
@@ -137,7 +136,8 @@ class HybridSimulation:
     def _compiled(self, outputs: TypedVariables) -> Instance | None:
         """The FMU for compiled steps; None if they cannot set and read all that there is."""
         fmu = self._fmu
-        if outputs.others or not self._x.size or not all(map(fmu.is_real, fmu.states)):
+        others = outputs.others or self._continuous.others
+        if others or not self._x.size or not all(map(fmu.is_real, fmu.states)):
             return None
         return instance(fmu, self._continuous.names, [], outputs.names)
 
@@ -198,7 +198,7 @@ class HybridSimulation:
         """Put the FMU at a point."""
         self._fmu.set_time(t)
         if self._continuous.names:
-            self._fmu.set(self._continuous, self._inputs_at(t)[self._continuous_at])
+            self._fmu.set_typed(self._continuous, self._inputs_at(t)[self._continuous_at])
         self._fmu.set_states(x)
 
     def _go_on(self, end: float) -> None:
@@ -354,9 +354,10 @@ class CoSimulationRun:
     """
 
     def __init__(self, fmu: CoSimulation, inputs: TypedVariables, holds: Vector) -> None:
-        self._fmu, self._inputs, self._holds = fmu, inputs, holds.copy()
-        others = inputs.others_at
-        self._holds[others] = np.where(holds[others] == 0.0, 1.0, holds[others])
+        self._fmu, self._inputs = fmu, inputs
+        moves = [fmu.moves(name) or fmu.is_real(name) for name in inputs.names]
+        still = ~np.array(moves, np.bool_)
+        self._holds = np.where(still & (holds == 0.0), 1.0, holds)
         self._states = fmu.typed(fmu.states)
         self._t = fmu.start_time
         self._before = fmu.get_typed(inputs)
