@@ -5,6 +5,7 @@ adds to them, so that recordings of one block tell only the sum: what a draught 
 hardly be.
 """
 
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -288,7 +289,9 @@ def test_what_may_be_there_moves_what_was_found_as_far_as_a_fit_beside_it(tmp_pa
 UNEVEN = (0.02, 0.015, 0.01, 0.007)  # sizes of roads [m]
 
 
-def driven(size: float, seed: Sequence[int], dead: float = 0.0) -> pd.DataFrame:
+def driven(
+    size: float, seed: Sequence[int], dead: float = 0.0, stiffness: float = 2e4, rise: float = 0.0
+) -> pd.DataFrame:
     """Heights by SciPy, of a spring that gives way by `dead` [mm] about zero travel."""
     rng, t = np.random.default_rng(seed), 0.01 * np.arange(400)
     rates = np.arange(0.3, 6.0, 0.3)
@@ -297,10 +300,10 @@ def driven(size: float, seed: Sequence[int], dead: float = 0.0) -> pd.DataFrame:
 
     def change(time: float, x: Vector) -> list[float]:
         travel = np.interp(time, t, road) - x[0]
-        force = 2e4 * (travel - 1e-3 * dead * np.tanh(travel / 2e-3))
+        force = stiffness * (travel - 1e-3 * dead * np.tanh(travel / 2e-3))
         return [x[1] + 5.0 * travel, force / 300.0]
 
-    run = solve_ivp(change, (0.0, t[-1]), [0.0, 0.0], t_eval=t, rtol=1e-8, max_step=0.01)
+    run = solve_ivp(change, (0.0, t[-1]), [0.0, rise], t_eval=t, rtol=1e-8, max_step=0.01)
     heights = run.y[0] + 1e-4 * rng.standard_normal(t.size)
     return pd.DataFrame({"time [s]": t, "r [m]": road, "z [m]": heights})
 
@@ -313,3 +316,34 @@ def test_a_cause_that_may_as_well_be_nothing_is_none(tmp_path):
     assert diagnosis.best.names == ("Progressive",)
     assert diagnosis.verdict == "unexplained"
     assert diagnosis.causes == ()
+
+
+@pytest.mark.parametrize(
+    ("declared", "advice", "stiffness", "rise"),
+    [
+        ('spread = "0.2 mm/s"', r'spread = "[\d.]+ m/s" in \[states.y\]', 0.0, 0.05),
+        ("k = 0.0005", r"k = 0.0\d+ in \[diagnosis.tolerances\]", 600.0, 0.0),
+    ],
+    ids=["starts", "tolerances"],
+)
+def test_what_is_declared_too_narrow_is_told_with_what_to_write(
+    declared, advice, stiffness, rise, tmp_path
+):
+    """Masses that move already, or springs that differ; by the advice, nothing is missing."""
+    library, file = machine("car")
+    told = file.replace("20 mm/s", "0.2 mm/s") + "[diagnosis.tolerances]\nk = 0.0005\n"
+    shares = zip(UNEVEN, (1.0, -1.0, 0.6, -0.8), strict=True)
+    frames = [
+        driven(size, [2, k], stiffness=2e4 + share * stiffness, rise=share * rise)
+        for k, (size, share) in enumerate(shares)
+    ]
+    outcomes = []
+    for name in ("narrow", "wide"):
+        (tmp_path / name).mkdir()
+        of = declare(tmp_path / name, library, told)
+        outcomes.append(diagnosed(of, cases(of, frames), tmp_path / name))
+        if name == "narrow":
+            said = re.search(f"write ({advice})", outcomes[0].warnings[0])
+            assert said is not None
+            told = told.replace(declared, said[1].partition(" in ")[0])
+    assert [outcome.diagnosis.verdict for outcome in outcomes] == ["unexplained", "nothing"]

@@ -220,7 +220,7 @@ class Outcome:
         ]
         shifted += [text for cause in diagnosis.causes if (text := _held(self.system, cause))]
         if diagnosis.differing is not None:
-            shifted.append(diagnosis.differing.text)
+            shifted.insert(0, diagnosis.differing.text)
         if diagnosis.noise_alone or diagnosis.gain is None:
             return [*limits, *shifted]
         return [

@@ -1,23 +1,25 @@
-"""Parameters that differ between recordings, where the system file holds them equal.
+"""What differs between recordings by more than the system file says: parameters, and starts.
 
-A resistance is warm on one day, a valve is set anew. Held equal, such a parameter leaves errors
-that no effect explains, and causes bend to them.
+A resistance is warm on one day, a valve is set anew, a tank begins half full. Held too equal, such
+a parameter or start leaves errors that no effect explains, and causes bend to them.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from workbench.arrays import Vector
+from workbench.arrays import Matrix, Vector
 from workbench.diagnosis.effects.candidates import CHANGE
 from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.linearized import LinearizedPoint, slowness
 from workbench.diagnosis.inference.quadratic import Joint, add, minimum
 from workbench.diagnosis.inference.search import FittedModel
-from workbench.diagnosis.inference.unknowns import SENSOR
+from workbench.diagnosis.inference.unknowns import ALL, SENSOR
+from workbench.system.units import with_unit
 
 _FEWEST = 3  # recordings: whatever sets two of them apart, any parameter may stand for
+_FREE = 1000.0  # spreads, of a start that may be anywhere: as far as mm are taken for m
 _MOST = 0.5  # share of what remains from which on a parameter is told: no other explains as much
 
 
@@ -40,11 +42,34 @@ class DifferingParameter:
         )
 
 
-def differing_parameter(fit: Fit, best: FittedModel, joint: Joint) -> DifferingParameter | None:
-    """Find the parameter whose own values in each recording explain most of what a fit leaves.
+@dataclass(frozen=True)
+class DifferingStarts:
+    """States of which other values at the start explain most of what remains."""
 
-    Each parameter that is held equal gets a change of its own in each recording, beside all that is
-    fitted. Linearised, so that it may not change by more than itself.
+    spreads: Mapping[str, str]  # that they would need, with units, by state
+    removed: float  # share of the systematic squared error
+
+    @property
+    def text(self) -> str:
+        """What they would explain, and what to do, for people."""
+        each = " and ".join(
+            f'spread = "{spread}" in [states.{name}]' for name, spread in self.spreads.items()
+        )
+        return (
+            f"If recordings began with {' and '.join(self.spreads)} further from what is expected "
+            f"than the system file says, that would explain {self.removed:.0%} of what remains. If "
+            f"they may, write {each}, and diagnose again."
+        )
+
+
+def what_differs(
+    fit: Fit, best: FittedModel, joint: Joint
+) -> DifferingParameter | DifferingStarts | None:
+    """Find what explains most of what a fit leaves, if each recording has its own value of it.
+
+    Each parameter gets a change of its own in each recording, beside all that is fitted, and each
+    state that no output shows, or all of these, another start. Linearised, so that a parameter may
+    not change by more than itself.
     Source: N. M. Laird, J. H. Ware (1982), Random-effects models for longitudinal data, Biometrics
     38, 963-974.
 
@@ -54,20 +79,45 @@ def differing_parameter(fit: Fit, best: FittedModel, joint: Joint) -> DifferingP
 
     Returns
     -------
-    That parameter; None if none explains more than half.
+    That parameter, or these states; None if nothing explains more than half.
     """
     if fit.unknowns.count < _FEWEST:
         return None
     lin, still = best.linearised, [np.zeros(len(joint.shared))] * fit.unknowns.count
-    before = _systematic(fit, lin, joint, still)
-    told = []
+    before = max(_systematic(fit, lin, joint, still), 1e-9)
+    told: list[DifferingParameter | DifferingStarts] = []
     for name, (value, columns) in _held_equal(fit, best, joint).items():
-        changes, steps = _own_changes(joint, columns, abs(value))
-        removed = 1.0 - _systematic(fit, lin, joint, steps) / max(before, 1e-9)
+        (changes,), steps = _own_changes(joint, [columns], abs(value))
+        removed = 1.0 - _systematic(fit, lin, joint, steps) / before
         if removed > _MOST and np.abs(changes).max() < abs(value):
             deviation = float(changes.std(ddof=1) / abs(value + changes.mean()))
             told.append(DifferingParameter(name, deviation, removed))
-    return max(told, key=lambda parameter: parameter.removed, default=None)
+    local = fit.unknowns.local
+    states = [name for name in fit.unknowns.starting if name not in fit.recorded]
+    tolerances = [name for name in local if name not in fit.unknowns.starting]
+    together = [states] if len(states) > 1 else []
+    for names in [*([name] for name in (*tolerances, *states)), *together]:
+        at, free = [[*local].index(name) for name in names], joint
+        for j in at:
+            free = free.joined(("", f"own {j}"), [system.P[:, j] for system in joint.systems])
+        own = [[len(joint.shared) + k] for k in range(len(at))]
+        changes, steps = _own_changes(free, own, _FREE)
+        removed = 1.0 - _systematic(fit, lin, free, steps) / before
+        moved = [
+            system.deviations[at] + system.local(step)[at] + change
+            for system, step, change in zip(free.systems, steps, changes.T, strict=True)
+        ]
+        deviations = np.sqrt(np.square(moved).mean(axis=0)) * [local[name] for name in names]
+        # Several, where they explain most of what one of them leaves.
+        least = 1.0 - _MOST * min([1.0, *(1.0 - own.removed for own in told)])
+        needed = _MOST if len(names) == 1 else least
+        if removed > needed and names[0] in states:
+            units = [fit.unknowns.level_unit((name, ALL)) for name in names]
+            spreads = map(with_unit, map(float, deviations), units)
+            told.append(DifferingStarts(dict(zip(names, spreads, strict=True)), removed))
+        elif removed > needed and deviations[0] < 1.0:
+            told.append(DifferingParameter(names[0], float(deviations[0]), removed))
+    return max(told, key=lambda differing: differing.removed, default=None)
 
 
 def _held_equal(fit: Fit, best: FittedModel, joint: Joint) -> dict[str, tuple[float, list[int]]]:
@@ -86,20 +136,28 @@ def _held_equal(fit: Fit, best: FittedModel, joint: Joint) -> dict[str, tuple[fl
     return {name: own for name, own in held.items() if name not in fit.unknowns.local}
 
 
-def _own_changes(joint: Joint, columns: Sequence[int], scale: float) -> tuple[Vector, list[Vector]]:
-    """Best changes of a parameter, (K,), and steps of all unknowns, (p,), in each recording."""
+def _own_changes(
+    joint: Joint, groups: Sequence[Sequence[int]], scale: float
+) -> tuple[Matrix, list[Vector]]:
+    """Best changes of what has its own, (g, K), and steps of all unknowns, (p,), per recording.
+
+    Parameters
+    ----------
+    groups : columns of each of them.
+    """
     count, known = len(joint.systems), len(joint.known)
     common = np.eye(len(joint.shared))[:, :known]
     transforms = []
     for k in range(count):
-        own = np.zeros((len(joint.shared), count))
-        own[columns, k] = 1.0
+        own = np.zeros((len(joint.shared), len(groups) * count))
+        for g, columns in enumerate(groups):
+            own[columns, g * count + k] = 1.0
         transforms.append(np.hstack([common, own]))
     parts = zip(joint.stops(), transforms, strict=True)
-    prior = joint.prior.columns(np.hstack([common, np.zeros((len(joint.shared), count))]))
-    N = prior.N + np.diag(np.repeat([0.0, scale**-2], [known, count]))
+    prior = joint.prior.columns(np.hstack([common, np.zeros_like(own)]))
+    N = prior.N + np.diag(np.repeat([0.0, scale**-2], [known, own.shape[1]]))
     best = minimum(add([*(stop.columns(own) for stop, own in parts), replace(prior, N=N)]))
-    return best[known:], [transform @ best for transform in transforms]
+    return best[known:].reshape(-1, count), [transform @ best for transform in transforms]
 
 
 def _systematic(fit: Fit, lin: LinearizedPoint, joint: Joint, steps: Sequence[Vector]) -> float:

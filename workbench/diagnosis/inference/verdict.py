@@ -12,7 +12,8 @@ from workbench.diagnosis.effects.candidates import LAG, SHARES
 from workbench.diagnosis.effects.catalogue import Effect
 from workbench.diagnosis.inference.between_recordings import (
     DifferingParameter,
-    differing_parameter,
+    DifferingStarts,
+    what_differs,
 )
 from workbench.diagnosis.inference.discrepancy import (
     correlated_deviations,
@@ -168,9 +169,9 @@ class Diagnosis:
     # whether causes leave no more than noise on held-out recordings; if not, what they leave widens
     # their intervals
     noise_alone: bool
-    # parameter that explains most of what remains if each recording has its own value; None: none
-    # does, or nothing remains
-    differing: DifferingParameter | None
+    # parameter or starts that explain most of what remains if each recording has its own; None:
+    # none does, or nothing remains
+    differing: DifferingParameter | DifferingStarts | None
     # signals that are late by themselves, as the system file does not say of any logger, and that
     # explain clearly more; it is then unexplained
     late: LateSignals | None
@@ -291,7 +292,7 @@ def _concluded(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagn
         partial=best.names if part_of else (),
         nearest=nearest,
         noise_alone=noise_alone,
-        differing=differing_parameter(fit, best, chosen.trial.joint) if remains else None,
+        differing=what_differs(fit, best, chosen.trial.joint) if remains else None,
         late=late,
         base=base,
         best=best,
