@@ -225,7 +225,7 @@ DAMAGES: dict[str, tuple[Callable[[Path], None], str]] = {
     "no XML": (emptied(XML), "no FMU"),
     "document type": (edited("<fmiModel", "<!DOCTYPE a><fmiModel"), "declares a document type"),
     "foreign platform": (foreign, r"binaries for .*expected a binary for this machine"),
-    "foreign binary": (foreign_inside, "a binary that cannot be loaded"),
+    "foreign binary": (foreign_inside, r"a binary that cannot be loaded \(binaries/"),
     "no binary": (cut(LIBRARY), "binaries for |no file binaries/linux64"),
     "empty binary": (emptied(LIBRARY), "an empty file binaries/linux64"),
     "half a binary": (halved, "a binary that cannot be loaded|crashed with SIG"),

@@ -221,9 +221,10 @@ class FMUInstance:
             )
         except Exception as error:  # FMPy raises bare Exception where a library cannot be loaded
             os.chdir(here)  # it looks for the library in its own folder, and stays there
+            said = str(error).replace(f"{self._scratch.path}{os.sep}", "")
             raise InputError(
                 where=str(self.description.path),
-                found=f"a binary that cannot be loaded ({error})",
+                found=f"a binary that cannot be loaded ({said})",
                 expected="one that this machine can load, with the functions of FMI",
                 remedy="export the model again for this machine",
             ) from None

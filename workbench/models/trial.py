@@ -166,9 +166,10 @@ def run_trial(description: Description, interface: str, folder: Path, limits: Li
             f'more with WORKBENCH_TRIAL="answer={10 * limits.answer:g}"'
         )
     if last["call"] == "not loaded":
+        error = last["error"].replace(f"{folder.resolve()}{os.sep}", "")
         raise InputError(
             where=str(description.path),
-            found=f"a binary that cannot be loaded ({last['error'][:400]})",
+            found=f"a binary that cannot be loaded ({error[:400]})",
             expected="one that this machine can load, with the functions of FMI",
             remedy="export the model again for this machine; see 'workbench fmu info'",
         )
