@@ -200,11 +200,17 @@ def test_a_level_that_hides_an_effect_is_said(tmp_path):
     assert "Draught" in sound.to_dict()["not_visible"]
 
 
-def test_a_level_of_known_spread_hides_nothing(tmp_path):
-    of = block(tmp_path / "block", f"[diagnosis.levels]\n{HALVES}")
-    outcome = diagnosed(of, cases(of, [recorded(G, seed) for seed in range(3)]), tmp_path)
-    assert outcome.to_dict()["not_visible"] == {}
-    assert outcome.warnings == []
+def test_a_level_of_known_spread_hides_what_shows_from_more_than_its_spread_on(tmp_path):
+    """A draught is what it stands for; radiation, though nearly alike, shows by less than that."""
+    for name, levels, hidden in (
+        ("both", HALVES, set()),
+        ("one", "Ga = { spread = 0.1 }\n", {"Draught"}),
+        ("free", "Ga = {}\n", {"Draught", "Radiation"}),
+    ):
+        of = block(tmp_path / name, f"[diagnosis.levels]\n{levels}")
+        outcome = diagnosed(of, cases(of, [recorded(G, seed) for seed in range(3)]), tmp_path)
+        assert outcome.to_dict()["not_visible"].keys() == hidden
+        assert outcome.warnings == []
 
 
 def test_a_level_further_from_its_sheet_than_is_likely_is_said(tmp_path):
