@@ -397,6 +397,23 @@ def test_eliminating_local_unknowns_is_least_squares_over_all():
     np.testing.assert_allclose(systems[2].local(step), brute[13:18], rtol=1e-6)
 
 
+def test_two_local_unknowns_that_act_alike_leave_what_one_of_them_does():
+    """Starts of two states may move all that is measured alike, by far more than tolerances do."""
+    one = recording(np.random.default_rng(5), 2, 9.0)
+    P = np.sign(one.P[:, :1]) * 2.0**40  # whose products are exact
+    one = replace(one, P=P, deviations=np.zeros(1), furthest=np.full(1, 9.0))
+    both = replace(
+        one,
+        P=np.hstack([one.P, one.P]),
+        deviations=np.zeros(2),
+        furthest=np.full(2, 9.0),
+    )
+    alone, together = one.eliminated(), both.eliminated()
+    assert_allclose(together.N, alone.N, rtol=1e-6, atol=1e-6)
+    z = np.array([0.3, -0.2])
+    assert_allclose(both.local(z).sum(), one.local(z).sum(), rtol=1e-6)
+
+
 def test_a_tolerance_at_its_bound_stays_there_while_the_rest_does_its_best():
     rng = np.random.default_rng(4)
     begun = rng.uniform(-1.0, 1.0, size=(4, 3))

@@ -59,6 +59,17 @@ def covariance(N: Matrix) -> Matrix:
     return inverse * scale[:, None] * scale[None, :]
 
 
+def _solved(N: Matrix, right: Matrix) -> Matrix:
+    """Solve N x = right; where rounding leaves several solutions, by the least of them."""
+    try:
+        return np.asarray(np.linalg.solve(N, right), np.float64)
+    except np.linalg.LinAlgError:
+        scale, scaled = _scaled(N)
+        least = np.linalg.lstsq(scaled, (scale * right.T).T, rcond=_ROUNDING)[0]
+        solved: Matrix = (scale * least.T).T
+        return solved
+
+
 def _scaled(N: Matrix) -> tuple[Vector, Matrix]:
     """Scale of each unknown, whatever its unit, and what remains of a normal matrix."""
     scale: Vector = 1.0 / np.sqrt(np.maximum(np.diag(N), 1e-100))
@@ -170,7 +181,7 @@ class RecordingSystem:
         """Chi-squared over z alone."""
         normal, coupling, gradient = self._local()
         both = np.column_stack([coupling, gradient])
-        solved: Matrix = np.asarray(np.linalg.solve(normal, both), np.float64)
+        solved = _solved(normal, both)
         r, deviations = self._about()
         N: Matrix = self.J.T @ self.J - coupling.T @ solved[:, :-1]
         g: Vector = self.J.T @ r - coupling.T @ solved[:, -1]
@@ -181,13 +192,13 @@ class RecordingSystem:
         """Best l for a step z of the common unknowns."""
         normal, coupling, gradient = self._local()
         step = np.zeros(self.P.shape[1]) if self.held is None else np.nan_to_num(self.held)
-        step[self._free] = np.linalg.solve(normal, -coupling @ z - gradient)
+        step[self._free] = _solved(normal, -coupling @ z - gradient)
         return step
 
     def follows(self) -> tuple[Matrix, Matrix]:
         """How l follows z, (q, p), and its covariance about that, (q, q)."""
         normal, coupling, _ = self._local()
-        own: Matrix = np.asarray(np.linalg.inv(normal), np.float64)
+        own = _solved(normal, np.eye(len(normal)))
         return -own @ coupling, own
 
     @property
