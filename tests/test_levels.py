@@ -292,7 +292,7 @@ def test_what_may_be_there_moves_what_was_found_as_far_as_a_fit_beside_it(tmp_pa
 
 # --- a mass on a spring, which a road moves ---
 
-UNEVEN = (0.02, 0.015, 0.01, 0.007)  # sizes of roads [m]
+UNEVEN = (0.02, 0.013, 0.008, 0.006)  # sizes of roads [m]
 
 
 def driven(

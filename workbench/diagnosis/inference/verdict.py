@@ -56,6 +56,7 @@ _DRAWS = 2000  # of the bootstrap over stops
 # Share from which on a part has the right place, if not the right form: of squares, an offset in
 # place of a ramp takes 75 %, a line in place of a parabola 94 %.
 _MOST = 0.9
+_NEEDED = 0.5  # share of squares from which on more of an error goes than stays
 _NEAREST = 3  # candidates that are told where none is accepted
 
 
@@ -237,7 +238,7 @@ def _concluded(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagn
             chosen, late = _selected_with(fit, catalogue, chosen, begun, report), None
         verdict = _verdict(fit, chosen) if late is None else "unexplained"
     base, best = chosen.base, chosen.best
-    gain, objections, noise_alone = None, list[str](), True
+    gain, objections, noise_alone, removed = None, list[str](), True, 1.0
     if best.active and late is None and not outside:
         report("held-out recordings")
         gain = _gain(fit, chosen)
@@ -259,12 +260,12 @@ def _concluded(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagn
             _cause(fit, chosen, effect, noise_alone=noise_alone, whole=verdict == "found")
             for effect in _strongest_first(fit, chosen, catalogue)
         ]
-        # Beside others, a part that bends as far as its effect allows stands for another law. Of
-        # several, each is needed on held-out recordings, whatever its interval.
+        # Beside others, a part that bends as far as its effect allows stands for another law. What
+        # held-out recordings say is needed is, whatever its interval; and so is each of several.
         bent: list[str] = []
         if len(causes) > 1:
             bent = _at_bounds(causes) if verdict == "partly explained" else []
-        elif not noise_alone:
+        elif not noise_alone and removed < _NEEDED:
             bent = _untold(causes)
         if bent:
             objections += bent
