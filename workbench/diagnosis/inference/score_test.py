@@ -85,9 +85,10 @@ class ScoreTest:
 
     The others may be present at a size that does not matter: a candidate must explain what all of
     them together, too small to matter, do not. That it is there at all is significant at the rate
-    of false alarms; whether it matters, its size says. Where levels can stand for one, their
-    spread says already how much of it does not matter. On held-out stops it is judged alone, since
-    what companions cost, by their size, shows only where they are fitted.
+    of false alarms; whether it matters, its size says. Effects that were found bend to much that is
+    neither: beside them, it must also explain what it does not at such a size. Where levels can
+    stand for one, their spread says already how much of it does not matter. On held-out stops it is
+    judged alone, since what companions cost, by their size, shows only where they are fitted.
     """
 
     def __init__(
@@ -115,6 +116,8 @@ class ScoreTest:
         base = self._select({})
         total = add([*base[0], base[1]])
         self._reference = total.at(minimum(total))
+        self._base = [total, *_without_each(total, base[0])]
+        self._alone = set(joint.known) <= {*joint.levels}
 
     @property
     def wrong(self) -> float:
@@ -208,7 +211,8 @@ class ScoreTest:
         best = minimum(total)
         sigma = float(np.sqrt(covariance(total.N)[-1, -1]))
         size = float(best[-1])
-        absent, *absent_without = (_fixed(f, 0.0) for f in (total, *_without_each(total, stops)))
+        forms = [total, *_without_each(total, stops)]
+        absent, *absent_without = [_fixed(f, 0.0) for f in forms] if self._alone else self._base
         none = minimum(absent)
         if not low <= size <= high:
             # What its bounds allow of it: the rest of the unknowns do their best beside that.

@@ -56,7 +56,6 @@ _DRAWS = 2000  # of the bootstrap over stops
 # Share from which on a part has the right place, if not the right form: of squares, an offset in
 # place of a ramp takes 75 %, a line in place of a parabola 94 %.
 _MOST = 0.9
-_NEEDED = 0.5  # share of squares from which on more of an error goes than stays
 _NEAREST = 3  # candidates that are told where none is accepted
 
 
@@ -238,7 +237,7 @@ def _concluded(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagn
             chosen, late = _selected_with(fit, catalogue, chosen, begun, report), None
         verdict = _verdict(fit, chosen) if late is None else "unexplained"
     base, best = chosen.base, chosen.best
-    gain, objections, noise_alone, removed = None, list[str](), True, 1.0
+    gain, objections, noise_alone = None, list[str](), True
     if best.active and late is None and not outside:
         report("held-out recordings")
         gain = _gain(fit, chosen)
@@ -260,14 +259,8 @@ def _concluded(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagn
             _cause(fit, chosen, effect, noise_alone=noise_alone, whole=verdict == "found")
             for effect in _strongest_first(fit, chosen, catalogue)
         ]
-        # Beside others, a part that bends as far as its effect allows stands for another law. What
-        # held-out recordings say is needed is, whatever its interval; and so is each of several.
-        bent: list[str] = []
-        if len(causes) > 1:
-            bent = _at_bounds(causes) if verdict == "partly explained" else []
-        elif not noise_alone and removed < _NEEDED:
-            bent = _untold(causes)
-        if bent:
+        # Beside others, a part that bends as far as its effect allows stands for another law.
+        if verdict == "partly explained" and len(causes) > 1 and (bent := _at_bounds(causes)):
             objections += bent
             verdict, causes, gain = "unexplained", [], None
     if causes:
@@ -428,16 +421,6 @@ def _at_bounds(causes: Sequence[Cause]) -> list[str]:
         for cause in causes
         for name, interval in cause.parameters.items()
         if interval.limit and interval.open
-    ]
-
-
-def _untold(causes: Sequence[Cause]) -> list[str]:
-    """Causes whose size may as well be zero, in words."""
-    sizes = {cause.effect.name: cause.parameters.get(cause.effect.label) for cause in causes}
-    return [
-        f"beside what remains, {name} may as well be nothing"
-        for name, size in sizes.items()
-        if size is not None and size.low <= 0.0 <= size.high
     ]
 
 
