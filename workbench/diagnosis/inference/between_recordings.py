@@ -20,7 +20,7 @@ from workbench.system.units import with_unit
 
 _FEWEST = 3  # recordings: whatever sets two of them apart, any parameter may stand for
 _FREE = 1000.0  # spreads, of a start that may be anywhere: as far as mm are taken for m
-_MOST = 0.5  # share of what remains from which on a parameter is told: no other explains as much
+_MOST = 0.5  # share of what remains from which on a parameter is named: no other explains as much
 
 
 @dataclass(frozen=True)
@@ -85,13 +85,13 @@ def what_differs(
         return None
     lin, still = best.linearised, [np.zeros(len(joint.shared))] * fit.unknowns.count
     before = max(_systematic(fit, lin, joint, still), 1e-9)
-    told: list[DifferingParameter | DifferingStarts] = []
+    explaining: list[DifferingParameter | DifferingStarts] = []
     for name, (value, columns) in _held_equal(fit, best, joint).items():
         (changes,), steps = _own_changes(joint, [columns], abs(value))
         removed = 1.0 - _systematic(fit, lin, joint, steps) / before
         if removed > _MOST and np.abs(changes).max() < abs(value):
             deviation = float(changes.std(ddof=1) / abs(value + changes.mean()))
-            told.append(DifferingParameter(name, deviation, removed))
+            explaining.append(DifferingParameter(name, deviation, removed))
     local = fit.unknowns.local
     states = [name for name in fit.unknowns.starting if name not in fit.recorded]
     tolerances = [name for name in local if name not in fit.unknowns.starting]
@@ -109,15 +109,15 @@ def what_differs(
         ]
         deviations = np.sqrt(np.square(moved).mean(axis=0)) * [local[name] for name in names]
         # Several, where they explain most of what one of them leaves.
-        least = 1.0 - _MOST * min([1.0, *(1.0 - own.removed for own in told)])
+        least = 1.0 - _MOST * min([1.0, *(1.0 - own.removed for own in explaining)])
         needed = _MOST if len(names) == 1 else least
         if removed > needed and names[0] in states:
             units = [fit.unknowns.level_unit((name, ALL)) for name in names]
             spreads = map(with_unit, map(float, deviations), units)
-            told.append(DifferingStarts(dict(zip(names, spreads, strict=True)), removed))
+            explaining.append(DifferingStarts(dict(zip(names, spreads, strict=True)), removed))
         elif removed > needed and deviations[0] < 1.0:
-            told.append(DifferingParameter(names[0], float(deviations[0]), removed))
-    return max(told, key=lambda differing: differing.removed, default=None)
+            explaining.append(DifferingParameter(names[0], float(deviations[0]), removed))
+    return max(explaining, key=lambda differing: differing.removed, default=None)
 
 
 def _held_equal(fit: Fit, best: FittedModel, joint: Joint) -> dict[str, tuple[float, list[int]]]:
