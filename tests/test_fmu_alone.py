@@ -18,6 +18,7 @@ from scipy.integrate import solve_ivp
 from workbench.__main__ import main
 from workbench.api import diagnose, read_cases
 from workbench.diagnosis import Outcome, Problem, catalogue, choose
+from workbench.diagnosis.data.clocks import held_otherwise
 from workbench.diagnosis.effects.candidates import rate_terms
 from workbench.diagnosis.laws import propose
 from workbench.diagnosis.simulation.prediction import Predictor
@@ -27,6 +28,7 @@ from workbench.models.added import write_extended
 from workbench.models.fmu import FMU
 from workbench.models.native import instance
 from workbench.runtime.engine import Engine
+from workbench.studies.power.diagnosing import library_effects
 from workbench.system.registry import load_system
 from workbench.system.system import System
 
@@ -283,6 +285,20 @@ def test_what_needs_the_equations_says_so(tank, tmp_path):
     assert "put the Modelica library" in outcome.next_steps[-1]
     with pytest.raises(InputError, match=re.escape("no Modelica library package.mo")):
         propose(outcome, problem, Engine(out=tmp_path))
+    with pytest.raises(InputError, match=re.escape("no Modelica library package.mo")):
+        library_effects(tank)
+
+
+def test_inputs_that_are_named_alone_may_be_held_otherwise(tank):
+    """Half a sample later; of a sensor that is late, all inputs may be."""
+    (inflow,) = tank.inputs
+    two = replace(tank, inputs=(replace(inflow, held=False), replace(inflow, name="rain")))
+    assert held_otherwise(two, {"InputLag[inflow]"}, 0.2, 0.3) == {"inflow": "held = true"}
+    assert held_otherwise(two, {"SensorDelay[level]"}, -0.3, -0.2) == {
+        "inflow": 'held = "before"',
+        "rain": "held = false",
+    }
+    assert held_otherwise(two, {"InputDelay[rain]"}, -0.3, -0.2) == {"rain": "held = false"}
 
 
 # --- terms beside rates ---

@@ -146,9 +146,13 @@ def memory_limit() -> int | None:
     """Memory that a process may have at most [bytes]; None where the system does not say."""
     if resource is None or sys.platform != "linux":
         return None
-    machine = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     (_, data), (space, _) = map(resource.getrlimit, (resource.RLIMIT_DATA, resource.RLIMIT_AS))
-    return min(size for size in (machine, data, space) if size != resource.RLIM_INFINITY)
+    return min(size for size in (_memory(), data, space) if size != resource.RLIM_INFINITY)
+
+
+def _memory() -> int:
+    """Memory of the machine [bytes]."""
+    return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
 
 
 def short_memory() -> str:
@@ -473,9 +477,9 @@ def _end_the_rest(group: int) -> None:
 def _describe_end(status: int) -> str:
     """Say how a process ended that did not come to its end."""
     how = f"killed by {signal.Signals(-status).name}" if status < 0 else f"ended, status {status},"
-    machine, limit = (os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"), memory_limit())
-    scarce = limit is not None and limit < machine
-    by = f", or as memory was short, of which {(limit or 0) >> 20} MB are allowed" * scarce
+    limit, by = memory_limit(), ""
+    if limit is not None and limit < _memory():
+        by = f", or as memory was short, of which {limit >> 20} MB are allowed"
     return (
         f"the command was {how} before it was done: by a model's own code, or from outside{by}. "
         "'workbench fmu check FILE' tries a model call by call"
