@@ -31,8 +31,7 @@ from workbench.observers.gains_file import usual_gains
 from workbench.observers.operating import DesignPointError, linearised, start_spreads, walks
 from workbench.observers.replay import replay
 from workbench.observers.simulation import prepare
-from workbench.observers.trajectory import Trajectory
-from workbench.observers.trust import size_doubt
+from workbench.observers.trajectory import size_doubt
 from workbench.recordings.case import read_case
 from workbench.studies.distance.forecast import stopping_of
 from workbench.studies.distance.simulation import DrivingInputs, StopSimulation
@@ -187,8 +186,7 @@ def test_the_size_of_a_state_follows_what_the_fmu_tells(attributes, size, said, 
         assert walks(fmu, system) == pytest.approx([2e-4 * size])
         assert start_spreads(fmu, system) == pytest.approx([20.0 if "20" in attributes else size])
         assert fmu.difference_steps(["T"], np.zeros(1)) < 1e-8 * size
-        path = Trajectory(np.arange(2), np.full((2, 1), 291.0), np.zeros((2, 1)))
-        doubt = size_doubt(fmu, system, path)
+        doubt = size_doubt(fmu, system, np.full((2, 1), 291.0))
     assert ("T is up to 291, taken for 1e-09" in doubt) == (size == 1e-9)
     with open_model(system) as fmu:  # whose scale of 10 K says more than a start
         assert (walks(fmu, system) == pytest.approx([2e-4 * size])) != said

@@ -14,6 +14,9 @@ from workbench.__main__ import main
 from workbench.errors import InputError
 from workbench.models.checks import CheckResult, check, is_fit
 from workbench.models.fmu import FMU, CoSimulation
+from workbench.observers import estimators_of
+from workbench.observers.gains_file import usual_gains
+from workbench.observers.replay import replay
 from workbench.runtime.supervision import Limits
 
 from .hostile_fmus import compile_library, rewritten
@@ -192,6 +195,31 @@ def test_an_fmu_with_wrong_derivatives_is_differentiated_by_differences(minimal_
             fmu.start({})
         # Central differences, whose steps are 6e-6 of a value.
         assert_allclose(wrong.state_jacobian(), right.state_jacobian(), rtol=1e-5, atol=1e-6)
+
+
+@needs_compiler
+@pytest.mark.parametrize(
+    "product", ["(i->state.time > 1.0 ? 0.9 : 1.0)", "(i->state.value[0] < 60.0)"]
+)
+def test_derivatives_that_are_wrong_along_a_recording_alone_are_not_used(
+    product, minimal_path, tmp_path, system, dry_case
+):
+    """By the time or by a state: where the model starts they are right."""
+    line = "    /* One column of all derivatives"
+    fault = f"const double scaled = seed[0] * {product};\n    seed = &scaled;\n"
+    path = faulty(minimal_path, tmp_path / "faulty.fmu", line, fault + line)
+    with FMU(path) as wrong, FMU(minimal_path) as right:
+        assert wrong.has_directional_derivatives
+        right.has_directional_derivatives = False
+        runs = [
+            replay(dry_case, ekf(fmu, system, usual_gains(ekf, fmu, system)))
+            for ekf in [estimators_of(system)["ekf"]]
+            for fmu in (wrong, right)
+        ]
+        assert not wrong.has_directional_derivatives
+    assert_array_equal(*(run.estimate for run in runs))
+    with FMU(path) as again:
+        assert not again.has_directional_derivatives
 
 
 @needs_compiler

@@ -42,7 +42,7 @@ from workbench.observers.estimators.disturbance import DisturbanceObserver
 from workbench.observers.estimators.kalman import ExtendedKalmanFilter
 from workbench.observers.replay import replay
 from workbench.observers.score import score
-from workbench.observers.trajectory import require_function
+from workbench.observers.trajectory import check_along
 from workbench.runtime.engine import Engine
 from workbench.runtime.files import write_whole
 from workbench.runtime.progress import ProgressReporter
@@ -72,10 +72,17 @@ def diagnose(
         compiled, or the model is none of this library.
     """
     refuse_too_few(problem.cases, problem.system, len(problem.held_out))
-    if problem.library is None:
-        with open_model(problem.system) as fmu:
-            for case in problem.cases:
-                require_function(fmu, problem.system, case)
+    with open_model(problem.system) as fmu:
+        doubts = [check_along(fmu, problem.system, case) for case in problem.cases]
+    outcome = _with_effects(problem, engine, every_platform, certainty)
+    warned = "; ".join(dict.fromkeys(filter(None, [*doubts, outcome.warned])))
+    return replace(outcome, warned=warned)
+
+
+def _with_effects(
+    problem: Problem, engine: Engine, every_platform: bool, certainty: bool
+) -> Outcome:
+    """Build an FMU that has all effects, and diagnose with it."""
     with tempfile.TemporaryDirectory() as scratch:
         problem, everything = _with_model(problem, Path(scratch), engine.report)
         try:

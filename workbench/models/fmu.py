@@ -37,6 +37,7 @@ from workbench.models.description import (
 from workbench.models.trial import (
     PROXY,
     built_here,
+    contradict_derivatives,
     derivatives_hold,
     remembers_steps,
     require_trial,
@@ -92,6 +93,9 @@ _SAME_STEP = 1e-4  # by which sample times may differ: what rounding of time sta
 _STEP = float(np.finfo(float).eps) ** (1 / 3)  # of differences, relative
 SAME_RATE = 1e-4  # of its size, by which iterations within a model may change a rate
 ALIKE = 1e3  # times: what a start or a scale says of a size is rougher than factors of ten
+# Points of a recording at which directional derivatives are compared with differences; shares of a
+# derivative: differences of one that agree less show a bend, and it is wrong by more.
+_COMPARED, _BENDS, _WRONG = 20, 0.01, 0.03
 _MOST_ITERATIONS = 100  # of discrete states at one event; models need some
 
 _CLASSES = {
@@ -569,6 +573,7 @@ class FMU(FMUInstance):
     time : (1,) that the FMU was set to last [s].
     next_event : (1,) time of the next time event [s], of the last start; infinite for none.
     warned : (1,) calls that it answered with a warning.
+    directional_fmi : (1,) version of FMI whose directional derivatives are taken, 0 for none.
     rate_references : (n,) value references of the derivatives of the states.
     scales : typical size of signals that a system declares, in the FMU's units; see `sizes`.
 
@@ -639,12 +644,22 @@ class FMU(FMUInstance):
         self.next_event = np.full(1, np.inf)
         super().__init__(self.description)
         # Wrong ones would be wrong steps of a model, and nothing would show it.
+        self.directional_fmi = np.zeros(1, np.int64)
         self.has_directional_derivatives = offered.directional_derivatives and derivatives_hold(
             self.description
         )
         self.remembers_steps = self.needs_completed_steps and remembers_steps(self.description)
         self._variants: list[FMU] = []
         self.scales: Mapping[str, float] = {}
+
+    @property
+    def has_directional_derivatives(self) -> bool:
+        """Whether directional derivatives of the FMU are taken, also by loops that are compiled."""
+        return bool(self.directional_fmi[0])
+
+    @has_directional_derivatives.setter
+    def has_directional_derivatives(self, taken: bool) -> None:
+        self.directional_fmi[0] = int(self.version[0]) if taken else 0
 
     def states_derivatives(self, unknowns: NDArray[np.uint32]) -> bool:
         """Whether the FMU states directional derivatives of these variables, by value reference.
@@ -948,6 +963,62 @@ class FMU(FMUInstance):
                     "tells it. Export it with events where it switches, with states for what it "
                     "remembers, and without random numbers"
                 )
+
+    def check_derivatives(
+        self, knowns: Sequence[str], outputs: Sequence[str], time: Vector, x: Matrix, u: Matrix
+    ) -> None:
+        """Take differences from now on if directional derivatives are others, along a recording.
+
+        As those that hold at the start alone, or are of the point before. A derivative is wrong
+        where differences to both sides, and those of ten times the step, agree with each other and
+        not with it: a bend, or noise of an iteration, says nothing.
+
+        Parameters
+        ----------
+        knowns : continuous inputs and corrections.
+        outputs : names, of any types.
+        time, x, u : (k,) of the FMU [s], (k, n) states, (k, m) values of `knowns`.
+        """
+        if not self.has_directional_derivatives:
+            return
+        shown = self.variables([y for y in outputs if y in self.outputs and self.is_real(y)])
+        unknowns = np.concatenate([self.rate_references, shown.references])
+        driven = self.variables(knowns)
+        for k in np.unique(np.linspace(0, time.size - 1, _COMPARED).astype(int)):
+            for variables in (self._state_variables, driven):
+                self.set_time(time[k])
+                self.set(driven, u[k])
+                self.set_states(x[k])
+                if self._contradicts(self.jacobian(unknowns, variables), variables, shown):
+                    self.has_directional_derivatives = False
+                    contradict_derivatives(self.description)
+                    return
+
+    def _contradicts(self, stated: Matrix, knowns: Variables, shown: Variables) -> bool:
+        """Whether derivatives of rates and outputs at the present point are no differences."""
+
+        def evaluate(values: Vector) -> Vector:
+            self._inject(knowns, values)
+            return np.concatenate([self.derivatives(), self.get(shown)])
+
+        centre = self.get(knowns).copy()
+        if not centre.size:
+            return False
+        steps = self.difference_steps(knowns.names, centre)
+        at = evaluate(centre)[:, None]
+        ahead, behind, wide, back = (
+            np.column_stack([evaluate(centre + share * step) for step in np.diag(steps)])
+            for share in (1.0, -1.0, 10.0, -10.0)
+        )
+        self._inject(knowns, centre)
+        mean = (ahead - behind) / (2.0 * steps)
+        bend = np.maximum(
+            np.abs(ahead - 2.0 * at + behind) / steps, np.abs(mean - (wide - back) / (20.0 * steps))
+        )
+        rounding = 64.0 * np.finfo(float).eps * np.abs(at) / steps
+        size = np.maximum(np.abs(stated), np.abs(mean))
+        told = bend <= _BENDS * size + rounding
+        return bool((told & (np.abs(stated - mean) > _WRONG * size + rounding)).any())
 
     def complete_step(self) -> bool:
         """Say that a step of integration is over; returns whether a step event is due.

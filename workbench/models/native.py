@@ -76,7 +76,8 @@ class Instance(NamedTuple):
     set_time: int
     get_indicators: int
     complete_step: int
-    fmi: int  # 2 or 3 with directional derivatives, 0 for differences
+    # (1,) version of FMI, whose directional derivatives are taken; 0: differences
+    directional_fmi: NDArray[np.int64]
     measured: int  # number of the measured inputs, the first of u
     time: Vector  # (1,) that the FMU was set to last [s]
     # indicators, event_signs: (z,) event indicators, and whether they were above 0 at the start
@@ -145,7 +146,9 @@ def instance(
         set_time=fmu.function_address("time"),
         get_indicators=fmu.function_address("indicators"),
         complete_step=fmu.function_address("complete_step") if fmu.needs_completed_steps else 0,
-        fmi=int(fmu.version[0]) if fmu.states_derivatives(unknowns) else 0,
+        directional_fmi=fmu.directional_fmi
+        if fmu.states_derivatives(unknowns)
+        else np.zeros(1, np.int64),
         measured=m,
         time=fmu.time,
         indicators=np.zeros(fmu.event_signs.size),
@@ -359,7 +362,7 @@ def differentiate(model, row, count):  # type: ignore[no-untyped-def]
 
     Where the FMU has no directional derivatives, all rows are written; see `linearise`.
     """
-    if model.fmi == 0:
+    if model.directional_fmi[0] == 0:
         return _differences(model)
     along = model.jacobian[row, :count]
     return direction(model, model.unknowns, model.knowns[row:], model.seed, along)
@@ -369,7 +372,7 @@ def differentiate(model, row, count):  # type: ignore[no-untyped-def]
 def direction(model, unknowns, knowns, seeds, out):  # type: ignore[no-untyped-def]
     """Derivatives of as many unknowns as `out` has, along as many knowns as `seeds`; a status."""
     count, number = out.size, seeds.size
-    if model.fmi == 2:
+    if model.directional_fmi[0] == 2:
         words = model.address, unknowns, count, knowns, number, seeds, out
         return _call(model, model.directional, words)
     more = model.address, unknowns, count, knowns, number, seeds, number, out, count
@@ -383,7 +386,7 @@ def linearise(model, count):  # type: ignore[no-untyped-def]
     The first `count` columns are written: n for the derivatives, n + l for the outputs too.
     Afterwards the FMU is where it was; model.dx and model.y are undefined.
     """
-    if model.fmi == 0:
+    if model.directional_fmi[0] == 0:
         return _differences(model)
     for j in range(model.jacobian.shape[0]):
         if differentiate(model, j, count):

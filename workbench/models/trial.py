@@ -98,6 +98,11 @@ def derivatives_hold(description: Description) -> bool:
     return not fmu_cache.is_known(_marks(description, MODEL_EXCHANGE)[1])
 
 
+def contradict_derivatives(description: Description) -> None:
+    """Remember that an FMU has other directional derivatives than differences show."""
+    fmu_cache.remember(_marks(description, MODEL_EXCHANGE)[1])
+
+
 def remembers_steps(description: Description) -> bool:
     """Whether rates and outputs of an FMU that was tried follow from earlier steps, too."""
     return fmu_cache.is_known(_marks(description, MODEL_EXCHANGE)[2])

@@ -11,7 +11,7 @@ from workbench.errors import FMUError
 from workbench.observers import Estimate, Estimator, Gains
 from workbench.observers.gains_file import usual_gains
 from workbench.observers.run import Ending, Run
-from workbench.observers.trajectory import require_function
+from workbench.observers.trajectory import check_along
 from workbench.recordings.case import Case
 from workbench.system.plugins import find_plugin, load
 from workbench.system.registry import open_model
@@ -40,8 +40,8 @@ def replay(case: Case, estimator: Estimator) -> Run:
     ending, message = Ending.OK, ""
     try:
         estimator.set_conditions(case.conditions)
+        doubts = [check_along(model, system, case) for model in estimator.models]
         for model in estimator.models:
-            require_function(model, system, case)
             model.begin_at(case.model_time)
         estimate = estimator.run(case.time, case.u, case.y)
         seconds = time.perf_counter() - begin
@@ -53,8 +53,8 @@ def replay(case: Case, estimator: Estimator) -> Run:
             ending = Ending.NOT_FINITE
             message = f"at t = {case.time[lost[0]]:.3f} s"
         validity = _claims(case, estimator, values, np.asarray(estimate.probability))
-        warned = [warning for model in estimator.models if (warning := model.take_warning())]
-        message = message or "; ".join(warned)
+        warned = [*doubts, *(model.take_warning() for model in estimator.models)]
+        message = message or "; ".join(filter(None, warned))
     except FMUError as error:
         seconds = time.perf_counter() - begin
         ending, message = Ending.FMU_FAILED, str(error)

@@ -42,7 +42,6 @@ from workbench.observers.trust import (
     contradictions,
     normalised_innovations,
     sampling_doubt,
-    size_doubt,
     spread_doubt,
     start_doubt,
     step_doubt,
@@ -352,7 +351,6 @@ class Simulation:
                 known = information(fmu, self.system, case)
                 path = trajectory(fmu, self.system, case)
                 clock = "" if path is None else time_doubt(fmu, self.system, case, path)
-                size = "" if path is None else size_doubt(fmu, self.system, path)
                 start = start_doubt(fmu, self.system, case)
                 sampling = sampling_doubt(fmu, self.system, case) if narrow else ""
                 share, step = 0.0, ""
@@ -369,7 +367,7 @@ class Simulation:
         return {
             "inseparable": {} if known is None else known.inseparable,
             "untold": () if known is None else known.untold,
-            "doubts": tuple(filter(None, (clock, unit, size, start, sampling, step, assumed))),
+            "doubts": tuple(filter(None, (clock, unit, start, sampling, step, assumed))),
             "resolved": not (sampling or clock),
             "step_share": share,
         }

@@ -8,9 +8,11 @@ from numpy.typing import NDArray
 
 from workbench.arrays import Matrix, Vector
 from workbench.errors import FMUError, InputError
-from workbench.models.fmu import FMU, NoFunctionError
+from workbench.models.description import CO_SIMULATION
+from workbench.models.fmu import ALIKE, FMU, NoFunctionError
 from workbench.models.hybrid import HybridSimulation
 from workbench.models.simulation import needs_simulation
+from workbench.pages.views import rounded
 from workbench.recordings.case import Case
 from workbench.system.system import System
 
@@ -44,19 +46,28 @@ def trajectory(fmu: FMU, system: System, case: Case) -> Trajectory | None:
     return Trajectory(kept, states_that_follow(fmu, system, case.time[kept], held, values, u), u)
 
 
-def require_function(fmu: FMU, system: System, case: Case) -> None:
-    """Refuse a model whose rates and outputs follow from other calls, along a recording.
+def check_along(fmu: FMU, system: System, case: Case, *, walks: bool = True) -> str:
+    """Check a model along a recording, before anything rests on it.
 
-    As a hysteresis in code, or a random draw, which no event tells. Samples that are missing are
-    between their neighbours. A model that cannot be led is at its own start, but for what is
-    measured.
+    It is refused if rates and outputs follow from other calls, as of a hysteresis in code, or a
+    random draw, which no event tells. Directional derivatives that are wrong are not used any more.
+    Samples that are missing are between their neighbours. A model that cannot be led is at its own
+    start, but for what is measured.
+
+    Parameters
+    ----------
+    walks : whether states walk at random by their size, so that it may not be too small, either.
+
+    Returns
+    -------
+    Which states are of another size than is taken, see `size_doubt`; or nothing.
 
     Raises
     ------
     NoFunctionError
     """
-    if fmu.is_function:
-        return
+    if fmu.interface == CO_SIMULATION or (fmu.is_function and not _unsized(fmu, system)):
+        return ""
     kept, held = _kept(case), _held(fmu, system)
     time = case.time[kept]
     u = _filled(case.time, case.u)[kept]
@@ -65,16 +76,60 @@ def require_function(fmu: FMU, system: System, case: Case) -> None:
     inputs = [signal.name for signal in system.inputs]
     outputs = [output.reading for output in system.outputs]
     fmu.begin_at(case.model_time)
-    begin = dict(zip(held, values[0], strict=True))
+    begin, doubt = dict(zip(held, values[0], strict=True)), ""
     try:
         x = _led(fmu, system, begin, (time, u, values))
-        fmu.start(begin)
-        fmu.require_function(inputs, outputs, fmu.start_time + time - time[0], x, u)
+        doubt = size_doubt(fmu, system, x, walks=walks)
+        if not fmu.is_function:
+            at = fmu.start_time + time - time[0]
+            fmu.start(begin)
+            fmu.require_function(inputs, outputs, at, x, u)
+            driven = [name for name in driving_names(system) if fmu.is_continuous(name)]
+            corrected = np.column_stack([u, np.zeros((time.size, len(system.corrections)))])
+            places = [driving_names(system).index(name) for name in driven]
+            fmu.check_derivatives(driven, outputs, at, x, corrected[:, places])
     except NoFunctionError:
         raise
     except (InputError, FMUError, np.linalg.LinAlgError):
         pass  # the run says why
     fmu.take_warning()  # of a run alone
+    return doubt
+
+
+def _unsized(fmu: FMU, system: System) -> list[str]:
+    """States whose size nothing says: the model no nominal value, the system no scale, no walk."""
+    variables = {variable.name: variable for variable in fmu.description.variables}
+    known = {*system.walks, *fmu.scales}
+    return [name for name in fmu.states if name not in known and not variables[name].nominal]
+
+
+def size_doubt(fmu: FMU, system: System, x: Matrix, *, walks: bool = True) -> str:
+    """Say which states are of another size along a recording than is taken; or nothing.
+
+    Steps of differences and tolerances of an integration are shares of a size, too, which are fine
+    if it is too small.
+
+    Parameters
+    ----------
+    x : (k, n) states.
+    walks : see `check_along`.
+    """
+    reach = dict(zip(fmu.states, np.abs(x).max(axis=0, initial=0.0), strict=True))
+    unsized = _unsized(fmu, system)
+    off = [
+        f"{name} is up to {rounded(reach[name])} {fmu.units.get(name, '')}".rstrip()
+        + f", taken for {rounded(size)}"
+        for name, size in zip(unsized, fmu.sizes(unsized), strict=True)
+        if reach[name] > 64.0 * np.finfo(float).eps  # which is rounding of what is 1
+        and not size / ALIKE <= reach[name] <= size * (ALIKE if walks else np.inf)
+    ]
+    if not off:
+        return ""
+    return (
+        f"nothing says of what size states are: {', '.join(off)}. Random walks, starts and steps "
+        "of differences may be far off. Write a nominal value in the model, or [states.NAME] walk "
+        "and spread"
+    )
 
 
 def _led(

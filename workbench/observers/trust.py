@@ -15,7 +15,7 @@ from scipy.special import chdtr, chdtrc, chdtri, ndtr
 
 from workbench.arrays import Matrix, Vector
 from workbench.errors import FMUError
-from workbench.models.fmu import ALIKE, FMU
+from workbench.models.fmu import FMU
 from workbench.observers import estimators_of
 from workbench.observers.estimators.kalman import ExtendedKalmanFilter
 from workbench.observers.estimators.open_loop import OpenLoop
@@ -468,32 +468,6 @@ def spread_doubt(fmu: FMU, system: System, case: Case) -> str:
         "nothing says how far from the model states may start; filters assume "
         f"{', '.join(assumed)} (a standard deviation). Say it in [states.NAME] spread, "
         "or as nominal value in the model"
-    )
-
-
-def size_doubt(fmu: FMU, system: System, path: Trajectory) -> str:
-    """Say which states are of another size along a recording than is taken; or nothing.
-
-    Of such a state nothing says the size: the model has no nominal value, the system no scale and
-    no walk. Steps of differences and tolerances of an integration are shares of a size, too.
-    """
-    variables = {variable.name: variable for variable in fmu.description.variables}
-    reach = np.abs(path.x).max(axis=0, initial=0.0)
-    off = [
-        f"{name} is up to {rounded(most)} {variables[name].unit or ''}".rstrip()
-        + f", taken for {rounded(size)}"
-        for name, most, size in zip(fmu.states, reach, fmu.sizes(fmu.states), strict=True)
-        if name not in {*system.walks, *fmu.scales}
-        and not variables[name].nominal
-        and most > 64.0 * np.finfo(float).eps  # which is rounding of what is 1
-        and not size / ALIKE <= most <= size * ALIKE
-    ]
-    if not off:
-        return ""
-    return (
-        f"nothing says of what size states are: {', '.join(off)}. Random walks, starts and steps "
-        "of differences may be far off. Write a nominal value in the model, or [states.NAME] walk "
-        "and spread"
     )
 
 

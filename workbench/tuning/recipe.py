@@ -16,7 +16,7 @@ from workbench.observers.gains_file import format_gains
 from workbench.observers.replay import replay, run_on_model
 from workbench.observers.run import Ending
 from workbench.observers.score import with_readings
-from workbench.observers.trajectory import require_function
+from workbench.observers.trajectory import check_along
 from workbench.pages.answer import finite
 from workbench.recordings.case import Case
 from workbench.runtime.pool import NoWorkersError
@@ -179,7 +179,7 @@ def pose(
     fastest = 1.0 / max(float(np.median(np.diff(case.time))) for case in cases)
     with open_model(system, estimator_class.role) as model:
         for case in cases:
-            require_function(model, system, case)
+            check_along(model, system, case)
         system = with_readings(system, [model])
         gains = estimator_class.default_gains(model, system)
         space = estimator_class.space(model, system, gains, slowest, fastest)
@@ -268,7 +268,7 @@ def tune(
 
 
 def _warnings(problem: Problem, gains: Vector) -> str:
-    """What the FMU first warns of in a case, with these gains; empty: nothing in any."""
+    """What is first said of the FMU in a case, with these gains; empty: nothing in any."""
     job = problem.job
     estimator_class = estimators_of(job.system)[job.estimator]
     with open_model(job.system, estimator_class.role) as fmu:

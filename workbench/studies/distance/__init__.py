@@ -6,13 +6,13 @@ past stops -> levels and how sure they are -> the model, drawn many times -> dis
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, wait
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 import numpy as np
 
 from workbench.errors import InputError
-from workbench.observers.trajectory import require_function
+from workbench.observers.trajectory import check_along
 from workbench.recordings.case import Case
 from workbench.runtime.engine import Engine, Reporter
 from workbench.runtime.pool import Pool
@@ -101,12 +101,13 @@ def distance_of_stop(
             remedy="give more recordings of this machine",
         )
     with open_model(system) as fmu:
-        for case in cases:
-            require_function(fmu, system, case)
+        doubts = [check_along(fmu, system, case) for case in cases]
     engine.report(f"fit to {len(cases)} stops")
     past = fit_past_stops(system, cases, engine)
     with Pool(engine.workers, open_forecaster, system) as pool:
-        return _Prediction(system, stops, past, effort, pool, engine.report).of(stop)
+        distance = _Prediction(system, stops, past, effort, pool, engine.report).of(stop)
+    warned = "; ".join(dict.fromkeys(filter(None, [*doubts, distance.warned])))
+    return replace(distance, warned=warned)
 
 
 class _Prediction:

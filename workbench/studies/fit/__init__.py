@@ -22,7 +22,7 @@ from workbench.models.description import MODEL_EXCHANGE, Description, read_descr
 from workbench.models.fmu import FMU
 from workbench.models.simulation import Drive, Simulation
 from workbench.observers.operating import ShownStart, shown_states, start_spreads
-from workbench.observers.trajectory import require_function
+from workbench.observers.trajectory import check_along
 from workbench.recordings.case import Case
 from workbench.runtime.engine import Engine
 from workbench.runtime.pool import Pool
@@ -100,6 +100,7 @@ class _Run(NamedTuple):
     counted: np.ndarray  # (n, l) samples that are compared
     given: Mapping[str, float]  # parameters that its conditions set
     starts: Mapping[str, ShownStart]  # of states that outputs show, at the first sample
+    doubt: str  # of the model along it, see `check_along`
 
     @property
     def begin(self) -> dict[str, float]:
@@ -134,8 +135,6 @@ def fit(
     entries = resolve_parameters(system, description, parameters)
     with open_model(system) as fmu:
         spreads = dict(zip(fmu.states, start_spreads(fmu, system), strict=True))
-        for case in (*cases, *held_out):
-            require_function(fmu, system, case)
         runs = [_run(case, system, fmu) for case in (*cases, *held_out)]
     unknowns = _unknowns(entries, description, system, runs[: len(cases)], spreads)
     workers = min(engine.workers, max(len(cases), len(unknowns)))
@@ -212,6 +211,7 @@ def resolve_parameters(
 
 
 def _run(case: Case, system: System, fmu: FMU) -> _Run:
+    doubt = check_along(fmu, system, case, walks=False)
     y = np.column_stack([case[output.name] for output in system.outputs])
     sigma = np.column_stack(
         [
@@ -236,7 +236,7 @@ def _run(case: Case, system: System, fmu: FMU) -> _Run:
     drive, given = Drive(case.time, u, case.model_time), system.set_by(case.conditions)
     fmu.begin_at(case.model_time)
     held = dict(zip((signal.name for signal in system.inputs), u[0], strict=True))
-    run = _Run(case, drive, y, sigma, counted, given, starts)
+    run = _Run(case, drive, y, sigma, counted, given, starts, doubt)
     fmu.start(run.begin, {**given, **held})
     return run._replace(starts={**shown_states(fmu, system, u[0], first, starts), **starts})
 
@@ -370,13 +370,17 @@ class _Problem:
         return [task.result() for task in tasks]
 
     def warnings(self, x: Vector) -> list[str]:
-        """What the FMU warns of, by recording."""
+        """What is said of the FMU, and what it warns of, by recording."""
         tasks = [
             self.pool.submit(_warning, run.drive, self.values(x, number))
             for number, run in enumerate(self.runs)
         ]
-        texts = [(run.case.name, task.result()) for run, task in zip(self.runs, tasks, strict=True)]
-        return [f"{name}: {text}" for name, text in texts if text]
+        return [
+            f"{run.case.name}: {text}"
+            for run, task in zip(self.runs, tasks, strict=True)
+            for text in (run.doubt, task.result())
+            if text
+        ]
 
     def residuals(self, x: Vector) -> Vector:
         """(N,) residuals over noise, those of priors last."""

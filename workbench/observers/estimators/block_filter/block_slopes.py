@@ -9,7 +9,7 @@ from workbench.models.native import compiled, direction, inlined, linearise
 @compiled
 def slopes(model, parts, state):  # type: ignore[no-untyped-def]
     """Derivatives of each block's rates and of the shared ones, by what acts on them; a status."""
-    if model.fmi == 0:
+    if model.directional_fmi[0] == 0:
         return slopes_by_differences(model, parts, state)
     count = parts.first.size - 2
     for i in range(count):
@@ -47,7 +47,7 @@ def slopes_by_differences(model, parts, state):  # type: ignore[no-untyped-def]
 @inlined
 def slope(model, column, known, out):  # type: ignore[no-untyped-def]
     """Derivative of the output of a column of the Jacobian by an unknown into out[0]; a status."""
-    if model.fmi == 0:  # all of them were taken, see `slopes_of_fed`
+    if model.directional_fmi[0] == 0:  # all of them were taken, see `slopes_of_fed`
         out[0] = model.jacobian[known, column]
         return 0
     own = model.unknowns[column:]
@@ -59,7 +59,7 @@ def slopes_of_fed(model, settings, state):  # type: ignore[no-untyped-def]
     """Derivatives of fed outputs that are no states, by block and shared unknowns; a status."""
     parts, seen, n = settings.blocks, settings.filter.layout.seen, model.x.size
     count, status = parts.first.size - 2, 0
-    if model.fmi == 0:
+    if model.directional_fmi[0] == 0:
         status = linearise(model, n + model.y.size)
     for j in range(seen.size):
         if seen[j] >= 0:
