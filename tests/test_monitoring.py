@@ -21,6 +21,9 @@ import workbench as wb
 from workbench.__main__ import main
 from workbench.arrays import Matrix, Vector
 from workbench.errors import InputError
+from workbench.machines.train.rig import AskedStop
+from workbench.machines.train.stops import Faults, draw_train, simulate_stop
+from workbench.machines.train.stops import write_stop as write_virtual
 from workbench.pages.provenance import run_of
 from workbench.recordings.case import read_case
 from workbench.runtime.files import check_checksum, with_checksum
@@ -399,6 +402,28 @@ def test_the_command_writes_what_it_says(history, usual, tmp_path, capsys):
     check("monitor", json.loads((tmp_path / "out" / "summary.json").read_text()))
     for name in ("history.png", "history.svg", "index.html", "work.csv", STATE):
         assert (tmp_path / "out" / name).stat().st_size > 500
+
+
+def test_a_turned_wheel_is_its_radius_and_no_friction_of_pads(train, tmp_path):
+    """6 mm of 460: beyond where a slip moves force in proportion.
+
+    The rig of the train has equations of its own. Means of two estimates of pads are known to 1 %,
+    as pads of an axle vary by 0.7 % from stop to stop.
+    """
+    tolerances, turned = draw_train(3, 0.0), np.where(np.arange(1, 9) == 6, -6e-3, 0.0)
+    for number in range(1, 5):
+        faults = Faults(radius=turned if number > 2 else np.zeros(8))
+        stop = AskedStop(f"{number:02d}_stop", 35.0, 3e5, "dry")
+        (tmp_path / stop.name).mkdir()
+        simulated = simulate_stop(stop, number, tolerances, faults)
+        write_virtual(simulated, number, faults, tmp_path / stop.name)
+    frame = wb.monitor(train, tmp_path, workers=1).to_frame()
+    table = frame.pivot(index="recording", columns="quantity", values="estimate")
+    moved = table.iloc[2:].mean() - table.iloc[:2].mean()
+    radii = [moved[f"r[{i}] against the others"] for i in range(1, 9)]
+    pads = [moved[f"muDC[{i}] against the others"] for i in range(1, 9)]
+    assert_allclose(radii, turned, atol=0.05e-3)
+    assert_allclose(pads, 0.0, atol=0.30 * 5.0 * 0.01)
 
 
 # --- recordings of an independent simulator ---

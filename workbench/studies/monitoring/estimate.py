@@ -13,7 +13,7 @@ from workbench.diagnosis.data.samples import compared
 from workbench.diagnosis.inference.thresholds import SOUND
 from workbench.errors import InputError
 from workbench.models.fmu import FMU
-from workbench.observers.estimators.kalman import ExtendedKalmanFilter
+from workbench.observers.estimators.unscented import UnscentedKalmanFilter
 from workbench.observers.replay import replay
 from workbench.observers.run import Ending
 from workbench.recordings.case import UNKNOWN, Case
@@ -55,10 +55,11 @@ def reach(estimated: EstimatedQuantity) -> float:
 class RecordingEstimator:
     """Estimates the quantities of recordings as constants, by the system's model.
 
-    A Kalman filter whose quantities do not walk is recursive least squares on the linearised model,
-    which weighs every sample by what it tells: D. Simon, Optimal State Estimation, Wiley 2006,
-    section 3.3. Nothing is known of them before but their ranges, so that no recording leans on
-    another.
+    A Kalman filter whose quantities do not walk is recursive least squares on the model, which
+    weighs every sample by what it tells: D. Simon, Optimal State Estimation, Wiley 2006, section
+    3.3. Nothing is known of them before but their ranges, so that no recording leans on another.
+    Over a whole range a model is far from linear: points linearise it where derivatives, taken
+    where a wheel seems to slide, say nothing of its radius.
 
     Parameters
     ----------
@@ -78,7 +79,7 @@ class RecordingEstimator:
         )
         self._model = model
         self.warned = ""  # by the FMU, in the recording that was estimated last
-        self._filters: dict[tuple[tuple[str, float], ...], ExtendedKalmanFilter] = {}
+        self._filters: dict[tuple[tuple[str, float], ...], UnscentedKalmanFilter] = {}
 
     def __call__(self, case: Case) -> RecordingEstimate:
         """Estimate from one recording.
@@ -115,12 +116,12 @@ class RecordingEstimator:
             counted=float(samples.usable.sum() * np.median(np.diff(case.time))),
         )
 
-    def _filter(self, parameters: Mapping[str, float]) -> ExtendedKalmanFilter:
+    def _filter(self, parameters: Mapping[str, float]) -> UnscentedKalmanFilter:
         key = tuple(sorted(parameters.items()))
         if key not in self._filters:
             model = self._model.variant(parameters)
-            gains = ExtendedKalmanFilter.default_gains(model, self._constant)
-            self._filters[key] = ExtendedKalmanFilter(model, self._constant, gains)
+            gains = UnscentedKalmanFilter.default_gains(model, self._constant)
+            self._filters[key] = UnscentedKalmanFilter(model, self._constant, gains)
         return self._filters[key]
 
 
