@@ -20,7 +20,7 @@ from workbench.models.fmu import FMU, CoSimulation
 from workbench.models.trial import ContainedError, NoAnswerError
 from workbench.runtime.supervision import Limits
 
-from .hostile_fmus import rewritten
+from .hostile_fmus import NAME, compile_library, rewritten
 from .processes import needs_compiler
 
 pytestmark = needs_compiler
@@ -72,6 +72,9 @@ ATTACKS = {
     "spin_at_exit": "did not return from unloading of its library",
     "scribble": "wrote to a file that another had opened",
     "scribble_and_leave": f"ended the process with exit status 0 in {CALL}",
+    "traced": "had its process traced as a debugger does",
+    "stopped": "had its process traced as a debugger does",
+    "round_up": "changed how the processor rounds",
 }
 
 
@@ -81,6 +84,48 @@ def test_what_an_fmu_did_is_named_and_leaves_nothing(attack, hostile_path, place
     with pytest.raises(ContainedError, match=f"^evil.fmu: {ATTACKS[attack]}"):
         FMU(hostile_path)
     assert list(places.iterdir()) == []
+
+
+LOG = "((fmi2CallbackLogger)((Instance *)c)->importer.callback)(NULL, NULL, fmi2Error, NULL, "
+# What is done in a function without an error, and what is said of it.
+WRONGS = {
+    "inputs": ("fmi2SetReal", "((double *)value)[0] += 1.0;", "wrote into what it was given"),
+    "states": ("fmi2SetContinuousStates", "((double *)x)[0] += 1.0;", "wrote into what it was"),
+    "no rates": ("fmi2GetDerivatives", "return fmi2OK;", "wrote no value where one was asked for"),
+    "no outputs": ("fmi2GetReal", "return fmi2Warning;", "wrote no value where one was asked"),
+    "no time": (
+        "fmi2NewDiscreteStates",
+        "eventInfo->nextEventTimeDefined = 1; eventInfo->nextEventTime = 0.0 / 0.0; return fmi2OK;",
+        "its next time event is at nan s",
+    ),
+    "escapes": (
+        "fmi2SetTime",
+        LOG + r'"\033[2Jgone\nerror: forged"); return fmi2Error;',
+        r"returned error: \\x1b\[2Jgone\\nerror: forged\.",
+    ),
+    "escapes by a byte": (
+        "fmi2SetTime",
+        LOG + r'"\302\233[2Jgone"); return fmi2Error;',
+        r"returned error: \\x9b\[2Jgone\.",
+    ),
+}
+
+
+@pytest.mark.parametrize("wrong", WRONGS)
+def test_what_a_call_does_without_an_error_and_may_not_is_told(wrong, root, tmp_path):
+    function, code, said = WRONGS[wrong]
+
+    def change(folder: Path) -> None:
+        file = folder / "sources" / "fmi2.c"
+        head = rf"(?m)^fmi2Status {function}\([^{{;]*\) \{{"
+        text, count = re.subn(head, lambda found: f"{found[0]} {code}", file.read_text())
+        assert count == 1
+        file.write_text(text)
+        compile_library(folder, NAME)
+
+    path = rewritten(root / "fmus" / "fmi2" / f"{NAME}.fmu", tmp_path / "wrong.fmu", change)
+    with pytest.raises(FMUError, match=f"^wrong.fmu: .*{said}"):
+        FMU(path).start({})
 
 
 @pytest.mark.parametrize("refusal", ["beg", "refuse"])

@@ -1,6 +1,7 @@
 """Estimators: what they recover, what they leave alone, and what they must not do."""
 
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
 
@@ -22,6 +23,7 @@ from workbench.observers.estimators.kalman import ExtendedKalmanFilter, carry
 from workbench.observers.estimators.open_loop import OpenLoop
 from workbench.observers.estimators.parameter import ParameterEstimator
 from workbench.observers.estimators.unscented import UnscentedKalmanFilter
+from workbench.observers.layout import rolling_ratio
 from workbench.observers.operating import settle, walks
 from workbench.observers.replay import replay
 from workbench.observers.run import Ending, Run
@@ -419,6 +421,14 @@ def test_unstable_gains_end_as_a_value_not_as_an_exception(fmu, gains, dry_case)
     assert run.ending is not Ending.OK or (result.nrmse or 0.0) > 0.15
     if run.ending is not Ending.OK:
         assert run.ending.value in result.reason
+
+
+@pytest.mark.parametrize("zero", ["correctionW", "omegaR"])
+def test_an_output_that_cannot_tell_rolling_is_refused(zero, minimal, system):
+    """It is zero throughout, or does not follow the wheel."""
+    blind = replace(system, rolling=replace(system.rolling, zero=zero))
+    with pytest.raises(InputError, match=f"'{zero}': found 0 where .* alone moves"):
+        rolling_ratio(minimal, blind)
 
 
 def test_estimator_that_is_called_tunable_must_say_where_gains_are_sought(minimal, system):

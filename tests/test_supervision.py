@@ -92,6 +92,7 @@ LATE = {
     "go": "a model's own code went to another folder, /",
     "close_streams": "error: .*Bad file descriptor",
     "close_files": "before it was done|Bad file descriptor",
+    "stopped": "before it was done",
 }
 
 

@@ -21,7 +21,7 @@ class InputError(ValueError):
     """
 
     def __init__(self, *, where: str, found: str, expected: str, remedy: str) -> None:
-        where, found, expected, remedy = map(_line, (where, found, expected, remedy))
+        where, found, expected, remedy = map(one_line, (where, found, expected, remedy))
         super().__init__(f"{where}: found {found}; expected {expected}. To do: {remedy}.")
         self.where = where
         self.found = found
@@ -34,7 +34,7 @@ class InputError(ValueError):
         return partial(type(self), **parts), ()
 
 
-def _line(text: str) -> str:
+def one_line(text: str) -> str:
     """One line that a terminal shows as it is, whatever stood in a file."""
     cut = text if len(text) <= _LONGEST else f"{text[:_LONGEST]}... ({len(text)} characters)"
     return cut if cut.isprintable() else "".join(map(_printable, cut))

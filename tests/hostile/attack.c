@@ -2,6 +2,7 @@
  * and at which of its calls. PLACE is a file to make. */
 #define _GNU_SOURCE
 #include <errno.h>
+#include <fenv.h>
 #include <fcntl.h>
 #include <linux/fs.h>
 #include <signal.h>
@@ -10,6 +11,7 @@
 #include <string.h>
 #include <sys/socket.h>
 #include <sys/ioctl.h>
+#include <sys/ptrace.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/time.h>
@@ -102,6 +104,16 @@ static void close_files(void) {
 
 static void kill_itself(void) { raise(SIGKILL); }
 
+/* As protection against copies does. */
+static void have_traced(void) { ptrace(PTRACE_TRACEME, 0, NULL, NULL); }
+
+static void be_stopped(void) {
+    have_traced();
+    raise(SIGUSR1);
+}
+
+static void round_up(void) { fesetround(FE_UPWARD); }
+
 static void stay_behind(void) {
     if (fork() == 0) {
         setsid();
@@ -150,6 +162,7 @@ static const struct {
     {"say_and_hide", say_and_hide},
     {"twice", twice},      {"close_streams", close_streams}, {"close_files", close_files},
     {"meddle", meddle},    {"beg", beg},          {"refuse", refuse},
+    {"traced", have_traced}, {"stopped", be_stopped}, {"round_up", round_up},
 };
 
 static int attack(const char *function) {

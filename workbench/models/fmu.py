@@ -23,7 +23,7 @@ from fmpy.fmi1 import FMICallException
 from numpy.typing import NDArray
 
 from workbench.arrays import Matrix, Vector
-from workbench.errors import FMUError, InputError, unknown_name
+from workbench.errors import FMUError, InputError, one_line, unknown_name
 from workbench.models import fmu_cache
 from workbench.models.archive import unpack
 from workbench.models.description import (
@@ -272,7 +272,7 @@ class FMUInstance:
 
     def _note(self, *arguments: Any) -> None:
         """Keep what the FMU logs, at last its status, category, message."""
-        message = (arguments[-1] or b"").decode(errors="replace")
+        message = one_line((arguments[-1] or b"").decode(errors="replace").strip())
         self._log.append(message)
         if arguments[-3] == _WARNING:
             self._warning_messages += 1
@@ -285,7 +285,7 @@ class FMUInstance:
     def take_warning(self) -> str:
         """How often the FMU warned since this was asked last, and its first message; or nothing."""
         count = max(int(self.warned[0]), self._warning_messages)
-        first = self._first_warning.strip() or "no message, but the status of a call"
+        first = self._first_warning or "no message, but the status of a call"
         self.warned[0], self._warning_messages, self._first_warning = 0, 0, ""
         if not count:
             return ""
@@ -380,6 +380,9 @@ class FMUInstance:
             if not needed:
                 instance.enterContinuousTimeMode()
                 next_time = float(time) if defined else math.inf
+                if math.isnan(next_time):
+                    name = _called(self.description)
+                    raise FMUError(f"{name}: it says that its next time event is at nan s")
                 return EventUpdate(next_time, nominals_changed)
         raise FMUError(
             f"{_called(self.description)}: its discrete states are not stable after "

@@ -19,7 +19,7 @@ from pathlib import Path, PurePosixPath
 from tempfile import TemporaryFile
 from typing import Any
 
-from workbench.errors import FMUError, InputError
+from workbench.errors import FMUError, InputError, one_line
 from workbench.models import fmu_cache, trial_calls
 from workbench.models.archive import unpack
 from workbench.models.description import CO_SIMULATION, MODEL_EXCHANGE, Description
@@ -178,6 +178,11 @@ def run_trial(description: Description, interface: str, folder: Path, limits: Li
             expected="one that this machine can load, with the functions of FMI",
             remedy="export the model again for this machine; see 'workbench fmu info'",
         )
+    if end.get("traced"):
+        raise ContainedError(
+            f"{where}: had its process traced as a debugger does, which stops at each signal. "
+            f"{tried}"
+        )
     if last["call"] != "end" or end["status"]:
         call, used = last["call"], end["used"]
         at = f" in {call} after {used:.2f} s of processor time"
@@ -188,6 +193,11 @@ def run_trial(description: Description, interface: str, folder: Path, limits: Li
         raise ContainedError(
             f"{where}: wrote to a file that another had opened, which destroys results. {tried}"
         )
+    if not last["rounds"]:
+        raise ContainedError(
+            f"{where}: changed how the processor rounds, for all that its process calculates. "
+            f"{tried}"
+        )
     borne, contradicted, remembers = _marks(description, interface)
     if last["contradicted"]:
         fmu_cache.remember(contradicted)
@@ -195,7 +205,7 @@ def run_trial(description: Description, interface: str, folder: Path, limits: Li
         fmu_cache.remember(remembers)
     if not last["partly"]:
         fmu_cache.remember(borne)
-    return f"{where}: {last['refused']}. {tried}" if last["refused"] else ""
+    return f"{where}: {one_line(last['refused'])}. {tried}" if last["refused"] else ""
 
 
 def describe_end(status: int, call: str, seconds: str, at: str = "") -> str:

@@ -33,6 +33,7 @@ _LOG2 = ctypes.CFUNCTYPE(None, _POINTER, _TEXT, ctypes.c_int, _TEXT, _TEXT)
 _LOG3 = ctypes.CFUNCTYPE(None, _POINTER, ctypes.c_int, _TEXT, _TEXT)
 _ALLOCATE = ctypes.CFUNCTYPE(_POINTER, _SIZE, _SIZE)
 _FREE = ctypes.CFUNCTYPE(None, _POINTER)
+_UNWRITTEN = bytes.fromhex("0123456789abf87f")  # a NaN that no calculation gives
 
 
 def limit_processor(seconds: float) -> None:
@@ -63,6 +64,13 @@ class _RefusedError(Exception):
     def __init__(self, message: str, status: int) -> None:
         super().__init__(message)
         self.status = status
+
+
+class _HarmError(Exception):
+    """The FMU answered a call without an error, and did other than FMI says with what it was given.
+
+    Whoever may refuse a call may not do that.
+    """
 
 
 class _Callbacks(ctypes.Structure):
@@ -116,11 +124,23 @@ class _Calls:
 
     def __call__(self, name: str, *arguments: Any) -> None:
         """Call a function with the instance and further arguments."""
+        arrays = [a for a in arguments if isinstance(a, ctypes.Array) and len(a)]
+        asked = [arrays.pop()] if arrays and name.startswith("Get") else []
+        given = [bytes(array) for array in arrays]
+        for array in asked if name != "GetDirectionalDerivative" else ():  # which is compared
+            ctypes.memmove(array, _UNWRITTEN * len(array), ctypes.sizeof(array))
         status = self._raw(self._prefix + name, ctypes.c_int, self.component, *arguments)
         if status not in (_OK, _WARNING):
             if status == _FATAL:
                 self.component = None
             raise self._refusal(f"{self._prefix}{name}", status)
+        wrong = ""
+        if given != [bytes(array) for array in arrays]:
+            wrong = "wrote into what it was given, which destroys inputs and states"
+        elif any(bytes(_DOUBLE(x)) == _UNWRITTEN for array in asked for x in array):
+            wrong = "returned without an error and wrote no value where one was asked for"
+        if wrong:
+            raise _HarmError(f"{self._prefix}{name} {wrong}")
 
     def _raw(self, name: str, result: Any, *arguments: Any) -> Any:
         function = getattr(self._library, name)
@@ -157,7 +177,7 @@ class _Calls:
         """Go on where the FMU refuses what not everybody needs."""
         try:
             yield
-        except _RefusedError as error:
+        except (_RefusedError, _HarmError) as error:
             if self.component is None:
                 raise
             self.refused.append(str(error))
@@ -457,12 +477,19 @@ def _work(task: dict[str, Any], report: int) -> None:
     refused, contradicted, remembers = "", False, False
     try:
         partly, contradicted, remembers = _try(task, tell)
-    except _RefusedError as error:
+    except (_RefusedError, _HarmError) as error:
         partly = refused = str(error)
     except (OSError, AttributeError) as error:
         tell("not loaded", error=str(error))
         os._exit(0)
-    found = {"contradicted": "yes" * contradicted, "remembers": "yes" * remembers}
+    one, little = 1.0, 1e-30
+    found = {
+        "contradicted": "yes" * contradicted,
+        "remembers": "yes" * remembers,
+        "rounds": "yes" * (one - little == one == one + little),
+    }
+    if resource is not None:
+        os.kill(own, signal.SIGCONT)  # stops a process that is traced, and no other
     tell("end", refused=refused, partly=partly, **found)
     os._exit(0)
 
@@ -484,12 +511,16 @@ def _watch(child: int, answer: float) -> dict[str, Any]:
     signal.setitimer(signal.ITIMER_REAL, answer)
     _, ending, used = os.wait4(child, 0)
     signal.setitimer(signal.ITIMER_REAL, 0.0)
+    if traced := os.WIFSTOPPED(ending):  # of which a parent hears who traces its child
+        os.kill(child, signal.SIGKILL)
+        _, ending, used = os.wait4(child, 0)
     while orphans := _orphans():
         for orphan in orphans:
             os.kill(orphan, signal.SIGKILL)
             os.waitpid(orphan, 0)
     status = os.waitstatus_to_exitcode(ending)
-    return {"status": status, "used": used.ru_utime + used.ru_stime, "late": bool(late)}
+    seconds = used.ru_utime + used.ru_stime
+    return {"status": status, "used": seconds, "late": bool(late), "traced": traced}
 
 
 def _orphans() -> list[int]:

@@ -1,5 +1,6 @@
 """Where laws find the signals of a system in its model, and the steps that all laws are made of."""
 
+import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
@@ -125,7 +126,16 @@ def rolling_ratio(fmu: FMU, system: System) -> float:
         fmu.set_states(moving)
         readings.append(float(fmu.get(zero)[0]))
     fmu.set_states(rest)
-    return -readings[0] / readings[1]
+    ratio = -readings[0] / readings[1] if readings[1] else math.nan
+    if not math.isfinite(ratio):
+        raise InputError(
+            where=f"{fmu.place}, variable '{fmu.names.get(rolling.zero, rolling.zero)}'",
+            found=f"{readings[1]:g} where {rolling.follower} alone moves, at 1, and "
+            f"{readings[0]:g} where {rolling.leader} does",
+            expected="numbers that are 0 where both roll, and not otherwise",
+            remedy="correct the model, or [rolling] zero of the system file",
+        )
+    return ratio
 
 
 @inlined

@@ -252,6 +252,9 @@ def supervised(
         # it ends would end this process, which has files to remove.
         with _watching(child, Watch(heart, limit)) as ended, _passing_on(child):
             _, ending = os.waitpid(child, 0)
+            if os.WIFSTOPPED(ending):  # a model has the process traced, by us: it stops at signals
+                os.kill(child, signal.SIGKILL)
+                _, ending = os.waitpid(child, 0)
         stuck = ended.is_set()
         _end_the_rest(child)
         os.set_blocking(done, False)  # a model may have left someone who holds the other end
