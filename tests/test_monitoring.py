@@ -147,6 +147,14 @@ def test_what_is_common_to_all_is_told_of_their_mean_alone():
     assert list(changed(Machine(3, 40).watched(fall))) == ["a"]
 
 
+def test_two_that_jump_at_once_are_reported_and_no_other():
+    def jump(values: Matrix) -> None:
+        values[20:, 1] -= 800.0
+        values[20:, 2] -= 700.0
+
+    assert list(changed(Machine(5, 40).watched(jump))) == ["a[2] against", "a[3] against"]
+
+
 def test_one_wild_estimate_hardly_raises_an_alarm_and_none_of_others():
     """It counts as three deviations: an alarm only where the sum was nearly there before."""
 

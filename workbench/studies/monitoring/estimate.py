@@ -52,6 +52,17 @@ def reach(estimated: EstimatedQuantity) -> float:
     return float((estimated.high - estimated.low) / np.sqrt(12.0))
 
 
+def _limits(estimated: EstimatedQuantity) -> tuple[float, float]:
+    """As much beyond the range as it is wide, but for another sign.
+
+    A filter that is on its way to values within must not end at a limit: what else it estimates
+    would have to make up for that.
+    """
+    low, high = estimated.range
+    below, above = 2.0 * low - high, 2.0 * high - low
+    return below if low < 0.0 else max(below, 0.0), above if high > 0.0 else min(above, 0.0)
+
+
 class RecordingEstimator:
     """Estimates the quantities of recordings as constants, by the system's model.
 
@@ -69,7 +80,7 @@ class RecordingEstimator:
     def __init__(self, system: System, model: FMU) -> None:
         self.system = system  # whose recordings they are
         constant = [
-            replace(quantity, walk=0.0, spread=reach(quantity))
+            replace(quantity, walk=0.0, spread=reach(quantity), range=_limits(quantity))
             for quantity in system.estimated
             if quantity.watched
         ]

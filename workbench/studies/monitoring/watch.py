@@ -106,7 +106,8 @@ class _Group:
         than chance makes.
         """
         m, away = len(self.members), self.moved.copy()
-        for _ in range(1 + m // 2):  # of more than half, nobody could tell which are wild
+        wild: list[int] = []
+        while True:
             watched = self.directions @ (values - away)
             if self.against:
                 watched[:-1] += away
@@ -116,12 +117,18 @@ class _Group:
                     for k in range(len(self.charts))
                 ]
             ).T
-            wild = np.where(away == self.moved, np.abs(surprises[:m]), np.nan)
-            if not self.against or not np.nanmax(wild, initial=0.0) > LARGEST:
+            before = away.copy()
+            for k in wild:  # what others that are wild did to it has changed
+                bound = self.charts[k].bounded(watched[k], spread[k], surprises[k])
+                away[k] = self.moved[k] + watched[k] - bound
+            size = np.abs(surprises[:m])
+            size[wild] = np.nan
+            # Of more than half, nobody could tell which are wild.
+            if self.against and np.nanmax(size, initial=0.0) > LARGEST and len(wild) < m // 2:
+                wild.append(int(np.nanargmax(size)))
+            elif np.allclose(away, before, rtol=0.0, atol=1e-3 * np.sqrt(spread.min())):
                 break
-            k = int(np.nanargmax(wild))
-            bound = self.charts[k].bounded(watched[k], spread[k], surprises[k])
-            away[k] += watched[k] - bound
+        return np.where(shown, watched, np.nan), surprises, squares
         return np.where(shown, watched, np.nan), surprises, squares
 
     def tracks(self) -> list[Track]:
