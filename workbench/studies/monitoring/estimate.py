@@ -53,14 +53,14 @@ def reach(estimated: EstimatedQuantity) -> float:
 
 
 def _limits(estimated: EstimatedQuantity) -> tuple[float, float]:
-    """As much beyond the range as it is wide, but for another sign.
+    """As much beyond the range as it is wide, on a side where that has no other sign.
 
     A filter that is on its way to values within must not end at a limit: what else it estimates
     would have to make up for that.
     """
     low, high = estimated.range
     below, above = 2.0 * low - high, 2.0 * high - low
-    return below if low < 0.0 else max(below, 0.0), above if high > 0.0 else min(above, 0.0)
+    return low if below < 0.0 <= low else below, high if high <= 0.0 < above else above
 
 
 class RecordingEstimator:
