@@ -4,19 +4,17 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-from workbench.diagnosis import choose, read_effects
-from workbench.models.modelica import read_library
+from workbench.diagnosis import problem_of
+from workbench.diagnosis.run import with_effects
 from workbench.recordings.case import Case
-from workbench.studies.power.diagnosing import build_everything, distances_in_set
-from workbench.system.system import OBSERVER, System
+from workbench.runtime.engine import silent
+from workbench.studies.power.diagnosing import distances_in_set
+from workbench.system.system import System
 
 
 def parted(of: System, recordings: Sequence[Case], true: str, other: str) -> float:
     """Distance of two effects [standard deviations]; 0: the other is nearer."""
-    library = read_library(of.library)
-    effects = choose([true, other], read_effects(library, of.models[OBSERVER].name))
     with tempfile.TemporaryDirectory() as scratch:
-        everything = Path(scratch) / "AllEffects.fmu"
-        build_everything(of, effects, everything)
-        _, shown = distances_in_set(of, effects, everything, recordings, true, [other])
+        asked = with_effects(problem_of(of, recordings, [true, other]), Path(scratch), silent)
+        _, shown = distances_in_set(*asked, true, [other])
     return max(0.0, shown[other])

@@ -17,15 +17,17 @@ from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
 from workbench.arrays import Vector
+from workbench.diagnosis import problem_of
 from workbench.diagnosis.data.motion import ModelSource
 from workbench.diagnosis.effects.catalogue import Effect
 from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.score_test import ScoreTest
 from workbench.diagnosis.inference.search import examine, fitted
 from workbench.diagnosis.inference.thresholds import Thresholds
+from workbench.diagnosis.run import with_effects
 from workbench.diagnosis.simulation.residual_model import ResidualModel
 from workbench.errors import InputError
-from workbench.studies.power.diagnosing import build_everything, library_effects
+from workbench.runtime.engine import silent
 from workbench.system.parts import StateNoise
 from workbench.system.system import System
 
@@ -109,8 +111,7 @@ def test_what_wanders_is_uncertain_by_as_much_as_it_moves_means(tmp_path):
     variances = []
     for name, more in (("still", ""), ("wanders", wander)):
         of = block(tmp_path / name, more)
-        effects, path = library_effects(of), tmp_path / f"{name}.fmu"
-        build_everything(of, effects, path)
+        _, path = with_effects(problem_of(of), tmp_path / name, silent)
         with ResidualModel(ModelSource(path, of, of.given), cases(of, [frame])) as simulations:
             variances.append(simulations.recordings[0].whitening[-1, 0, 0] ** -2)
             size = of.comparison.block
@@ -125,8 +126,8 @@ def test_a_state_at_the_start_is_no_further_off_than_chance_makes_it(tmp_path):
     known = replace(of, state_noise=(StateNoise("Tc", "Tc", walk=None, spread=1.0),))
     warm = recorded(G, 1).iloc[360:].reset_index(drop=True)
     warm["time [s]"] -= warm["time [s]"][0]
-    effects, path = library_effects(of), tmp_path / "all.fmu"
-    build_everything(of, effects, path)
+    asked, path = with_effects(problem_of(of), tmp_path, silent)
+    effects = asked.effects
     steps = {}
     for name, system in (("free", of), ("known", known)):
         with ResidualModel(
@@ -263,8 +264,9 @@ def test_a_law_that_stands_for_two_gives_way_to_them(tmp_path):
 
 def test_what_may_be_there_moves_what_was_found_as_far_as_a_fit_beside_it(tmp_path):
     """A draught is found; radiation, too little to be a cause, would take some of its size."""
-    effects, path = library_effects(of := heated_block(tmp_path / "block")), tmp_path / "all.fmu"
-    build_everything(of, effects, path)
+    of = heated_block(tmp_path / "block")
+    asked, path = with_effects(problem_of(of), tmp_path, silent)
+    effects = asked.effects
     draught, radiation = effects
     moved, away = {}, {}
     for s in (0.0, S):

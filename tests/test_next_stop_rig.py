@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 import workbench as wb
-from workbench.diagnosis import Outcome
+from workbench.diagnosis import Outcome, problem_of
 from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.rivals import Rivals
+from workbench.diagnosis.run import with_effects
 from workbench.machines.wheelset.rig import (
     CONSTANT_PADS,
     SCENARIOS,
@@ -21,13 +22,11 @@ from workbench.machines.wheelset.rig import (
     stop_of,
 )
 from workbench.recordings.case import Case, read_case, read_cases
-from workbench.runtime.engine import ALONE
+from workbench.runtime.engine import ALONE, silent
 from workbench.studies.design import NextStop, RankedExperiment, next_stop, predict_experiments
 from workbench.studies.design.candidates import Experiment, all_settings
 from workbench.studies.power.diagnosing import (
-    build_everything,
     diagnose_set,
-    library_effects,
     rivals_of_set,
 )
 from workbench.system.experiments import Setting
@@ -235,12 +234,11 @@ def test_a_faster_stop_is_proposed_and_parts_the_radii(system, tmp_path):
     """By the lightest stop alone, a wheel of 1.5 mm less and a roller of 2.3 mm more look alike."""
     if not RADIUS.is_dir():
         pytest.skip("needs the independent recordings, which have licences of their own")
-    effects, all_effects = library_effects(system), tmp_path / "AllEffects.fmu"
-    build_everything(system, effects, all_effects)
+    asked, all_effects = with_effects(problem_of(system), tmp_path, silent)
     light = read_cases([RADIUS / "01_dry_80_1.5"], system)
-    _, rivals = rivals_of_set(system, effects, all_effects, light)
+    _, rivals = rivals_of_set(replace(asked, cases=light), all_effects)
     assert {model.effects for model in rivals.models} == {("WheelRadius",), ("RollerRadius",)}
     assert "initial speed 160 km/h" in next_stop(system, rivals, ALONE).tried[0].text
     both = [*light, *read_cases([RADIUS / "06_dry_160_3.6_rev"], system)]
-    (cause,) = diagnose_set(system, effects, all_effects, both).causes
+    (cause,) = diagnose_set(replace(asked, cases=both), all_effects).causes
     assert (cause.effect.name, cause.confusable_with) == ("WheelRadius", ())

@@ -12,6 +12,7 @@ import pytest
 
 import workbench as wb
 from workbench.__main__ import main
+from workbench.diagnosis import problem_of
 from workbench.errors import InputError
 from workbench.machines.wheelset.planting import PLANTABLE, PlantedStops
 from workbench.machines.wheelset.rig import SCENARIOS, Effects
@@ -19,7 +20,6 @@ from workbench.recordings.case import read_case, read_cases
 from workbench.recordings.datasets import read_recorded
 from workbench.recordings.plausibility import Origin, doubts
 from workbench.studies.power import Repertoire
-from workbench.studies.power.diagnosing import library_effects
 from workbench.system.registry import load_system
 
 from .scenarios import REFERENCE
@@ -202,7 +202,7 @@ def test_a_recording_without_forces_raises_no_doubt(system, root):
 @pytest.mark.long
 def test_no_effect_of_the_virtual_rig_makes_a_recording_doubtful(tmp_path, system):
     """Each as large as sixteen times what matters, to either side, where it can be so large."""
-    known = Repertoire(PLANTABLE, library_effects(system))
+    known = Repertoire(PLANTABLE, problem_of(system).effects)
     usual = SCENARIOS["03_dry_120_3.6"]
     slower = dataclasses.replace(usual.conditions, initial_speed=60 / 3.6)
     rig = PlantedStops((dataclasses.replace(usual, conditions=slower),), REFERENCE)

@@ -11,10 +11,12 @@ import pytest
 from scipy.stats import binom
 
 from workbench.__main__ import main
+from workbench.diagnosis import problem_of
 from workbench.diagnosis.data.clocks import late_signals
 from workbench.diagnosis.effects.extension import variables
 from workbench.diagnosis.inference.quadratic import beside
 from workbench.diagnosis.inference.thresholds import thresholds
+from workbench.diagnosis.run import with_effects
 from workbench.errors import InputError
 from workbench.machines.wheelset.planting import PLANTABLE, SHEET_ERRORS
 from workbench.machines.wheelset.rig import (
@@ -26,6 +28,7 @@ from workbench.machines.wheelset.rig import (
 from workbench.models.fmu import FMU
 from workbench.pages.provenance import run_of
 from workbench.recordings.case import Case
+from workbench.runtime.engine import silent
 from workbench.studies.power import (
     Journal,
     NamedCause,
@@ -38,9 +41,7 @@ from workbench.studies.power import (
 )
 from workbench.studies.power.campaign import SURE, clear, limits_of_effects, predict_campaign
 from workbench.studies.power.diagnosing import (
-    build_everything,
     information_of_set,
-    library_effects,
 )
 from workbench.studies.power.following import SHARES, summarise_following
 from workbench.studies.power.planting import Group, Kind
@@ -64,7 +65,8 @@ from .scenarios import REFERENCE, short
 from .schemas import check
 
 SYSTEM = load_system("wheelset")
-REPERTOIRE = Repertoire(PLANTABLE, library_effects(SYSTEM))
+PROBLEM = problem_of(SYSTEM)
+REPERTOIRE = Repertoire(PLANTABLE, tuple(PROBLEM.effects))
 IDENTITY = {"seed": 1}
 PROVENANCE = {
     "run": run_of("power", SYSTEM, {}),
@@ -91,8 +93,7 @@ def named(effect: str, *twins: str, **intervals: tuple[float, float, float]) -> 
 @pytest.fixture(scope="module")
 def all_effects(once) -> Path:
     def build(folder: Path) -> Path:
-        build_everything(SYSTEM, REPERTOIRE.effects, folder / "AllEffects.fmu")
-        return folder / "AllEffects.fmu"
+        return with_effects(PROBLEM, folder, silent)[1]
 
     return once("rig with everything", build)
 
@@ -421,7 +422,7 @@ def test_what_is_clear_is_found_in_19_of_20(unknowns):
 def test_a_signature_by_recordings_is_that_by_derivatives(all_effects):
     """An effect that is taken for one that the catalogue lacks: the same information on it."""
     study = sets.study()
-    setup = Setup(SYSTEM, study.rig, all_effects, REPERTOIRE.effects)
+    setup = Setup(study.rig, PROBLEM, all_effects)
     gain = 0.016
 
     def made(gains: dict[str, float]) -> list[Case]:
@@ -429,8 +430,8 @@ def test_a_signature_by_recordings_is_that_by_derivatives(all_effects):
         return setup.record(planting, study.rig.simulate(1, gains))
 
     lacking, known = ("fx_gain", "lacking"), ("FxGain", "gain")
-    given = SYSTEM, REPERTOIRE.effects, all_effects, made({})
-    joint = information_of_set(*given, {lacking: (gain, made({"fx_gain": gain}))})
+    given = setup.problem(made({})), all_effects
+    joint, _ = information_of_set(*given, {lacking: (gain, made({"fx_gain": gain}))})
     at = [joint.shared.index(lacking), joint.shared.index(known)]
     left = beside(joint.total().N, range(len(joint.known)))[np.ix_(at, at)]
     # A gain of 1.6 % bends the whitening of relative noise by as much.

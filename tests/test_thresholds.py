@@ -9,10 +9,12 @@ from hypothesis import strategies as st
 from scipy.stats import binom, chi2, norm
 
 from workbench.__main__ import main
+from workbench.diagnosis import problem_of
 from workbench.diagnosis.inference.thresholds import thresholds
+from workbench.diagnosis.run import with_effects
 from workbench.machines.wheelset.planting import SHEET_ERRORS, PlantedStops
 from workbench.machines.wheelset.rig import SCENARIOS
-from workbench.runtime.engine import Engine
+from workbench.runtime.engine import Engine, silent
 from workbench.studies.power import (
     NamedCause,
     Planting,
@@ -20,7 +22,7 @@ from workbench.studies.power import (
     diagnose_sets,
     open_virtual_rig,
 )
-from workbench.studies.power.diagnosing import build_everything, diagnose_set, library_effects
+from workbench.studies.power.diagnosing import diagnose_set
 from workbench.studies.power.planting import draw_sets, plan_sheet_errors
 from workbench.studies.power.report import sheet_check, thresholds_check
 from workbench.studies.power.run import PowerStudy, Setup
@@ -39,7 +41,8 @@ from .scenarios import REFERENCE, short
 
 ROOT = Path(__file__).parents[1]
 SYSTEM = load_system("wheelset")
-EFFECTS = library_effects(SYSTEM)
+PROBLEM = problem_of(SYSTEM)
+EFFECTS = PROBLEM.effects
 DERIVED = ("significant", "fall", "immaterial", "tied")
 
 rates = st.floats(1e-6, 0.2)
@@ -103,12 +106,11 @@ def test_one_threshold_is_changed_and_no_other(name, factor):
 def test_what_is_clear_is_said_by_half_and_by_twice_of_a_threshold(tmp_path):
     """Two short stops, a load cell's gain of 1.6 %; simulations that are kept change nothing."""
     rig = PlantedStops((short("01_dry_80_1.5", 30.0), short("03_dry_120_3.6", 40.0)), REFERENCE)
-    setup = Setup(SYSTEM, rig, tmp_path / "AllEffects.fmu", EFFECTS)
-    build_everything(SYSTEM, EFFECTS, setup.everything)
+    setup = Setup(rig, *with_effects(PROBLEM, tmp_path, silent))
     planting = Planting("single", 12, 8.0, {"fx_gain": 0.016}, ("FxGain",))
     effect = vary(setup, planting, ["fall"])
     cases = setup.record(planting, rig.simulate(planting.seed, planting.gains))
-    plain = diagnose_set(SYSTEM, EFFECTS, setup.everything, cases)
+    plain = diagnose_set(setup.problem(cases), setup.everything)
     assert effect.said == (plain.verdict, *(cause.effect.name for cause in plain.causes))
     assert (effect.said[0], effect.changed) == ("found", ())
 
@@ -172,7 +174,7 @@ def test_a_wrong_inertia_of_the_roller_never_gets_a_wrong_name(gain, tmp_path):
     rig = PlantedStops(tuple(SCENARIOS[name] for name in names), REFERENCE)
     planting = Planting("sheet", 41, 1.0, {"roller_inertia": gain}, ("RollerInertia",))
     (verdict,), _ = diagnose_sets(
-        [(planting,)], PowerStudy(SYSTEM, rig, EFFECTS), Engine(out=tmp_path), seed=1, resume=False
+        [(planting,)], PowerStudy(PROBLEM, rig), Engine(out=tmp_path), seed=1, resume=False
     )
     assert verdict.verdict in ("found", "nothing", "unexplained")
     assert not named_wrong(verdict)

@@ -12,15 +12,18 @@ from tests import growth
 from workbench.__main__ import main
 from workbench.api import observe
 from workbench.arrays import Matrix
+from workbench.diagnosis import problem_of
 from workbench.diagnosis.data.motion import ModelSource
 from workbench.diagnosis.inference.verdict import Cause
+from workbench.diagnosis.run import with_effects
 from workbench.diagnosis.simulation.residual_model import ResidualModel
 from workbench.errors import InputError
 from workbench.machines.train.planting import PLANTABLE, PlantedTrain, virtual_rig
 from workbench.observers.estimators.kalman import ExtendedKalmanFilter
 from workbench.recordings.case import Case, read_case, read_cases
+from workbench.runtime.engine import silent
 from workbench.studies.power import Planting, Repertoire, read_recorded_sets
-from workbench.studies.power.diagnosing import build_everything, diagnose_set, library_effects
+from workbench.studies.power.diagnosing import diagnose_set
 from workbench.system.registry import load_system, model_path, open_model
 from workbench.system.system import OBSERVER
 
@@ -75,7 +78,7 @@ def test_a_fault_acts_in_its_place(name, tmp_path):
 
 
 def test_all_that_is_planted_is_known_to_the_library_and_within_its_bounds():
-    repertoire = Repertoire(PLANTABLE, library_effects(SYSTEM))
+    repertoire = Repertoire(PLANTABLE, tuple(problem_of(SYSTEM).effects))
     known = {effect.name for effect in repertoire.effects}
     assert {plantable.effect for plantable in PLANTABLE} <= known
     assert repertoire.size(repertoire.plantable("units[2]")) == 0.25  # four of it are a unit
@@ -229,8 +232,7 @@ def rms(ratios: list[Matrix]) -> float:
 @pytest.fixture(scope="module")
 def everything(once) -> Path:
     def build(folder: Path) -> Path:
-        build_everything(SYSTEM, library_effects(SYSTEM), folder / "everything.fmu")
-        return folder / "everything.fmu"
+        return with_effects(problem_of(SYSTEM), folder, silent)[1]
 
     return once("train with everything", build)
 
@@ -240,7 +242,7 @@ def named(planted: dict[str, float], seed: int, everything: Path, folder: Path) 
     rig = virtual_rig([], None)
     rig.write(rig.simulate(seed, planted), planted, folder)
     cases = read_cases([folder], SYSTEM)
-    (cause,) = diagnose_set(SYSTEM, library_effects(SYSTEM), everything, cases).causes
+    (cause,) = diagnose_set(problem_of(SYSTEM, cases), everything).causes
     return cause
 
 
@@ -298,8 +300,8 @@ def test_low_adhesion_that_slides_hide_is_given_no_other_name(everything, tmp_pa
     gains = {"adhesion": 0.38}
     rig = virtual_rig([], None)
     rig.write(rig.simulate(4077804687, gains), gains, tmp_path)
-    effects = library_effects(SYSTEM)
-    diagnosis = diagnose_set(SYSTEM, effects, everything, read_cases([tmp_path], SYSTEM))
+    cases = read_cases([tmp_path], SYSTEM)
+    diagnosis = diagnose_set(problem_of(SYSTEM, cases), everything)
     assert {cause.effect.name for cause in diagnosis.causes} <= {"LowAdhesion"}
 
 

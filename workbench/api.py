@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 from workbench import diagnosis, observers, recordings, tuning
-from workbench.diagnosis import Outcome, Problem, laws
+from workbench.diagnosis import Outcome, laws
 from workbench.diagnosis.laws import Proposal
 from workbench.errors import InputError
 from workbench.observers import Gains
@@ -296,18 +296,10 @@ def diagnose(
     InputError
         If recordings or library cannot be used.
     """
-    problem = _problem(system, cases, effects, held_out)
+    problem = diagnosis.problem_of(system, cases, effects, held_out)
     engine = _writing("diagnosis", work)
     outcome = diagnosis.diagnose(problem, engine, certainty=certainty)
     return laws.compared_with_one_law(outcome, problem, engine)
-
-
-def _problem(
-    system: System, cases: Sequence[Case], effects: Sequence[str], held_out: Sequence[Case]
-) -> Problem:
-    library = diagnosis.library_of(system)
-    chosen = diagnosis.choose(effects, diagnosis.catalogue(system, library))
-    return Problem(system, cases, library, chosen, held_out)
 
 
 def propose(
@@ -337,7 +329,7 @@ def propose(
             expected="'unexplained', several causes, or one beside which errors last",
             remedy="ask for no law: nothing is missing, or one effect explains it",
         )
-    problem = _problem(found.system, found.cases, effects, held_out)
+    problem = diagnosis.problem_of(found.system, found.cases, effects, held_out)
     return laws.propose(found, problem, _writing("proposal", work))
 
 

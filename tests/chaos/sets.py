@@ -4,11 +4,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 from tests.scenarios import short
+from workbench.diagnosis import problem_of
 from workbench.machines.wheelset.planting import PlantedStops
 from workbench.runtime import resources
 from workbench.runtime.engine import Engine
 from workbench.studies.power import Planting, SetVerdict, diagnose_sets
-from workbench.studies.power.diagnosing import library_effects
 from workbench.studies.power.run import PowerStudy
 from workbench.system.registry import load_system
 
@@ -22,7 +22,7 @@ def study() -> PowerStudy:
     system = load_system("wheelset")
     stops = (short("01_dry_80_1.5", 30.0), short("03_dry_120_3.6", 40.0))
     rig = PlantedStops(stops, resources.fmus() / "fmi2" / "Reference.fmu")
-    return PowerStudy(system, rig, library_effects(system))
+    return PowerStudy(problem_of(system), rig)
 
 
 def run(

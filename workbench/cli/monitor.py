@@ -111,19 +111,17 @@ def _diagnose_change(
     result: MonitoringResult,
     provenance: dict[str, Any],
 ) -> dict[str, Any]:
-    from workbench.diagnosis import Problem, catalogue, diagnose, library_of
+    from workbench.diagnosis import diagnose, problem_of
     from workbench.diagnosis.report import write_diagnosis
     from workbench.recordings.datasets import read_recorded
     from workbench.studies.monitoring.cause import known_from_before, recordings_after
 
     system, out = known_from_before(result), options.out / "cause"
-    library = library_of(system)
-    effects = catalogue(system, library)
     names = recordings_after(result)
     output.stage(f"cause of the change, from {', '.join(names)}")
     cases = [read_recorded(Path(options.history) / name, system) for name in names]
     engine = Engine(options.workers, output.stage, out)
-    outcome = diagnose(Problem(system, cases, library, effects), engine)
+    outcome = diagnose(problem_of(system, cases), engine)
     page = write_diagnosis(outcome, provenance, out)
     output.result(outcome.summary())
     output.result(f"to read: {page}")

@@ -17,11 +17,10 @@ from workbench.runtime.files import locked_folder
 from workbench.runtime.resources import own_version
 
 if TYPE_CHECKING:
-    from workbench.diagnosis import Effect
+    from workbench.diagnosis import Problem
     from workbench.studies.power import Plantable, PowerStudy, Repertoire, VirtualRig
     from workbench.studies.power.planting import Group
     from workbench.studies.power.report import Check
-    from workbench.system.system import System
 
 _SIGMAS = [2.0, 4.0, 6.0, 10.0, 20.0]  # from what nobody finds to what nobody may miss
 WORKERS_NEED = (
@@ -148,13 +147,14 @@ def _add_checks(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, output: Output) -> CommandResult:
     """Make, diagnose and count."""
+    from workbench.diagnosis import Problem, catalogue, library_of
+    from workbench.diagnosis.effects.candidates import COEFFICIENT
+    from workbench.models.modelica import read_library
     from workbench.studies.power import PowerStudy, open_virtual_rig, read_recorded_sets
-    from workbench.studies.power.diagnosing import library_effects
     from workbench.studies.power.own_model import OwnModel
     from workbench.system.registry import load_system, model_path
     from workbench.system.system import REFERENCE
 
-    require_compiler()
     if options.sigmas is not None and (options.check or options.recorded):
         other = options.check.replace("_", "-") if options.check else "recorded"
         raise InputError(
@@ -166,21 +166,24 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
     system = load_system(options.system)
     if options.library:
         system = replace(system, library=options.library)
-    effects = library_effects(system)
+    library = library_of(system) if options.library is None else read_library(options.library)
+    problem = Problem(system, (), library, catalogue(system, library))
+    if library is not None or any(effect.size == COEFFICIENT for effect in problem.effects):
+        require_compiler()
     if options.recorded:
         sets = read_recorded_sets(system, options.recorded)
         with locked_folder(options.out):
             output.progress(f"{len(sets.recordings)} recorded sets")
-            study = PowerStudy(system, sets, effects)
+            study = PowerStudy(problem, sets)
             return _usual(options, output, study, sets.groups, _repertoire(options, study))
     known = model_path(system, REFERENCE) if REFERENCE in system.models else None
     with locked_folder(options.out):
-        output.progress(f"{len(effects)} effects in the library")
+        output.progress(f"{len(problem.effects)} effects that can be found")
         rig = open_virtual_rig(
             system,
             options.case,
             options.reference or known,
-            lambda: _own_model(options, system, effects),
+            lambda: _own_model(options, problem),
         )
         if options.form_error and not isinstance(rig, OwnModel):
             raise InputError(
@@ -189,7 +192,7 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
                 expected="a system whose own model makes the recordings",
                 remedy="leave --form-error out, or choose a system without a simulated rig",
             )
-        study = PowerStudy(system, rig, effects)
+        study = PowerStudy(problem, rig)
         output.progress(f"sets of {len(rig.recordings)} recordings")
         if about := study.rig.identity.get("machine"):
             output.result(f"Recordings are made by {about}.")
@@ -206,18 +209,16 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
         return _result(path, interrupted)
 
 
-def _own_model(
-    options: argparse.Namespace, system: System, effects: Sequence[Effect]
-) -> VirtualRig:
+def _own_model(options: argparse.Namespace, problem: Problem) -> VirtualRig:
     """The system's own model as a machine, where no plugin has equations of one."""
-    from workbench.studies.power.diagnosing import build_everything
+    from workbench.diagnosis.run import with_effects
+    from workbench.runtime.engine import silent
     from workbench.studies.power.own_model import own_model, template_cases
 
-    templates = template_cases(system, options.case)
-    path = options.out / "machine" / "AllEffects.fmu"
-    path.parent.mkdir(parents=True, exist_ok=True)
-    build_everything(system, effects, path)
-    return own_model(system, effects, path, templates, options.form_error)
+    problem = replace(problem, cases=template_cases(problem.system, options.case))
+    folder = options.out / "machine"
+    folder.mkdir(parents=True, exist_ok=True)
+    return own_model(*with_effects(problem, folder, silent), options.form_error)
 
 
 def _select(names: Sequence[str], rig: VirtualRig) -> tuple[Plantable, ...]:
@@ -302,7 +303,9 @@ def _usual(
     output.result(format_power(summary))
     page = options.out / "index.html"
     output.result(f"to read: {page}, data and figures beside it")
-    return replace(_result(options.out / "power.json", interrupted), page=page)
+    result = replace(_result(options.out / "power.json", interrupted), page=page)
+    none = len(summary["failed"]) == summary["sets"]  # of what failed, no share says anything
+    return replace(result, status=1) if none and not interrupted else result
 
 
 def _check_sheet_errors(

@@ -12,7 +12,7 @@ from workbench.diagnosis.inference.residuals import Dependence, Residuals
 from workbench.diagnosis.inference.sample_errors import Errors
 from workbench.diagnosis.inference.verdict import Cause, Diagnosis, Gain, Interval
 from workbench.diagnosis.outcome import Extension, Outcome
-from workbench.diagnosis.problem import Problem, catalogue, library_of
+from workbench.diagnosis.problem import Problem, catalogue, library_of, problem_of
 from workbench.diagnosis.run import build_everything, diagnose, given_values
 
 __all__ = [
@@ -33,5 +33,6 @@ __all__ = [
     "diagnose",
     "given_values",
     "library_of",
+    "problem_of",
     "read_effects",
 ]

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from workbench.diagnosis.data.clocks import clocks, delays
 from workbench.diagnosis.effects.candidates import candidates, considered
-from workbench.diagnosis.effects.catalogue import Effect, read_effects
+from workbench.diagnosis.effects.catalogue import Effect, choose, read_effects
 from workbench.errors import InputError
 from workbench.models.modelica import Library, read_library
 from workbench.recordings.case import Case
@@ -76,3 +76,20 @@ class Problem:
     def base(self) -> str:
         """Name of the model that is diagnosed."""
         return self.system.models[OBSERVER].name
+
+
+def problem_of(
+    system: System,
+    cases: Sequence[Case] = (),
+    effects: Sequence[str] = (),
+    held_out: Sequence[Case] = (),
+) -> Problem:
+    """What is asked of recordings of a system: all that may be missing, or effects by name.
+
+    Raises
+    ------
+    InputError
+        See `catalogue` and `choose`.
+    """
+    library = library_of(system)
+    return Problem(system, cases, library, choose(effects, catalogue(system, library)), held_out)

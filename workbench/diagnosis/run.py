@@ -3,7 +3,9 @@
 import tempfile
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
@@ -50,6 +52,8 @@ from workbench.system.reader import with_model
 from workbench.system.registry import open_file, open_model
 from workbench.system.system import OBSERVER, System
 
+Result = TypeVar("Result")
+
 EVERYTHING, EXTENDED = "AllEffects", "Extended"
 # Observers that are tried with both models: one with a gain for all, one that makes it as it goes.
 _TRIED = (DisturbanceObserver, ExtendedKalmanFilter)
@@ -84,91 +88,125 @@ def _with_effects(
 ) -> Outcome:
     """Build an FMU that has all effects, and diagnose with it."""
     with tempfile.TemporaryDirectory() as scratch:
-        problem, everything = _with_model(problem, Path(scratch), engine.report)
-        try:
-            return _diagnosed(problem, everything, engine, every_platform, certainty, free=False)
-        except EventError:
-            if problem.library is not None:
-                raise
-            engine.report("events of the model at other values: whole simulations instead")
-            return _diagnosed(problem, everything, engine, every_platform, certainty, free=True)
+        problem, everything = with_effects(problem, Path(scratch), engine.report)
+        source = ModelSource(everything, problem.system, given_values(everything, problem.system))
+        ask = partial(_outcome, engine, every_platform=every_platform, certainty=certainty)
+        return ask_fit(problem, source, engine, ask)
 
 
-def _diagnosed(
+def ask_fit(
     problem: Problem,
-    everything: Path,
+    source: ModelSource,
     engine: Engine,
+    ask: Callable[[Problem, ResidualModel, Fit], Result],
+) -> Result:
+    """Ask a fit of recordings; its problem has those effects that they can show.
+
+    An FMU alone that has events at other values is simulated as a whole.
+
+    Parameters
+    ----------
+    source : an FMU that has all effects.
+    """
+    try:
+        with ResidualModel(source, problem.cases, engine) as simulations:
+            shown = shown_effects(problem, simulations)
+            return ask(shown, simulations, Fit(simulations, shown.effects))
+    except EventError:
+        if problem.library is not None or source.free:
+            raise
+        engine.report("events of the model at other values: whole simulations instead")
+        return ask_fit(problem, source._replace(free=True), engine, ask)
+
+
+def shown_effects(problem: Problem, simulations: ResidualModel) -> Problem:
+    """The problem with those effects of an FMU alone that its recordings can show.
+
+    Raises
+    ------
+    InputError
+        If only terms beside rates are asked for, of an FMU that nothing corrects.
+    """
+    if problem.library is not None:
+        return problem
+    system, effects = problem.system, problem.effects
+    if simulations.free:
+        # Terms of several forms explain a run that nothing corrects as one parameter does.
+        effects = [effect for effect in effects if effect.size != COEFFICIENT]
+        if not effects:
+            raise InputError(
+                where=f"{system.source}, [candidates]",
+                found="only terms beside rates, of an FMU that runs freely",
+                expected="parameters or sensors",
+                remedy="choose some of 'workbench diagnose --list'",
+            )
+    begun = simulations.begin[0]  # by what was measured, in each recording
+    effects = [effect for effect in effects if effect.parameter not in begun]
+    return replace(problem, effects=tuple(fitting_recordings(effects, system, problem.cases)))
+
+
+def _outcome(
+    engine: Engine,
+    problem: Problem,
+    simulations: ResidualModel,
+    fit: Fit,
+    *,
     every_platform: bool,
     certainty: bool,
-    *,
-    free: bool,
 ) -> Outcome:
-    """A diagnosis with an FMU that has all effects; `free` if nothing corrects simulations."""
+    """Conclude, and write the extended model."""
     system, effects, report = problem.system, problem.effects, engine.report
-    source = ModelSource(everything, system, given_values(everything, system), free)
-    with ResidualModel(source, problem.cases, engine) as simulations:
-        if simulations.free and problem.library is None:
-            # Terms of several forms explain a run that nothing corrects as one parameter does.
-            effects = [effect for effect in effects if effect.size != COEFFICIENT]
-            if not effects:
-                raise InputError(
-                    where=f"{system.source}, [candidates]",
-                    found="only terms beside rates, of an FMU that runs freely",
-                    expected="parameters or sensors",
-                    remedy="choose some of 'workbench diagnose --list'",
-                )
-        if problem.library is None:
-            begun = simulations.begin[0]  # by what was measured, in each recording
-            effects = [effect for effect in effects if effect.parameter not in begun]
-            effects = list(fitting_recordings(effects, system, problem.cases))
-            problem = replace(problem, effects=effects)
-        fit = Fit(simulations, effects)
-        diagnosis = conclude(fit, effects, report)
-        base, best = diagnosis.base, diagnosis.best
-        asked = certainty and bool(diagnosis.causes) and not diagnosis.interrupted
-        assessed = assess(fit, best, report) if asked else None
-        answer = _Conclusion(problem, engine, simulations, fit, diagnosis)
-        extension = answer.extend(every_platform=every_platform)
-        errors = errors_of(simulations, fit, base.linearised, best.linearised, held_out=False)
-        starts = fit.unknowns.starts(best.point)
-        if problem.held_out:
-            report("errors on recordings that were held out")
-            more, their_starts = held_out_errors(
-                simulations, effects, (base, best), problem.held_out, engine.workers
-            )
-            errors, starts = errors + more, starts | their_starts
-        shown = residuals(simulations, fit, base.linearised, best.linearised)
-        return Outcome(
-            system=system,
-            cases=tuple(simulations.cases),
-            diagnosis=diagnosis,
-            residuals=shown,
-            dependences=dependences(simulations, shown),
-            levels={
-                key: (float(value), fit.unknowns.level_unit(key))
-                for key, value in best.point.levels.items()
-            },
-            deviations={
-                name: dict(zip(fit.unknowns.local, map(float, row), strict=True))
-                for name, row in zip(fit.unknowns.names, best.point.deviations, strict=True)
-            },
-            set_aside={recording.name: recording.set_aside for recording in simulations.recordings},
-            observers=answer.observers(extension),
-            extension=extension,
-            errors=tuple(errors),
-            starts=_differing(system, extension, starts),
-            rivals=gathered(simulations, fit, base, diagnosis.rivals) if diagnosis.rivals else None,
-            certainty=assessed,
-            unsure=dict(simulations.unsure) if simulations.free else None,
-            warned=simulations.take_warning(),
+    diagnosis = conclude(fit, effects, report)
+    base, best = diagnosis.base, diagnosis.best
+    asked = certainty and bool(diagnosis.causes) and not diagnosis.interrupted
+    assessed = assess(fit, best, report) if asked else None
+    answer = _Conclusion(problem, engine, simulations, fit, diagnosis)
+    extension = answer.extend(every_platform=every_platform)
+    errors = errors_of(simulations, fit, base.linearised, best.linearised, held_out=False)
+    starts = fit.unknowns.starts(best.point)
+    if problem.held_out:
+        report("errors on recordings that were held out")
+        more, their_starts = held_out_errors(
+            simulations, effects, (base, best), problem.held_out, engine.workers
         )
+        errors, starts = errors + more, starts | their_starts
+    shown = residuals(simulations, fit, base.linearised, best.linearised)
+    return Outcome(
+        system=system,
+        cases=tuple(simulations.cases),
+        diagnosis=diagnosis,
+        residuals=shown,
+        dependences=dependences(simulations, shown),
+        levels={
+            key: (float(value), fit.unknowns.level_unit(key))
+            for key, value in best.point.levels.items()
+        },
+        deviations={
+            name: dict(zip(fit.unknowns.local, map(float, row), strict=True))
+            for name, row in zip(fit.unknowns.names, best.point.deviations, strict=True)
+        },
+        set_aside={recording.name: recording.set_aside for recording in simulations.recordings},
+        observers=answer.observers(extension),
+        extension=extension,
+        errors=tuple(errors),
+        starts=_differing(system, extension, starts),
+        rivals=gathered(simulations, fit, base, diagnosis.rivals) if diagnosis.rivals else None,
+        certainty=assessed,
+        unsure=dict(simulations.unsure) if simulations.free else None,
+        warned=simulations.take_warning(),
+    )
 
 
-def _with_model(
-    problem: Problem, scratch: Path, report: Callable[[str], None]
+def with_effects(
+    problem: Problem, folder: Path, report: Callable[[str], None]
 ) -> tuple[Problem, Path]:
-    """The problem, and an FMU with all that it considers, at zero."""
-    everything = scratch / f"{EVERYTHING}.fmu"
+    """The problem, with starts that nobody declared, and an FMU with all its effects, at zero.
+
+    Parameters
+    ----------
+    folder : where that is written; an FMU alone that needs no terms beside rates serves itself.
+    """
+    everything = folder / f"{EVERYTHING}.fmu"
     if problem.library is None:
         # Nobody has said how states begin, which an FMU tells only by their nominal values.
         with open_model(problem.system) as model:

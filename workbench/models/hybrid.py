@@ -144,7 +144,8 @@ class HybridSimulation:
     @cached_property
     def _jump_matters(self) -> bool:
         """Whether a jump of an input may be an event, or compiled steps cannot set it."""
-        if self._signs.size or self._inputs.others:
+        jumping = len(self._continuous.names) < len(self._inputs.names)
+        if self._signs.size or self._inputs.others or jumping:
             return True
         return any(v.variability == "discrete" for v in self._fmu.description.variables)
 

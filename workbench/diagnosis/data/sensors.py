@@ -230,7 +230,8 @@ def fitting_recordings(
     """Effects, those of sensors as recordings can show them.
 
     The limit of a sensor is sought among its readings. A dead zone around zero is an offset where
-    no reading comes near, and readings that are no multiples of a step above noise have none.
+    no reading comes near, and readings that are no multiples of a step above noise have none. A
+    step is that of the readings: by another one a run goes in other steps, as wrong as without.
     """
     for effect in effects:
         signals = [effect.sensor] if effect.sensor else effect.late
@@ -245,10 +246,10 @@ def fitting_recordings(
         if effect.size == LOSS:
             limits = np.quantile(np.abs(read), _LIMITS)
             yield replace(effect, shapes=((LIMIT, tuple(dict.fromkeys(map(float, limits)))),))
-        elif not (
-            (effect.size == WIDTH and np.abs(read).min() > noise)
-            or (effect.size == STEP and step_of(read) < noise)
-        ):
+        elif effect.size == STEP:
+            if (step := step_of(read)) >= noise:
+                yield replace(effect, told=step)
+        elif effect.size != WIDTH or np.abs(read).min() <= noise:
             yield effect
 
 

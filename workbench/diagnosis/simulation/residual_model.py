@@ -88,8 +88,8 @@ class ResidualModel:
             self.simulated = self._prepared(restarting=restarting and not self.free)
             if not self.free:
                 try:
-                    nominal = [self.nominal] * len(self.recordings)
-                    parts = settled_parts(self._simulator(self.simulated), nominal)
+                    usual: list[dict[str, float]] = [{} for _ in self.recordings]
+                    parts = settled_parts(self._simulator(self.simulated), usual)
                     self.simulated = self.simulated._replace(parts=parts)
                 except EventError:
                     self._model, self.free = replace(self._model, motion=None), True

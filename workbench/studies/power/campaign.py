@@ -53,7 +53,7 @@ def predict_campaign(
     with study.setup() as setup:
         clean = Planting("clean", seed, 0.0, {}, ())
         cases = setup.record(clean, study.rig.simulate(seed, {}))
-        diagnosis = diagnose_set(setup.system, setup.effects, setup.everything, cases)
+        diagnosis = diagnose_set(setup.problem(cases), setup.everything)
     decides = of_system(study.system.comparison, len(study.effects))
     known = {effect.name: effect for effect in study.effects}
     return [
@@ -105,12 +105,12 @@ def limits_of_effects(
             for plantable in wanted
             if plantable.effect not in names and np.isfinite(size := repertoire.size(plantable))
         }
-        joint = information_of_set(setup.system, setup.effects, setup.everything, cases, others)
-    at = _columns_of_effects(study.effects, joint)
+        joint, effects = information_of_set(setup.problem(cases), setup.everything, others)
+    at = _columns_of_effects(effects, joint)
     at |= {name: [[joint.shared.index((name, _LACKING))]] for name, _ in others}
     left = beside(joint.total().N, range(len(joint.known)))
     multiple = clear(1, of_system(study.system.comparison, len(study.effects)))
-    return [_limit(plantable, at, left, study.effects, multiple) for plantable in wanted]
+    return [_limit(plantable, at, left, effects, multiple) for plantable in wanted]
 
 
 def _changed(setup: Setup, name: str, size: float, seed: int) -> tuple[float, list[Case]]:
@@ -219,18 +219,18 @@ def _effect_chance(
     decides: Thresholds,
 ) -> EffectChance:
     absolute = [factor * effect.matters for factor in sizes]
-    for score in diagnosis.scores:
-        if score.effect.name == effect.name and dict(score.shape) == dict(planted.shapes):
-            unknowns = 1 + len(score.phases) * effect.order_locked
-            return EffectChance(
-                effect=effect.name,
-                unit=planted.unit,
-                matters=effect.matters,
-                sigma=score.sigma,
-                chances=tuple((s, chance(s / score.sigma, unknowns, decides)) for s in absolute),
-                least=max(effect.matters, score.sigma * clear(unknowns, decides)),
-            )
-    return EffectChance(effect.name, planted.unit, effect.matters, None, (), None)
+    score = planted.score_of(diagnosis)
+    if score is None:
+        return EffectChance(effect.name, planted.unit, effect.matters, None, (), None)
+    unknowns = 1 + len(score.phases) * effect.order_locked
+    return EffectChance(
+        effect=effect.name,
+        unit=planted.unit,
+        matters=effect.matters,
+        sigma=score.sigma,
+        chances=tuple((s, chance(s / score.sigma, unknowns, decides)) for s in absolute),
+        least=max(effect.matters, score.sigma * clear(unknowns, decides)),
+    )
 
 
 def chance(distance: float, unknowns: int, decides: Thresholds) -> float:

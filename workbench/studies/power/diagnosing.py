@@ -1,15 +1,13 @@
-"""The diagnosis as its power is measured: all effects of the library in one FMU, set by set."""
+"""The diagnosis as its power is measured: all effects in one FMU, set by set."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from workbench import diagnosis
 from workbench.arrays import Vector
-from workbench.diagnosis import Diagnosis, Effect, Problem, catalogue, library_of
+from workbench.diagnosis import Diagnosis, Effect, Problem
 from workbench.diagnosis.data.motion import ModelSource
 from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.quadratic import Joint, Key
@@ -18,54 +16,38 @@ from workbench.diagnosis.inference.score_test import shapes, signatures
 from workbench.diagnosis.inference.search import FittedModel, examine, extended
 from workbench.diagnosis.inference.verdict import conclude
 from workbench.diagnosis.laws import one_law
+from workbench.diagnosis.run import Result, ask_fit
 from workbench.diagnosis.simulation.residual_model import ResidualModel
 from workbench.diagnosis.simulation.simulator import WhitenedResiduals
-from workbench.errors import InputError
-from workbench.models.modelica import read_library
 from workbench.recordings.case import Case
 from workbench.runtime.engine import ALONE, silent
-from workbench.system.system import System
 
 _NONE: Mapping[Key, tuple[float, Sequence[Case]]] = {}
 
 
-def library_effects(system: System) -> tuple[Effect, ...]:
-    """Effects of a system's library, which a diagnosis may find."""
-    if not system.library.is_file():
-        raise InputError(
-            where=str(system.source),
-            found=f"no Modelica library {system.library.name} beside it",
-            expected="a library, whose effects are injected into its own model",
-            remedy="put package.mo beside the system file, or give it with --library. The power of "
-            "a diagnosis of an FMU alone is not measured",
-        )
-    return catalogue(system, read_library(system.library))
+def diagnose_set(problem: Problem, everything: Path) -> Diagnosis:
+    """Diagnose one set of recordings, in this process alone.
 
+    Parameters
+    ----------
+    everything : FMU with all effects of the problem, at zero.
+    """
 
-def build_everything(system: System, effects: Sequence[Effect], path: Path) -> None:
-    """Build the FMU of the observer model with every effect, at zero."""
-    diagnosis.build_everything(system, read_library(system.library), effects, path)
+    def concluded(shown: Problem, _: ResidualModel, fit: Fit) -> Diagnosis:
+        return conclude(fit, shown.effects, silent)
 
-
-def diagnose_set(
-    system: System, effects: Sequence[Effect], everything: Path, cases: Sequence[Case]
-) -> Diagnosis:
-    """Diagnose one set of recordings, in this process alone."""
-    with _fit(system, effects, everything, cases) as (_, fit):
-        result = conclude(fit, effects, silent)
+    result = _ask(problem, everything, concluded)
     if result.verdict != "found":
         return result
-    law = one_law(result, Problem(system, cases, library_of(system), effects), ALONE)
+    law = one_law(result, problem, ALONE)
     return result.outdone(law) if law else result
 
 
 def information_of_set(
-    system: System,
-    effects: Sequence[Effect],
+    problem: Problem,
     everything: Path,
-    cases: Sequence[Case],
     others: Mapping[Key, tuple[float, Sequence[Case]]] = _NONE,
-) -> Joint:
+) -> tuple[Joint, Sequence[Effect]]:
     """Linearise one set about the nominal model: what it says of each effect and each level.
 
     Errors have the variance of the sensors' noise; levels and what differs between recordings have
@@ -75,23 +57,35 @@ def information_of_set(
     ----------
     others : by the name of an effect that the catalogue lacks, its size and the same recordings
         with it; its signature is the difference of their errors, over that size.
+
+    Returns
+    -------
+    joint : of the set.
+    effects : that it can show, with their shapes.
     """
-    with _fit(system, effects, everything, cases) as (_, fit):
+
+    def informed(
+        shown: Problem, _: ResidualModel, fit: Fit
+    ) -> tuple[Joint, list[WhitenedResiduals], Sequence[Effect]]:
         candidates = [
             (effect, shape)
-            for effect in effects
+            for effect in shown.effects
             if not fit.unknowns.presence.unseen(effect)
             for shape in shapes(effect)
         ]
         lin = fit.linearise(fit.at(fit.unknowns.start()), (), candidates)
         lin = replace(lin, variance_factors=np.ones(lin.variance_factors.size))
         joint = fit.quadratics(lin, signatures(candidates))
-        for key, (size, changed) in others.items():
-            with _fit(system, effects, everything, changed) as (_, other):
-                errors = other.at(other.unknowns.start()).residuals
-            moved = map(_accounted, errors, lin.residuals)
-            joint = joint.joined(key, [column / size for column in moved])
-        return joint
+        return joint, list(lin.residuals), shown.effects
+
+    def begun(_: Problem, __: ResidualModel, fit: Fit) -> Sequence[WhitenedResiduals]:
+        return fit.at(fit.unknowns.start()).residuals
+
+    joint, usual, effects = _ask(problem, everything, informed)
+    for key, (size, changed) in others.items():
+        errors = _ask(replace(problem, cases=changed), everything, begun)
+        joint = joint.joined(key, [column / size for column in map(_accounted, errors, usual)])
+    return joint, effects
 
 
 def _accounted(changed: WhitenedResiduals, usual: WhitenedResiduals) -> Vector:
@@ -102,22 +96,21 @@ def _accounted(changed: WhitenedResiduals, usual: WhitenedResiduals) -> Vector:
     return np.append(errors.ravel(), usual.rest - changed.rest)
 
 
-def rivals_of_set(
-    system: System, effects: Sequence[Effect], everything: Path, cases: Sequence[Case]
-) -> tuple[Diagnosis, Rivals | None]:
+def rivals_of_set(problem: Problem, everything: Path) -> tuple[Diagnosis, Rivals | None]:
     """Diagnose one set, and keep its remaining candidates; None where no cause is found."""
-    with _fit(system, effects, everything, cases) as (model, fit):
-        result = conclude(fit, effects, silent)
-        return result, gathered(model, fit, result.base, result.rivals) if result.rivals else None
+
+    def concluded(
+        shown: Problem, simulations: ResidualModel, fit: Fit
+    ) -> tuple[Diagnosis, Rivals | None]:
+        result = conclude(fit, shown.effects, silent)
+        rivals = result.rivals
+        return result, gathered(simulations, fit, result.base, rivals) if rivals else None
+
+    return _ask(problem, everything, concluded)
 
 
 def distances_in_set(
-    system: System,
-    effects: Sequence[Effect],
-    everything: Path,
-    cases: Sequence[Case],
-    true: str,
-    others: Sequence[str],
+    problem: Problem, everything: Path, true: str, others: Sequence[str]
 ) -> tuple[Diagnosis, dict[str, float]]:
     """Diagnose one set, and measure how far effects stay from the true one, each fitted alone.
 
@@ -130,9 +123,10 @@ def distances_in_set(
     distances : by name [standard deviations], negative if it is nearer than the true one; of those
         that could be fitted.
     """
-    with _fit(system, effects, everything, cases) as (_, fit):
-        result = conclude(fit, effects, silent)
-        base, trial = examine(fit, result.base, effects, silent)
+
+    def measured(shown: Problem, __: ResidualModel, fit: Fit) -> tuple[Diagnosis, dict[str, float]]:
+        result = conclude(fit, shown.effects, silent)
+        base, trial = examine(fit, result.base, shown.effects, silent)
         fits: dict[str, FittedModel | None] = {}
         for score in trial.scores():
             name = score.effect.name
@@ -151,15 +145,19 @@ def distances_in_set(
             name: distance(c - least[true]) for name, c in least.items() if name != true
         }
 
+    return _ask(problem, everything, measured)
+
 
 def distance(chi_squared: float) -> float:
     """Standard deviations of a difference of chi-squared, with its sign."""
     return float(np.sign(chi_squared) * np.sqrt(abs(chi_squared)))
 
 
-@contextmanager
-def _fit(
-    system: System, effects: Sequence[Effect], everything: Path, cases: Sequence[Case]
-) -> Iterator[tuple[ResidualModel, Fit]]:
-    with ResidualModel(ModelSource(everything, system, system.given), cases) as simulations:
-        yield simulations, Fit(simulations, effects)
+def _ask(
+    problem: Problem,
+    everything: Path,
+    ask: Callable[[Problem, ResidualModel, Fit], Result],
+) -> Result:
+    """Ask a fit, in this process alone; see `ask_fit`."""
+    source = ModelSource(everything, problem.system, problem.system.given)
+    return ask_fit(problem, source, ALONE, ask)

@@ -170,7 +170,7 @@ def _row(setup: Setup, planting: Planting) -> FollowingRow:
 def _follow(row: FollowingRow, setup: Setup, planting: Planting) -> None:
     (planted,) = planting.effects
     cases = setup.record(planting, setup.rig.simulate(planting.seed, planting.gains))
-    diagnosis, rivals = rivals_of_set(setup.system, setup.effects, setup.everything, cases)
+    diagnosis, rivals = rivals_of_set(setup.problem(cases), setup.everything)
     row.verdict, row.group = diagnosis.verdict, _names(diagnosis)
     if rivals is None or len(rivals.models) == 1:
         return
@@ -192,7 +192,8 @@ def _follow(row: FollowingRow, setup: Setup, planting: Planting) -> None:
         for sensor in experiments.sensors:
             sensed = proposal.sensors.get(sensor.label)
             if sensed is not None and (at,) in sensed.prediction.groups:
-                fitted = replace(setup, system=with_sensor(setup.system, sensor))
+                asked = replace(setup.asked, system=with_sensor(setup.system, sensor))
+                fitted = replace(setup, asked=asked)
                 row.sensed = {"sensor": sensor.label, **make(sensed, fitted)}
                 break
     row.drawn = list(map(make, predict_experiments(setup.system, rivals, plan, 1)))
@@ -213,10 +214,8 @@ def _diagnose_with(
     rig = setup.rig.following(experiment.to_dict(), setup.system)
     more = replace(setup, rig=rig).record(planting, rig.simulate(planting.seed, planting.gains))
     others = [name for name in names if name != planted]
-    recordings = [*cases, *more]
-    diagnosis, shown = distances_in_set(
-        setup.system, setup.effects, setup.everything, recordings, planted, others
-    )
+    asked = setup.problem([*cases, *more])
+    diagnosis, shown = distances_in_set(asked, setup.everything, planted, others)
     named = _names(diagnosis)
     return {
         "experiment": experiment.text,

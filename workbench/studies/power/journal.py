@@ -75,10 +75,8 @@ def verdict_of(
     if planting.kind == "single":
         ((name, size),) = planting.gains.items()
         planted = repertoire.plantable(name)
-        for score in diagnosis.scores:
-            if score.effect.name == planted.effect and dict(score.shape) == dict(planted.shapes):
-                clearness = float(abs(size) / score.sigma)
-                break
+        if (score := planted.score_of(diagnosis)) is not None:
+            clearness = float(abs(size) / score.sigma)
     return SetVerdict(
         planting, diagnosis.verdict, causes, before, after, seconds, clearness=clearness
     )

@@ -94,7 +94,13 @@ def propose_left_out(
     -------
     rows : one for each set, see `LeftOutRow`.
     interrupted : whether Ctrl-C ended the run; what was finished is in the rows.
+
+    Raises
+    ------
+    InputError
+        If the model is an FMU alone.
     """
+    _ = study.problem.modelica  # in whose equations laws are sought
     sets = [group[0] for group in groups if group[0].kind != "pair"]
     rows: list[dict[str, Any]] = []
     progress = StepReporter(engine.report, len(sets))
@@ -109,7 +115,7 @@ def propose_left_out(
 
 
 def _row(planting: Planting, study: PowerStudy, workers: int) -> LeftOutRow:
-    system, library, rig, effects = study.system, study.library, study.rig, study.effects
+    system, rig, effects = study.system, study.rig, study.effects
     planted = [effect for effect in effects if effect.name in planting.effects]
     others = [effect for effect in effects if effect not in planted]
     acting = {slot for effect in planted for slot in effect.slots}
@@ -126,7 +132,7 @@ def _row(planting: Planting, study: PowerStudy, workers: int) -> LeftOutRow:
             rig.write(simulated, planting.gains, recordings)
             cases = read_cases([recordings], system)
             engine = Engine(workers, out=out)
-            problem = Problem(system, cases, library, others)
+            problem = replace(study.problem, cases=cases, effects=others)
             before = diagnose(problem, engine)
             row.verdict = before.diagnosis.verdict
             row.named = [cause.effect.name for cause in before.diagnosis.causes]

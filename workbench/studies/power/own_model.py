@@ -14,23 +14,35 @@ from typing import Any
 
 import numpy as np
 
-from workbench.arrays import Vector
-from workbench.diagnosis import Effect
+from workbench.arrays import Matrix, Vector
+from workbench.diagnosis import Effect, Problem
 from workbench.diagnosis.data.clocks import late_signals, lateness, moved
+from workbench.diagnosis.data.counting import refuse_too_few
 from workbench.diagnosis.data.motion import ModelSource
 from workbench.diagnosis.data.samples import Samples, standardised
+from workbench.diagnosis.data.sensors import (
+    SensorReading,
+    lagged,
+    readings,
+    sensed,
+    sensor_errors,
+)
+from workbench.diagnosis.effects.candidates import COEFFICIENT, STEP
 from workbench.diagnosis.effects.extension import variables
 from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.quadratic import Key
 from workbench.diagnosis.inference.score_test import shapes
+from workbench.diagnosis.run import shown_effects
 from workbench.diagnosis.simulation.residual_model import ResidualModel
 from workbench.errors import InputError
-from workbench.models.fmu import CoSimulation
-from workbench.models.native import co_simulation_instance, raise_on_failure
+from workbench.models.description import MODEL_EXCHANGE
+from workbench.models.fmu import FMU, CoSimulation
+from workbench.models.simulation import Drive, Simulation
+from workbench.observers.trajectory import require_function
 from workbench.recordings.case import Case, Value, read_cases
 from workbench.runtime.files import write_whole
-from workbench.studies.design.simulation import step_block
 from workbench.studies.power.planting import Plantable, SheetError
+from workbench.system.registry import open_file, open_model
 from workbench.system.system import System
 
 Readings = tuple[int, list[dict[str, Vector]]]
@@ -41,12 +53,12 @@ Readings = tuple[int, list[dict[str, Vector]]]
 class OwnModel:
     """Sets of recordings by the system's own model, a `VirtualRig`."""
 
-    system: System
+    # of recordings of the machine, whose inputs, times and conditions are those of a set; with all
+    # that can be planted
+    problem: Problem
     everything: Path  # FMU of the observer model with every effect
-    effects: tuple[Effect, ...]  # that it has
-    # recordings of the machine, whose inputs, times and conditions are those of a set
-    templates: tuple[Case, ...]
     plantables: tuple[Plantable, ...]  # all effects
+    free: bool  # whether the diagnosis simulates as a whole, too
     # share of its effect by which a law is wrong: its size goes with a quantity that is drawn, see
     # `quantities`
     form_error: float = 0.0
@@ -54,29 +66,43 @@ class OwnModel:
     sheet_errors: tuple[SheetError, ...] = ()
 
     @property
+    def system(self) -> System:
+        """Whose model it is."""
+        return self.problem.system
+
+    @property
     def about(self) -> str:
         """What makes the recordings, for people."""
-        form = "have their exact form: on the machine itself the diagnosis is right less often"
+        alone = self.problem.library is None
+        solved = "solved by the Co-Simulation of its FMU instead of the steps of the diagnosis"
+        if alone:
+            solved = "simulated at a tolerance of 1e-8 instead of by the steps of the diagnosis"
+        if self.free:
+            solved = "simulated as the diagnosis does"
+        form = "Laws have their exact form"
+        if alone:
+            form = "The figures hold only as far as its form is right, since the same FMU diagnoses"
+        form += ": on the machine itself the diagnosis is right less often"
         if self.form_error:
             form = (
-                "are wrong in form: the size of each changes with a quantity that is drawn, by "
-                f"{self.form_error:.0%} rms"
+                "Laws are wrong in form: the size of each changes with a quantity that is drawn, "
+                f"by {self.form_error:.0%} rms"
             )
         return (
-            "the system's own model, solved by the Co-Simulation of its FMU instead of the steps "
-            "of the diagnosis, with the tolerances, levels, noise and resolution of the system "
-            f"file. Laws {form}"
+            f"the system's own model, {solved}, with the tolerances, levels, noise and resolution "
+            f"of the system file. {form}"
         )
 
     @property
     def recordings(self) -> tuple[str, ...]:
         """Names of the recordings."""
-        return tuple(case.name for case in self.templates)
+        return tuple(case.name for case in self.problem.cases)
 
     @property
     def identity(self) -> Mapping[str, Any]:
         """Model and recordings."""
-        data = b"".join(column.tobytes() for c in self.templates for column in (c.time, c.u, c.y))
+        cases = self.problem.cases
+        data = b"".join(column.tobytes() for c in cases for column in (c.time, c.u, c.y))
         return {
             "machine": self.about,
             "recordings": list(self.recordings),
@@ -87,9 +113,8 @@ class OwnModel:
     def simulate(self, seed: int, gains: Mapping[str, float]) -> "Readings":
         """Readings of each recording, without noise."""
         rng = np.random.default_rng(seed)
-        source = ModelSource(self.everything, self.system, self.system.given)
-        with ResidualModel(source, self.templates) as simulations:
-            unknowns = Fit(simulations, self.effects).unknowns
+        with ResidualModel(_source(self.problem, self.everything), self.problem.cases) as model:
+            unknowns = Fit(model, self.problem.effects).unknowns
             point, sizes = unknowns.start(), dict[Key, float]()
             phases = dict[str, Vector]()
             for name, gain in gains.items():
@@ -107,78 +132,104 @@ class OwnModel:
             deviations = rng.standard_normal(point.deviations.shape)
             drawn = replace(point, sizes=sizes, levels=levels, deviations=deviations, phases=phases)
             starts = list(unknowns.starts(drawn).values())
-            recordings = simulations.recordings
+            without = list(unknowns.starts(replace(drawn, sizes={}, phases={})).values())
+            for start in starts:  # a state that is drawn stays where it can be
+                start |= {
+                    name: float(np.clip(start[name], *model.bounds.get(name, (-np.inf, np.inf))))
+                    for name in unknowns.starting
+                }
+            recordings = model.recordings
             wrong = [
                 variable
                 for name in gains
                 for size in unknowns.effects[name].sizes
                 for variable in variables(unknowns.effects[name], size)
-                if variable in simulations.nominal and self.form_error
+                if variable in model.nominal and self.form_error
             ]
         courses = standardised(recordings)
         quantity, sign = rng.integers(courses[0].shape[1]), rng.choice([-1.0, 1.0])
         sets = []
-        with CoSimulation(self.everything) as model:
-            for recording, start, course in zip(recordings, starts, courses, strict=True):
-                factor = 1.0 + sign * self.form_error * course[:, quantity]
-                varied = {name: start[name] * factor for name in wrong}
-                sets.append(self._recorded(model, recording, start, varied))
+        with self._opened() as fmu:
+            names = [*(signal.name for signal in self.system.inputs), *wrong]
+            outputs = [self.system.signals[name].reading for name in recordings[0].signals]
+            holds = np.append(self.system.holds, np.zeros(len(wrong)))
+            simulation = Simulation(fmu, names, outputs, holds)
+            for k, (recording, start) in enumerate(zip(recordings, starts, strict=True)):
+                factor = 1.0 + sign * self.form_error * courses[k][:, quantity]
+                usual = {name: without[k].get(name, 0.0) for name in wrong}
+                varied = {
+                    name: zero + (start[name] - zero) * factor for name, zero in usual.items()
+                }
+                sets.append(self._recorded(simulation, recording, start, varied))
         return seed, sets
 
     def write(self, simulated: "Readings", gains: Mapping[str, float], folder: Path) -> None:
         """Write readings with noise, rounded to the resolution of their sensors."""
         seed, sets = simulated
-        for number, (case, readings) in enumerate(zip(self.templates, sets, strict=True), 1):
+        effects = {effect.name: effect for effect in self.problem.effects}
+        coarse = {
+            effects[name].sensor: step
+            for name, step in gains.items()
+            if effects[name].sensor and effects[name].size == STEP
+        }
+        for number, (case, clean) in enumerate(zip(self.problem.cases, sets, strict=True), 1):
             rng, columns = np.random.default_rng([seed, number]), {"time [s]": case.time}
-            for name, values in readings.items():
+            for name, values in clean.items():
                 if name not in case:
                     continue
                 signal = self.system.signals[name]
                 read = values + signal.deviation(values) * rng.standard_normal(values.size)
-                if step := signal.resolution:
-                    read = step * np.round(read / step)
+                for step in (coarse.get(name, 0.0), signal.resolution):
+                    read = step * np.round(read / step) if step else read
                 columns[f"{name} [{signal.unit}]"] = read
             rows = np.column_stack(list(columns.values())).tolist()
             lines = [",".join(columns), *(",".join(f"{v:.9g}" for v in row) for row in rows)]
             write_whole(folder / case.name / "measured.csv", "\n".join(lines) + "\n")
             write_whole(folder / case.name / "case.toml", self._description(case))
 
+    def _opened(self) -> FMU:
+        if self.problem.library is None:
+            return open_file(self.everything, self.system, {})
+        return CoSimulation(self.everything)
+
     def _recorded(
         self,
-        model: CoSimulation,
+        simulation: Simulation,
         recording: Samples,
         start: Mapping[str, float],
         varied: Mapping[str, Vector],
     ) -> dict[str, Vector]:
-        """Readings of one recording, (n,) by signal: structures and loggers included.
+        """Readings of one recording, (n,) by signal: structures, sensors and loggers included.
+
+        Steps of a sensor come last, in `write`: it rounds what its noise moves.
 
         Parameters
         ----------
         varied : parameters that change in time, (n,).
         """
-        system, states = self.system, set(model.states)
-        known = {name: value for name, value in start.items() if name in model.defaults}
-        model.start(
-            {name: value for name, value in known.items() if name in states},
-            {name: value for name, value in known.items() if name not in states},
-        )
-        inputs = [signal.name for signal in system.inputs]
-        model.set(model.variables(inputs), recording.u[0])
-        outputs = [system.signals[name].reading for name in recording.signals]
-        driven = np.column_stack([recording.u, *varied.values()])
-        holds = np.append(self.system.holds, np.zeros(len(varied)))
-        running = co_simulation_instance(model, [*inputs, *varied], outputs)
-        y = np.zeros((recording.time.size, len(outputs)))
-        for k, h in enumerate(np.diff(recording.time)):
-            pair = slice(k, k + 2)
-            raise_on_failure(step_block(running, float(h), holds, driven[pair], y[pair]), model)
+        system, time = self.system, recording.time
+        wrong = {
+            name: sensor._replace(step=0.0)
+            for name, sensor in readings(sensor_errors(system), start).items()
+        }
+        inputs = dict(zip(recording.inputs, recording.u.T, strict=True))
+        driving = [
+            lagged(time, column, wrong.get(name, SensorReading()).lag)
+            for name, column in inputs.items()
+        ]
+        u = np.reshape([*driving, *varied.values()], (-1, time.size)).T.copy()
+        drive = Drive(time, _whole(simulation.fmu, recording.inputs, u), recording.model_time)
+        y = simulation.run(drive, _able(simulation.fmu, start))
+        for j in range(y.shape[1]):
+            y[:, j] = recording.behind_structure(j, y[:, j])
+        read = dict(zip(recording.signals, sensed(recording, y, wrong).T, strict=True))
+        for name, column in inputs.items():
+            sensor = wrong.get(name, SensorReading())
+            read[name] = sensor.factor * column + sensor.offset
         late = lateness(late_signals(system), start)
-        readings = dict(zip(inputs, recording.u.T, strict=True))
-        for j, name in enumerate(recording.signals):
-            readings[name] = recording.behind_structure(j, y[:, j])
         return {
-            name: moved(recording.time, values, late[name]) if name in late else values.copy()
-            for name, values in readings.items()
+            name: moved(time, read[name], late[name]) if name in late else read[name].copy()
+            for name in (*inputs, *recording.signals)
         }
 
     def _description(self, case: Case) -> str:
@@ -217,37 +268,82 @@ def template_cases(system: System, names: Sequence[str]) -> list[Case]:
     return read_cases(folders, system)
 
 
-def own_model(
-    system: System,
-    effects: Sequence[Effect],
-    everything: Path,
-    templates: Sequence[Case],
-    form_error: float = 0.0,
-) -> OwnModel:
+def own_model(problem: Problem, everything: Path, form_error: float = 0.0) -> OwnModel:
     """The virtual machine of a system.
 
     Parameters
     ----------
+    problem : of recordings of the machine, see `template_cases`, and all effects.
     everything : FMU of its observer model with all effects.
-    templates : recordings of the machine, see `template_cases`.
     form_error : see `OwnModel`.
+
+    Raises
+    ------
+    InputError
+        If a diagnosis of such recordings is refused, or an FMU alone has no law whose form could
+        be wrong.
     """
-    with CoSimulation(everything) as model:
-        least = {v.name: v.minimum for v in model.description.variables if v.minimum is not None}
-        units = dict(model.units)
-    plantables = []
-    for effect in effects:
-        variable = variables(effect, effect.size)[0]
-        low = 0.0 if effect.order_locked else least.get(variable, -np.inf)
-        plantables.append(
-            Plantable(
-                name=effect.name,
-                unit="s" if effect.late else units.get(variable, "1"),
-                effect=effect.name,
-                least=low,
-                signed=low < 0.0,
-                shapes=_middle_shape(effect),
+    refuse_too_few(problem.cases, problem.system)
+    if problem.library is None:
+        with open_model(problem.system) as fmu:
+            for case in problem.cases:
+                require_function(fmu, problem.system, case)
+    with ResidualModel(_source(problem, everything), problem.cases) as model:
+        known = {effect.name: effect for effect in shown_effects(problem, model).effects}
+        # Recordings of a sensor that does not go in steps may yet be made to.
+        planted = [
+            known.get(effect.name, effect)
+            for effect in problem.effects
+            if effect.name in known or (effect.size == STEP and _read(effect, problem.cases))
+        ]
+        if form_error and problem.library is None:
+            planted = [effect for effect in planted if effect.size == COEFFICIENT]
+        if not planted:
+            raise InputError(
+                where="--form-error",
+                found="no term beside a rate, of an FMU alone",
+                expected="one or more: a value, a start, a sensor and a clock have no form that "
+                "could be wrong",
+                remedy="leave --form-error out",
             )
-        )
-    machine = OwnModel(system, everything, tuple(effects), tuple(templates), tuple(plantables))
-    return replace(machine, form_error=form_error)
+        unknowns = Fit(model, planted).unknowns
+        plantables = []
+        for effect in planted:
+            low, high = unknowns.bounds(effect, effect.size)
+            plantables.append(
+                Plantable(
+                    name=effect.name,
+                    unit=unknowns.unit(effect, effect.size) or "1",
+                    effect=effect.name,
+                    least=low,
+                    most=high,
+                    signed=low < 0.0,
+                    shapes=_middle_shape(effect),
+                )
+            )
+        machine = replace(problem, effects=tuple(planted))
+        return OwnModel(machine, everything, tuple(plantables), model.free, form_error)
+
+
+def _source(problem: Problem, everything: Path) -> ModelSource:
+    return ModelSource(everything, problem.system, problem.system.given)
+
+
+def _able(fmu: FMU, start: Mapping[str, float]) -> dict[str, float]:
+    """Start values that may be set: clocks and sensors are none of the FMU."""
+    own = fmu.states if fmu.interface == MODEL_EXCHANGE else ()
+    able = {v.name for v in fmu.description.variables if v.initial != "calculated"}
+    return {name: value for name, value in start.items() if name in {*able, *own}}
+
+
+def _whole(fmu: FMU, inputs: Sequence[str], u: Matrix) -> Matrix:
+    """Inputs (n, m) in numbers that their types hold, of which noise makes others."""
+    kinds = {v.name: v for v in fmu.description.variables}
+    whole = [j for j, name in enumerate(inputs) if not kinds[name].floats]
+    u[:, whole] = np.round(u[:, whole])
+    return u
+
+
+def _read(effect: Effect, cases: Sequence[Case]) -> bool:
+    """Whether any recording has what a sensor reads."""
+    return any(effect.sensor in case and not np.isnan(case[effect.sensor]).all() for case in cases)

@@ -8,7 +8,11 @@ from typing import Literal, Protocol
 
 import numpy as np
 
+from workbench.diagnosis import Diagnosis
+from workbench.diagnosis.inference.score_test import CandidateScore
 from workbench.errors import InputError, unknown_name
+
+_ALIKE = 0.2  # of a shape, within which it is the same: readings of each set have own noise
 
 Kind = Literal["clean", "single", "pair", "outside", "sheet"]
 
@@ -40,7 +44,9 @@ class Plantable:
     name: str  # of the rig's effect
     unit: str  # of its gain, SI
     effect: str = ""  # of the library's; empty if the library has none
-    least: float = -math.inf  # smallest gain that makes sense [unit]
+    # least, most: gains that make sense [unit]
+    least: float = -math.inf
+    most: float = math.inf
     signed: bool = True  # whether it is planted in both directions
     # whether it changes readings only, so that one simulation serves all sizes
     sensed: bool = False
@@ -49,6 +55,21 @@ class Plantable:
     # unit of sizes [unit]; nan: what matters to the library, which has the effect
     unit_size: float = math.nan
     slot: str = ""  # of the base model where it acts, if the library lacks it
+
+    def score_of(self, diagnosis: Diagnosis) -> CandidateScore | None:
+        """Score of this effect about the nominal model, in its shape; None where there is none.
+
+        Limits of sensors are tried where the readings of a set lie: the nearest is taken.
+        """
+        shape = dict(self.shapes)
+
+        def apart(score: CandidateScore) -> float:
+            ratios = [value / shape[name] for name, value in score.shape.items()]
+            return max((abs(ratio - 1.0) for ratio in ratios), default=0.0)
+
+        own = [s for s in diagnosis.scores if s.effect.name == self.effect]
+        alike = [s for s in own if s.shape.keys() == shape.keys() and apart(s) <= _ALIKE]
+        return min(alike, key=apart, default=None)
 
 
 def assigned(assignments: Sequence[str], known: Mapping[str, Plantable]) -> dict[str, float]:
@@ -258,7 +279,8 @@ def _pair(repertoire: Repertoire, seed: int, multiple: float) -> Planting:
 
 def _gain(plantable: Plantable, size: float, rng: np.random.Generator) -> float:
     gain = float(f"{size:.6g}")
-    negative = plantable.signed and rng.random() < 0.5 and -gain >= plantable.least
+    downwards = plantable.signed and (rng.random() < 0.5 or gain > plantable.most)
+    negative = downwards and -gain >= plantable.least
     return -gain if negative else gain
 
 

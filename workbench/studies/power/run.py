@@ -6,19 +6,19 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, as_completed
 from contextlib import contextmanager, nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
 from workbench import diagnosis
-from workbench.diagnosis import Effect
+from workbench.diagnosis import Effect, Problem
+from workbench.diagnosis.run import with_effects
 from workbench.errors import WorkerError
-from workbench.models.modelica import Library, read_library
 from workbench.recordings.case import Case, read_cases
-from workbench.runtime.engine import Engine
+from workbench.runtime.engine import Engine, silent
 from workbench.runtime.pool import Pool
 from workbench.runtime.progress import StepReporter
-from workbench.studies.power.diagnosing import build_everything, diagnose_set
+from workbench.studies.power.diagnosing import diagnose_set
 from workbench.studies.power.journal import Journal, SetVerdict, verdict_of
 from workbench.studies.power.planting import Group, Planting, Repertoire
 from workbench.studies.power.virtual_rig import VirtualRig
@@ -34,10 +34,18 @@ Result = TypeVar("Result")
 class Setup:
     """How every set is made and diagnosed."""
 
-    system: System
     rig: VirtualRig  # makes the recordings
+    asked: Problem  # of each set, but for its recordings
     everything: Path  # FMU of the observer model with every effect at zero, which diagnoses them
-    effects: tuple[Effect, ...]  # that it has
+
+    @property
+    def system(self) -> System:
+        """Of the machine."""
+        return self.asked.system
+
+    def problem(self, cases: Sequence[Case]) -> Problem:
+        """What is asked of a set."""
+        return replace(self.asked, cases=cases)
 
     def record(self, planting: Planting, simulated: Any) -> list[Case]:
         """Write what the rig's sensors make of a simulation, and read it back."""
@@ -48,29 +56,31 @@ class Setup:
     @property
     def repertoire(self) -> Repertoire:
         """What can be planted, and what can be found."""
-        return Repertoire(self.rig.plantables, self.effects)
+        return Repertoire(self.rig.plantables, tuple(self.asked.effects))
 
 
 @dataclass(frozen=True, eq=False)
 class PowerStudy:
     """Whose power is measured: a diagnosis of what a virtual rig records."""
 
-    system: System
+    problem: Problem  # what is asked of each set, but for its recordings
     rig: VirtualRig  # makes the recordings
-    effects: Sequence[Effect]  # of the system's library, which may be found
 
     @property
-    def library(self) -> Library:
-        """Of the system."""
-        return read_library(self.system.library)
+    def system(self) -> System:
+        """Of the machine."""
+        return self.problem.system
+
+    @property
+    def effects(self) -> Sequence[Effect]:
+        """What may be found."""
+        return self.problem.effects
 
     @contextmanager
     def setup(self) -> Iterator[Setup]:
         """Build the FMU with all effects, which is there as long as this is open."""
         with tempfile.TemporaryDirectory(prefix="power-", ignore_cleanup_errors=True) as folder:
-            everything = Path(folder) / "AllEffects.fmu"
-            build_everything(self.system, self.effects, everything)
-            yield Setup(self.system, self.rig, everything, tuple(self.effects))
+            yield Setup(self.rig, *with_effects(self.problem, Path(folder), silent))
 
 
 def diagnose_sets(
@@ -172,7 +182,7 @@ def _evaluate(setup: Setup, group: Group) -> list[SetVerdict]:
             if simulated is None:
                 simulated = setup.rig.simulate(planting.seed, planting.gains)
             cases = setup.record(planting, simulated)
-            result = diagnose_set(setup.system, setup.effects, setup.everything, cases)
+            result = diagnose_set(setup.problem(cases), setup.everything)
         except Exception as error:  # one set must not end a run of hours; it is counted
             results.append(_failure(planting, error, time.perf_counter() - begin))
         else:

@@ -14,6 +14,7 @@ from workbench.diagnosis.data.motion import ModelSource
 from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.thresholds import Soundness, Thresholds, of_system
 from workbench.diagnosis.inference.verdict import conclude
+from workbench.diagnosis.run import shown_effects
 from workbench.diagnosis.simulation.prediction import Variation
 from workbench.diagnosis.simulation.residual_model import ResidualModel
 from workbench.diagnosis.simulation.simulator import WhitenedResiduals
@@ -109,7 +110,7 @@ def _key(points: Sequence[Mapping[str, float]]) -> tuple[frozenset[tuple[str, fl
 def vary(setup: Setup, planting: Planting, names: Sequence[str]) -> ThresholdSensitivity:
     """Make one set of recordings, and diagnose it by half and twice of each threshold named."""
     cases = setup.record(planting, setup.rig.simulate(planting.seed, planting.gains))
-    usual = of_system(setup.system.comparison, len(setup.effects))
+    usual = of_system(setup.system.comparison, len(setup.asked.effects))
     variants = {(name, factor): scaled(usual, name, factor) for name in names for factor in FACTORS}
     by_samples: dict[Soundness, list[Thresholds]] = {}
     for thresholds in (usual, *variants.values()):
@@ -135,10 +136,9 @@ def _verdicts(
     verdicts: dict[Thresholds, tuple[str, ...]] = {}
     try:
         with CachedResidualModel(setup.everything, setup.system, cases, samples) as simulations:
+            effects = shown_effects(setup.problem(cases), simulations).effects
             for variant in variants:
-                diagnosis = conclude(
-                    Fit(simulations, setup.effects, variant), setup.effects, silent
-                )
+                diagnosis = conclude(Fit(simulations, effects, variant), effects, silent)
                 causes = (cause.effect.name for cause in diagnosis.causes)
                 verdicts[variant] = diagnosis.verdict, *causes
     except InputError:  # too few samples are left
