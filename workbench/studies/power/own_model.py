@@ -38,7 +38,7 @@ from workbench.errors import InputError
 from workbench.models.description import MODEL_EXCHANGE
 from workbench.models.fmu import FMU, CoSimulation
 from workbench.models.simulation import Drive, Simulation
-from workbench.observers.trajectory import require_function
+from workbench.observers.trajectory import check_along
 from workbench.recordings.case import Case, Value, read_cases
 from workbench.runtime.files import write_whole
 from workbench.studies.power.planting import Plantable, SheetError
@@ -62,6 +62,8 @@ class OwnModel:
     # share of its effect by which a law is wrong: its size goes with a quantity that is drawn, see
     # `quantities`
     form_error: float = 0.0
+
+    doubt: str = ""  # about the model along the recordings, see `check_along`
 
     sheet_errors: tuple[SheetError, ...] = ()
 
@@ -90,7 +92,7 @@ class OwnModel:
             )
         return (
             f"the system's own model, {solved}, with the tolerances, levels, noise and resolution "
-            f"of the system file. {form}"
+            f"of the system file. {form}{self.doubt and f'. Doubt: {self.doubt}'}"
         )
 
     @property
@@ -284,10 +286,8 @@ def own_model(problem: Problem, everything: Path, form_error: float = 0.0) -> Ow
         be wrong.
     """
     refuse_too_few(problem.cases, problem.system)
-    if problem.library is None:
-        with open_model(problem.system) as fmu:
-            for case in problem.cases:
-                require_function(fmu, problem.system, case)
+    with open_model(problem.system) as fmu:
+        doubts = dict.fromkeys(check_along(fmu, problem.system, case) for case in problem.cases)
     with ResidualModel(_source(problem, everything), problem.cases) as model:
         known = {effect.name: effect for effect in shown_effects(problem, model).effects}
         # Recordings of a sensor that does not go in steps may yet be made to.
@@ -322,7 +322,8 @@ def own_model(problem: Problem, everything: Path, form_error: float = 0.0) -> Ow
                 )
             )
         machine = replace(problem, effects=tuple(planted))
-        return OwnModel(machine, everything, tuple(plantables), model.free, form_error)
+        doubt = "; ".join(filter(None, doubts))
+        return OwnModel(machine, everything, tuple(plantables), model.free, form_error, doubt)
 
 
 def _source(problem: Problem, everything: Path) -> ModelSource:
