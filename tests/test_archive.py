@@ -240,7 +240,10 @@ DAMAGES: dict[str, tuple[Callable[[Path], None], str]] = {
     "text for a number": (edited('start="0.0"', 'start="many"'), r"start value of '\w+' = 'many'"),
     "NaN": (edited('start="0.0"', 'start="nan"'), r"start value of '\w+' = 'nan'"),
     "endless start": (edited('start="0.0"', 'start="1e999"'), r"start value of '\w+' = '1e999'"),
-    "reference below zero": (edited('valueReference="1"', 'valueReference="-1"'), "reference -1"),
+    "reference below zero": (
+        edited('valueReference="1"', 'valueReference="-1"'),
+        "valueReference = '-1'",
+    ),
     "reference too large": (
         edited('valueReference="1"', 'valueReference="4294967296"'),
         "reference 4294967296",
@@ -249,7 +252,30 @@ DAMAGES: dict[str, tuple[Callable[[Path], None], str]] = {
         edited('valueReference="1"', f'valueReference="{"9" * 5000}"'),
         "no FMU",
     ),
-    "index of nothing": (edited('derivative="', 'derivative="0'), "derivative = '0"),
+    "index of nothing": (
+        edited('derivative="1"', 'derivative="0"'),
+        "model variable index 0 which",
+    ),
+    "dependency from the end": (edited('dependencies="', 'dependencies="-1 '), "ies = '-1' of an"),
+    "dependency on nothing": (edited('dependencies="', 'dependencies="0 '), "ies = '0' of an"),
+    "number of Python": (edited('valueReference="1"', 'valueReference="1_0"'), "nce = '1_0' of an"),
+    "start of Python": (edited('start="0.0"', 'start="1_0"'), r"start value of '\w+' = '1_0'"),
+    "other digits": (edited('start="0.0"', 'start="\u0663"'), r"start value of '\w+' = '\u0663'"),
+    "states of one reference": (
+        edited('valueReference="1"', 'valueReference="0"'),
+        "the states 'omegaW' and 'omegaR' with one value reference",
+    ),
+    "indicators without end": (
+        edited('numberOfEventIndicators="0"', 'numberOfEventIndicators="4000000000"'),
+        "4000000000 event indicators",
+    ),
+    "unknown variability": (
+        edited('variability="tunable"', 'variability="-"'),
+        "variability '-' of",
+    ),
+    "line within a name": (edited('name="tauR"', 'name="a&#10;error: b"'), r"'a\\nerror: b' of 10"),
+    "name of a terminal": (edited('name="tauR"', 'name="a&#x9b;2J"'), r"'a\\x9b2J' of 4"),
+    "name without end": (edited('name="tauR"', f'name="{"n" * 5000}"'), "of 5000 characters"),
     "index too large": (edited('derivative="', 'derivative="99'), "no FMU"),
     "name twice": (edited('name="tauR"', 'name="pB"'), "two variables 'pB'"),
     "indicators below zero": (

@@ -14,7 +14,7 @@ from xml.parsers import expat
 
 import fmpy
 
-from workbench.errors import InputError, unknown_name
+from workbench.errors import InputError, one_line, unknown_name
 from workbench.models.archive import DESCRIPTION, damaged, opened
 from workbench.runtime.resources import CHECKOUT
 
@@ -265,6 +265,10 @@ def _read(path: Path, state: tuple[int, ...]) -> Description:
         ) from None
 
 
+_VARIABILITIES = ("constant", "fixed", "tunable", "discrete", "continuous")
+_LONGEST_NAME = 4096  # characters; those of nested models have hundreds
+# Of terminals, and those that turn the direction in which text is shown.
+_CONTROLS = re.compile("[\x00-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069]")
 _MOST_ELEMENTS = 1_000_000  # of arrays; the variables of the largest models are 100 000
 
 
@@ -294,10 +298,7 @@ def _description(
     if not description.guid:
         raise _WrongError("no guid or instantiationToken")
     places = [name.split("/") for name in files]
-    for element in root.iter():
-        for key in ("index", "derivative"):
-            if (element.get(key) or "1").startswith(("0", "-")) and description.fmiVersion == "2.0":
-                raise _WrongError(f"{key} = '{element.get(key)}' of an element <{element.tag}>")
+    _refuse_wrong_references(description.fmiVersion, root)
     _refuse_impossible(description, root)
     elements = {v.name: _elements(v) for v in description.modelVariables if v.dimensions}
     variables = tuple(
@@ -316,9 +317,9 @@ def _description(
         path=path,
         sha256=hashlib.sha256(path.read_bytes()).hexdigest(),
         version=description.fmiVersion,
-        name=description.modelName or "",
-        text=description.description or "",
-        tool=description.generationTool or "",
+        name=_said(description.modelName),
+        text=_said(description.description),
+        tool=_said(description.generationTool),
         token=description.guid,
         interfaces={
             name: _interface(tag, description.fmiVersion)
@@ -344,6 +345,19 @@ def _description(
     )
 
 
+def _refuse_wrong_references(version: str, root: ElementTree.Element) -> None:
+    """Refuse references that are no whole numbers as XML has them.
+
+    Python reads more than these, such as 1_0, and takes places from 0 down as from the end.
+    """
+    for element in root.iter():
+        for key in ("valueReference", "index", "derivative", "dependencies"):
+            place = version == "2.0" and key != "valueReference"  # these count from 1
+            for word in (element.get(key) or "").split():
+                if not (word.isascii() and word.isdigit()) or (place and not word.strip("0")):
+                    raise _WrongError(f"{key} = '{word[:40]}' of an element <{element.tag}>")
+
+
 def _refuse_wrong_states(description: "fmpy.model_description.ModelDescription") -> None:
     """Refuse derivatives of nothing, of what is no state, and two of the same."""
     states = [unknown.variable.derivative for unknown in description.derivatives]
@@ -355,7 +369,11 @@ def _refuse_wrong_states(description: "fmpy.model_description.ModelDescription")
             )
         if (state.variability or "continuous") != "continuous" or state.type not in _FLOATS:
             raise _WrongError(f"a derivative '{name}' of '{state.name}', which is no state")
-        if sum(other is state for other in states) > 1:
+        same = [other for other in states if other.valueReference == state.valueReference]
+        if any(other is not state for other in same):
+            names = " and ".join(f"'{other.name}'" for other in same)
+            raise _WrongError(f"the states {names} with one value reference")
+        if len(same) > 1:
             raise _WrongError(f"two derivatives of '{state.name}' in the model structure")
 
 
@@ -363,7 +381,7 @@ def _refuse_impossible(
     description: "fmpy.model_description.ModelDescription", root: ElementTree.Element
 ) -> None:
     """Refuse counts, factors and roles that no model has."""
-    if description.numberOfEventIndicators < 0:
+    if not 0 <= description.numberOfEventIndicators <= _MOST_ELEMENTS:
         raise _WrongError(f"{description.numberOfEventIndicators} event indicators")
     for tag in ("BaseUnit", "DisplayUnit"):
         for unit in root.iter(tag):
@@ -380,6 +398,8 @@ def _refuse_impossible(
         elements = str(count) if count < 10**18 else "more than 10^18"
         raise _WrongError(f"arrays with {elements} elements, where {_MOST_ELEMENTS} can be read,")
     for variable in description.modelVariables:
+        if (variable.variability or "continuous") not in _VARIABILITIES:
+            raise _WrongError(f"the variability '{variable.variability}' of '{variable.name}'")
         if any(length < 1 for length in variable.shape or ()):
             raise _WrongError(f"an array '{variable.name}' of the shape {variable.shape}")
         timed = variable.intervalVariability not in (None, "triggered")
@@ -436,10 +456,14 @@ def _variable(variable: "fmpy.model_description.ModelVariable") -> Variable:
     name = variable.name
     if not name:
         raise _WrongError("a variable without a name")
+    if len(name) > _LONGEST_NAME or _CONTROLS.search(name + (variable.unit or "")):
+        raise _WrongError(
+            f"the name '{name[:40]}' of {len(name)} characters, or with control characters"
+        )
     if not 0 <= variable.valueReference < 2**32:
         raise _WrongError(f"the value reference {variable.valueReference} of '{name}'")
-    if real:
-        _number(variable.start, f"the start value of '{name}'")
+    if not variable.dimensions:
+        _refuse_wrong_start(variable, variable.start)
 
     def limit(key: str) -> float | None:
         if variable.dimensions or variable.type in (*_NO_NUMBERS, "Boolean"):
@@ -464,11 +488,18 @@ def _variable(variable: "fmpy.model_description.ModelVariable") -> Variable:
         nominal=limit("nominal"),
         minimum=minimum,
         maximum=maximum,
-        text=variable.description or "",
+        text=_said(variable.description),
         array=bool(variable.dimensions),
         initial=variable.initial,
         items=_items(variable),
     )
+
+
+def _refuse_wrong_start(
+    variable: "fmpy.model_description.ModelVariable", start: str | None
+) -> None:
+    if variable.type not in (*_NO_NUMBERS, "Boolean"):
+        _number(start, f"the start value of '{variable.name}'")
 
 
 def _items(variable: "fmpy.model_description.ModelVariable") -> tuple[int, ...]:
@@ -490,6 +521,8 @@ def _elements(variable: "fmpy.model_description.ModelVariable") -> tuple[Variabl
     starts: list[str | None] = list((array.start or "").split())
     if len(starts) != len(places):  # none, or one for all
         starts = [array.start] * len(places)
+    for start in dict.fromkeys(starts):
+        _refuse_wrong_start(variable, start)
     return tuple(
         replace(
             array,
@@ -504,6 +537,11 @@ def _elements(variable: "fmpy.model_description.ModelVariable") -> tuple[Variabl
     )
 
 
+def _said(text: str | None) -> str:
+    """A text for people, as one line that they can read."""
+    return one_line(" ".join((text or "").split()))
+
+
 def _number(text: str | float | None, what: str, *, endless: bool = False) -> float | None:
     """A number of the description, if there is one; endless ones only where they have a meaning."""
     if text is None:
@@ -511,6 +549,8 @@ def _number(text: str | float | None, what: str, *, endless: bool = False) -> fl
     try:
         number = float(text)
     except ValueError:
+        number = math.nan
+    if isinstance(text, str) and ("_" in text or not text.isascii()):  # which Python reads
         number = math.nan
     if math.isnan(number) or (math.isinf(number) and not endless):
         raise _WrongError(f"{what} = '{str(text)[:40]}'")
