@@ -38,6 +38,7 @@ from workbench.studies.distance.simulation import DrivingInputs, StopSimulation
 from workbench.system.registry import load_system, open_model
 
 from .built import machine_file
+from .hostile_fmus import rewritten
 from .processes import COMPILER, needs_compiler
 
 pytestmark = needs_compiler
@@ -1039,6 +1040,51 @@ def test_a_new_system_asks_what_a_channel_leaves_open(header, asked, build, tmp_
     text = (path.parent / "new" / "system.toml").read_text()
     questions = re.findall("QUESTION: T: (.*)", text)
     assert [asked in question for question in questions] == [True] * bool(asked)
+
+
+UNITS = "<UnitDefinitions>{}</UnitDefinitions><TypeDefinitions>"
+RISE = '<SimpleType name="Rise"><Real relativeQuantity="true" unit="K"/></SimpleType>'
+
+
+@pytest.mark.parametrize(
+    ("attributes", "units", "size"),
+    [
+        ('unit="K"', "", 273.15),
+        ('unit="K" relativeQuantity="true"', "", 0.0),
+        ('declaredType="Rise"', "", 0.0),
+        ('declaredType="Rise" relativeQuantity="false"', "", 273.15),
+        (
+            'unit="m"',
+            '<Unit name="m"><BaseUnit m="1" factor="0.001"/></Unit>',
+            "defines as 0.001 m",
+        ),
+        ('unit="N"', '<Unit name="N"><BaseUnit kg="1" m="1" s="-2" factor="1000"/></Unit>', "1000"),
+        ('unit="rpm"', '<Unit name="rpm"><BaseUnit s="-1" factor="0.016667"/></Unit>', 0.0),
+    ],
+)
+def test_units_are_what_the_model_says_of_them(attributes, units, size, build, tmp_path, capsys):
+    """A difference of 6 degC is one of 6 K; millimetres that are called m are none."""
+    variables = VARIABLES.replace('<Real start="291"/>', f'<Real start="291" {attributes}/>')
+    template = machine_file(
+        "room_fmu/modelDescription.xml", count=0, start=0.0, variables=variables
+    )
+    described = template.replace("<TypeDefinitions>", UNITS.format(units) + RISE)
+
+    def change(folder: Path) -> None:
+        (folder / "modelDescription.xml").write_text(described)
+
+    path = rewritten(build("RELAYS"), tmp_path / "Other.fmu", change)
+    log = recorded(tmp_path) / "measured.csv"
+    header = f"T [{attributes[6:-1]}]" if units else "T [degC]"
+    log.write_text(log.read_text().replace("T [K]", header))
+    options = ["new", tmp_path / "new", "--fmu", path, "--recordings", log, "--yes", "--quiet"]
+    assert main([*map(str, options)]) == (2 if isinstance(size, str) else 0)
+    if isinstance(size, str):
+        assert size in capsys.readouterr().err
+    else:
+        (output,) = load_system(tmp_path / "new").outputs
+        largest = pd.read_csv(log)[header].max()
+        assert output.scale == pytest.approx(largest + size, rel=1e-3)
 
 
 def test_what_needs_modelica_asks_for_the_class(build):

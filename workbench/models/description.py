@@ -64,6 +64,7 @@ class Variable:
     element: int = 0
     size: int = 1
     items: tuple[int, ...] = ()  # values of an enumeration, which may have holes
+    relative: bool = False  # whether it is a difference, whose unit has no zero of its own
 
     @property
     def holds_number(self) -> bool:
@@ -97,6 +98,8 @@ class Description:
     # sizes of the files of all platforms [bytes], by name in the archive
     binaries: Mapping[str, int]
     variables: tuple[Variable, ...]
+    # by name of a unit that it defines: SI units, "kg.m-1.s-2", and how many of them it is
+    units: Mapping[str, tuple[str, float]]
     # states, rates: names of the continuous states and their derivatives, in FMI's order
     states: tuple[str, ...]
     rates: tuple[str, ...]
@@ -301,8 +304,9 @@ def _description(
     _refuse_wrong_references(description.fmiVersion, root)
     _refuse_impossible(description, root)
     elements = {v.name: _elements(v) for v in description.modelVariables if v.dimensions}
+    relative = _relative(root)
     variables = tuple(
-        variable
+        replace(variable, relative=v.name in relative)
         for v in description.modelVariables
         for variable in (_variable(v), *elements.get(v.name, ()))
     )
@@ -329,6 +333,11 @@ def _description(
         platforms=tuple(sorted({p[1] for p in places if p[0] == "binaries" and len(p) > 2})),
         binaries={name: size for name, size in files.items() if name.startswith("binaries/")},
         variables=variables,
+        units={
+            unit.name: _in_si(unit.baseUnit)
+            for unit in description.unitDefinitions
+            if unit.name and unit.baseUnit
+        },
         states=tuple(
             name for u in description.derivatives for name in scalars(u.variable.derivative.name)
         ),
@@ -423,6 +432,33 @@ def _refuse_impossible(
             raise _WrongError(f"the stop time {stop:g} s before the start time {start:g} s")
         if stop is not None and math.isinf(stop - start):
             raise _WrongError(f"an experiment from {start:g} s to {stop:g} s, which has no length")
+
+
+def _relative(root: ElementTree.Element) -> set[str]:
+    """Names of variables that are differences, which FMPy 0.3.32 does not read."""
+    types: set[str] = set()
+    names: set[str] = set()
+    for place in ("TypeDefinitions", "ModelVariables"):  # FMI 2.0 has attributes in an element more
+        for tag in root.findall(f"{place}/*"):
+            said = [
+                e.get("relativeQuantity") for e in (tag, *tag) if "relativeQuantity" in e.attrib
+            ]
+            declared = next(
+                (e.get("declaredType") for e in (tag, *tag) if e.get("declaredType")), ""
+            )
+            if said[0] in ("true", "1") if said else declared in types:
+                names.add(tag.get("name", ""))
+        types, names = names, set()
+    return types
+
+
+def _in_si(base: "fmpy.model_description.BaseUnit") -> tuple[str, float]:
+    """SI units as a product, 1 for none, and how many of them a unit is."""
+    powers = {
+        name: int(getattr(base, name)) for name in ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
+    }
+    factors = [name + f"{power}" * (power != 1) for name, power in powers.items() if power]
+    return ".".join(factors) or "1", float(base.factor)
 
 
 def _interface(element: ElementTree.Element, version: str) -> Interface:

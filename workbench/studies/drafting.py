@@ -264,11 +264,17 @@ def _candidate(
     unit, read_in = own or stated or "1", stated or own or "1"
     if own and not _is_known(own):  # such as degC, which has a zero of its own
         if stated not in ("", own):
-            return None, f"'{place.channel.name}' is in [{stated}], the model's variable in [{own}]"
+            return None, (
+                f"'{place.channel.name}' is in [{stated}], the model's variable in [{own}], to which "
+                "nothing is converted: convert the column before"
+            )
         why += f"; the workbench does not convert [{own}], values are taken as they are"
         if not stated:
             doubt = doubt or f"{name}: no unit in the file, [{own}] of the model is taken"
         unit = read_in = "1"
+    elif own and variable.relative and (way := conversion(stated, own)) and way.zero:
+        read_in = own
+        why += f"; a difference in the model, so that [{stated}] is read as [{own}]"
     elif own and stated and conversion(stated, own) is None:
         return None, f"'{place.channel.name}' is in [{stated}], the model's variable in [{own}]"
     elif own and not stated:

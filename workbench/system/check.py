@@ -26,6 +26,8 @@ from workbench.system.stopping import ASKED, MOVED, OUTSIDE, RISING
 from workbench.system.system import System
 from workbench.system.units import si_factor
 
+_ROUNDED = 1e-3  # share by which a unit may be defined otherwise, as calories are
+
 # What to do about a name in [parameters] that is no parameter, by its causality.
 _REMEDIES = {
     "calculatedParameter": "set the parameters that it follows from",
@@ -84,6 +86,7 @@ def check_model(system: System, model: Description) -> None:
                 expected=f"[{unit}] for {ours}; nothing is converted silently",
                 remedy=f"export the model with this variable in {unit}",
             )
+        _check_unit(declared or "1", model, where)
     _check_aliases(system, model)
     _check_ranges(system, model)
     _check_corrections(system, model)
@@ -99,6 +102,22 @@ def check_model(system: System, model: Description) -> None:
                 if name in variables
                 else "correct the name",
             )
+
+
+def _check_unit(name: str, model: Description, where: str) -> None:
+    """Refuse a unit that the model defines as many times what its name says."""
+    base, size = model.units.get(name, ("", 1.0))
+    try:
+        factor = si_factor(name, base, where) if base else size
+    except InputError:  # of an unknown unit, or one that counts radians otherwise
+        return
+    if abs(factor / size - 1.0) > _ROUNDED:
+        raise InputError(
+            where=where,
+            found=f"unit [{name}], which the model defines as {size:g} {base}",
+            expected=f"{factor:g} {base}, as its name says",
+            remedy="correct the unit in the model, and export it again",
+        )
 
 
 def _check_aliases(system: System, model: Description) -> None:
