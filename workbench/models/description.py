@@ -250,7 +250,7 @@ def _read(path: Path, state: tuple[int, ...]) -> Description:
             description = fmpy.read_model_description(stream, validate=False)
     except Exception as error:  # FMPy raises bare Exception for anything that is no FMU
         raise damaged(path, error) from None
-    if description.fmiVersion not in ("2.0", "3.0"):
+    if not re.fullmatch(r"2\.0|3\.0(\.\d+)?", description.fmiVersion):  # with its bug fixes
         raise InputError(
             where=str(path),
             found=f"FMI {description.fmiVersion}",
@@ -320,13 +320,13 @@ def _description(
     return Description(
         path=path,
         sha256=hashlib.sha256(path.read_bytes()).hexdigest(),
-        version=description.fmiVersion,
+        version=description.fmiVersion[:3],
         name=_said(description.modelName),
         text=_said(description.description),
         tool=_said(description.generationTool),
         token=description.guid,
         interfaces={
-            name: _interface(tag, description.fmiVersion)
+            name: _interface(tag, description.fmiVersion[:3])
             for name, tag in offered.items()
             if tag is not None
         },
