@@ -172,6 +172,17 @@ DOCUMENTS: dict[str, Any] = {
     "by row": {s: {"h [mm]": h, "b": 1.0} for s, h in SAMPLES},
     "deep": {"result": {"rig": "A", "series": [{"t": s, "h [mm]": h} for s, h in SAMPLES]}},
     "described": {"signals": {n: {"unit": u, "gain": 1, "zero": 0} for n, u in CHANNELS}} | BY_UNIT,
+    "pairs": {"series": [{"name": "h", "unit": "mm", "data": SAMPLES}]},
+    "metrics": {"data": {"result": [{"metric": {"__name__": "h [mm]"}, "values": SAMPLES}]}},
+    "pairs turned": [{"target": "h [mm]", "datapoints": [(h, s) for s, h in SAMPLES]}] * 2,
+    "values of columns": {
+        "results": [{"series": [{"name": "tank", "columns": ["t", "h [mm]"], "values": SAMPLES}]}]
+    },
+    "states": [
+        [{"entity_id": name, "attributes": {"unit_of_measurement": "mm"}, **state[0]}, *state[1:]]
+        for state in [[{"last_changed": s, "state": str(h)} for s, h in SAMPLES]]
+        for name in ("h", "b")
+    ],
     "x, y": {"channels": [{"name": "h", "unit": "mm", "time": STAMPS, "values": LEVELS}]},
 }
 
@@ -179,7 +190,7 @@ DOCUMENTS: dict[str, Any] = {
 @pytest.mark.parametrize("document", DOCUMENTS.values(), ids=DOCUMENTS)
 def test_json_has_channels_units_and_dates(tmp_path, document):
     (tmp_path / "a.json").write_text(json.dumps(document))
-    (held,) = read_recorded_file(tmp_path / "a.json").groups
+    held = read_recorded_file(tmp_path / "a.json").groups[0]
     clock = next(channel for channel in held.channels if channel.stamp)
     level = next(channel for channel in held.channels if channel.name == "h")
     assert (level.unit, iso(clock.start)) == ("mm", "2024-03-05T10:00:00.000000")
@@ -195,6 +206,25 @@ def test_json_of_lines_is_read_and_a_cut_line_is_named(tmp_path):
     (tmp_path / "a.json").write_text("\n".join([*lines[:7], lines[7][:9], *lines[8:]]))
     with pytest.raises(InputError, match="line 8: found text that is no JSON"):
         read_recorded_file(tmp_path / "a.json")
+
+
+@pytest.mark.parametrize(
+    ("line", "name"),
+    [
+        ('tank,site=a\\,b h={},note="ok, 1",n=5i {}000000000', "h"),
+        ("level value={} {}000", "level"),
+    ],
+)
+def test_lines_of_influx_are_read(tmp_path, line, name):
+    text = "".join(line.format(h, 1709630000 + k) + "\n" for k, h in enumerate(LEVELS))
+    (tmp_path / "a.txt").write_text(f"# exported\n{text}")
+    recorded = read_recorded_file(tmp_path / "a.txt")
+    channels = {channel.name: channel.values for channel in recorded.groups[0].channels}
+    assert_allclose(channels[name], LEVEL)
+    assert_allclose(np.diff(channels["time"]) / channels["time"][0], 1.0 / 1709630000, rtol=1e-6)
+    (tmp_path / "a.txt").write_text(text + "tank h=\n")
+    with pytest.raises(InputError, match=rf"line {LEVEL.size + 1}: found 'tank h='"):
+        read_recorded_file(tmp_path / "a.txt")
 
 
 def test_times_may_be_texts(tmp_path):

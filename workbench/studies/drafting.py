@@ -265,8 +265,8 @@ def _candidate(
     if own and not _is_known(own):  # such as degC, which has a zero of its own
         if stated not in ("", own):
             return None, (
-                f"'{place.channel.name}' is in [{stated}], the model's variable in [{own}], to which "
-                "nothing is converted: convert the column before"
+                f"'{place.channel.name}' is in [{stated}], the model's variable in [{own}], "
+                "to which nothing is converted: convert the column before"
             )
         why += f"; the workbench does not convert [{own}], values are taken as they are"
         if not stated:

@@ -22,6 +22,8 @@ from workbench.recordings.formats.cells import by_tag
 from workbench.recordings.formats.contents import Contents, FileChannel, Group, RecordedFile
 from workbench.recordings.formats.json_text import is_json
 from workbench.recordings.formats.json_text import read as read_as_json
+from workbench.recordings.formats.line_protocol import is_line_protocol
+from workbench.recordings.formats.line_protocol import read as read_lines_of_influx
 from workbench.recordings.formats.text import read as read_as_text
 from workbench.runtime.files import read_bytes
 from workbench.runtime.pool import Pool
@@ -141,8 +143,9 @@ def _reader(path: Path, raw: bytes) -> _Reader:
         module = "workbooks.read_others"
     _refuse_unread(path, raw, is_workbook=module == "workbooks.read_excel")
     if not module:
-        is_document = is_json(raw)
-        return partial(_read_whole, read_as_json, "JSON") if is_document else read_as_text
+        if is_json(raw):
+            return partial(_read_whole, read_as_json, "JSON")
+        return read_lines_of_influx if is_line_protocol(raw) else read_as_text
     package, called = _PACKAGES[module]
     try:
         import_module(package)

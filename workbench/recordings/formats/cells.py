@@ -111,6 +111,7 @@ _PARTS_OF_TAGS = {
     **dict.fromkeys(("series", "metric", "entity_id"), "tag"),  # of Grafana and Home Assistant
     **dict.fromkeys(("value", "wert", "_value", "messwert", "val", "varvalue", "state"), "value"),
     **dict.fromkeys(("unit", "units", "einheit", "uom"), "unit"),
+    "attributes.unit_of_measurement": "unit",  # of Home Assistant
 }
 # Columns that hold parts of a second beside time stamps, and digits of these.
 _PARTS = {

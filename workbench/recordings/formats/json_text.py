@@ -15,6 +15,8 @@ from workbench.recordings.formats.spelling import name_and_unit, spell_unit
 
 _SCALAR = str | int | float | bool | None
 _FEWEST = 3  # rows of a table
+# Lists of times and values, and which of the two is the time: Prometheus, others, Graphite.
+_PAIRS = {"values": 0, "data": 0, "datapoints": 1}
 _UNITS = ("units", "unit", "einheiten")
 
 
@@ -82,6 +84,15 @@ def _split_tables(
     if rows is not None:
         tables.append((name, rows, units))
         return {}
+    if isinstance(value, list) and value and all(isinstance(entry, Mapping) for entry in value):
+        if all(signals := list(map(_pairs, value))):
+            for entry, rows in zip(value, signals, strict=True):
+                called = rows[0][1]
+                tables.append((called, rows, {**units, called: entry.get("unit", "")}))
+            return {}
+        named = [entry.get("name") or f"{name}({k})" for k, entry in enumerate(value, 1)]
+        parts = zip(named, value, strict=True)
+        return [_split_tables(str(own), entry, units, tables) for own, entry in parts]
     if not isinstance(value, Mapping):
         return value
     stated = next((entry for key, entry in value.items() if key.lower() in _UNITS), units)
@@ -92,11 +103,14 @@ def _split_tables(
 def _rows(value: Any) -> list[list[Any]] | None:
     """Rows of a table with its names first; None where a value is no table.
 
-    A table is a list of records or of rows, `columns` with `data`, or a mapping of mappings of one
-    kind: of columns by row, or of rows by column.
+    A table is a list of records or of rows, `columns` with `data` or `values`, or a mapping of
+    mappings of one kind: of columns by row, or of rows by column. Records of one signal each may
+    be in lists of their own.
     """
+    value = _joined(value)
     if isinstance(value, Mapping):
         columns, data, index = (value.get(key) for key in ("columns", "data", "index"))
+        data = value.get("values") if data is None else data
         if isinstance(columns, list) and isinstance(data, list) and _are_lists(data):
             stated = isinstance(index, list) and len(index) == len(data) and _tells(index)
             left = ["index", *index] if stated and isinstance(index, list) else []
@@ -112,6 +126,40 @@ def _rows(value: Any) -> list[list[Any]] | None:
         names = list(dict.fromkeys(key for record in flat for key in record))
         return [names, *([record.get(key) for key in names] for record in flat)]
     return value if _are_lists(value) and any(isinstance(cell, str) for cell in value[0]) else None
+
+
+def _joined(value: Any) -> Any:
+    """Records of lists of one signal each, as Home Assistant has them; else the value."""
+    lists = isinstance(value, list) and all(isinstance(own, list) and own for own in value)
+    if lists and all(isinstance(record, Mapping) for own in value for record in own):
+        # What the first of them says alone holds for all.
+        return [{**own[0], **record} for own in value for record in own]
+    return value
+
+
+def _pairs(signal: Mapping[str, Any]) -> list[list[Any]]:
+    """Rows of a signal that has its name beside a list of pairs, names first; or none."""
+    name = next((signal[key] for key in ("metric", "name", "target") if key in signal), None)
+    key = next((key for key in _PAIRS if isinstance(signal.get(key), list)), "")
+    rows = signal.get(key, [])
+    if (
+        name is None
+        or "columns" in signal
+        or not rows
+        or not _are_lists(rows)
+        or {len(row) for row in rows} != {2}
+    ):
+        return []
+    at = _PAIRS[key]
+    called = _name_of_metric(name) if isinstance(name, Mapping) else str(name)
+    return [["time", called], *([row[at], row[1 - at]] for row in rows)]
+
+
+def _name_of_metric(labels: Mapping[str, Any]) -> str:
+    """The name of a metric with its labels, as Prometheus writes it."""
+    name = str(labels.get("__name__", ""))
+    rest = ",".join(f'{key}="{value}"' for key, value in labels.items() if key != "__name__")
+    return f"{name}{{{rest}}}" if rest else name
 
 
 def _records(value: Mapping[str, Any]) -> list[dict[str, Any]]:
