@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 from matio import save_to_mat
 from numpy.testing import assert_allclose
-from scipy.io import savemat
+from scipy.io import netcdf_file, savemat
 
 from workbench.errors import InputError
 from workbench.recordings.channels import propose
@@ -225,6 +225,56 @@ def test_lines_of_influx_are_read(tmp_path, line, name):
     (tmp_path / "a.txt").write_text(text + "tank h=\n")
     with pytest.raises(InputError, match=rf"line {LEVEL.size + 1}: found 'tank h='"):
         read_recorded_file(tmp_path / "a.txt")
+
+
+@pytest.mark.parametrize("pack", [np.savez, np.savez_compressed])
+def test_arrays_of_numpy_are_channels(tmp_path, pack):
+    pack(tmp_path / "a.npz", t=TIME, h=LEVEL, h_unit="mm", old=np.array([{}, None]))
+    recorded = read_recorded_file(tmp_path / "a.npz")
+    (held,) = recorded.groups
+    assert [(c.name, c.unit) for c in held.channels] == [("t", ""), ("h", "mm")]
+    assert_allclose(held.channels[1].values, LEVEL)
+    assert any("'old' is an array of objects of Python" in note for note in recorded.notes)
+
+
+def test_netcdf_of_the_classic_format_is_read_with_its_attributes(tmp_path):
+    with netcdf_file(tmp_path / "a.nc", "w") as file:
+        file.createDimension("time", TIME.size)
+        for name, code, values, unit, scale in (
+            ("time", "d", TIME, "seconds since 2024-03-05 10:00:00", 1.0),
+            ("h", "i", np.round(10.0 * LEVEL), "mm", 0.1),
+        ):
+            variable = file.createVariable(name, code, ("time",))
+            variable[:], variable.units, variable.scale_factor = values, unit, scale
+    clock, level = read_recorded_file(tmp_path / "a.nc").groups[0].channels
+    assert (iso(clock.start), level.unit) == ("2024-03-05T10:00:00.000000", "mm")
+    assert_allclose(level.values, LEVEL, atol=0.051)
+
+
+@pytest.mark.parametrize("form", ["fixed", "table"])
+def test_frames_of_pandas_have_the_names_of_their_columns(tmp_path, form):
+    """As pandas 2.2 and PyTables 3.10 write them; lists of names are pickled, and only read."""
+    counts = 1709632800 * 10**9 + np.round(1e9 * TIME).astype("i8")
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        log = file.create_group("log")
+        if form == "fixed":
+            log.attrs.update(pandas_type=np.bytes_(b"frame"), nblocks=1)
+            log["axis1"], log["axis0"] = counts, [b"h", b"n"]
+            log["axis1"].attrs["kind"] = np.bytes_(b"datetime64[ns]")
+            log["block0_items"] = [b"h", b"n"]
+            log["block0_values"] = np.column_stack([LEVEL, TIME])
+        else:
+            log.attrs["pandas_type"] = np.bytes_(b"frame_table")
+            fields = [("index", "i8"), ("values_block_0", "f8", (1,)), ("n", "f8")]
+            rows = zip(counts, LEVEL[:, None], TIME, strict=True)
+            log["table"] = np.array(list(rows), dtype=fields)
+            log["table"].attrs["index_kind"] = np.bytes_(b"datetime64[ns]")
+            log["table"].attrs["values_block_0_kind"] = np.bytes_(b"(lp0\nVh\np1\na.")
+            log.create_group("_i_table")["bounds"] = TIME
+    channels = {c.name: c for c in read_recorded_file(tmp_path / "a.h5").groups[0].channels}
+    assert list(channels) == ["time", "h", "n"]
+    assert (channels["time"].unit, channels["time"].values[0]) == ("ns", counts[0])
+    assert_allclose(channels["h"].values, LEVEL)
 
 
 def test_times_may_be_texts(tmp_path):

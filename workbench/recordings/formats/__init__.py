@@ -7,6 +7,7 @@ channel means for a machine is not known here.
 import gzip
 import hashlib
 import io
+import re
 import struct
 import warnings
 import zipfile
@@ -41,30 +42,60 @@ _PACKAGES = {
     "workbooks.read_others": ("python_calamine", "a workbook (.ods, .xlsb)"),
     "parquet": ("pyarrow", "a Parquet or Arrow file"),
     "matlab5": ("scipy", "a MAT file"),
+    "netcdf3": ("scipy", "a NetCDF file"),
+    "numpy_arrays": ("numpy", "arrays of NumPy (.npz)"),
     "hdf5": ("h5py", "a MAT 7.3 or HDF5 file"),
     "mdf": ("asammdf", "an MDF file"),
     "tdms": ("nptdms", "a TDMS file"),
 }
 # Their libraries hand what a file says to compiled code, which may end the process or never return.
-_NATIVE = frozenset({"hdf5", "matlab5", "mdf", "parquet", "workbooks.read_others"})
+_NATIVE = frozenset({"hdf5", "matlab5", "mdf", "netcdf3", "parquet", "workbooks.read_others"})
 _MAT_4 = struct.Struct("<5i")  # type, rows, columns, imaginary, length of the name
 _START, _RATE = 60.0, 1e6  # [s] and [byte/s], a twentieth of what they read on a busy machine
+_MESSAGES = "a trace of bus messages{}, whose signals are not decoded"
 _UNREAD = {  # how files begin that are told, and not read
     b"\x93NUMPY": "an array of NumPy (.npy)",
-    b"\x80\x04\x95": "an object of Python (pickle)",
+    **{b"\x80" + bytes([k]): "an object of Python (pickle)" for k in range(2, 6)},
     b"SQLite format 3": "a database of SQLite",
     b"BZh": "a file packed by bzip2",
+    b"\xfd7zXZ": "a file packed by xz",
+    b"\x28\xb5\x2f\xfd": "a file packed by zstd",
     b"7z\xbc\xaf": "an archive (.7z)",
+    b"Rar!": "an archive (.rar)",
     b"%PDF": "a PDF",
+    b"{\\rtf": "a document (.rtf)",
+    b"\x89PNG": "a picture",
+    b"\xff\xd8\xff": "a picture",
+    b"#ROSBAG": "a bag of ROS",
+    b"\x89MCAP": "a bag of ROS 2 (.mcap)",
+    b"|CF,2": "a file of imc FAMOS (.raw, .dat)",
+    b"\xffBIOSEMI": "a file of BDF",
     b"DIAEXTENDED": "a header of DIAdem (.dat), whose samples are in another file",
     b"<": "text of HTML or XML",
 }
 _UNREAD_WITHIN = {  # what stands near the begin of others
     b"usi:tdm": "a header of DIAdem (.tdm), whose samples are in another file",
-    b"internal events logged": "a trace of bus messages (.asc), whose signals are not decoded",
+    b"<sie": "a file of SoMat (.sie)",
+    b"No. Variables:": "results of SPICE (.raw)",
+    "No. Variables:".encode("utf-16-le"): "results of SPICE (.raw)",
+    b"FROM stdin": "a dump of a database (SQL)",
+    b"INSERT INTO": "a dump of a database (SQL)",
+    b"CREATE TABLE": "a dump of a database (SQL)",
+    b"$FILEVERSION=": _MESSAGES.format(" (.trc)"),
+    b"internal events logged": _MESSAGES.format(" (.asc)"),
 }
 _HDF5 = b"\x89HDF\r\n\x1a\n"
+_FORMS = {  # of the begin of others
+    re.compile(rb"RIFF....WAVE", re.S): "sound (.wav), whose samples have no unit",
+    re.compile(rb"0 {7}.{160}\d\d\.\d\d\.\d\d", re.S): "a file of EDF",
+    re.compile(rb".{257}ustar", re.S): "an archive (.tar)",
+    re.compile(rb"\s*-1\s*\n +(15|18|55|58b?|151|164|2411|2414)\s"): "a universal file (.uff)",
+    re.compile(rb"LOGG.\0\0\0", re.S): _MESSAGES.format(" (.blf)"),
+    re.compile(rb"\(\d+\.\d+\) \w+ [0-9A-Fa-f]+#"): _MESSAGES.format(" (candump)"),
+}
 _BEGINS = {  # how files begin, whatever their ending
+    b"CDF\x01": "netcdf3",
+    b"CDF\x02": "netcdf3",
     b"PAR1": "parquet",
     b"ARROW1": "parquet",
     b"MDF     ": "mdf",
@@ -141,6 +172,8 @@ def _reader(path: Path, raw: bytes) -> _Reader:
         b"xl/workbook.bin" in raw or b"opendocument.spread" in raw[:200]
     ):
         module = "workbooks.read_others"
+    if module == "workbooks.read_excel" and b".npy" in raw[:2000]:
+        module = "numpy_arrays"
     _refuse_unread(path, raw, is_workbook=module == "workbooks.read_excel")
     if not module:
         if is_json(raw):
@@ -166,18 +199,19 @@ def _refuse_unread(path: Path, raw: bytes, *, is_workbook: bool) -> None:
     format_name = next(
         (format_name for start, format_name in _UNREAD.items() if begin.startswith(start)), ""
     )
+    format_name = next((words for form, words in _FORMS.items() if form.match(raw)), format_name)
     within = (words for text, words in _UNREAD_WITHIN.items() if text in begin)
     format_name = next(within, format_name)
     if is_workbook and b"[Content_Types].xml" not in raw and zipfile.is_zipfile(io.BytesIO(raw)):
         format_name = "an archive (.zip)"
-        format_name = "arrays of NumPy (.npz)" if b".npy" in begin else format_name
     if format_name:
         raise InputError(
             where=str(path),
             found=format_name,
-            expected="a recording as CSV, JSON, .xlsx, .xls, .xlsb, .ods, .mat, .h5, .parquet, "
-            ".feather, .tdms or .mf4",
-            remedy="unpack it, or save or export the recording in one of these formats",
+            expected="a recording as CSV, JSON, .xlsx, .xls, .xlsb, .ods, .mat, .h5, .npz, "
+            ".parquet, .feather, .tdms or .mf4",
+            remedy="unpack it, or export the recording as CSV in the program that wrote it: a "
+            "column of times, one for each signal, and a first row of names with units",
         )
 
 

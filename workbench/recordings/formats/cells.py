@@ -69,7 +69,8 @@ _FEWEST = 3  # samples one after the other
 _FEW = 50  # rows that tell whether times go back
 # Labels of rows: of names, of units; and of a column that holds remarks.
 _NAME_ROW = re.compile(
-    r"((channel|kanal|signal|trace|sensor)[ _]?)?(names?|bezeichnung)\W*|kanal|channel|signal",
+    r"((channel|kanal|signal|trace|sensor|long)[ _]?)?(names?|bezeichnung)\W*|kanal|channel|signal"
+    r"|path",
     re.IGNORECASE,
 )
 _UNIT_ROW = re.compile(

@@ -10,6 +10,7 @@ import numpy as np
 
 from workbench.recordings.formats.arrays import Opaque, by_place, read_groups
 from workbench.recordings.formats.contents import Contents
+from workbench.recordings.formats.frames import read_frame
 from workbench.recordings.formats.matlab_objects import read_objects
 
 _CLASS = "MATLAB_class"
@@ -42,6 +43,8 @@ def _holds_object(value: Any) -> bool:
 
 def _members(group: h5py.Group, file: h5py.File) -> dict[str, Any]:
     """What a group holds, by name; #refs# are what cells point at."""
+    if (frame := read_frame(group)) is not None:
+        return frame
     structures = _structures(group, file)
     if structures:
         return by_place(structures)
@@ -71,7 +74,7 @@ def _entries(items: Mapping[str, Any], file: h5py.File) -> dict[str, Any]:
         value = _value(item, file)
         if value is None:
             continue
-        members[name] = _scaled(value, item)
+        members[name] = scaled(value, item.attrs)
         for key, rate in _attributes(item, _RATES).items():
             # Of channels with rates of their own, no one is that of all.
             members[key] = rate if members.get(key, rate) == rate else np.nan
@@ -87,9 +90,9 @@ def _entries(items: Mapping[str, Any], file: h5py.File) -> dict[str, Any]:
     return members
 
 
-def _scaled(value: Any, item: h5py.Dataset) -> Any:
+def scaled(value: Any, attributes: Mapping[str, Any]) -> Any:
     """Values in the unit of their entry, NaN where they are those that stand for none."""
-    stated = {key.lower(): text for key, text in item.attrs.items() if np.size(text) == 1}
+    stated = {key.lower(): text for key, text in attributes.items() if np.size(text) == 1}
     if not isinstance(value, np.ndarray) or value.dtype.kind not in "fiu":
         return value
     numbers = {

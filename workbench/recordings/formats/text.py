@@ -108,9 +108,8 @@ def _decode(path: Path, raw: bytes) -> tuple[str, str]:
         raise InputError(
             where=str(path),
             found="zero bytes, which no text has",
-            expected="a CSV, or a log file with its usual ending",
-            remedy="give the file its own ending (.mf4, .tdms, .mat, .xlsx, .parquet), or export "
-            "it as CSV",
+            expected="a CSV, or a file of a format that is read",
+            remedy="export the recording as CSV in the program that wrote it",
         )
     try:
         return raw.decode("utf-8-sig"), "UTF-8"
