@@ -210,8 +210,8 @@ def _refuse_unread(path: Path, raw: bytes, *, is_workbook: bool) -> None:
             found=format_name,
             expected="a recording as CSV, JSON, .xlsx, .xls, .xlsb, .ods, .mat, .h5, .npz, "
             ".parquet, .feather, .tdms or .mf4",
-            remedy="unpack it, or export the recording as CSV in the program that wrote it: a "
-            "column of times, one for each signal, and a first row of names with units",
+            remedy="unpack it, or export it as CSV in the program that wrote it. One column holds "
+            "times, the others a signal each, and the first row names with units",
         )
 
 
