@@ -544,6 +544,33 @@ def test_errors_far_above_noise_are_never_nothing(swing, tmp_path):
     assert quietly(swing, tmp_path / "recordings", "m").diagnosis.verdict == "unexplained"
 
 
+def with_speed(swing: System, folder: Path) -> System:
+    """The swing whose speed is read, too."""
+    speed = 'unit = "m/s"\nnoise = "3 mm/s"\nscale = "2 m/s"\n'
+    text = (swing.source).read_text().replace("Swing.fmu", str(swing.source.parent / "Swing.fmu"))
+    (folder / "system.toml").write_text(f"{text}\n[outputs.v]\n{speed}")
+    return load_system(folder)
+
+
+def test_a_late_sensor_in_motion_is_late_where_it_begins(swing, tmp_path):
+    """A speed that changes by 5 m/s2 is 50 deviations off what was read 30 ms late."""
+    system, late, fine = with_speed(swing, tmp_path), 30, np.arange(0.0, 6.005, 1e-3)
+    rng = np.random.default_rng(4)
+    for number, start in enumerate((0.5, 0.35, -0.4)):
+        s, v = motion(lambda v: 0.0, start, fine)
+        part = slice(200 + 100 * number, -1, 10)
+        time = fine[part] - fine[part][0]
+        columns = {
+            "time [s]": time,
+            "s [m]": s[part] + 1e-3 * rng.standard_normal(time.size),
+            "v [m/s]": np.roll(v, late)[part] + 3e-3 * rng.standard_normal(time.size),
+        }
+        write_case(tmp_path / f"recordings/{number}", columns, "Released")
+    (cause,) = quietly(system, tmp_path / "recordings").diagnosis.causes
+    assert cause.effect.name == "SensorDelay[v]"
+    assert cause.parameters["delay"].low < 1e-3 * late < cause.parameters["delay"].high
+
+
 @pytest.mark.long
 def test_friction_of_three_parts_is_named_with_each(swing, tmp_path):
     """What fades with speed gains nothing beside dry friction, without what rises with speed."""
@@ -552,10 +579,7 @@ def test_friction_of_three_parts_is_named_with_each(swing, tmp_path):
         rubs = np.tanh(v / 1e-3)
         return 0.25 * rubs + 0.5 * rubs * np.exp(-abs(v) / 0.5) + 0.05 * v
 
-    speed = 'unit = "m/s"\nnoise = "3 mm/s"\nscale = "2 m/s"\n'
-    text = (swing.source).read_text().replace("Swing.fmu", str(swing.source.parent / "Swing.fmu"))
-    (tmp_path / "system.toml").write_text(f"{text}\n[outputs.v]\n{speed}")
-    system = load_system(tmp_path)
+    system = with_speed(swing, tmp_path)
     rng, time = np.random.default_rng(3), np.arange(0.0, 6.005, 0.01)
     for number, start in enumerate((1.5, 1.0, -1.2)):
         s, v = motion(law, start, time)

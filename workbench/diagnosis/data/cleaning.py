@@ -207,13 +207,18 @@ def _scatter(values: Vector) -> float:
     return float(1.4826 * np.median(np.abs(values)))
 
 
-def first_value(time: Vector, values: Vector, noise: float) -> float:
-    """Value at the start of a signal: by a line through as many samples as lie along one."""
+def first_value(time: Vector, values: Vector, noise: float, before: float = 0.0) -> float:
+    """Value at the start of a signal: by a line through as many samples as lie along one.
+
+    Parameters
+    ----------
+    before : time by which the start was before the first sample [s].
+    """
     count = time.size
     while count > 2:
         line = np.polynomial.Polynomial.fit(time[:count], values[:count], 1)
         if np.std(values[:count] - line(time[:count])) < ALONG * noise:
-            return float(line(time[0]))
+            return float(line(time[0] - before))
         count //= 2
     return float(values[0])
 

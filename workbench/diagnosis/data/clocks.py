@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
 from workbench.arrays import Matrix, Vector
-from workbench.diagnosis.data.samples import Samples
+from workbench.diagnosis.data.cleaning import first_value
+from workbench.diagnosis.data.samples import Samples, starting
 from workbench.diagnosis.effects.candidates import LEAST_SKEWS
 from workbench.diagnosis.effects.catalogue import Effect
 from workbench.diagnosis.effects.extension import variables
@@ -198,6 +199,26 @@ def in_time(samples: Samples, late: Mapping[str, float]) -> Samples:
             slow = uniform_filter1d(y[:, j], window, mode="nearest")
             y[:, j] += moved(time, slow, -late[name]) - slow
     return replace(samples, u=u, y=y)
+
+
+def late_start(samples: Samples, signal: str, system: System, late: float) -> float:
+    """By how much a signal that is read late [s] began elsewhere than its first samples say.
+
+    One that is read early began before them, along their line.
+    """
+    h = float(np.median(np.diff(samples.time)))
+    count, noise = starting(system, h), system.signals[signal].noise_at_scale
+    column = samples.y[:, samples.signals.index(signal)]
+
+    def value(first: int, before: float = 0.0) -> float:
+        part = slice(first, first + count)
+        return first_value(samples.time[part], column[part], noise, before)
+
+    share, first = np.modf(min(late / h, samples.time.size - 2.0))
+    if late < 0.0:
+        return value(0, -late) - value(0)
+    after = (1.0 - share) * value(int(first)) + share * value(int(first) + 1)
+    return float(after - value(0))
 
 
 def mirrored(samples: Samples, errors: Matrix, late: Mapping[str, float]) -> Matrix:

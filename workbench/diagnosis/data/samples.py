@@ -247,7 +247,7 @@ def prepare(
         smooth(time, clean[signal.name], signal.smoothed, h, sound.held) for signal in system.inputs
     ]
     rest, rest_noise = _at_rest(system.comparison, case, clean, counted.applied)
-    start = slice(0, max(1, round(_STARTING * system.sample_time / h)))
+    start = slice(0, starting(system, h))
     first = {n: first_value(time[start], clean[n][start], deviation[n]) for n in case.outputs}
     begin = _begin(system, first, model.motion)
     modes = {j: m for j, n in enumerate(signals) if (m := system.signals[n].mode) is not None}
@@ -385,6 +385,11 @@ def _shown(case: Case, system: System, fmu: FMU, begin: Mapping[str, float]) -> 
     fmu.start(own, {**given, **dict(zip(case.inputs, u, strict=True))})
     shown = shown_states(fmu, without_guesses(system, fmu), u, begin, own)
     return {name: start.value for name, start in shown.items()}
+
+
+def starting(system: System, h: float) -> int:
+    """Samples, h [s] apart, of a first value."""
+    return max(1, round(_STARTING * system.sample_time / h))
 
 
 def standardised(recordings: Sequence[Samples]) -> list[Matrix]:

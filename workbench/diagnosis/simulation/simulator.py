@@ -11,7 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.arrays import Matrix, Vector
-from workbench.diagnosis.data.clocks import in_time, late_signals, lateness, mirrored, moved
+from workbench.diagnosis.data.clocks import (
+    in_time,
+    late_signals,
+    late_start,
+    lateness,
+    mirrored,
+    moved,
+)
 from workbench.diagnosis.data.samples import Samples
 from workbench.diagnosis.data.sensors import (
     SensorReading,
@@ -138,7 +145,7 @@ class Simulator:
         """Variables of the FMU at each sample of one recording, (n, w)."""
         recording = self._in_time(number, values)
         predictor = self._predictor_of(recording.signals, watched)
-        return predictor.along(recording, self._known(values))
+        return predictor.along(recording, self._known(number, values))
 
     def free_run(self, number: int, values: Mapping[str, float]) -> Matrix:
         """Errors of samples of one recording that nothing corrects, see `Samples.sizes`, (2, c).
@@ -149,7 +156,9 @@ class Simulator:
         late = lateness(self._clocks, values)
         freed = corrected(in_time(recording.free, late), self._wrong(values))
         try:
-            errors = self._predictor.errors(freed, self._known(values)) + (recording.y - freed.y)
+            errors = self._predictor.errors(freed, self._known(number, values)) + (
+                recording.y - freed.y
+            )
         except FMUError:
             return np.full((2, len(recording.slopes)), np.nan)
         with np.errstate(over="ignore", invalid="ignore"):  # what runs away is as large as it gets
@@ -219,7 +228,7 @@ class Simulator:
             varied = [columns[j] for j in part]
             shares = None if courses is None else courses[:, part]
             absent = self._absent(values, varied, sizes or {})
-            given = recording, self._known(values), varied, shares, absent
+            given = recording, self._known(number, values), varied, shares, absent
             errors, along = self._predictor.derivatives(*given)
             if not any(column.setting for column in varied):
                 simulated = errors + (self._recordings[number].y - recording.y)
@@ -377,13 +386,17 @@ class Simulator:
     def _means(self, number: int, recorded: Samples, values: Mapping[str, float]) -> Matrix:
         """Errors of the blocks, by channel (b, c), of a recording that was read otherwise."""
         recording = self._recordings[number]
-        errors = self._predictor.errors(recorded, self._known(values)) - (recorded.y - recording.y)
+        errors = self._predictor.errors(recorded, self._known(number, values)) - (
+            recorded.y - recording.y
+        )
         return recording.channels(self._read(number, errors, values))
 
     def _simulated(self, number: int, values: Mapping[str, float]) -> tuple[Matrix, Vector]:
         """Prediction errors of all samples, and whitened errors of inputs at rest, (q,)."""
         recording, in_time = self._recordings[number], self._in_time(number, values)
-        errors = self._predictor.errors(in_time, self._known(values)) + (recording.y - in_time.y)
+        errors = self._predictor.errors(in_time, self._known(number, values)) + (
+            recording.y - in_time.y
+        )
         return errors, (recording.rest - self._fmu.get(self._rest)) / recording.rest_noise
 
     def _in_time(self, number: int, values: Mapping[str, float]) -> Samples:
@@ -398,7 +411,7 @@ class Simulator:
             return read_.free  # what is cut off leads nothing
         # What leads a run are outputs as they were, which what is bent says by the run alone: first
         # by one that nothing leads.
-        straight, known = read_.free, self._known(values)
+        straight, known = read_.free, self._known(number, values)
         for _ in range(_STRAIGHTENED):
             seen = straight.y - self._predictor.errors(straight, known)
             straight = straightened(read_, seen, wrong)
@@ -407,13 +420,19 @@ class Simulator:
     def _wrong(self, values: Mapping[str, float]) -> dict[str, SensorReading]:
         return readings(self._sensors, values)
 
-    def _known(self, values: Mapping[str, float]) -> dict[str, float]:
+    def _known(self, number: int, values: Mapping[str, float]) -> dict[str, float]:
+        """Values of the FMU's variables; states begin as they were, by one clock, rightly read."""
         others = {
             *(name for name, _ in self._delays.values()),
             *self._clocks,
             *self._sensors,
         }
         known = {name: value for name, value in values.items() if name not in others}
+        if self._system.comparison.leading is None:  # what leads a run lets it forget its start
+            recording = self._recordings[number]
+            for name, late in lateness(self._clocks, values).items():
+                if name in known and name in recording.signals:
+                    known[name] += late_start(recording, name, self._system, late)
         return starts(known, self._wrong(values))
 
     def _read(
