@@ -248,6 +248,27 @@ def test_two_digits_of_a_year_go_on_from_99_to_00(tmp_path, tank):
     assert_allclose(clock(table(tmp_path / "a.csv", stamps), tank).times, QUARTER * np.arange(60))
 
 
+@pytest.mark.parametrize("form", ["{}00:{:02d}:{:02d}.5", "{}{:02d}:{:02d}.5"])
+def test_times_before_a_trigger_are_below_zero(tmp_path, tank, form):
+    seconds = [30.0 * (k - 20) for k in range(60)]
+    parts = [("-" if s < 0 else "", *divmod(int(abs(s)), 60)) for s in seconds]
+    read = clock(table(tmp_path / "a.csv", [form.format(*part) for part in parts]), tank)
+    expected = [s + np.copysign(0.5, s) for s in seconds]
+    assert_allclose(read.times, np.array(expected) - expected[0])
+    assert read.corrections == ()
+
+
+@pytest.mark.parametrize("lost", ["n/a", "10:0x:00", ""])
+@pytest.mark.parametrize("first", [0, 20])
+def test_samples_without_a_time_are_told(tmp_path, tank, lost, first):
+    """They were left out without a word: a third of a recording, if its clock starts late."""
+    stamps = local(datetime(2024, 3, 5, 10, tzinfo=UTC), 60, "%d.%m.%Y %H:%M")
+    stamps[first : first + 20] = [lost] * 20
+    read = clock(table(tmp_path / "a.csv", stamps), tank)
+    said = f"20 samples without a time are left out, the first is sample {first + 1}"
+    assert read.corrections[-1] == said
+
+
 def test_rows_that_were_mixed_are_to_be_sorted(tmp_path, tank):
     stamps = local(datetime(2024, 3, 1, tzinfo=UTC), 60, "%Y-%m-%d %H:%M")
     stamps[30:32] = stamps[31:29:-1]

@@ -8,6 +8,7 @@ from datetime import UTC, datetime
 from itertools import combinations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from workbench.arrays import Vector
 from workbench.errors import InputError
@@ -568,8 +569,21 @@ def _goes_back(times: Vector) -> bool:
     return bool((np.diff(times[np.isfinite(times)]) < 0).any())
 
 
+def _holds_values(group: Group, clock: Clock) -> NDArray[np.bool_]:
+    """Whether samples, (n,), have a number in a channel beside the times."""
+    held = np.zeros(clock.times.size, np.bool_)
+    for channel in group.channels:
+        if not channel.stamp and channel.name != clock.channel and channel.values.size == held.size:
+            held |= np.isfinite(channel.values)
+    return held
+
+
 def _going_on(clock: Clock, group: Group, where: str) -> Clock:
-    """The clock, if it goes on from sample to sample."""
+    """The clock, if it goes on from sample to sample; samples without a time are told."""
+    lost = np.flatnonzero(~np.isfinite(clock.times) & _holds_values(group, clock))
+    if lost.size:
+        said = f"{lost.size} samples without a time are left out, the first is sample {lost[0] + 1}"
+        clock = replace(clock, corrections=(*clock.corrections, said))
     if _increases(clock.times):
         return clock
     if again := _rows_of_one_time(clock.times, group):

@@ -67,10 +67,13 @@ _COMPACT_SHORT = re.compile(  # 240305 101500
     r"(?P<h>[01]\d|2[0-3])(?P<m>[0-5]\d)(?P<s>[0-5]\d)([.,](?P<f>\d{1,12}))?"
 )
 # Durations of days go on with d, days or a point: 1d 10:00:00, 1 days 10:00:00, 1.10:00:00.
+_BEFORE = r"(?P<sign>-(?=\d+:\d\d[:.,]\d))?"  # a trigger; -05:00 is an offset of UTC
 _OF_DAY = re.compile(
-    rf"((?P<days>\d+)(\s*d(ays?)?,?\s+|\s+Tage?,?\s+|\.(?=\d\d:)))?{_CLOCK}{_ZONE}"
+    rf"{_BEFORE}((?P<days>\d+)(\s*d(ays?)?,?\s+|\s+Tage?,?\s+|\.(?=\d\d:)))?{_CLOCK}{_ZONE}"
 )
-_OF_HOUR = re.compile(r"(?P<m>\d{1,2}):(?P<s>\d\d)[.,](?P<f>\d{1,12})")  # as spreadsheets save it
+_OF_HOUR = re.compile(
+    _BEFORE + r"(?P<m>\d{1,2}):(?P<s>\d\d)[.,](?P<f>\d{1,12})"
+)  # as spreadsheets save it
 _OF_MINUTES = re.compile(r"(?P<m>\d{1,4}):(?P<s>\d\d)")  # where it is said that they are minutes
 _DURATION = re.compile(  # PT1H15M, 1h 15m 0s
     r"(?=P|.*\d\s*[hm].*\d)P?((?P<days>\d+)\s*d\s*)?T?((?P<h>\d+)\s*h\s*)?((?P<m>\d+)\s*m(in)?\s*)?"
@@ -224,7 +227,10 @@ def _of_day(name: str, texts: Sequence[str], pattern: re.Pattern[str]) -> FileCh
     known = np.array([match is not None for match in matches])
     whole = np.array([_clock(match) if match else 0 for match in matches])
     parts, words = _counted_frames(matches, whole)
-    times = whole + parts - np.array([_offset(match) for match in matches])
+    signs = np.array(
+        [-1.0 if match and match.groupdict().get("sign") else 1.0 for match in matches]
+    )
+    times = signs * (whole + parts) - np.array([_offset(match) for match in matches])
     period = 24 * _HOUR
     if pattern in (_OF_HOUR, _OF_MINUTES):
         period = _HOUR
@@ -238,7 +244,7 @@ def _of_day(name: str, texts: Sequence[str], pattern: re.Pattern[str]) -> FileCh
     if pattern is _OF_DAY and not any(match and match["zone"] for match in matches):
         times[known], mended = _mend_changes(times[known], dated=False)
         words += mended
-    shown = float(times[known][0])
+    shown = float(times[known][0]) if signs.min() > 0.0 else math.nan
     values = _from_first(times, known)
     return FileChannel(
         name, "s", values, stamp=True, shown=shown, corrections=tuple(words), texts=tuple(texts)
