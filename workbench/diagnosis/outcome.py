@@ -154,8 +154,7 @@ class Outcome:
                 rest = "a size beyond its bound explains more"
             more = f" This is a part: {rest}."
         return (
-            f"The model lacks {'; and '.join(names)}; in cross-validation its error falls from "
-            f"{diagnosis.gain.before:.1f} to {diagnosis.gain.after:.1f} times the noise"
+            f"The model lacks {'; and '.join(names)}; in cross-validation {diagnosis.gain.text}"
             f"{self._held_out}."
             f"{more}{cost}"
         )
@@ -536,7 +535,8 @@ def _told(cause: Cause) -> list[str]:
         f"  {name}: {p.text}" if p.limit else f"  {name} = {p.text}"
         for name, p in cause.parameters.items()
     ]
-    lines.append(f"  explains {cause.explained:.1%} of what can be, in cross-validation")
+    if cause.explained >= 0.0005:
+        lines.append(f"  explains {cause.explained:.1%} of what can be, in cross-validation")
     if cause.confusable_with:
         lines.append(
             f"  indistinguishable from {', '.join(cause.confusable_with)} in these data; "

@@ -514,9 +514,9 @@ def _gain(system: System, summary: Mapping[str, Any], suffixes: Sequence[str]) -
         blocks.append("Nothing was extended, so that there is no gain to measure.")
     else:
         text = Markup(
-            "Cross-validation: each recording was predicted from a fit to the others. Its error "
-            "falls from <strong>{:.2f}</strong> to <strong>{:.2f}</strong> (95 %: {:.2f} to "
-            "{:.2f}). Measured is the {}."
+            "Cross-validation: each recording was predicted from a fit to the others. Its error is "
+            "<strong>{:.2f}</strong> without, and <strong>{:.2f}</strong> with what is named "
+            "(95 %: {:.2f} to {:.2f}). Measured is the {}."
         )
         ends = (gain[key] for key in ("before", "after", "low", "high"))
         blocks += [text.format(*ends, gain["measure"]), _dots(gain, suffixes)]

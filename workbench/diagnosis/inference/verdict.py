@@ -135,6 +135,23 @@ class Gain:
     high: float
     recordings: Mapping[str, tuple[float, float]]  # (before, after) by name
 
+    @property
+    def text(self) -> str:
+        """What the error does, in words; a fit with tolerances may err as little without.
+
+        >>> Gain(before=1.04, after=1.0, low=1.0, high=1.0, recordings={}).text
+        'its error falls from 1.04 to 1.00 times the noise'
+        """
+        for digits in (1, 2):
+            before, after = (f"{error:.{digits}f}" for error in (self.before, self.after))
+            if before != after:
+                way = "falls" if self.after < self.before else "rises"
+                return f"its error {way} from {before} to {after} times the noise"
+        return (
+            f"its error is {after} times the noise with and without, as tolerances that are less "
+            "likely make up for it"
+        )
+
 
 @dataclass(frozen=True)
 class NearestCandidate:
