@@ -6,7 +6,7 @@
 #define SAYS fmi2True
 #endif
 enum { H, DH, V, DV, G, DG, E, SIZE };
-typedef struct { double r[SIZE]; } Ball;
+typedef struct { double r[SIZE], left; /* in v by derivatives */ } Ball;
 static void reset(Ball *m) {
     memset(m, 0, sizeof *m);
     m->r[H] = 1.0, m->r[G] = 9.81, m->r[E] = 0.8;
@@ -34,13 +34,13 @@ fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *e) {
 }
 fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean n, fmi2Boolean *event, fmi2Boolean *end) { *event = *end = fmi2False; return fmi2OK; }
 fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component c, fmi2Real x[], size_t n) { x[0] = x[1] = 1.0; return fmi2OK; }
-fmi2Status fmi2SetContinuousStates(fmi2Component c, const fmi2Real x[], size_t n) { double *r = ((Ball *)c)->r; r[H] = x[0], r[V] = x[1]; return fmi2OK; }
+fmi2Status fmi2SetContinuousStates(fmi2Component c, const fmi2Real x[], size_t n) { double *r = ((Ball *)c)->r; r[H] = x[0], r[V] = x[1], ((Ball *)c)->left = 0.0; return fmi2OK; }
 fmi2Status fmi2GetContinuousStates(fmi2Component c, fmi2Real x[], size_t n) { const double *r = ((Ball *)c)->r; x[0] = r[H], x[1] = r[V]; return fmi2OK; }
 fmi2Status fmi2GetDerivatives(fmi2Component c, fmi2Real x[], size_t n) { calculate(c); x[0] = ((Ball *)c)->r[DH], x[1] = ((Ball *)c)->r[DV]; return fmi2OK; }
 fmi2Status fmi2GetEventIndicators(fmi2Component c, fmi2Real z[], size_t n) { z[0] = ((Ball *)c)->r[H]; return fmi2OK; }
 fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference k[], size_t n, fmi2Real v[]) {
     calculate(c);
-    for (size_t i = 0; i < n; i++) v[i] = ((Ball *)c)->r[k[i]];
+    for (size_t i = 0; i < n; i++) v[i] = ((Ball *)c)->r[k[i]] + (k[i] == V) * ((Ball *)c)->left;
     return fmi2OK;
 }
 fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference k[], size_t n, const fmi2Real v[]) {
@@ -54,9 +54,18 @@ fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *s) {
 }
 fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate s) { memcpy(c, s, sizeof(Ball)); return fmi2OK; }
 fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *s) { free(*s), *s = NULL; return fmi2OK; }
+/* As Dymola does, it leaves in v what only a call that sets the states takes out. */
+fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference z[], size_t nz, const fmi2ValueReference v[], size_t nv, const fmi2Real dv[], fmi2Real dz[]) {
+    for (size_t i = 0; i < nz; i++) {
+        dz[i] = 0.0;
+        for (size_t j = 0; j < nv; j++)
+            dz[i] += dv[j] * ((z[i] == v[j] || (z[i] == DH && v[j] == V)) - (z[i] == DV && (v[j] == G || v[j] == DG)));
+    }
+    ((Ball *)c)->left = 1.0;
+    return fmi2OK;
+}
 /* FMPy looks for all functions; these are never called. */
 #define NEVER(name) fmi2Status name(void) { return fmi2Error; }
 NEVER(fmi2SetDebugLogging) NEVER(fmi2GetInteger) NEVER(fmi2GetBoolean) NEVER(fmi2GetString)
 NEVER(fmi2SetInteger) NEVER(fmi2SetBoolean) NEVER(fmi2SetString)
 NEVER(fmi2SerializedFMUstateSize) NEVER(fmi2SerializeFMUstate) NEVER(fmi2DeSerializeFMUstate)
-NEVER(fmi2GetDirectionalDerivative)

@@ -23,6 +23,7 @@ from workbench.diagnosis.simulation.residual_model import ResidualModel
 from workbench.errors import FMUError, InputError
 from workbench.models.added import CONSTANT, RateTerm, write_extended
 from workbench.models.fmu import FMU, CoSimulation, EventError, NoFunctionError
+from workbench.models.native import OK, instance, linearise, place, read
 from workbench.models.simulation import Drive, Simulation
 from workbench.observers import choose, estimators_of
 from workbench.observers.contract import Estimator
@@ -504,6 +505,19 @@ def test_states_that_change_at_an_event_without_a_word_are_read(tmp_path, compil
     assert simulated[:, 0] == pytest.approx(fall(time, 9.81)[0], abs=1e-6)
 
 
+def test_what_derivatives_leave_in_an_fmu_is_not_read(tmp_path, compiled):
+    """Dymola leaves its directions in variables: a spring constant had a slope of 1e4 times."""
+    path = bouncing(tmp_path, compiled("ball.c"), ' providesDirectionalDerivative="true"')
+    with FMU(path) as fmu:
+        fmu.start({})
+        model = instance(fmu, ["dg"], [], ["h", "v"])
+        model.x[:] = 0.5, -3.0
+        assert model.directional_fmi[0] == 2
+        assert place(model) == linearise(model, 4) == read(model) == OK
+        assert model.y.tolist() == [0.5, -3.0]
+        assert model.jacobian.tolist() == [[0.0, 0.0, 1.0, 0.0], [1.0, 0.0, 0.0, 1.0]]
+
+
 def test_states_that_change_without_an_event_are_refused(build):
     """At the end of a step, where an integrator goes on with its own."""
     with FMU(build("RELAYS", flags=["-DMOVES"])) as fmu:
@@ -645,10 +659,13 @@ def test_the_check_says_of_each_use_what_commands_do(kind, saves, build, arrays,
             assert runs != bool(possible[use]), use
 
 
-def bouncing(folder: Path, library: Path) -> Path:
-    """The FMU of a ball, with its system file beside it."""
+def bouncing(folder: Path, library: Path, able: str = "") -> Path:
+    """The FMU of a ball, with more that it is able to, and its system file beside it."""
+    said = machine_file("ball/modelDescription.xml").replace(
+        "<ModelExchange", f"<ModelExchange{able}"
+    )
     with zipfile.ZipFile(folder / "Ball.fmu", "w") as archive:
-        archive.writestr("modelDescription.xml", machine_file("ball/modelDescription.xml"))
+        archive.writestr("modelDescription.xml", said)
         archive.write(library, f"{BINARY}/Ball{fmpy.sharedLibraryExtension}")
     (folder / "system.toml").write_text(machine_file("ball/system.toml"))
     return folder / "Ball.fmu"

@@ -78,6 +78,7 @@ class Instance(NamedTuple):
     complete_step: int
     # (1,) version of FMI, whose directional derivatives are taken; 0: differences
     directional_fmi: NDArray[np.int64]
+    foreign: bool  # whether another tool made the FMU
     measured: int  # number of the measured inputs, the first of u
     time: Vector  # (1,) that the FMU was set to last [s]
     # indicators, event_signs: (z,) event indicators, and whether they were above 0 at the start
@@ -149,6 +150,7 @@ def instance(
         directional_fmi=fmu.directional_fmi
         if fmu.states_derivatives(unknowns)
         else np.zeros(1, np.int64),
+        foreign=not fmu.is_own,
         measured=m,
         time=fmu.time,
         indicators=np.zeros(fmu.event_signs.size),
@@ -391,7 +393,16 @@ def linearise(model, count):  # type: ignore[no-untyped-def]
     for j in range(model.jacobian.shape[0]):
         if differentiate(model, j, count):
             return REFUSED
-    return OK
+    return recover(model)
+
+
+@inlined
+def recover(model):  # type: ignore[no-untyped-def]
+    """Set the states anew after directional derivatives; returns a status.
+
+    An FMU of another tool may keep variables as these left them: Dymola's velocity is the rate.
+    """
+    return set_states(model) if model.foreign else OK
 
 
 @compiled

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from workbench.arrays import Matrix, Tensor, Vector, zeros
 from workbench.models.fmu import FMU, References
-from workbench.models.native import Instance, differentiate, direction, inlined, solve
+from workbench.models.native import Instance, differentiate, direction, inlined, recover, solve
 
 _GAMMA = 1.0 - 1.0 / math.sqrt(2.0)
 
@@ -134,7 +134,7 @@ def renew(model, tangent):  # type: ignore[no-untyped-def]
             return 1
         for i in range(unknowns):
             tangent.by_columns[now, q, i] = tangent.shares[q] * tangent.along[i]
-    return 0
+    return recover(model)
 
 
 @inlined
