@@ -165,8 +165,7 @@ class CrossValidation:
         """
         if self._fit.unknowns.count == 1:
             return []
-        unsure = np.array([own.mean() for own in self.left_open(after, fast=fast)])
-        was, now = self.squares(before, fast=fast), self.squares(after, fast=fast) - unsure
+        was, now = self.squares(before, fast=fast), self._sure(after, fast=fast)
         if len(after.active) == 1:
             was *= np.exp(self._fit.decides.tied / np.array(self._counts(after, fast=fast)))
         worse = now > np.maximum(was, self.chance(after, fast=fast))
@@ -176,6 +175,17 @@ class CrossValidation:
         """Share of the explainable by which two fits differ; mean square error of the first."""
         before, after = (float(self.squares(model, fast=fast).mean()) for model in (less, best))
         return float(np.clip((before - after) / max(before - 1.0, 1e-9), 0.0, 1.0)), before
+
+    def removed(self, before: FittedModel, after: FittedModel, *, fast: bool) -> float:
+        """Share of the explainable that is gone, but for what a fit to the others leaves open."""
+        was, now = self.squares(before, fast=fast).mean(), self._sure(after, fast=fast)
+        return float((was - np.maximum(now, 0.0).mean()) / max(was - 1.0, 1e-9))
+
+    def _sure(self, fitted: FittedModel, *, fast: bool) -> Vector:
+        """Mean square of each recording, less what a fit to the others leaves open of it, (K,)."""
+        unsure = [own.mean() for own in self.left_open(fitted, fast=fast)]
+        sure: Vector = self.squares(fitted, fast=fast) - np.array(unsure)
+        return sure
 
     def _shown(self, fitted: FittedModel) -> list[Mask]:
         """Channels that are told, of each recording or part."""

@@ -20,6 +20,7 @@ from workbench.diagnosis.inference.quadratic import (
 )
 
 _LARGEST = 1e4  # times what matters, up to which a size is sought
+_TOLD = 1e-3  # share of what a candidate explains alone, from which on it is told from others
 _UNSEEN = 1e-12  # share of all information on an unknown, which stops that do not show it have
 Candidate = tuple[Effect, Mapping[str, float]]
 
@@ -192,6 +193,21 @@ class ScoreTest:
             if low <= best[-1] <= high and abs(best[-1]) > least:
                 furthest = np.maximum(furthest, np.abs(best[:count] - alone))
         return furthest
+
+    def lack_of_fit(self) -> tuple[float, int]:
+        """Fall of chi-squared by all candidates together, of any size, and how many they are.
+
+        By those that what is known does not stand for but for a thousandth, which derivatives may
+        be wrong by. Source: C. R. Rao (1948), Proc. Camb. Phil. Soc. 44, 50-57.
+        """
+        total, known = self.joint.total(), len(self._known)
+        whole = np.block([[total.N, total.g[:, None]], [total.g[None, :], total.c]])
+        left = beside(whole, self._known)[known:, known:]
+        scale = 1.0 / np.sqrt(np.maximum(np.diag(total.N)[known:], 1e-100))
+        values, vectors = np.linalg.eigh(left[:-1, :-1] * np.outer(scale, scale))
+        told = values > _TOLD
+        falls = (vectors.T @ (scale * left[:-1, -1]))[told] ** 2 / values[told]
+        return float(falls.sum()), falls.size
 
     def scores(self) -> list[CandidateScore]:
         """All candidates, best first."""

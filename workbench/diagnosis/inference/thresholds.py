@@ -101,6 +101,15 @@ class Thresholds:
         """
         return float(chdtri(unknowns, 2.0 * ndtr(-self.significant)))
 
+    def chance(self, unknowns: int) -> float:
+        """Chi-squared of so many unknowns that chance exceeds at the rate of false alarms.
+
+        >>> decides = thresholds(28)
+        >>> round(decides.chance(2), 1), round(decides.tied, 1)
+        (12.4, 12.4)
+        """
+        return float(chdtri(unknowns, 2.0 * ndtr(-self.immaterial)))
+
     @property
     def needed(self) -> float:
         """Fall of chi-squared by an effect beside others: significant beyond what forms fake."""

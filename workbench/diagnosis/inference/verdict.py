@@ -16,6 +16,7 @@ from workbench.diagnosis.inference.between_recordings import (
     what_differs,
 )
 from workbench.diagnosis.inference.discrepancy import (
+    WRONG,
     correlated_deviations,
     hidden_by_noise,
     share_by_form,
@@ -56,6 +57,7 @@ _DRAWS = 2000  # of the bootstrap over stops
 # Share from which on a part has the right place, if not the right form: of squares, an offset in
 # place of a ramp takes 75 %, a line in place of a parabola 94 %.
 _MOST = 0.9
+_HALF = 0.5  # share of squares from which on a cause explains more than it leaves
 _NEAREST = 3  # candidates that are told where none is accepted
 
 
@@ -251,7 +253,9 @@ def _concluded(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagn
         late = by_themselves(fit, chosen.base, chosen.best, clean=_clean(fit, chosen))
         if late is not None and (begun := _with_clock(fit, catalogue, chosen, late)) is not None:
             report(f"with {begun.active[0].name}, where the fits above did not get")
-            chosen, late = _selected_with(fit, catalogue, chosen, begun, report), None
+            timed = _selected_with(fit, catalogue, chosen, begun, report)
+            if begun.active[0] in timed.best.active:
+                chosen, late = timed, None
         verdict = _verdict(fit, chosen) if late is None else "unexplained"
     base, best = chosen.base, chosen.best
     gain, objections, noise_alone = None, list[str](), True
@@ -260,8 +264,7 @@ def _concluded(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagn
         gain = _gain(fit, chosen)
         if not chosen.interrupted:
             worse, left = _objections(fit, chosen, gain, whole=verdict == "found")
-            alone = verdict == "found" and len(best.active) == 1
-            objections = [*worse, *([] if alone else left)]
+            objections = [*worse, *left]
             before, after = gain.before**2 - 1.0, gain.after**2 - 1.0
             removed = (before - after) / max(before, 1e-9)
             part = not worse and not astray and removed > _MOST
@@ -459,12 +462,34 @@ def _objections(
     ]
     left = []
     # Several causes bend to much that is neither of them: what they leave must be noise, or each
-    # must explain, beside the others, what a right cause does of what it is to explain.
+    # must explain, beside the others, what a right cause does of what it is to explain. One alone
+    # must explain more than it leaves, of what the other recordings are sure of.
     noise = validation.noise_alone(best, fast=fast)
-    shares = [validation.explained(less, best, fast=fast)[0] for less in chosen.less.values()]
-    if not whole or not (noise or min(shares) >= 1.0 - fit.decides.left):
+    most = 1.0 - fit.decides.left
+    if len(best.active) == 1:
+        enough = validation.removed(base, best, fast=fast) >= min(_HALF, most)
+    else:
+        shares = [validation.explained(less, best, fast=fast)[0] for less in chosen.less.values()]
+        enough = min(shares, default=0.0) >= most
+    if not whole or not (noise or enough):
         left.append(f"{gain.after:.1f} times the noise remains in cross-validation")
+    if others := _lacking(fit, chosen):
+        left.append(others)
     return worse, left
+
+
+def _lacking(fit: Fit, chosen: Selection) -> str:
+    """Whether what remains goes with other effects, of any sign, as no chance does; empty: not.
+
+    None of them is a cause, but together they are many shapes that another law may have. A right
+    law may be wrong by `WRONG` of its effect. Derivatives of a run that nothing corrects tell
+    little of it.
+    """
+    fall, unknowns = chosen.trial.lack_of_fit()
+    by_form = max(WRONG**2, fit.decides.left) * beyond(chosen.base, chosen.best)
+    if fit.free or not unknowns or fall <= by_form + fit.decides.chance(unknowns):
+        return ""
+    return "what remains goes with other effects of the catalogue, but none explains it"
 
 
 def _nearest(
