@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -205,6 +206,18 @@ def test_a_path_that_cannot_be_read_is_refused(tmp_path, capsys):
     long = str(tmp_path / ("x" * 5000))
     assert "x (50" not in refused(["simulate", long], capsys)
     assert "no such file" in refused(["simulate", "--system", long], capsys)
+
+
+@pytest.mark.parametrize("name", ["a\033[2J", "a\x9b2J\u202eb"])
+def test_a_name_gives_a_terminal_no_commands(name, root, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    shutil.copytree(root / "cases" / "01_dry_80_1.5", tmp_path / name)
+    options = ("--estimator", "open_loop", "--workers", "1", "--out", "out")
+    assert main(["simulate", name, *options]) == 0
+    shown = capsys.readouterr()
+    for text in shown:
+        assert name.encode("unicode_escape").decode() in text
+        assert all(line.isprintable() for line in text.splitlines())
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="a folder of somebody else is made by root")

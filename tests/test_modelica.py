@@ -202,6 +202,10 @@ end P;
         ("package P\n annotation (__Workbench(a=1/3));\nend P;", 2, "found '/'"),
         ("package P\n annotation (__Workbench(a=1, a=2));\nend P;", 2, "expected one 'a'"),
         ("package P ?\nend P;", 1, "found '\\?'"),
+        *(
+            (f"package P\n  model {name}\n  end {name};\nend P;", 2, "names of at most 4096 char")
+            for name in ("x" * 100_000, "'" + "x 1" * 2000 + "'")
+        ),
     ],
 )
 def test_what_cannot_be_read_is_refused_with_its_line(text, line, message, tmp_path):
@@ -234,6 +238,9 @@ def test_a_file_must_stand_where_its_class_belongs(tmp_path):
         read_library(tmp_path / "package.mo")
     part.write_text("within P; model B end B;")
     with pytest.raises(InputError, match=r"found class P\.B; expected a class named A"):
+        read_library(tmp_path / "package.mo")
+    part.write_bytes(b"\xef\xbb\xbfwithin P; model A end A;")
+    with pytest.raises(InputError, match="found a byte order mark before its text"):
         read_library(tmp_path / "package.mo")
     part.write_bytes(b'within P; model A "\xff" end A;')
     with pytest.raises(InputError, match="expected Modelica in UTF-8"):

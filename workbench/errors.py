@@ -37,7 +37,12 @@ class InputError(ValueError):
 def one_line(text: str) -> str:
     """One line that a terminal shows as it is, whatever stood in a file."""
     cut = text if len(text) <= _LONGEST else f"{text[:_LONGEST]}... ({len(text)} characters)"
-    return cut if cut.isprintable() else "".join(map(_printable, cut))
+    return printable(cut)
+
+
+def printable(text: str) -> str:
+    """A line with the codes of characters that a terminal takes as commands."""
+    return text if text.isprintable() else "".join(map(_printable, text))
 
 
 def _printable(character: str) -> str:

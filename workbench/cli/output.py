@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from workbench.errors import InputError
+from workbench.errors import InputError, printable
 from workbench.runtime.files import end_copy
 
 
@@ -39,13 +39,13 @@ class Output:
     def result(self, text: str) -> None:
         """Print a result for people."""
         if not self.json:
-            _print(text)
+            _print(_shown(text))
 
     def progress(self, line: str) -> None:
         """Print a line of progress."""
         end_copy()
         if not self.quiet:
-            print(line, file=sys.stderr, flush=True)
+            print(_shown(line), file=sys.stderr, flush=True)
 
     def stage(self, line: str) -> None:
         """Print a line of progress, with the time since the command began."""
@@ -68,7 +68,8 @@ class Output:
         """Print an error to standard error and into the document; returns the status."""
         end_copy()
         with suppress(OSError, ValueError):  # which is full, or closed
-            print(error if isinstance(error, str) else f"error: {error}", file=sys.stderr)
+            message = error if isinstance(error, str) else f"error: {error}"
+            print(_shown(message), file=sys.stderr)
         if self.json:
             parts = ("where", "found", "expected", "remedy")
             known = isinstance(error, InputError)
@@ -80,7 +81,12 @@ class Output:
 
 def warn(message: object) -> None:
     """Print a warning."""
-    print(f"warning: {message}", file=sys.stderr, flush=True)
+    print(_shown(f"warning: {message}"), file=sys.stderr, flush=True)
+
+
+def _shown(text: str) -> str:
+    """Lines without commands for a terminal, which names of files and channels may hold."""
+    return "\n".join(map(printable, text.split("\n")))
 
 
 def _document(command: str, status: int, content: Mapping[str, Any]) -> str:

@@ -66,15 +66,20 @@ def read(file: Path) -> str:
             expected="the package.mo of a Modelica library, or its only file",
             remedy="give its path, with --library on the command line",
         )
+    marked = "a byte order mark before its text, at which the Modelica front end stops"
     try:
-        return file.read_text(encoding="utf-8-sig")
+        text = file.read_text(encoding="utf-8")
+        found = marked * text.startswith("\ufeff")
     except UnicodeDecodeError as error:
+        found = f"no text ({error})"
+    if found:
         raise InputError(
             where=str(file),
-            found=f"no text ({error})",
+            found=found,
             expected="Modelica in UTF-8",
-            remedy="save the file as UTF-8",
-        ) from None
+            remedy="save the file as UTF-8, without a byte order mark",
+        )
+    return text
 
 
 class _Uses(Cursor):

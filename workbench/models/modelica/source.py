@@ -45,6 +45,7 @@ VENDOR = "__Workbench"
 EXPERIMENT = ("StartTime", "StopTime", "Interval", "Tolerance")
 _BLOCKS = frozenset({"if", "for", "when", "while"})
 _PROPAGATION = frozenset({"each", "final"})
+LONGEST = 4096  # characters of a name; checks look at each as a beginning, and people never do
 DEEPEST = 100  # brackets or classes within each other; people give up long before
 CLOSING = {"(": ")", "[": "]", "{": "}"}
 
@@ -84,6 +85,9 @@ class Cursor:
                 )
             if match.lastgroup != "gap":
                 self._tokens.append(Token(str(match.lastgroup), match[0], at, match.end()))
+                if match.lastgroup == "name" and len(match[0]) > LONGEST:
+                    self._next = len(self._tokens) - 1
+                    raise self.refusal(f"names of at most {LONGEST} characters")
                 depth += (match[0] in CLOSING) - (match[0] in CLOSING.values())
                 if depth > DEEPEST:
                     self._next = len(self._tokens) - 1
