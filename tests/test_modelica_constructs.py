@@ -173,6 +173,24 @@ def test_an_experiment_gives_start_stop_step_and_tolerance(tmp_path):
     assert [float(celsius.factor), float(celsius.offset)] == [1.0, 273.15]
 
 
+@pytest.mark.parametrize(
+    ("body", "remedy"),
+    [
+        ("Modelica.Units.SI.Mass m=2; output Real y=m;", "set MODELICAPATH to the folder"),
+        ("import SI=Modelica.Units.SI; SI.Mass m=2;", "set MODELICAPATH to the folder"),
+        ("import Modelica.Constants.pi; output Real y=pi;", "set MODELICAPATH to the folder"),
+        ("output Real y=Modelica.Math.sin(time);", "set MODELICAPATH to the folder"),
+        ("Mass m=2;", "correct the name, or import it"),
+        ("output Real y; protected Real a; algorithm a:=time; y:=a+1;", "a function with this"),
+        ('output Real y; algorithm y:=1; y:=y+time; assert(y>0, "");', "a function with this"),
+    ],
+)
+def test_a_refusal_says_what_helps_there(body, remedy, tmp_path):
+    """Of names of the standard library, and of algorithms, remedies were to correct the source."""
+    with pytest.raises(InputError, match=rf"package.mo:2.*To do: .*{remedy}"):
+        make_explicit(flatten(library(tmp_path, f"model M {body} end M;"), "Lib.M"))
+
+
 def test_refusals_name_no_other_file_than_the_users(tmp_path):
     """The front end, the C compiler and the cache work in temporary folders of their own."""
     for number, construct in enumerate(CONSTRUCTS):

@@ -20,7 +20,7 @@ import rumoca
 
 from workbench.errors import InputError
 from workbench.models.compiler.expressions import BINARY, NO_EVENT, REWRITE, Arena, Value, each
-from workbench.models.modelica import Library, check, files, packages, read_library
+from workbench.models.modelica import STANDARD, Library, check, files, packages, read_library
 from workbench.models.modelica.classes import Class, Component, Modifier
 from workbench.models.modelica.source import EXPERIMENT, KINDS
 from workbench.runtime.supervision import blaming, limited_memory, quiet_panics
@@ -51,7 +51,13 @@ _REMEDIES = (
         f"use for loops of constant length and if-expressions, or {_EXPORT}",
     ),
     (r"for-equation range", "loop over a range of numbers, such as 1:3"),
-    (r"declarative algorithm", "write equations, or a function with this algorithm"),
+    (r"unresolved [\w ]+: 'Modelica\.", f"correct the name, or {STANDARD}"),
+    (r"instantiates partial", "redeclare it as a class that is complete"),
+    (r"cardinality\(", "write a Boolean parameter in its place, which says what is connected"),
+    (
+        r"declarative algorithm|model algorithm",
+        "write equations, or a function with this algorithm",
+    ),
     (r"violates constrainedby", "extend a common class, and name it after 'constrainedby'"),
     (
         r"unbalanced model",

@@ -5,11 +5,12 @@ Needs no Modelica compiler.
 
 from workbench.models.modelica.check import check
 from workbench.models.modelica.classes import Class, Component, Extends, Modifier
-from workbench.models.modelica.files import PACKAGE, files, packages
+from workbench.models.modelica.files import PACKAGE, STANDARD, files, packages
 from workbench.models.modelica.library import Library, read_library
 
 __all__ = [
     "PACKAGE",
+    "STANDARD",
     "Class",
     "Component",
     "Extends",

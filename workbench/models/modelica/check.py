@@ -14,6 +14,7 @@ from typing import NoReturn
 
 from workbench.errors import InputError, closest
 from workbench.models.modelica.classes import Class, Component, Connection, Modifier
+from workbench.models.modelica.files import STANDARD
 from workbench.models.modelica.library import Library
 
 _SCALAR = frozenset({"quantity", "min", "max", "start", "fixed"})
@@ -151,7 +152,9 @@ class _Checker:
                 where,
                 f"no class '{name}'{closest(name.rpartition('.')[2], short)}",
                 f"a class that is known in {scope}",
-                "correct the name, or import it",
+                f"correct the name, or {STANDARD}"
+                if full_name.startswith("Modelica.")
+                else "correct the name, or import it",
             )
         return full_name
 

@@ -9,6 +9,11 @@ from workbench.models.modelica.source import Cursor
 from workbench.runtime import resources
 
 PACKAGE = "package.mo"
+# What to do about a name of the standard library that is not found.
+STANDARD = (
+    'write annotation(uses(Modelica(version="4.0.0"))) in the package, and set MODELICAPATH to the '
+    "folder that holds the library"
+)
 
 
 def packages(file: Path) -> tuple[Path, ...]:
