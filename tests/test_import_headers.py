@@ -255,6 +255,24 @@ def test_a_format_that_nobody_reads_is_called_by_its_name(tmp_path, content, wor
         read_recorded_file(path)
 
 
+@pytest.mark.parametrize(
+    ("preamble", "blank"),
+    [
+        (["Record Length,60,,", "Sample Interval,5e-1,,", "Source,CH1,,"], ",,,"),
+        (["Record Length,60,Points,", ",,,", "Trigger Time,0.0,s,"], ",,,"),
+    ],
+)
+def test_samples_beside_a_preamble_are_all_read(tmp_path, preamble, blank):
+    """Those beside it were taken for names, and left out."""
+    left = [*preamble, *[blank] * (60 - len(preamble))]
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join(f"{own}{0.5 * k:.4f},{900.5 + k},4.5" for k, own in enumerate(left)))
+    channels = read_recorded_file(path).groups[0].channels
+    assert [channel.name for channel in channels] == ["column 4", "column 5", "column 6"]
+    assert_allclose(channels[0].values, 0.5 * np.arange(60.0))
+    assert_allclose(channels[1].values, 900.5 + np.arange(60.0))
+
+
 @pytest.mark.parametrize("write", [pq.write_table, feather.write_feather])
 def test_texts_of_parquet_and_arrow_are_dates_times_and_numbers(tmp_path, write):
     moments = [datetime.datetime(2024, 3, 5, 10) + datetime.timedelta(seconds=k) for k in range(60)]

@@ -44,6 +44,11 @@ def read(path: Path, raw: bytes) -> Contents:
     separator = _separator(path, lines)
     rows, numbers, broken = _rows(lines, separator)
     rows, padded = (rows, 0) if separator == " " else _filled(rows)
+    if beside := _preamble_beside(rows):
+        height, width = beside
+        names = [f"column {i + 1}" for i in range(width, len(rows[0]))]
+        rows = [*(row[:width] for row in rows[:height]), names, *(row[width:] for row in rows)]
+        numbers = [*numbers[:height], numbers[0], *numbers]
     table = find_table(rows, numbers, str(path))
     if lines[0].startswith("LabVIEW Measurement"):
         table = _of_labview(table)
@@ -245,6 +250,21 @@ def _is_numeric(line: str) -> bool:
     """Whether most of what stands in a line are numbers or times."""
     cells = line.split()
     return 2 * sum(is_number(cell) or is_stamp(cell) for cell in cells) > len(cells)
+
+
+def _preamble_beside(rows: Sequence[Sequence[str]]) -> tuple[int, int] | None:
+    """Rows and columns of a preamble that stands left of samples, as oscilloscopes write it.
+
+    Samples go on from the first row to the last; on their left all cells are empty but the first.
+    """
+    width = max(map(len, rows), default=0)
+    if len(rows) < _SAMPLED // 10 or {len(row) for row in rows} != {width}:
+        return None
+    columns = list(zip(*rows, strict=True))
+    first = next((i for i, cells in enumerate(columns) if all(map(is_number, cells))), 0)
+    left = [k for k, row in enumerate(rows) if any(cell.strip() for cell in row[:first])]
+    height = left[-1] + 1 if left else 0
+    return (height, first) if 1 < height < len(rows) // 2 and left[0] == 0 else None
 
 
 def _of_labview(table: Cells) -> Cells:
