@@ -33,7 +33,7 @@ from workbench.observers.operating import DesignPointError, linearised, start_sp
 from workbench.observers.replay import replay
 from workbench.observers.simulation import prepare
 from workbench.observers.trajectory import size_doubt
-from workbench.recordings.case import read_case
+from workbench.recordings.case import make_case, read_case
 from workbench.studies.distance.forecast import stopping_of
 from workbench.studies.distance.simulation import DrivingInputs, StopSimulation
 from workbench.system.registry import load_system, open_model
@@ -669,6 +669,34 @@ def bouncing(folder: Path, library: Path, able: str = "") -> Path:
         archive.write(library, f"{BINARY}/Ball{fmpy.sharedLibraryExtension}")
     (folder / "system.toml").write_text(machine_file("ball/system.toml"))
     return folder / "Ball.fmu"
+
+
+def thrown(time: np.ndarray, restitution: float) -> tuple[np.ndarray, np.ndarray]:
+    """Height and speed of the ball from 1 m, by its parabolas, (n,) each."""
+    first = np.sqrt(2.0 / 9.81)
+    flights = 2.0 * first * restitution ** np.arange(1.0, 60.0)
+    begins = first + np.append(0.0, np.cumsum(flights))
+    number = np.searchsorted(begins, time, side="right")  # of throws before
+    since = time - np.append(-first, begins)[number]
+    speed = 9.81 * first * restitution**number
+    return speed * since - 0.5 * 9.81 * since**2, speed - 9.81 * since
+
+
+def test_a_fit_of_what_jumps_reaches_the_noise_and_its_interval_holds_the_truth(tmp_path, compiled):
+    """A throw at the sample before is off by 100 deviations: squares alone kept it there."""
+    bouncing(tmp_path, compiled("ball.c"))
+    read = 'outputs.v = { unit = "m/s", noise = "5 cm/s", scale = "5 m/s" }'
+    text = machine_file("ball/system.toml").replace('reported = ["v"]', read)
+    (tmp_path / "system.toml").write_text(text.replace("1 cm", "3 mm"))
+    system, rng, time = wb.load_system(tmp_path), np.random.default_rng(1), 0.005 * np.arange(481)
+    h, v = thrown(time, 0.72)
+    read_ = {"h": h + 3e-3 * rng.standard_normal(481), "v": v + 0.05 * rng.standard_normal(481)}
+    case = make_case("thrown", (time, read_), {}, system)
+    outcome = wb.fit(system, [case], ["e"], settings=wb.FitSettings(starts=1, profiles=False))
+    restitution = outcome.values[0]
+    assert outcome.doubts == ()
+    assert restitution.low < 0.72 < restitution.high
+    assert restitution.high - restitution.low < 1e-3
 
 
 @pytest.mark.parametrize("name", ["ekf", "ukf"])

@@ -52,6 +52,7 @@ _SHARE = 0.1  # of the leading part of a direction, from which on another one be
 _CHEAP = 60.0  # [s] that profiles may take before a covariance has to do
 _FREE = FittedParameter(name="", range=(-np.inf, np.inf), prior=(), by_recording=None)
 _UNBOUNDED = 1e100  # deviations, whose squares can still be added up
+_MUCH = 4.0  # deviations of chi-squared; chance leaves more once in 30 000 fits
 _FAILED = 1e4  # deviations, of all samples of a recording that cannot be simulated
 
 
@@ -136,6 +137,7 @@ def fit(
     with open_model(system) as fmu:
         spreads = dict(zip(fmu.states, start_spreads(fmu, system), strict=True))
         runs = [_run(case, system, fmu) for case in (*cases, *held_out)]
+        jumps = fmu.has_events or fmu.interface != MODEL_EXCHANGE
     unknowns = _unknowns(entries, description, system, runs[: len(cases)], spreads)
     workers = min(engine.workers, max(len(cases), len(unknowns)))
     with Pool(workers, _simulation, system) as pool:
@@ -152,7 +154,7 @@ def fit(
             )
         # The first of each worker compiles.
         problem.seconds = min(problem.time_residuals() for _ in range(workers + 1))
-        search, interrupted = _Search(problem, settings, engine.report), False
+        search, interrupted = _Search(problem, settings, engine.report, jumps=jumps), False
         try:
             search.run()
         except KeyboardInterrupt:
@@ -441,7 +443,7 @@ class _Problem:
         self._progress(None)
         return jacobian
 
-    def local(self, x: Vector, held: int | None = None) -> OptimizeResult:
+    def local(self, x: Vector, held: int | None = None, loss: Loss | None = None) -> OptimizeResult:
         """A local fit (trust region reflective); of a profile, one unknown is held."""
         free = np.array([q for q in range(x.size) if q != held])
         low, high = self.low[free], self.high[free]
@@ -463,7 +465,7 @@ class _Problem:
             inside,
             jacobian,
             bounds=(low, high),
-            loss=self.loss,
+            loss=loss or self.loss,
             ftol=1e-6,  # of half of as many squares as there are samples: far below a half
             xtol=1e-8,
             gtol=1e-8,
@@ -472,12 +474,23 @@ class _Problem:
 
 
 class _Search:
-    """Local fits from several starts, and differential evolution where they disagree."""
+    """Local fits from several starts, and differential evolution where they disagree.
+
+    Parameters
+    ----------
+    jumps : whether outputs may jump along a recording.
+    """
 
     def __init__(
-        self, problem: _Problem, settings: FitSettings, report: Callable[[str], None]
+        self,
+        problem: _Problem,
+        settings: FitSettings,
+        report: Callable[[str], None],
+        *,
+        jumps: bool,
     ) -> None:
         self._problem, self._settings, self._report = problem, settings, report
+        self._jumps = jumps
         self.costs: list[float] = []
         self.converged = False
         self.evolved = ""
@@ -504,7 +517,7 @@ class _Search:
     def _fit(self, x: Vector) -> None:
         least = self._problem.least
         try:
-            result = self._problem.local(x)
+            result = self._local(x)
         except FMUError as error:  # a model that bears no step from here
             self._report(str(error))
             self.costs.append(np.inf)
@@ -512,6 +525,22 @@ class _Search:
         self.costs.append(float(result.cost))
         if result.cost <= least:
             self.converged = result.status > 0
+
+    def _local(self, x: Vector) -> OptimizeResult:
+        """A local fit; where much is left of what jumps, again by way of one that bears outliers.
+
+        An output that jumps one sample off is wrong by hundreds of deviations, and no derivative
+        says so: squares keep each jump between its samples, though all else asks for another time.
+        By the robust loss a sample counts once for each deviation, and jumps go where the rest is.
+        """
+        problem = self._problem
+        result = problem.local(x)
+        size = problem.residuals_at_best.size
+        left = 2.0 * result.cost - size > _MUCH * np.sqrt(2.0 * size)  # chi-squared's deviation
+        if not (self._jumps and left and problem.loss == "linear"):
+            return result
+        again = problem.local(problem.local(x, loss="soft_l1").x)
+        return again if again.cost < result.cost else result
 
     def agree(self) -> bool:
         """Whether all starts reached sums of squares that chance does not part."""
