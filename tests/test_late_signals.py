@@ -14,6 +14,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from workbench.diagnosis import Outcome, Problem, catalogue, diagnose, read_effects
+from workbench.diagnosis.data.clocks import late_signals
 from workbench.diagnosis.data.motion import ModelSource
 from workbench.diagnosis.inference import timing
 from workbench.diagnosis.inference.fit import Fit
@@ -69,7 +70,10 @@ def said(skews: Mapping[str, float], monkeypatch: pytest.MonkeyPatch) -> LateSig
     def model(left: float, active: Any = ()) -> Any:
         sizes = {(c.name, c.size): skews[c.late[0]] for c in active}
         errors = SimpleNamespace(
-            variance_factors=np.ones(1), weighed=lambda factors: left, active=active
+            variance_factors=np.ones(1),
+            squares=np.ones(1),
+            weighed=lambda factors: left,
+            active=active,
         )
         return SimpleNamespace(linearised=errors, point=SimpleNamespace(sizes=sizes), active=active)
 
@@ -139,11 +143,13 @@ def recorded(late: Mapping[str, int], seed: int) -> pd.DataFrame:
     )
 
 
-def diagnosis(late: Mapping[str, int], folder: Path, loggers: str = "") -> Outcome:
+def diagnosis(
+    late: Mapping[str, int], folder: Path, loggers: str = "", file: str = MOTOR_FILE
+) -> Outcome:
     motor = folder / "motor"
     motor.mkdir()
     (motor / "package.mo").write_text(MOTOR)
-    (motor / "system.toml").write_text(MOTOR_FILE + loggers)
+    (motor / "system.toml").write_text(file + loggers)
     of = load_system(motor)
     library = read_library(of.library)
     recordings = cases(of, [recorded(late, seed) for seed in range(3)])
@@ -175,6 +181,18 @@ def test_one_late_signal_is_named_and_its_advice_leads_to_the_cause(signal, ms, 
     assert cause.effect.name == "LoggerTimeSkew[own]"
     skew = cause.parameters["skew"]
     assert skew.low <= 1e-3 * ms <= skew.high
+
+
+@pytest.mark.parametrize("signal", ["i", "w"])
+def test_a_clock_that_explains_what_is_wrong_is_a_cause_from_the_least_time_on(signal, tmp_path):
+    """One sample late, of which 0.6 matter; a cause beside others has to be twice as late."""
+    file = MOTOR_FILE.replace("[diagnosis]", '[diagnosis]\nleast_skew = "0.6 ms"')
+    late = diagnosis({signal: 1}, tmp_path, f'[loggers]\nown = ["{signal}"]\n', file)
+    (cause,) = late.diagnosis.causes
+    assert cause.effect.matters == pytest.approx(1.2e-3)
+    assert cause.parameters["skew"].value == pytest.approx(1e-3, abs=1e-4)
+    # Nothing leads this motion: an input that is moved would bend between other samples.
+    assert late_signals(late.system)["LoggerTimeSkew[own].skew"] == {signal: 1.0}
 
 
 def test_a_clock_tells_nothing_of_an_input_that_moves_nothing(tmp_path):

@@ -466,7 +466,10 @@ def pruned(
             size = abs(best.point.sizes[key])
             clear = size / max(sigma[trial.joint.known.index(key)], 1e-300)
             material = size / effect.matters
-            if effect.size == COEFFICIENT:  # no sheet says what matters: what errors need does, too
+            # No sheet says what matters of a term: what errors need does, too; of a clock alone,
+            # too, from the least time on.
+            late = effect.late and len(less) == 1 and size > fit.least_skew
+            if effect.size == COEFFICIENT or late:
                 material = max(material, beyond(less[effect], best) / fit.decides.needed)
             ratios[effect] = min(clear / fit.decides.significant, material)
         if len(less) > 1 or fit.restarted:

@@ -52,7 +52,8 @@ def by_themselves(
     base, best : the nominal model and the last one, with all derivatives.
     clean : whether the last one leaves nothing that lasts.
     """
-    if clean and all(effect.late and effect.size == DELAY for effect in best.active):
+    active = best.active
+    if clean and active and all(effect.late and effect.size == DELAY for effect in active):
         return None  # of signals by themselves
     clocks = list(fit.own_clocks)
     other, least = fit.beside(clocks), fit.least_skew
@@ -66,7 +67,10 @@ def by_themselves(
         if not clocks:
             return None
         model = _fitted(other, base, clocks, starts, sought)
-        explains = float(model.linearised.variance_factors.max()) < fit.decides.wrong
+        lin = model.linearised
+        # What swings about zero may have no mean that lasts.
+        wrong = max(float(lin.variance_factors.max()), float(lin.squares.max()))
+        explains = wrong < fit.decides.wrong
         if not explains and not starts and not clean:
             # By more than a machine's shortest time, derivatives point elsewhere.
             starts = fit.apparent_skews(base.point)
