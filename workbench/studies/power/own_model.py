@@ -60,9 +60,8 @@ class OwnModel:
     plantables: tuple[Plantable, ...]  # all effects
     free: bool  # whether the diagnosis simulates as a whole, too
     # share of its effect by which a law is wrong: its size goes with a quantity that is drawn, see
-    # `quantities`
+    # `standardised`
     form_error: float = 0.0
-
     doubt: str = ""  # about the model along the recordings, see `check_along`
 
     sheet_errors: tuple[SheetError, ...] = ()
@@ -298,13 +297,20 @@ def own_model(problem: Problem, everything: Path, form_error: float = 0.0) -> Ow
         ]
         if form_error and problem.library is None:
             planted = [effect for effect in planted if effect.size == COEFFICIENT]
+            if not planted:
+                raise InputError(
+                    where="--form-error",
+                    found="no term beside a rate, of an FMU alone",
+                    expected="one or more: a value, a start, a sensor and a clock have no form "
+                    "that could be wrong",
+                    remedy="leave --form-error out",
+                )
         if not planted:
             raise InputError(
-                where="--form-error",
-                found="no term beside a rate, of an FMU alone",
-                expected="one or more: a value, a start, a sensor and a clock have no form that "
-                "could be wrong",
-                remedy="leave --form-error out",
+                where=f"{problem.system.source}, [candidates]",
+                found="none that the recordings could show",
+                expected="one or more",
+                remedy="choose some of 'workbench diagnose --list'",
             )
         unknowns = Fit(model, planted).unknowns
         plantables = []
