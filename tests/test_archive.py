@@ -182,6 +182,15 @@ def test_only_what_runs_here_is_unpacked(tmp_path):
     assert files == {XML, LIBRARY, "resources/table.txt"}
 
 
+@pytest.mark.parametrize("place", ["file", "file/inside"])
+def test_where_nothing_can_be_unpacked_no_folder_of_our_own_is_named(place, tmp_path):
+    (tmp_path / "file").touch()
+    with pytest.raises(InputError, match="no way to unpack it for this run") as refused:
+        unpack(OWN, tmp_path / place, "binaries/linux64")
+    assert str(tmp_path) not in str(refused.value)
+    assert "room for 1 MB" in str(refused.value)
+
+
 # --- content ---
 
 

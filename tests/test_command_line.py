@@ -67,6 +67,14 @@ def test_a_reader_that_has_gone_costs_nothing_but_the_text(root, options):
     assert (run.returncode, run.stderr) == (0, b"")
 
 
+@pytest.mark.parametrize("option", ["--out", "--workers"])
+def test_two_dashes_are_no_value(option, capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(["simulate", "cases", f"{option}=--"])
+    assert ended.value.code == 2
+    assert f"{option}=--: expected a value" in capsys.readouterr().err
+
+
 def test_a_mistake_is_a_document_too(capsys):
     error = document(["simulate", "cases/nowhere"], capsys)["error"]
     assert isinstance(error, dict)

@@ -3,6 +3,7 @@
 import argparse
 import json
 import os
+import re
 import sys
 import tempfile
 from collections.abc import Sequence
@@ -56,6 +57,8 @@ def main(arguments: Sequence[str] | None = None, *, confined: bool = False) -> i
     given = sys.argv[1:] if arguments is None else arguments
     command = next((word for word in given if not word.startswith("-")), "")
     parser = command_line(own_version(), command)
+    if empty := next((word for word in given if re.fullmatch("--.*=--", word)), ""):
+        parser.error(f"{empty}: expected a value")  # argparse takes it for none, and reads no type
     options = parser.parse_args(given)
     output = Output(getattr(options, "json", False), getattr(options, "quiet", False))
     isolated = getattr(options, "isolated", False) and not confined

@@ -127,9 +127,9 @@ def unpack(path: Path, folder: Path, binaries: str) -> None:
                 _write(archive, entry, folder / entry.filename)
         except OSError as error:
             raise InputError(
-                where=str(folder),
-                found=f"no way to unpack {path.name} there ({error.strerror or error})",
-                expected=f"a folder for temporary files with room for {size >> 20} MB",
+                where=str(path),
+                found=f"no way to unpack it for this run ({error.strerror or error})",
+                expected=f"a folder for temporary files with room for {(size >> 20) + 1} MB",
                 remedy="make room, or set TMPDIR to another folder",
             ) from None
 
