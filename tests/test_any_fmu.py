@@ -128,6 +128,18 @@ def test_discrete_states_are_iterated_until_they_are_stable(build):
         assert run(fmu, "open_loop", 600.0)[-1] == pytest.approx(exact(1500.0, 600.0), abs=0.03)
 
 
+@pytest.mark.parametrize("begin", [294.0, 297.0])
+def test_a_calculated_start_beyond_a_switch_is_in_the_mode_of_there(begin, build):
+    """At 291 K the thermostat heats, up to 295 K: above, it does not."""
+    exact_start = 'initial="exact"><Real start="291"/>'
+    calculated = VARIABLES.replace(exact_start, 'initial="calculated"><Real/>')
+    assert calculated != VARIABLES
+    with FMU(build("THERMOSTAT", variables=calculated)) as fmu:
+        fmu.start({"T": begin})
+        assert fmu.get_states()[0] == begin
+        assert fmu.get(fmu.variables(["P"]))[0] == (1500.0 if begin < 295.0 else 0.0)
+
+
 def along(what: str, times: np.ndarray, G: float = 50.0, T: float = 291.0) -> np.ndarray:
     """Temperature of the room at 280 K outside, by the closed form from event to event."""
     values, t, power, slowness = [], 0.0, 1500.0, 1e5 / G

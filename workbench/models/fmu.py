@@ -844,10 +844,13 @@ class FMU(FMUInstance):
             return
         x = self.get_states()
         wanted = np.array([states.get(name, x[i]) for i, name in enumerate(self.states)])
-        if not np.array_equal(x, wanted):  # such as of calculated ones
-            self.set_states(wanted)
         if self.event_signs.size:
             self.event_signs[:] = self.event_indicators() > 0.0
+        if not np.array_equal(x, wanted):  # such as of calculated ones
+            self.set_states(wanted)
+            signs = self.event_signs
+            if signs.size and ((self.event_indicators() > 0.0) != signs).any():
+                self.handle_event()  # it began elsewhere, in the mode of that place
 
     @property
     def has_events(self) -> bool:
