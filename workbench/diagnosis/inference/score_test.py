@@ -209,6 +209,14 @@ class ScoreTest:
         falls = (vectors.T @ (scale * left[:-1, -1]))[told] ** 2 / values[told]
         return float(falls.sum()), falls.size
 
+    def explained(self, sizes: Mapping[Key, float]) -> float:
+        """Rise of chi-squared, with what is expected of levels, without effects of these sizes."""
+        known = self.joint.known
+        at = [j for j, key in enumerate(known) if key in sizes]
+        size = np.array([sizes[known[j]] for j in at])
+        own = covariance(self.joint.total().N[: len(known), : len(known)])[np.ix_(at, at)]
+        return float(size @ np.linalg.solve(own, size))
+
     def scores(self) -> list[CandidateScore]:
         """All candidates, best first."""
         scores = [self._score(effect, shape) for effect, shape in self._candidates]

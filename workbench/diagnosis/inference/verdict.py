@@ -482,12 +482,14 @@ def _lacking(fit: Fit, chosen: Selection) -> str:
     """Whether what remains goes with other effects, of any sign, as no chance does; empty: not.
 
     None of them is a cause, but together they are many shapes that another law may have. A right
-    law may be wrong by `WRONG` of its effect. Derivatives of a run that nothing corrects tell
-    little of it.
+    law may be wrong by `WRONG` of its effect; and a model that is not quite its machine leaves
+    less than a right law explains. Derivatives of a run that nothing corrects tell little of it.
     """
     fall, unknowns = chosen.trial.lack_of_fit()
-    by_form = max(WRONG**2, fit.decides.left) * beyond(chosen.base, chosen.best)
-    if fit.free or not unknowns or fall <= by_form + fit.decides.chance(unknowns):
+    explained = chosen.trial.explained(chosen.best.point.sizes)
+    by_form = max(WRONG**2, fit.decides.left) * explained
+    chance = fit.decides.chance(unknowns) if unknowns else np.inf
+    if fit.free or fall <= max(by_form + chance, explained + unknowns):
         return ""
     return "what remains goes with other effects of the catalogue, but none explains it"
 
