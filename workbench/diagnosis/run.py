@@ -44,7 +44,7 @@ from workbench.observers.estimators.disturbance import DisturbanceObserver
 from workbench.observers.estimators.kalman import ExtendedKalmanFilter
 from workbench.observers.replay import replay
 from workbench.observers.score import score
-from workbench.observers.trajectory import check_along
+from workbench.observers.trajectory import doubts_along
 from workbench.runtime.engine import Engine
 from workbench.runtime.files import write_whole
 from workbench.runtime.progress import ProgressReporter
@@ -77,10 +77,9 @@ def diagnose(
     """
     refuse_too_few(problem.cases, problem.system, len(problem.held_out))
     with open_model(problem.system) as fmu:
-        doubts = [check_along(fmu, problem.system, case) for case in problem.cases]
+        doubts = doubts_along(fmu, problem.system, problem.cases)
     outcome = _with_effects(problem, engine, every_platform, certainty)
-    warned = "; ".join(dict.fromkeys(filter(None, [*doubts, outcome.warned])))
-    return replace(outcome, warned=warned)
+    return replace(outcome, warned="; ".join(filter(None, (doubts, outcome.warned))))
 
 
 def _with_effects(

@@ -96,6 +96,12 @@ def check_along(fmu: FMU, system: System, case: Case, *, walks: bool = True) -> 
     return doubt
 
 
+def doubts_along(fmu: FMU, system: System, cases: Sequence[Case]) -> str:
+    """Check a model along recordings, see `check_along`; what is said of it, each once."""
+    doubts = dict.fromkeys(check_along(fmu, system, case) for case in cases)
+    return "; ".join(filter(None, doubts))
+
+
 def _unsized(fmu: FMU, system: System) -> list[str]:
     """States whose size nothing says: the model no nominal value, the system no scale, no walk."""
     variables = {variable.name: variable for variable in fmu.description.variables}

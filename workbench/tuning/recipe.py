@@ -16,7 +16,7 @@ from workbench.observers.gains_file import format_gains
 from workbench.observers.replay import replay, run_on_model
 from workbench.observers.run import Ending
 from workbench.observers.score import with_readings
-from workbench.observers.trajectory import check_along
+from workbench.observers.trajectory import doubts_along
 from workbench.pages.answer import finite
 from workbench.recordings.case import Case
 from workbench.runtime.pool import NoWorkersError
@@ -178,8 +178,7 @@ def pose(
     slowest = 1.0 / max(case.time[-1] - case.time[0] for case in cases)
     fastest = 1.0 / max(float(np.median(np.diff(case.time))) for case in cases)
     with open_model(system, estimator_class.role) as model:
-        for case in cases:
-            check_along(model, system, case)
+        doubts_along(model, system, cases)
         system = with_readings(system, [model])
         gains = estimator_class.default_gains(model, system)
         space = estimator_class.space(model, system, gains, slowest, fastest)

@@ -143,6 +143,8 @@ class Gain:
 
         >>> Gain(before=1.04, after=1.0, low=1.0, high=1.0, recordings={}).text
         'its error falls from 1.04 to 1.00 times the noise'
+        >>> Gain(before=1.0, after=1.0, low=1.0, high=1.0, recordings={}).text.partition(",")[0]
+        'its error is 1.00 times the noise with and without'
         """
         for digits in (1, 2):
             before, after = (f"{error:.{digits}f}" for error in (self.before, self.after))

@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from workbench.errors import InputError
-from workbench.observers.trajectory import check_along
+from workbench.observers.trajectory import doubts_along
 from workbench.recordings.case import Case
 from workbench.runtime.engine import Engine, Reporter
 from workbench.runtime.pool import Pool
@@ -101,13 +101,12 @@ def distance_of_stop(
             remedy="give more recordings of this machine",
         )
     with open_model(system) as fmu:
-        doubts = [check_along(fmu, system, case) for case in cases]
+        doubts = doubts_along(fmu, system, cases)
     engine.report(f"fit to {len(cases)} stops")
     past = fit_past_stops(system, cases, engine)
     with Pool(engine.workers, open_forecaster, system) as pool:
         distance = _Prediction(system, stops, past, effort, pool, engine.report).of(stop)
-    warned = "; ".join(dict.fromkeys(filter(None, [*doubts, distance.warned])))
-    return replace(distance, warned=warned)
+    return replace(distance, warned="; ".join(filter(None, (doubts, distance.warned))))
 
 
 class _Prediction:

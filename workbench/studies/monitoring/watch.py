@@ -18,6 +18,7 @@ from workbench.system.parts import EstimatedQuantity
 
 _FEWEST = 3  # of an array: of two, nothing tells which has moved
 _OBSERVED = 0.5  # share of the variance before a recording that it must take away
+_ROUNDS = 64  # at most; each halves what wild entries do to each other, as half are wild at most
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +108,7 @@ class _Group:
         """
         m, away = len(self.members), self.moved.copy()
         wild: list[int] = []
-        while True:
+        for _ in range(_ROUNDS):
             watched = self.directions @ (values - away)
             if self.against:
                 watched[:-1] += away
@@ -128,7 +129,6 @@ class _Group:
                 wild.append(int(np.nanargmax(size)))
             elif np.allclose(away, before, rtol=0.0, atol=1e-3 * np.sqrt(spread.min())):
                 break
-        return np.where(shown, watched, np.nan), surprises, squares
         return np.where(shown, watched, np.nan), surprises, squares
 
     def tracks(self) -> list[Track]:

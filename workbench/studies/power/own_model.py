@@ -38,7 +38,7 @@ from workbench.errors import InputError
 from workbench.models.description import MODEL_EXCHANGE
 from workbench.models.fmu import FMU, CoSimulation
 from workbench.models.simulation import Drive, Simulation
-from workbench.observers.trajectory import check_along
+from workbench.observers.trajectory import doubts_along
 from workbench.recordings.case import Case, Value, read_cases
 from workbench.runtime.files import write_whole
 from workbench.studies.power.planting import Plantable, SheetError
@@ -286,7 +286,7 @@ def own_model(problem: Problem, everything: Path, form_error: float = 0.0) -> Ow
     """
     refuse_too_few(problem.cases, problem.system)
     with open_model(problem.system) as fmu:
-        doubts = dict.fromkeys(check_along(fmu, problem.system, case) for case in problem.cases)
+        doubt = doubts_along(fmu, problem.system, problem.cases)
     with ResidualModel(_source(problem, everything), problem.cases) as model:
         known = {effect.name: effect for effect in shown_effects(problem, model).effects}
         # Recordings of a sensor that does not go in steps may yet be made to.
@@ -328,7 +328,6 @@ def own_model(problem: Problem, everything: Path, form_error: float = 0.0) -> Ow
                 )
             )
         machine = replace(problem, effects=tuple(planted))
-        doubt = "; ".join(filter(None, doubts))
         return OwnModel(machine, everything, tuple(plantables), model.free, form_error, doubt)
 
 
