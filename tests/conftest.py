@@ -42,12 +42,16 @@ from .hostile_fmus import hostile  # noqa: E402
 from .page_rules import script  # noqa: E402
 from .processes import LONGEST  # noqa: E402
 from .runtime_instances import Fmu, compile_model  # noqa: E402
+from .systems import TRAIN, WHEELSET  # noqa: E402
 
 # Doctests are looked for in all files, by importing them: this one takes functions out of Python.
 collect_ignore = ["platforms/sitecustomize.py"]
 
 ROOT = Path(__file__).parent.parent
 Result = TypeVar("Result")
+
+# Else each worker, and each program that tests start, compiles all modules of the repository anew.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 # Its sockets stay where the first of them was, which may be no folder of one test: that has a long
 # name, and goes.
@@ -124,12 +128,12 @@ def reference_path() -> Path:
 
 @pytest.fixture(scope="session")
 def system() -> System:
-    return load_system("wheelset")
+    return WHEELSET
 
 
 @pytest.fixture(scope="session")
 def train() -> System:
-    return load_system("train")
+    return TRAIN
 
 
 @pytest.fixture(scope="session")

@@ -51,15 +51,15 @@ from workbench.observers.run import Ending, Run
 from workbench.observers.score import score
 from workbench.recordings.case import Case, read_case, read_cases
 from workbench.recordings.csv import read_columns
-from workbench.system.registry import load_system, open_model
+from workbench.system.registry import open_model
 
 from .page_rules import check_page
 from .recordings import record
 from .schemas import check
+from .systems import WHEELSET as SYSTEM
 
 ROOT = Path(__file__).parent.parent
 RECORDINGS = ROOT.parent / "shared" / "recordings"
-SYSTEM = load_system("wheelset")
 # Of a wheelset, which has no like parts, the block filter is the extended one.
 KINDS = {name: kind for name, kind in all_estimators(SYSTEM).items() if name != "arrow"}
 OBSERVERS = tuple(KINDS)[2:]  # the others are baselines

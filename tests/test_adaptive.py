@@ -18,11 +18,11 @@ from workbench.observers.replay import replay
 from workbench.observers.run import Run
 from workbench.observers.score import judged_window
 from workbench.recordings.case import read_cases
-from workbench.system.registry import load_system
 from workbench.system.system import System
 
+from .systems import WHEELSET
+
 ROOT = Path(__file__).parent.parent
-WHEELSET = load_system("wheelset")
 FILTERS = ("ekf", "ukf", "imm", "mhe")
 KINDS = (ExtendedKalmanFilter, UnscentedKalmanFilter, MovingHorizonEstimator)
 STEP, BRAKING = 0.005, 2.7e5  # [s], [Pa]

@@ -26,8 +26,7 @@ from workbench.system.registry import load_system, open_model
 from workbench.system.system import System
 
 from .built import build_text, declare, machine, write_case
-
-TRAIN = load_system("train")
+from .systems import TRAIN
 
 
 @pytest.fixture(scope="module")

@@ -41,6 +41,7 @@ from workbench.system.registry import load_system, open_model
 from .built import machine_file
 from .hostile_fmus import rewritten
 from .processes import COMPILER, needs_compiler
+from .systems import TRAIN
 
 pytestmark = needs_compiler
 
@@ -320,7 +321,7 @@ def test_what_the_fmu_warns_of_stands_at_the_top_of_each_answer(
 def test_a_stop_says_what_the_fmu_warns_of(build):
     """What falls to rest from 296 K is above its table at first, from 291.5 K it is not."""
     system = load_system(build("TIMETABLE", start=600.0, flags=["-DWARNS=1"]).parent)
-    stopping = replace(stopping_of(load_system("train")), state="T", longest=600.0)
+    stopping = replace(stopping_of(TRAIN), state="T", longest=600.0)
     drive = DrivingInputs(np.zeros(1), np.zeros(1), np.zeros(1), np.full((1, 2), 280.0))
     with open_model(system) as fmu:
         for rest, begin, warns in ((293.0, 296.0, True), (290.0, 291.5, False)):

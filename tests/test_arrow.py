@@ -20,11 +20,12 @@ from workbench.observers.estimators.block_filter.blocks import divide
 from workbench.observers.estimators.block_filter.filter import BlockKalmanFilter
 from workbench.observers.estimators.kalman import ExtendedKalmanFilter
 from workbench.observers.operating import walks
-from workbench.system.registry import load_system, open_model
+from workbench.system.registry import open_model
 from workbench.system.system import System
 
 from . import growth
 from .built import declare, machine_file
+from .systems import TRAIN
 
 COUNT = 5
 EVERY = range(1, COUNT + 1)
@@ -141,7 +142,7 @@ def test_outputs_keep_together_what_they_depend_on():
 
 def test_a_model_without_blocks_has_the_extended_filter():
     """Of this train loads shift by the pads of all axles at once: each depends on each other."""
-    system = load_system("train")
+    system = TRAIN
     with open_model(system) as fmu:
         plain, estimator = made(fmu, system)
         t, u, y = growth.stop(system)

@@ -24,13 +24,12 @@ from workbench.models.modelica import read_library
 from workbench.recordings.case import Case, read_cases
 from workbench.runtime.engine import Engine
 from workbench.system.reader import with_model
-from workbench.system.registry import load_system
 from workbench.system.system import OBSERVER, System
 
 from .recordings import record
+from .systems import WHEELSET as SYSTEM
 
 ROOT = Path(__file__).parent.parent
-SYSTEM = load_system("wheelset")
 LIBRARY = read_library(ROOT / "modelica" / "WheelsetRig" / "package.mo")
 EFFECTS = catalogue(SYSTEM, LIBRARY)
 LABELLED = ROOT.parent / "shared" / "recordings" / "labelled"

@@ -55,11 +55,12 @@ from workbench.recordings.case import Case, make_case, read_cases
 from workbench.system.registry import load_system
 from workbench.system.template import write_system
 
+from .systems import WHEELSET as SYSTEM
+
 ROOT = Path(__file__).parent.parent
 LIBRARY = read_library(ROOT / "modelica" / "WheelsetRig" / "package.mo")
 EFFECTS = read_effects(LIBRARY, "MinimalObserver")
 MINIMAL = ROOT / "fmus" / "fmi2" / "MinimalObserver.fmu"
-SYSTEM = load_system("wheelset")
 DRY = {
     "initial_speed": 27.8,
     "brake_pressure": 2.7e5,

@@ -22,7 +22,6 @@ from workbench.diagnosis.outcome import FAST, lasting, lasting_blocks, recording
 from workbench.diagnosis.report import write_diagnosis_page
 from workbench.machines.wheelset.rig import CONSTANT_PADS, plant
 from workbench.pages.figures import CaseFigure
-from workbench.system.registry import load_system
 from workbench.system.system import System
 
 from .page_rules import check_page, data, script, section, text
@@ -30,6 +29,7 @@ from .processes import running
 from .recordings import record
 from .scenarios import short
 from .schemas import check
+from .systems import WHEELSET
 
 STOPS = {"01_dry_80_1.5": 45.0, "03_dry_120_3.6": 70.0, "05_dry_120_2.7_rev": 60.0}  # from [km/h]
 PLANTED = 150.0  # [N] of the load cells, some ten times the noise of half a second
@@ -58,7 +58,7 @@ def residuals(gap: bool) -> Residuals:
         name="stop",
         time=time,
         balances=(Balance("slip", "Slip, as measured", "m/s", "mm/s", slip),),
-        channels=load_system("wheelset").comparison.channels,
+        channels=WHEELSET.comparison.channels,
         block_time=time[kept],
         before=after + step[:, None],
         after=after,

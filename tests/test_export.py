@@ -20,11 +20,11 @@ from workbench.models.compiler.flat import flatten
 from workbench.observers import Estimator, Gains, choose
 from workbench.observers.export import build_observer, write_package
 from workbench.observers.gains_file import format_gains
-from workbench.system.registry import load_system, open_model
+from workbench.system.registry import open_model
 
 from .exported import Exported, run_fmu, with_all_gains, write_fmu
+from .systems import WHEELSET as SYSTEM
 
-SYSTEM = load_system("wheelset")
 KINDS = choose(SYSTEM, list(SYSTEM.export.classes))
 NAMES = tuple(KINDS)
 INPUTS = ("pB", "tauR", "omegaW", "omegaR")

@@ -32,9 +32,9 @@ from workbench.system.system import System
 from . import heater
 from .exported import Exported, instance, run_fmu, run_python, with_all_gains, write_fmu
 from .processes import COMPILER
+from .systems import WHEELSET as SYSTEM
 
 ROOT = Path(__file__).parent.parent
-SYSTEM = load_system("wheelset")
 NAMES = ("ekf", "ukf", "mhe", "imm", "disturbance_observer", "parameter_estimator")
 # Of the largest value of an output. Found here: equal to the bit, as the order of operations is the
 # same; elementary functions of another library may differ in their last bit.

@@ -24,11 +24,10 @@ from workbench.observers.run import Ending
 from workbench.observers.score import score
 from workbench.observers.simulation import CaseResult
 from workbench.recordings.case import Case, read_case, read_cases
-from workbench.system.registry import load_system
 
 from .recordings import record
+from .systems import WHEELSET as SYSTEM
 
-SYSTEM = load_system("wheelset")
 RR, JR, TRAIN_INERTIA = 0.70, 1500.0, 7840.0
 WORN = 0.45  # m, wheel radius of Worn
 

@@ -16,9 +16,9 @@ from workbench.machines.wheelset.rig.proposed import proposed_stop
 from workbench.pages.runs import read_runs
 from workbench.recordings.datasets import _hashes_before
 from workbench.recordings.importing import imported
-from workbench.system.registry import load_system
 
 from .case_folders import LINES, TOML, write
+from .systems import WHEELSET
 
 DEEP = 5000
 DIGITS = 5000
@@ -255,4 +255,4 @@ def test_what_another_run_left_and_no_run_writes_is_refused(name, tmp_path):
     for content in ("[]", "{", DEEP_LIST, json.dumps(large), json.dumps(half)):
         (tmp_path / name).write_text(content)
         with pytest.raises(InputError, match=f"{name}: found {found}"):
-            read(tmp_path, load_system("wheelset"))
+            read(tmp_path, WHEELSET)

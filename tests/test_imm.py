@@ -24,9 +24,9 @@ from workbench.system.system import System
 
 from .built import declare, machine
 from .linear import exact_step, with_steps
+from .systems import WHEELSET
 
 ROOT = Path(__file__).parent.parent
-WHEELSET = load_system("wheelset")
 
 # --- on a linear model: a vessel that cools, insulated or bare, heated by a source and the sun ---
 

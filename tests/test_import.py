@@ -24,7 +24,6 @@ from workbench.recordings.case import Case, read_cases
 from workbench.recordings.channels import RecordingOptions, propose, propose_recordings
 from workbench.recordings.formats import read_recorded_file
 from workbench.recordings.plausibility import Origin, doubts
-from workbench.system.registry import load_system
 from workbench.system.system import System
 
 from .files_of_stops import FORMATS_OF_STOPS, Stops, add_sheet, workbook, workbook_of_stamps
@@ -37,6 +36,7 @@ from .recorder_files import (
     mdf_4,
     recorded,
 )
+from .systems import TRAIN
 from .train_stops import write_stop
 
 UNITS = {"pB": 1e5, "tauR": 1e3, "omegaW": 1 / 3.6 / 0.4, "omegaR": 1 / 3.6 / 0.6, "Fx": 1e3}
@@ -295,7 +295,7 @@ def train_stop(tmp_path_factory) -> Case:
     """A stop of a train on the level, without faults."""
     folder = tmp_path_factory.mktemp("train") / "01_stop"
     write_stop(folder, 1, {})
-    (case,) = read_cases([folder], load_system("train"))
+    (case,) = read_cases([folder], TRAIN)
     return case
 
 
@@ -326,19 +326,18 @@ def test_channels_of_a_train_are_known_by_the_names_of_a_laboratory(
     out = tmp_path / "cases"
     command = ["import", str(tmp_path / "stop.csv"), "--system", "train", "--out", str(out)]
     assert main([*command, "--condition", "rail=dry", "--yes"]) == 0
-    (case,) = read_cases([out], load_system("train"))
+    (case,) = read_cases([out], TRAIN)
     for name, values in train_stop.signals.items():
         assert_allclose(case[name], values, rtol=1e-12, atol=1e-12)
 
 
 def test_speeds_of_all_axles_in_another_unit_contradict_the_acceleration(train_stop):
     """In km/h declared as rad/s they agree with each other."""
-    train = load_system("train")
     wrong = {f"omega{i}": 3.6 * 0.46 * train_stop[f"omega{i}"] for i in range(1, 9)}
     origin = Origin("stop.csv", 2, {}, "")
     signals = {**train_stop.signals, **wrong}
     right, told = (
-        doubts(train_stop.time, recorded, train_stop.conditions, train, origin)
+        doubts(train_stop.time, recorded, train_stop.conditions, TRAIN, origin)
         for recorded in (train_stop.signals, signals)
     )
     (doubt,) = set(told) - set(right)

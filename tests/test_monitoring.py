@@ -32,10 +32,10 @@ from workbench.studies.monitoring.cause import known_from_before, recordings_aft
 from workbench.studies.monitoring.chart import LARGEST, Chart, Scatter, run_length, threshold
 from workbench.studies.monitoring.report import write_monitoring
 from workbench.studies.monitoring.watch import Track, watch
-from workbench.system.registry import load_system
 
 from .page_rules import check_page, script
 from .schemas import check
+from .systems import TRAIN
 from .train_stops import write_stop
 
 RECORDINGS = Path(__file__).parent.parent.parent / "shared" / "recordings" / "train"
@@ -521,7 +521,7 @@ def test_each_machine_is_watched_as_it_is_alone(fleet, local, tmp_path):
     table = pd.read_csv(local / "fleet.csv").set_index("machine")
     assert list(table["recordings"]) == [0, 2, 2]
     assert "no recording that can be used" in table.loc["broken", "refusal"]
-    alone = wb.monitor(load_system("train"), fleet / "two", out=tmp_path, workers=1)
+    alone = wb.monitor(TRAIN, fleet / "two", out=tmp_path, workers=1)
     frame = alone.to_frame().to_csv(index=False, float_format="%.8g")
     assert (local / "two" / "estimates.csv").read_text() == frame
 

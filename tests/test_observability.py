@@ -24,15 +24,14 @@ from workbench.observers.observability import (
 )
 from workbench.system.expression import Expression
 from workbench.system.parts import OperatingPoint
-from workbench.system.registry import load_system
 
 from .page_rules import check_page
 from .schemas import check
+from .systems import WHEELSET as SYSTEM
 
 ROOT = Path(__file__).parents[1]
 FULL = ROOT / "fmus/fmi2/FullObserver.fmu"
 CASE = ROOT / "cases/02_dry_100_2.7"
-SYSTEM = load_system("wheelset")
 FRICTION_PRIOR = prior(SYSTEM)
 FIRST = np.zeros(1, int)
 HALF_A_SECOND = 100

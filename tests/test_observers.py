@@ -29,8 +29,9 @@ from workbench.observers.replay import replay
 from workbench.observers.run import Ending, Run
 from workbench.observers.score import judged_window, low_pass, score
 from workbench.recordings.case import Case, read_case, read_cases
-from workbench.system.registry import load_system
 from workbench.system.system import System
+
+from .systems import WHEELSET
 
 RR, JR, TRAIN_INERTIA = 0.70, 1500.0, 7840.0
 SECONDS, STEP = 24.0, 0.005
@@ -110,7 +111,6 @@ def stop(fmu) -> Stop:
     return cache(partial(recorded_stop, fmu))
 
 
-WHEELSET = load_system("wheelset")
 ESTIMATORS = list(estimators_of(WHEELSET))
 OBSERVERS = ESTIMATORS[2:]  # the others are baselines
 ONLINE = [name for name, kind in estimators_of(WHEELSET).items() if not kind.offline]

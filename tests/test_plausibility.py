@@ -23,6 +23,7 @@ from workbench.studies.power import Repertoire
 from workbench.system.registry import load_system
 
 from .scenarios import REFERENCE
+from .systems import TRAIN, WHEELSET
 
 RECORDINGS = Path(__file__).parent.parent.parent / "shared" / "recordings"
 NAME = "03_dry_120_3.6"
@@ -262,7 +263,7 @@ def test_recordings_of_a_train_that_are_right_raise_no_doubt(set_):
     cases = sorted((RECORDINGS / "train" / set_).rglob("case.toml"))
     if not cases:
         pytest.skip("recordings that are not at hand")
-    train = load_system("train")
+    train = TRAIN
     for path in cases:
         assert read_recorded(path.parent, train).doubts == (), path
 
@@ -314,7 +315,7 @@ SAMPLES: dict[str, tuple[Callable[[Table], Table], str]] = {
 @pytest.mark.parametrize("name", SAMPLES)
 def test_what_goes_out_and_back_at_once_is_told_with_its_line(name, stop, tmp_path):
     change, message = SAMPLES[name]
-    system = load_system("wheelset")
+    system = WHEELSET
     toml, table = stop
     assert read_case(write(tmp_path / "whole", toml, table), system).doubts == ()
     told = read_case(write(tmp_path / "changed", toml, change(table)), system).doubts

@@ -55,7 +55,6 @@ from workbench.studies.power.report import (
 )
 from workbench.studies.power.run import Setup
 from workbench.studies.power.statistics import intervals_cover, named_all, named_right
-from workbench.system.registry import load_system
 from workbench.system.template import write_system
 
 from .chaos import sets
@@ -63,8 +62,8 @@ from .page_rules import check_page
 from .processes import comes_true, living, running
 from .scenarios import REFERENCE, short
 from .schemas import check
+from .systems import WHEELSET as SYSTEM
 
-SYSTEM = load_system("wheelset")
 PROBLEM = problem_of(SYSTEM)
 REPERTOIRE = Repertoire(PLANTABLE, tuple(PROBLEM.effects))
 IDENTITY = {"seed": 1}

@@ -23,11 +23,11 @@ from workbench.studies.design.candidates import Experiment, all_settings, other_
 from workbench.studies.design.simulation import predict_recording
 from workbench.system.experiments import RELEASE
 from workbench.system.expression import Expression
-from workbench.system.registry import load_system, model_path
+from workbench.system.registry import model_path
 
 from .recordings import REFERENCE, record
+from .systems import WHEELSET as SYSTEM
 
-SYSTEM = load_system("wheelset")
 STOP = SCENARIOS["01_dry_80_1.5"]
 WARM = replace(STOP, conditions=replace(STOP.conditions, disc_temperature=450.0))
 FADE = plant(CONSTANT_PADS, ["fade=4e-4"])

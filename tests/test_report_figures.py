@@ -22,10 +22,11 @@ from workbench.observers.simulation import CaseResult, case_figure, prepare
 from workbench.pages.drawing import drawing, extremes, pack_samples
 from workbench.pages.figures import DARK, LIGHT
 from workbench.pages.provenance import run_of
-from workbench.system.registry import load_system
+
+from .systems import WHEELSET
 
 PROVENANCE = {
-    "run": run_of("simulate", load_system("wheelset"), {}),
+    "run": run_of("simulate", WHEELSET, {}),
     "workbench": "0",
     "commit": None,
     "python": "3",

@@ -31,13 +31,12 @@ from workbench.machines.wheelset.rig import (
 from workbench.machines.wheelset.rig.drive import Drive, Losses
 from workbench.recordings.case import read_case, read_cases
 from workbench.studies.design import with_sensor
-from workbench.system.registry import load_system
 
 from .processes import LONGEST, ROOT, running
 from .scenarios import BRAKE_RADIUS, REFERENCE, ROLLER_RADIUS, SEED, normal_force
+from .systems import WHEELSET as SYSTEM
 
 CASES = ROOT / "cases"  # of the rig with this seed, which is asked below
-SYSTEM = load_system("wheelset")
 TRAIN_INERTIA, ROLLER_INERTIA, WHEELSET_INERTIA = 7840.0, 1500.0, 110.0  # kg.m2, data sheet
 
 
@@ -418,7 +417,7 @@ def test_interrupt_keeps_finished_cases(tmp_path):
 
 
 def test_cases_are_the_standard_stops_of_the_rig():
-    assert tuple(case.name for case in read_cases([CASES], load_system("wheelset"))) == STANDARD
+    assert tuple(case.name for case in read_cases([CASES], SYSTEM)) == STANDARD
     for name in STANDARD:
         made = json.loads((CASES / name / "truth.json").read_text())
         assert (made["seed"], made["rate"]) == (1, 200)

@@ -18,9 +18,9 @@ from workbench.machines.wheelset.rig import (
 )
 from workbench.machines.wheelset.rig.sensors import FURTHER
 from workbench.recordings.case import read_case
-from workbench.system.registry import load_system
 
 from .scenarios import REFERENCE, ROLLER_RADIUS, SEED, WHEEL_RADIUS, short
+from .systems import WHEELSET
 
 CHANNELS = ("pB", "tauR", "omegaW", "omegaR", "Fx")
 
@@ -231,7 +231,7 @@ def test_dropouts_leave_out_rows_and_nothing_else(tmp_path):
     assert set(kept) < set(full)
     expected = rate * stop.time[-1]
     assert len(full) - len(kept) == pytest.approx(expected, abs=4.0 * np.sqrt(expected))
-    case = read_case(tmp_path / "lossy", load_system("wheelset"))
+    case = read_case(tmp_path / "lossy", WHEELSET)
     assert np.diff(case.time).max() > 0.009
     truth = pd.read_csv(tmp_path / "lossy" / "truth.csv")
     assert np.array_equal(truth["time [s]"], case.time)

@@ -11,9 +11,9 @@ import pytest
 import workbench.system.template
 from workbench.cli.schemas import gains_schema, summaries, system_schema
 from workbench.system.installed import system_files
-from workbench.system.registry import load_system
 
 from .schemas import check, validator
+from .systems import WHEELSET
 
 PACKAGE = Path(workbench.__file__).parent
 SYSTEMS = {
@@ -63,7 +63,7 @@ def test_a_wrong_table_of_how_a_machine_stops_is_refused(name):
 
 
 def test_tuned_gains_that_come_along_are_as_the_schema_says_and_others_are_not():
-    schema = validator(gains_schema(load_system("wheelset")))
+    schema = validator(gains_schema(WHEELSET))
     files = sorted((PACKAGE / "machines" / "wheelset" / "gains").glob("*.toml"))
     assert files
     for path in files:

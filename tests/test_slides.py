@@ -20,14 +20,13 @@ from workbench.machines.wheelset.rig.scenarios import Patch
 from workbench.models.fmu import FMU, CoSimulation
 from workbench.models.modelica import read_library
 from workbench.recordings.case import Case, read_cases
-from workbench.system.registry import load_system
 from workbench.system.system import System
 
 from .recordings import record
+from .systems import WHEELSET as SYSTEM
 
 ROOT = Path(__file__).parent.parent
 MINIMAL = ROOT / "fmus" / "fmi2" / "MinimalObserver.fmu"
-SYSTEM = load_system("wheelset")
 LIBRARY = read_library(ROOT / "modelica" / "WheelsetRig" / "package.mo")
 EFFECTS = catalogue(SYSTEM, LIBRARY)
 WET = {"muWR": 0.2, "polach.kA": 0.3, "polach.kS": 0.1, "polach.B": 0.2}

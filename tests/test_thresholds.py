@@ -35,12 +35,11 @@ from workbench.studies.power.sensitivity import (
 )
 from workbench.studies.power.statistics import named_wrong, summarise_sheet
 from workbench.system.comparison import RATE
-from workbench.system.registry import load_system
 
 from .scenarios import REFERENCE, short
+from .systems import WHEELSET as SYSTEM
 
 ROOT = Path(__file__).parents[1]
-SYSTEM = load_system("wheelset")
 PROBLEM = problem_of(SYSTEM)
 EFFECTS = PROBLEM.effects
 DERIVED = ("significant", "fall", "immaterial", "tied")

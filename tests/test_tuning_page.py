@@ -16,7 +16,7 @@ from numpy.testing import assert_allclose
 
 from workbench.__main__ import main
 from workbench.observers import Gains, estimators_of
-from workbench.system.registry import load_system, open_model
+from workbench.system.registry import open_model
 from workbench.system.system import System
 from workbench.tuning.report import write_tuning_page
 
@@ -24,6 +24,7 @@ from .page_rules import check_page, data, script, text
 from .processes import LONGEST, comes_true, running
 from .recordings import write_beginnings
 from .schemas import check
+from .systems import WHEELSET
 
 HOSTILE = '08_wet "<img src=x onerror=alert(1)>" & co'  # a folder may have this name
 CASES = ("03_dry_120_3.6", HOSTILE)
@@ -201,7 +202,7 @@ def test_every_gain_is_shown_with_its_numbers_and_unit(page, summary):
     assert table.at["L43", "what it does"] == "rate of dmuDC by ∫ omegaW"
 
 
-TUNABLE = [name for name, kind in estimators_of(load_system("wheelset")).items() if kind.tunable]
+TUNABLE = [name for name, kind in estimators_of(WHEELSET).items() if kind.tunable]
 
 
 def told(system: System, estimator: str) -> tuple[Gains, dict[str, tuple[str, str]]]:

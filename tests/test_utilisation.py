@@ -13,10 +13,11 @@ from workbench.observers.estimators.disturbance import DisturbanceObserver
 from workbench.observers.replay import replay
 from workbench.observers.run import Run
 from workbench.recordings.case import Case, read_case
-from workbench.system.registry import load_system
 from workbench.system.system import System
 
-COLUMNS = list(load_system("wheelset").columns)
+from .systems import WHEELSET
+
+COLUMNS = list(WHEELSET.columns)
 RR, NOMINAL = 0.70, 0.15
 Slide = tuple[Case, Run]
 

@@ -27,7 +27,8 @@ from workbench.studies.power.diagnosing import diagnose_set
 from workbench.system.registry import load_system, model_path, open_model
 from workbench.system.system import OBSERVER
 
-SYSTEM = load_system("train")
+from .systems import TRAIN as SYSTEM
+
 TRUE_TO_SHEET = {"tolerances": -1.0, "noise": -1.0}
 SHARED = Path(__file__).parent.parent.parent / "shared" / "recordings"
 RIG = virtual_rig(["01_120_service_dry"], None)

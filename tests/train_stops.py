@@ -6,7 +6,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from workbench.system.registry import load_system, open_model
+from workbench.system.registry import open_model
+
+from .systems import TRAIN
 
 PADS = 0.30  # friction of sound ones, as in the library
 _STEP, _COAST, _SPEED = 0.1, 15.0, 20.0  # s, s, m/s
@@ -32,17 +34,16 @@ def write_stop(
     each by 0.7 %.
     """
     random = np.random.default_rng(seed)
-    system = load_system("train")
     level = PADS * random.normal(1.0, 0.02)
     friction = {
         f"muDC[{i}]": level * pads.get(i, PADS) / PADS * random.normal(1.0, 0.007)
         for i in range(1, 9)
     }
-    outputs = [output.name for output in system.outputs]
+    outputs = [output.name for output in TRAIN.outputs]
     rows = []
-    with open_model(system) as model:
+    with open_model(TRAIN) as model:
         model.start({**dict.fromkeys(outputs[:-1], _SPEED / 0.46), "vTrain": _SPEED}, friction)
-        inputs = model.variables([variable.name for variable in system.inputs])
+        inputs = model.variables([variable.name for variable in TRAIN.inputs])
         states = [model.states.index(name) for name in outputs]
         u = np.array([0.0, 0.0, 0.0, 0.0, _MASS, _MASS, 0.0, 0.0, 0.0])
         for k in range(round((_COAST + 15.0) / _STEP)):
@@ -51,9 +52,9 @@ def write_stop(
             model.set(inputs, u)
             x = model.step(_STEP)
             rows.append([(k + 1) * _STEP, *u, *x[states]])
-    units = {signal.name: signal.unit for signal in (*system.inputs, *system.outputs)}
+    units = {signal.name: signal.unit for signal in (*TRAIN.inputs, *TRAIN.outputs)}
     frame = pd.DataFrame(rows, columns=["time [s]", *(f"{n} [{u}]" for n, u in units.items())])
-    for signal in (*system.inputs, *system.outputs):
+    for signal in (*TRAIN.inputs, *TRAIN.outputs):
         column = f"{signal.name} [{signal.unit}]"
         if signal.name not in ("curve", "slope1", "slope2"):
             frame[column] += signal.deviation(frame[column]) * random.standard_normal(len(frame))

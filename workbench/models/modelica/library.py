@@ -5,6 +5,7 @@ Source: Modelica Language Specification 3.6, sections 5.3 (lookup of names) and 
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -280,9 +281,15 @@ def read_library(file: Path) -> Library:
     return Library(file, [cls for package in own for cls in _read(package, "")], installed)
 
 
+@lru_cache(maxsize=1024)  # files: a campaign, and each command of a session, reads them anew
+def _classes(file: Path, text: str, enclosing: str) -> tuple[Class, ...]:
+    """Classes of a file with this text."""
+    return tuple(Reader(file, text).file(enclosing))
+
+
 def _read(file: Path, enclosing: str) -> Iterator[Class]:
     """Classes of a file and, of a package.mo, of all files and folders beside it."""
-    classes = Reader(file, read(file)).file(enclosing)
+    classes = _classes(file, read(file), enclosing)
     name = classes[0].name
     is_package = file.name == "package.mo"
     expected = file.parent.name if is_package else file.stem
