@@ -116,12 +116,6 @@ def test_separators_line_ends_and_blank_last_lines_do_not_matter(tmp_path, separ
     assert_same(read(write(tmp_path / "a", csv)), read(write(tmp_path / "b")))
 
 
-@pytest.mark.parametrize("separator", [";", "\t"])
-def test_decimal_commas_give_the_same_case(tmp_path, separator):
-    lines = [line.replace(";", separator) for line in german(LINES)]
-    assert_same(read(write(tmp_path / "a", lines)), read(write(tmp_path / "b")))
-
-
 def test_a_byte_order_mark_does_not_matter(tmp_path):
     mark = b"\xef\xbb\xbf"
     marked = read(write(tmp_path / "a", mark + "\n".join(LINES).encode(), mark + TOML.encode()))

@@ -233,12 +233,6 @@ def test_the_readme_says_of_machines_what_the_page_says():
         assert set(numbers) <= set(known)
 
 
-def test_the_picture_of_the_readme_is_small_and_drawn_by_the_diagnosis():
-    picture = ROOT / "docs" / "pictures" / "diagnosis.svg"
-    assert picture.stat().st_size < 200_000
-    assert "matplotlib" in picture.read_text()
-
-
 def test_calls_are_read_as_a_shell_does():
     code = "workbench tune ekf \\\n  --budget 2  # quick\nworkbench doctor --json > doctor.json\n"
     assert list(calls(code)) == [["tune", "ekf", "--budget", "2"], ["doctor", "--json"]]

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from fmpy.ssp.simulation import simulate_ssp
 from fmpy.ssp.ssd import read_ssd, read_ssv
-from fmpy.validation import validate_fmu
 
 from workbench.__main__ import main
 from workbench.cli.parser import command_line
@@ -71,30 +70,6 @@ def test_limits_of_friction_are_kept_and_reached(exported, dry_case):
     estimate = run_fmu(exported.path, *recording, list(OUTPUTS))
     assert estimate[:, list(OUTPUTS).index("muDC")].max() == 0.45
     assert disagreement(estimate, run_python(exported.python, *recording)) < AGREEMENT
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_a_tool_without_python_of_ours_gets_the_same_of_fmi_3(tmp_path, dry_case, name):
-    """FMPy's own simulation, which sees the estimate at the end of a step, one sample later.
-
-    Of FMI 2, and step by step, see `test_export_laws`.
-    """
-    with open_model(SYSTEM, KINDS[name].role) as fmu:
-        estimator = KINDS[name](fmu, SYSTEM, KINDS[name].default_gains(fmu, SYSTEM))
-        path = write_fmu(tmp_path / "law.fmu", estimator, 3)
-        expected = run_python(estimator, dry_case.time, dry_case.u, dry_case.y)
-    assert validate_fmu(str(path)) == []
-    time = np.arange(dry_case.time.size) * 0.005
-    signals = np.column_stack([time, dry_case.u, dry_case.y])
-    result = fmpy.simulate_fmu(
-        str(path),
-        input=np.array([tuple(row) for row in signals], [(n, float) for n in ("time", *INPUTS)]),
-        stop_time=time[-1],
-        output=[*OUTPUTS],
-        output_interval=float(fmpy.read_model_description(str(path)).defaultExperiment.stepSize),
-    )
-    estimate = np.column_stack([result[output] for output in OUTPUTS])
-    assert disagreement(estimate[1:], expected[:-1]) < AGREEMENT
 
 
 def test_gains_are_parameters_that_another_tool_may_set(exported, tmp_path, dry_case):
@@ -272,16 +247,6 @@ def test_in_an_ssp_tool_frictions_are_right_at_any_step(package, step, pressure,
     # Half a bar is a quarter above where the pads touch: their friction is looked for longest.
     within = 0.03 if pressure < 1e5 else 3e-3
     assert result["muDCEstimate"][late] == pytest.approx(0.33 if parameters else 0.30, abs=within)
-
-
-def test_start_values_of_the_package_cover_the_observer(package):
-    ssp = str(package / "out" / "DisturbanceObserver.ssp")
-    values = {
-        parameter.name: float(parameter.value)
-        for parameter in read_ssv(ssp, resource="resources/start.ssv").parameters
-    }
-    for name in ("omegaW", "omegaR"):
-        assert values[f"observer.{name}"] == values[f"machine.{name}"] > 0.0
 
 
 def test_gains_of_an_estimator_that_is_none_are_refused(root, tmp_path, monkeypatch, capsys):

@@ -32,11 +32,6 @@ SHARE = {"value": 95.0, "low": 75.1, "high": 99.87, "unit": "%", "better": "high
 
 
 @pytest.mark.parametrize("name", figures.FIGURES)
-def test_each_table_has_one_place_on_the_page(name):
-    assert len(figures.block(name).findall(figures.page_of(name).read_text())) == 1
-
-
-@pytest.mark.parametrize("name", figures.FIGURES)
 def test_what_is_said_to_be_written_is_of_its_command(name):
     (text,) = figures.block(name).findall(figures.page_of(name).read_text())
     if "Written by" in text:

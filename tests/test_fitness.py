@@ -13,7 +13,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from workbench.__main__ import main
 from workbench.errors import InputError
 from workbench.models.checks import CheckResult, check, is_fit
-from workbench.models.fmu import FMU, CoSimulation
+from workbench.models.fmu import FMU
 from workbench.observers import estimators_of
 from workbench.observers.gains_file import usual_gains
 from workbench.observers.replay import replay
@@ -319,22 +319,6 @@ def test_command_ends_with_2_for_a_wrong_file(co_simulation_only, capsys):
     assert main(["fmu", "check", str(co_simulation_only)]) == 2
     assert main(["fmu", "check", __file__]) == 2
     assert "no FMU" in capsys.readouterr().err
-
-
-def test_co_simulation_rolls_back_to_identical_bits(minimal_path):
-    with CoSimulation(minimal_path) as simulation:
-        inputs = simulation.variables(["pB", "tauR"])
-        simulation.start({"omegaW": 60.0, "omegaR": 39.5})
-        simulation.set(inputs, np.array([3.6e5, 4e3]))
-        simulation.step(0.1)
-        saved = simulation.save()
-        first = [simulation.step(0.01) for _ in range(20)]
-        simulation.restore(saved)
-        simulation.set_time(0.1)
-        second = [simulation.step(0.01) for _ in range(20)]
-        simulation.release(saved)
-    assert_array_equal(first, second)
-    assert first[0][0] > first[-1][0] + 1.0  # it brakes
 
 
 def test_state_serialised_by_one_instance_continues_in_another(minimal_path):

@@ -281,17 +281,26 @@ def test_recordings_that_come_later_twice_or_damaged_change_nothing(
     assert set(result.refused) == {"05", "18"}
 
 
-def test_nothing_is_estimated_twice(history, train, tmp_path, monkeypatch):
-    for name in ("01", "02"):
-        shutil.copytree(history / name, tmp_path / "in" / name)
-    wb.monitor(train, tmp_path / "in", out=tmp_path / "out", workers=1)
+@pytest.fixture
+def two(history, train, once, tmp_path) -> Path:
+    """Folder with recordings `in` and results `out` of two stops that were monitored."""
+
+    def monitored(folder: Path) -> Path:
+        for name in ("01", "02"):
+            shutil.copytree(history / name, folder / "in" / name)
+        wb.monitor(train, folder / "in", out=folder / "out", workers=1)
+        return folder
+
+    return shutil.copytree(once("two stops monitored", monitored), tmp_path, dirs_exist_ok=True)
+
+
+def test_nothing_is_estimated_twice(two, train, monkeypatch):
     monkeypatch.setattr("workbench.studies.monitoring.estimate.replay", None)  # would fail
-    assert wb.monitor(train, tmp_path / "in", out=tmp_path / "out", workers=1).names == ("01", "02")
+    assert wb.monitor(train, two / "in", out=two / "out", workers=1).names == ("01", "02")
 
 
-def test_a_state_of_another_model_or_a_damaged_one_is_refused(history, train, tmp_path):
-    shutil.copytree(history / "01", tmp_path / "in" / "01")
-    wb.monitor(train, tmp_path / "in", out=tmp_path / "out", workers=1)
+@pytest.mark.usefixtures("two")
+def test_a_state_of_another_model_or_a_damaged_one_is_refused(train, tmp_path):
     state = tmp_path / "out" / STATE
     whole = state.read_bytes()
     with sqlite3.connect(state) as connection:
@@ -330,21 +339,18 @@ def _change(result: str, **changes: object) -> str:
     ],
 )
 def test_a_damaged_or_impossible_result_is_left_out_until_its_recording_is_estimated_anew(
-    damage, history, train, tmp_path
+    damage, two, train
 ):
-    for name in ("01", "02"):
-        shutil.copytree(history / name, tmp_path / "in" / name)
-    before = wb.monitor(train, tmp_path / "in", out=tmp_path / "out", workers=1)
-    with closing(sqlite3.connect(tmp_path / "out" / STATE)) as connection, connection:
+    with closing(sqlite3.connect(two / "out" / STATE)) as connection, connection:
         (text,) = connection.execute("SELECT result FROM results WHERE name = '01'").fetchone()
         connection.execute("UPDATE results SET result = ? WHERE name = '01'", (damage(text),))
-    (tmp_path / "in" / "01").rename(tmp_path / "away")
-    without = wb.monitor(train, tmp_path / "in", out=tmp_path / "out", workers=1)
+    (two / "in" / "01").rename(two / "away")
+    without = wb.monitor(train, two / "in", out=two / "out", workers=1)
     assert without.names == ("02",)
     assert "its result in the state is damaged" in without.refused["01"]
-    (tmp_path / "away").rename(tmp_path / "in" / "01")
-    again = wb.monitor(train, tmp_path / "in", out=tmp_path / "out", workers=1)
-    assert again.names == before.names
+    (two / "away").rename(two / "in" / "01")
+    again = wb.monitor(train, two / "in", out=two / "out", workers=1)
+    assert again.names == ("01", "02")
     assert not again.refused
 
 

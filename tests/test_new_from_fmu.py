@@ -234,14 +234,6 @@ def test_it_is_simulated_on_its_recordings(folder, tmp_path):
         assert max(errors.values()) < 0.2 * alone
 
 
-def test_it_is_tuned(folder, tmp_path):
-    quick = ("--budget", "2", "--population", "3", "--workers", "1")
-    summary = ran("tune disturbance_observer", folder, tmp_path, *quick)
-    assert isinstance(summary["z"], float)
-    assert isinstance(summary["z_reasoned"], float)
-    assert summary["z"] <= summary["z_reasoned"]
-
-
 def diagnosed(folder: Path, out: Path, effects: Sequence[str] = ()) -> Outcome:
     system = load_system(folder)
     cases = read_cases([folder / "recordings"], system)
@@ -254,8 +246,3 @@ def test_the_wall_that_seeps_is_named(folder, tmp_path):
     (cause,) = diagnosis.causes
     assert cause.effect.name == "Seepage"
     assert cause.parameters["k"].low < SEEPAGE < cause.parameters["k"].high
-
-
-def test_a_tight_wall_is_not(tmp_path):
-    write_system(tmp_path / "tight", 0.0)
-    assert diagnosed(tmp_path / "tight", tmp_path).diagnosis.verdict == "nothing"

@@ -176,11 +176,6 @@ def test_pitch_of_brake_units_shows_when_the_pads_nearly_stop_sliding(full):
     assert not set(test.invisible) & {"betaB", "omegaBeta"}
 
 
-def test_test_point_of_the_system_is_the_middle_of_what_stops_cover(full):
-    for own, expected in zip(settle(full, SYSTEM.tested), settle(full, braking()), strict=True):
-        assert_allclose(own, expected, rtol=1e-12)
-
-
 def test_operating_point_carries_the_brake_torque(full):
     x, u = settle(full, braking())
     force, Fz = full.get(full.variables(["Fx", "Fz"]))

@@ -206,26 +206,6 @@ def test_what_fails_half_way_leaves_the_file_as_it_was(tmp_path):
     assert [file.name for file in tmp_path.iterdir()] == ["result"]
 
 
-def test_a_full_disk_is_told_and_keeps_the_file_before(tmp_path, monkeypatch):
-    path = tmp_path / "result"
-    write_whole(path, "before")
-
-    def refuse(number: int) -> None:
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(os, "fsync", refuse)
-    with pytest.raises(InputError, match=r"result: found .*No space left on device"):
-        write_whole(path, "after")
-    assert path.read_text() == "before"
-    assert [file.name for file in tmp_path.iterdir()] == ["result"]
-
-
-def test_a_place_that_is_no_folder_is_refused(tmp_path):
-    (tmp_path / "file").write_text("")
-    with pytest.raises(InputError, match="cannot be written"):
-        write_whole(tmp_path / "file" / "result", "content")
-
-
 def test_a_part_that_takes_long_says_how_much_is_left_of_it():
     lines: list[str] = []
     done = ProgressReporter(lines.append, "simulations", interval=0.0).part(4)

@@ -14,25 +14,11 @@ from workbench.__main__ import main
 from workbench.cli import COMMANDS
 from workbench.system.installed import built_models
 
-HEAVY = ("numba", "numpy", "scipy", "matplotlib", "pandas", "fmpy", "pint")
 OWN = ("modelica", "fmus", "cases")  # at the top level of a checkout, in the wheel as data
 
 
 def run(*command: str, **options: object) -> subprocess.CompletedProcess[str]:
     return subprocess.run([sys.executable, *command], capture_output=True, text=True, **options)
-
-
-@pytest.mark.parametrize(
-    "command",
-    [("-c", "import workbench"), ("-m", "workbench", "--version"), ("-m", "workbench", "--help")],
-    ids=" ".join,
-)
-def test_nothing_heavy_is_imported_before_it_is_needed(root, command):
-    done = run("-X", "importtime", *command, cwd=root)
-    assert done.returncode == 0
-    imported = {line.rpartition("|")[2].strip() for line in done.stderr.splitlines()}
-    assert "workbench" in imported
-    assert imported.isdisjoint(HEAVY)
 
 
 def test_what_takes_long_to_load_is_loaded_only_where_it_is_needed(root):

@@ -367,6 +367,7 @@ def test_nothing_is_proposed_where_nothing_is_missing(tmp_path, capsys):
     options = ["--system", str(tmp_path / "tight"), "--out", str(tmp_path / "out")]
     assert main(["diagnose", *options, "--workers", "1", "--propose"]) == 0
     assert "No law is proposed" in capsys.readouterr().out
+    assert read(tmp_path / "out")["verdict"] == "nothing"
     assert not (tmp_path / "out" / "proposed").exists()
 
 

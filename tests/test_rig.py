@@ -423,12 +423,6 @@ def test_cases_are_the_standard_stops_of_the_rig():
         assert (made["seed"], made["rate"]) == (1, 200)
 
 
-def test_makefile_and_this_file_make_the_same_cases():
-    """`make cases` needs the command that is tried above."""
-    recipe = re.search(r"^cases:.*\n\t(.+)$", (ROOT / "Makefile").read_text(), re.MULTILINE)
-    assert recipe[1] == "$(RUN) -m workbench rig --seed 1 --truth-every 4 --out cases"
-
-
 def test_nothing_but_accuracy_reads_the_truth_of_the_rig():
     """What estimates, tunes or diagnoses cannot import it either: its layer is above."""
     package = ROOT / "workbench"

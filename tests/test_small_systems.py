@@ -263,8 +263,3 @@ def test_curvature_of_a_signal_sampled_slowly_is_no_noise():
     decay = 7e5 * np.exp(-np.arange(40.0) / 7.0)
     assert deviation_of(decay + noise) == pytest.approx(3e2, rel=0.4)
     assert deviation_of(noise) == pytest.approx(3e2, rel=0.4)
-
-
-def test_observability_without_an_input(bottle, tmp_path):
-    assert status_of("observability", bottle, tmp_path, "00_leak") == 0
-    assert (tmp_path / "00_leak.png").is_file()
