@@ -1,7 +1,9 @@
 """A pool of processes survives what its tasks do, and asks nothing of the program that uses it."""
 
+import gc
 import math
 import os
+import platform
 import signal
 import subprocess
 import sys
@@ -170,6 +172,33 @@ def test_finishing_keeps_what_is_under_way_and_drops_what_waits():
 def test_workers_use_one_blas_thread(isolated):
     with threadpool_limits(2), Pool(1, nullcontext, np.zeros(1), isolated=isolated) as pool:
         assert set(pool.submit(blas_threads).result()) == {1}
+
+
+def frozen(state: object) -> int:
+    return gc.get_freeze_count()
+
+
+def test_no_worker_searches_for_garbage_in_what_its_server_imported():
+    with Pool(1, nullcontext, 0, isolated=True) as pool:
+        assert pool.submit(frozen).result() > 1000
+
+
+def faults(state: object) -> int:
+    """Pages that a task was given anew, of 32 MB in pieces that it also needed before."""
+    import resource
+
+    for _ in range(3):
+        before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
+        pieces = [np.ones(2**19) for _ in range(8)]
+        del pieces
+    return resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before
+
+
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="another memory allocator")
+def test_workers_keep_memory_for_the_next_task():
+    # Of 8192 pages of 4 KB.
+    with Pool(1, nullcontext, 0, isolated=True) as pool:
+        assert pool.submit(faults).result() < 100
 
 
 # --- programs that use a pool ---

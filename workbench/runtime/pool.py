@@ -45,6 +45,9 @@ Arguments = TypeVarTuple("Arguments")
 _PREPARATION = 600.0  # [s] to load models and compile loops, on a busy machine
 _END = 5.0  # [s] from the end of a pipe to that of its process, on a busy machine
 _GIVEN = "given.pickle"  # in the folder of a pool
+_READY = "workbench.runtime.server_ready"
+# A worker needs the same memory again for the next task: glibc is to keep what is freed.
+_KEPT = {"MALLOC_MMAP_THRESHOLD_": str(2**25), "MALLOC_TRIM_THRESHOLD_": str(2**28)}
 _SECRET_SIZE = 16  # [byte]
 
 
@@ -419,11 +422,11 @@ def preload(*modules: str) -> None:
         return
     # The server is to find modules where this process does.
     paths = os.pathsep.join(path or os.getcwd() for path in sys.path)
-    place = {"PYTHONPATH": paths, "PYTHONSAFEPATH": "1"}
+    place = {"PYTHONPATH": paths, "PYTHONSAFEPATH": "1", **_KEPT}
     with _starting, _hidden_program():
         before = {name: os.environ.get(name) for name in place}
         os.environ |= place
-        forkserver.set_forkserver_preload(list(modules))
+        forkserver.set_forkserver_preload([*modules, _READY])
         forkserver.ensure_running()
         for name, value in before.items():
             del os.environ[name]
