@@ -192,6 +192,15 @@ def test_dates_and_times_stand_in_columns_of_their_own(tmp_path, tank, names, fo
     assert iso(read_clock.start).startswith("2024-03-01")
 
 
+@pytest.mark.parametrize("form", ["%G-W%V-%uT%H:%M", "%GW%V%uT%H%M00", "%G-W%V-%u %H:%M:%S"])
+def test_days_may_be_those_of_weeks(tmp_path, tank, form):
+    moments = [datetime(2026, 11, 28, 20) + timedelta(seconds=QUARTER * k) for k in range(40)]
+    week = [moment.strftime(form) for moment in moments]
+    read = clock(table(tmp_path / "a.csv", week), tank)
+    assert_allclose(read.times, QUARTER * np.arange(40))
+    assert iso(read.start) == "2026-11-28T20:00:00.000000"
+
+
 @pytest.mark.parametrize(
     "form", ["{d} days {h:02d}:{m:02d}:00", "{d}.{h:02d}:{m:02d}:00", "P{d}DT{h}H{m}M"]
 )

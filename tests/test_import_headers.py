@@ -21,6 +21,7 @@ from numpy.testing import assert_allclose
 from pyarrow import feather
 
 from workbench.errors import InputError
+from workbench.recordings.channels import propose
 from workbench.recordings.formats import read_recorded_file
 from workbench.recordings.formats.numbers import is_missing
 from workbench.recordings.formats.spelling import name_and_unit
@@ -46,6 +47,51 @@ def test_names_and_units_stand_in_rows_of_their_own(tmp_path, recorder):
     rows = [recorder["row"].format(k) for k in range(60)]
     path = table(tmp_path / "a.csv", [*recorder["head"].split("\n"), *rows])
     assert channels(path) == [(name, unit) for name, unit in recorder["channels"]]
+
+
+@pytest.mark.parametrize(
+    ("header", "row", "unit", "first"),
+    [
+        ("time [s];h [cm];inflow [l/s]", "{t};{c};4.5", "cm", 95.0),  # goes on in other columns
+        ("time [s];T [degC];p [bar]", "{k};21.5;1.5", "bar", 1.5),  # of other signals
+        ("time [s];h [mm]", "{k};{c}", "mm", 95.0),
+        ("time [s];inflow [l/s];h [mm]", "{k};4.5;{c}", "mm", 95.0),  # of another run
+    ],
+)
+@pytest.mark.parametrize("between", [[], ["", "Test 2", ""]])
+def test_a_table_below_another_has_its_own_columns(tmp_path, header, row, unit, first, between):
+    above = [f"{k};4.{k % 9};95{k % 7}.1" for k in range(60)]
+    below = [row.format(t=k + 60, k=k, c=95 + k % 7) for k in range(40)]
+    lines = ["time [s];inflow [l/s];h [mm]", *above, *between, header, *below]
+    first_table, second_table = read_recorded_file(table(tmp_path / "a.csv", lines)).groups
+    assert [channel.values.size for channel in first_table.channels] == [60] * 3
+    own = next(channel for channel in second_table.channels if channel.unit == unit)
+    assert own.values.size == 40
+    assert own.values[0] == first
+
+
+def test_a_header_that_comes_again_on_each_page_is_no_table(tmp_path):
+    header = "time [s];inflow [l/s];h [mm]"
+    rows = [f"{k};4.{k % 9};95{k % 7}.1" for k in range(60)]
+    lines = [header, *rows[:20], header, *rows[20:40], "INFO;pump;started", *rows[40:]]
+    (group,) = read_recorded_file(table(tmp_path / "a.csv", lines)).groups
+    assert_allclose(group.channels[0].values, np.arange(60))
+
+
+def test_marks_of_order_within_a_file_are_no_part_of_a_number(tmp_path):
+    parts = [f"{k};4.{k % 9};95{k % 7}.1\n" for k in range(60)]
+    text = "\ufefftime [s];inflow [l/s];h [mm]\n" + "\ufeff".join(
+        parts
+    )  # of parts that were joined
+    (group,) = read_recorded_file(table(tmp_path / "a.csv", [text])).groups
+    assert_allclose(group.channels[0].values, np.arange(60))
+
+
+def test_nodes_of_a_circuit_are_no_units(tmp_path):
+    rows = [f"{k}e-3\t4.{k % 9}\t95{k % 7}.1\t0.1" for k in range(60)]
+    path = table(tmp_path / "a.txt", ["time\tV(in)\tV(h)\tI(R1)", *rows])
+    assert channels(path) == [("time", ""), ("V(in)", ""), ("V(h)", ""), ("I(R1)", "")]
+    assert [name_and_unit(name)[1] for name in ("V(mV)", "v(m/s)", "I(A)")] == ["mV", "m/s", "A"]
 
 
 @pytest.mark.parametrize(
@@ -375,6 +421,16 @@ def test_channels_have_the_names_that_a_preamble_gives_their_numbers(tmp_path):
     (group,) = read_recorded_file(table(tmp_path / "a.csv", [*head, *rows])).groups
     labels = {channel.name: channel.about for channel in group.channels}
     assert labels == {"Date&Time": "", "Number": "", "CH1": "inflow", "CH2": "level in"}
+
+
+def test_formulas_that_were_never_computed_say_so(tmp_path, tank):
+    book = openpyxl.Workbook()
+    book.active.append(["time [s]", "inflow [l/s]", "h [mm]"])
+    for k in range(40):
+        book.active.append([k, 4 + k % 3, f"=B{k + 2}*200"])
+    book.save(tmp_path / "a.xlsx")
+    problems = propose([read_recorded_file(tmp_path / "a.xlsx")], tank, {}).problems
+    assert any("'h' holds nothing; of formulas that were never computed" in p for p in problems)
 
 
 def test_a_workbook_of_excel_97_has_sheets_dates_and_gaps(tmp_path):

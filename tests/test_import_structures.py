@@ -322,7 +322,7 @@ def test_hdf5_is_read_with_what_its_attributes_say(tmp_path):
     """A table with names, rows of a compound, a rate, times since a date; no object of MATLAB."""
     with h5py.File(tmp_path / "a.h5", "w") as file:
         table = file.create_group("a").create_dataset("data", data=np.column_stack([FLOW, LEVEL]))
-        table.attrs["columns"] = ["inflow [l/s]", "h [mm]"]
+        table.attrs["columns"], table.attrs["units"] = ["inflow", "h"], ["l/s", "mm"]
         table.attrs["sample_rate"] = 2.0
         rows = np.array(list(zip(TIME, LEVEL, strict=True)), dtype=[("time", float), ("h", float)])
         file.create_dataset("b", data=rows)

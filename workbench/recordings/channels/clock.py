@@ -209,6 +209,8 @@ def _no_time(group: Group, system: System, where: str) -> InputError:
     for channel in group.left:
         if is_time(channel.name):
             text = next(filter(None, channel.texts), "")
+            if not text:
+                continue
             return InputError(
                 where=where,
                 found=f"no time: '{channel.name}' holds texts such as '{text}', no date that is "

@@ -146,6 +146,11 @@ def _text_of(signal: Signal, texts: Sequence[FileChannel], notes: Sequence[str])
     for channel in texts:
         if likeness_to(channel.name, channel.about, signal.names):
             example = next(filter(None, channel.texts), "")
+            if not example:
+                return (
+                    f"'{channel.name}' holds nothing; of formulas that were never computed there "
+                    "is no number: open and save the file in a program of spreadsheets"
+                )
             return f"'{channel.name}' holds texts such as '{example}', no numbers"
     for note in notes:  # '...' has a formula that is not understood
         if (match := _LEFT_OUT.match(note)) and likeness_to(match["name"], "", signal.names):

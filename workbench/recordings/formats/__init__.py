@@ -66,6 +66,7 @@ _UNREAD = {  # how files begin that are told, and not read
     b"{\\rtf": "a document (.rtf)",
     b"\x89PNG": "a picture",
     b"\xff\xd8\xff": "a picture",
+    b"IGOR": "text of Igor Pro (.itx)",
     b"#ROSBAG": "a bag of ROS",
     b"\x89MCAP": "a bag of ROS 2 (.mcap)",
     b"|CF,2": "a file of imc FAMOS (.raw, .dat)",

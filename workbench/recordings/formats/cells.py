@@ -2,6 +2,7 @@
 
 import math
 import re
+from bisect import bisect_left
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -161,6 +162,55 @@ class Cells:
     units: tuple[str, ...]
     # what a row of the preamble says of each column, which begins with its name
     about: tuple[str, ...] = ()
+
+
+def find_tables(rows: Sequence[Sequence[str]], lines: Sequence[int], where: str) -> list[Cells]:
+    """Find all tables that stand below each other, each with a header of its own.
+
+    A header that comes again, as at the begin of a page, begins no table where its times go on.
+
+    Parameters
+    ----------
+    lines : of the file, on which the rows stand.
+
+    Raises
+    ------
+    InputError
+        See `find_table`.
+    """
+    table = find_table(rows, lines, where)
+    samples = set(table.lines)
+    others = (
+        i for i, line in enumerate(lines) if line > table.lines[0] and line not in samples
+    )  # none of a table whose channels are rows
+    begin = next((i for i in others if _begins_table(rows, i, table, lines)), None)
+    if begin is None:
+        return [table]
+    while lines[begin - 1] not in samples:  # a preamble of its own
+        begin -= 1
+    above = find_table(rows[:begin], lines[:begin], where)
+    return [above, *find_tables(rows[begin:], lines[begin:], where)]
+
+
+def _begins_table(
+    rows: Sequence[Sequence[str]], i: int, table: Cells, lines: Sequence[int]
+) -> bool:
+    """Whether a row below samples is a header of others than those of a table."""
+    names = [cell.strip() for cell in _trim(rows[i])]
+    if len(names) < 2 or not all(map(_is_text, names)):
+        return False
+    below = next((k for k in range(i + 1, len(rows)) if _is_data(rows[k])), len(rows))
+    following = rows[below : below + _FEWEST]
+    if below - i > _HEADER_ROWS or len(following) < _FEWEST:
+        return False
+    if any(len(_trim(row)) > len(names) or not _is_data(row) for row in following):
+        return False
+    if names == [cell.strip() for cell in _trim(table.names)]:
+        last = table.rows[bisect_left(table.lines, lines[i]) - 1][0]
+        pair = last.replace(",", "."), following[0][0].replace(",", ".")
+        return all(map(is_number, pair)) and float(pair[1]) <= float(pair[0])
+    known = {name_and_unit(name)[0] for name in table.names}
+    return any(name_and_unit(name)[0] in known or name_and_unit(name)[1] for name in names)
 
 
 def find_table(rows: Sequence[Sequence[str]], lines: Sequence[int], where: str) -> Cells:
@@ -470,6 +520,12 @@ def _are_units(cells: Sequence[str]) -> bool:
     return bool(held) and sum(map(is_unit, held)) >= 0.75 * len(held)
 
 
+def parts_of_tables(tables: Sequence[Cells]) -> list[tuple[str, Cells]]:
+    """What is to be read as groups of their own, by name: of each table what `parted` finds."""
+    named = [(f"table {k}" * (len(tables) > 1), table) for k, table in enumerate(tables, 1)]
+    return [(f"{name} {tag}".strip(), own) for name, table in named for tag, own in parted(table)]
+
+
 def parted(table: Cells) -> list[tuple[str, Cells]]:
     """Tables with times of their own, by name, where one holds several; else one without a name.
 
@@ -626,8 +682,8 @@ def read_group(
         elif (bare := _numbers_within(cells, labels[i][1])) is not None:
             numbers[i] = all_plain(bare[0])
             labels[i] = labels[i][0], bare[1]
-        elif any(cells):
-            notes.append(f"'{labels[i][0]}' holds texts")
+        elif any(cells) or table.names[i].strip():
+            notes.append(f"'{labels[i][0]}' holds {'texts' if any(cells) else 'nothing'}")
             none = np.full(len(cells), math.nan)
             left.append(FileChannel(labels[i][0], "", none, texts=tuple(cells)))
     notes += _leave_out_bad(labels, columns, numbers)

@@ -78,13 +78,13 @@ def _entries(items: Mapping[str, Any], file: h5py.File) -> dict[str, Any]:
         for key, rate in _attributes(item, _RATES).items():
             # Of channels with rates of their own, no one is that of all.
             members[key] = rate if members.get(key, rate) == rate else np.nan
-        for key in _NAMES:
+        for key in (*_NAMES, *_UNITS):
             labels = item.attrs.get(key)
             if isinstance(labels, np.ndarray | list) and len(labels) > 1:
                 texts = [text.decode() if isinstance(text, bytes) else str(text) for text in labels]
                 members[f"{name}_{key}"] = texts
         unit = next((text for key, text in item.attrs.items() if key.lower() in _UNITS), None)
-        if unit is not None and np.size(unit):
+        if unit is not None and np.size(unit) == 1:
             text = np.ravel(unit)[0]
             members[f"{name}_unit"] = text.decode() if isinstance(text, bytes) else str(text)
     return members

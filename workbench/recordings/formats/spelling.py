@@ -10,7 +10,7 @@ from workbench.system.units import check_unit, si_factor
 # Spellings that mean one unit alone. Case matters elsewhere: mN is no MN.
 _SPELLINGS = {
     "-": "1", "--": "1", "[-]": "1", "none": "1", "ohne": "1",
-    "secs": "s", "second": "s", "seconds": "s", "Sek": "s", "Sek.": "s", "sek": "s",
+    "secs": "s", "second": "s", "Second": "s", "seconds": "s", "Sek": "s", "Sek.": "s", "sek": "s",
     "Sekunden": "s", "msec": "ms", "millisecond": "ms", "milliseconds": "ms",
     "usec": "us", "hours": "h", "hrs": "h", "Std.": "h", "Stunden": "h", "minutes": "min",
     "Minuten": "min", "days": "d", "Tage": "d",
@@ -159,6 +159,9 @@ _NAMED = re.compile(
     r"(?P<name>.*?)\s*(?:\[(?P<square>[^\[\]]*)\]|[({<](?P<round>[^(){}<>]*)[)}>])\s*"
 )
 _WITHIN = re.compile(r"(?P<name>.*\S)\s*\[(?P<unit>[^\[\]]+)\]\s*(?P<rest>\S.*)")
+# V(h) and I(R1) of circuits: a voltage of a node, a current through a part, not in hours.
+_OF_CIRCUIT = re.compile(r"(?P<kind>[VI])\((?P<of>[^()]+)\)", re.IGNORECASE)
+_KINDS_OF_CIRCUIT = {"V": ("V", "m/s", "m3"), "I": ("A",)}
 _TRAILING = re.compile(
     r"(?P<name>.*?\S)\s*(?:\s/\s?|\s+in\s+|,\s*)(?P<unit>\S+)(\s+\((LGR|SEN) S/N.*\))?"
 )
@@ -175,6 +178,10 @@ def name_and_unit(cell: str) -> tuple[str, str]:
     ('flow (1)', '')
     """
     text = cell.strip().strip("'\"").strip()
+    if match := _OF_CIRCUIT.fullmatch(text):
+        units = _KINDS_OF_CIRCUIT[match["kind"].upper()]
+        if not any(conversion(spell_unit(match["of"]), unit) for unit in units):
+            return text, ""
     if match := _NAMED.fullmatch(text):
         unit = match["square"] if match["square"] is not None else match["round"]
         # A number is one of a channel, not its unit; [1] is none of a quantity without one.

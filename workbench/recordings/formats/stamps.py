@@ -83,6 +83,7 @@ _DURATION = re.compile(  # PT1H15M, 1h 15m 0s
 # What a sample most often is, and no time is: the shortest without a mark has 14 figures.
 _NUMBER = re.compile(r"[+-]?\d{0,13}([.,]\d*)?([eE][+-]?\d+)?")
 _OF_CONTROLLERS = re.compile(r"^(DATE_AND_TIME|DT|TIME_OF_DAY|TOD|TIME|T)#", re.IGNORECASE)
+_OF_WEEK = re.compile(r"(\d{4})-?W(\d\d)-?(\d)(?!\d)")
 _ZONE_WITHIN = re.compile(r"(?<=:\d\d )([A-Z]{3,4}) ((?:19|20)\d\d)$")  # 10:00:00 CEST 2024
 _TIMES_ALONE = (_OF_DAY, _OF_HOUR, _OF_MINUTES, _DURATION)
 _EPOCH = date(1970, 1, 1).toordinal()
@@ -127,7 +128,16 @@ def _match(text: str) -> re.Match[str] | None:
 
 
 def _spelled(text: str) -> str:
-    """A time as others write it: without DT# of controllers, its zone behind its year."""
+    """A time as others write it: without DT# of controllers, its zone behind its year.
+
+    Days of weeks (2026-W48-7) are as those of months.
+    """
+    if "W" in text and (match := _OF_WEEK.match(text)):
+        try:
+            day = date.fromisocalendar(*map(int, match.groups()))
+        except ValueError:  # a week 54
+            return text
+        return f"{day if '-' in match[0] else f'{day:%Y%m%d}'}{text[match.end() :]}"
     text = _OF_CONTROLLERS.sub("", text) if "#" in text else text
     return _ZONE_WITHIN.sub(r"\2 \1", text)
 

@@ -11,7 +11,14 @@ import numpy as np
 
 from workbench.errors import InputError
 from workbench.recordings.csv import is_cut
-from workbench.recordings.formats.cells import Cells, find_table, is_quantity, parted, read_group
+from workbench.recordings.formats.cells import (
+    Cells,
+    find_table,
+    find_tables,
+    is_quantity,
+    parts_of_tables,
+    read_group,
+)
 from workbench.recordings.formats.contents import Contents
 from workbench.recordings.formats.numbers import is_missing, is_number
 from workbench.recordings.formats.stamps import is_stamp
@@ -35,6 +42,7 @@ def read(path: Path, raw: bytes) -> Contents:
         If it holds no table, or one that can be read in two ways.
     """
     text, encoding = _decode(path, raw)
+    text = text.replace("\ufeff", "")  # of parts that were joined
     text = text.replace("\r\r\n", "\n").replace("\r\n", "\n").replace("\r", "\n")
     lines = text.rstrip("\n").split("\n")
     # Monitors of serial ports put a time before what they receive.
@@ -49,9 +57,10 @@ def read(path: Path, raw: bytes) -> Contents:
         names = [f"column {i + 1}" for i in range(width, len(rows[0]))]
         rows = [*(row[:width] for row in rows[:height]), names, *(row[width:] for row in rows)]
         numbers = [*numbers[:height], numbers[0], *numbers]
-    table = find_table(rows, numbers, str(path))
-    if lines[0].startswith("LabVIEW Measurement"):
-        table = _of_labview(table)
+    if not lines[0].startswith("LabVIEW Measurement"):
+        *tables, table = find_tables(rows, numbers, str(path))
+    else:
+        tables, table = [], _of_labview(find_table(rows, numbers, str(path)))
         ends = [line for line in lines if line.startswith("***End_of_Header***")]
         if len(ends) > 2 and not any(row[0].strip() for row in table.rows):
             raise InputError(
@@ -67,22 +76,25 @@ def read(path: Path, raw: bytes) -> Contents:
     )
     if cut:
         table = replace(table, rows=table.rows[:-1], lines=table.lines[:-1])
+    tables.append(table)
     # Between commas, a number has a comma only in quotation marks.
-    commas = separator != "," or any("," in cell for row in table.rows for cell in row)
-    parts = [read_group(own, tag, str(path), commas=commas) for tag, own in parted(table)]
+    commas = separator != "," or any("," in c for own in tables for row in own.rows for c in row)
+    parts = [read_group(own, tag, str(path), commas=commas) for tag, own in parts_of_tables(tables)]
     groups, reading = [group for group, *_ in parts], parts[0][1]
     notes = list(dict.fromkeys(note for *_, own in parts for note in own))
     words = ["CSV", _SEPARATORS[separator], reading, encoding]
-    below = [number for number in numbers if number >= table.lines[0]]
-    broken += max(0, len(below) - len(table.lines) - bool(cut))
+    begin = tables[0].lines[0]
+    kept = {line for own in tables for line in own.lines}
+    below = [number for number in numbers if number >= begin]
+    heads = sum(len(own.head) for own in tables[1:])
+    broken += max(0, len(below) - len(kept) - heads - bool(cut))
     if broken:
-        kept = set(table.lines)
         first = next((number for number in below if number not in kept), 0)
         at = f", the first in line {first}" if first else ""
         notes.append(f"{broken} lines that are no samples were left out{at}")
     if padded:
         notes.append(f"{padded} lines end before the last column: the cells they lack are empty")
-    words.append(f"samples from line {table.lines[0]}")
+    words.append(f"samples from line {begin}")
     return Contents(", ".join(words), groups, notes, (cut,) if cut else ())
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from workbench.errors import InputError
-from workbench.recordings.formats.cells import find_table, parted, read_group
+from workbench.recordings.formats.cells import find_tables, parts_of_tables, read_group
 from workbench.recordings.formats.contents import Contents, Group
 from workbench.runtime.supervision import quiet_panics
 
@@ -193,12 +193,12 @@ def _read_sheets(
         rows = [[_text(cell) for cell in row] for row in content[:_MOST]]
         filled = [i for i, row in enumerate(rows) if any(row)]
         try:
-            table = find_table([rows[i] for i in filled], [i + 1 for i in filled], where)
+            tables = find_tables([rows[i] for i in filled], [i + 1 for i in filled], where)
             parts = [
                 read_group(
                     part, f"{title} {tag}".strip() if len(sheets) > 1 else tag or title, where
                 )
-                for tag, part in parted(table)
+                for tag, part in parts_of_tables(tables)
             ]
         except InputError as error:
             refusal = error
@@ -209,7 +209,8 @@ def _read_sheets(
         own = list(dict.fromkeys(note for *_, notes_of_part in parts for note in notes_of_part))
         notes += [f"sheet '{title}' is hidden"] * (title in hidden)
         notes += [f"sheet '{title}': {note}" for note in own]
-        left = sum(i + 1 >= table.lines[0] for i in filled) - len(table.lines)
+        left = sum(i + 1 >= tables[0].lines[0] for i in filled)
+        left -= sum(len(table.lines) for table in tables) + sum(len(t.head) for t in tables[1:])
         if left:
             notes.append(f"sheet '{title}': {left} rows that are no samples were left out")
     if refusal is not None and not groups:
