@@ -32,7 +32,7 @@ from workbench.observers.gains_file import usual_gains
 from workbench.observers.operating import DesignPointError, linearised, start_spreads, walks
 from workbench.observers.replay import replay
 from workbench.observers.simulation import prepare
-from workbench.observers.trajectory import size_doubt
+from workbench.observers.trajectory import check_along, size_doubt
 from workbench.recordings.case import make_case, read_case
 from workbench.studies.distance.forecast import stopping_of
 from workbench.studies.distance.simulation import DrivingInputs, StopSimulation
@@ -529,6 +529,28 @@ def test_what_derivatives_leave_in_an_fmu_is_not_read(tmp_path, compiled):
         assert place(model) == linearise(model, 4) == read(model) == OK
         assert model.y.tolist() == [0.5, -3.0]
         assert model.jacobian.tolist() == [[0.0, 0.0, 1.0, 0.0], [1.0, 0.0, 0.0, 1.0]]
+
+
+@pytest.mark.parametrize("moved", [[], ["G", "C"]])
+def test_derivatives_are_compared_where_a_fit_may_move_parameters(moved, build):
+    """Code may have its start values as numbers: only elsewhere they are wrong."""
+    path = build("TIMETABLE", flags=["-DSTALE"])
+    with zipfile.ZipFile(path) as archive:
+        library = archive.read(f"{BINARY}/Room{fmpy.sharedLibraryExtension}")
+        text = archive.read("modelDescription.xml").decode()
+    offered = 'modelIdentifier="Room" providesDirectionalDerivative="true"/>'
+    with zipfile.ZipFile(path, "w") as archive:
+        comment = f"<!-- {moved} --></fmiModelDescription>"  # what is found is remembered by bytes
+        text = text.replace("</fmiModelDescription>", comment)
+        archive.writestr("modelDescription.xml", text.replace('modelIdentifier="Room"/>', offered))
+        archive.writestr(f"{BINARY}/Room{fmpy.sharedLibraryExtension}", library)
+    system, time = load_system(path.parent), 20.0 * np.arange(60.0)
+    noise = 0.05 * np.random.default_rng(1).standard_normal((2, time.size))
+    columns = {"time [s]": time, "Ta [K]": 280.0 + noise[0], "T [K]": 291.0 + noise[1]}
+    case = wb.case_from_frame(system, pd.DataFrame(columns))
+    with open_model(system) as fmu:
+        check_along(fmu, system, case, moved=moved)
+        assert fmu.has_directional_derivatives == (not moved)
 
 
 def test_states_that_change_without_an_event_are_refused(build):
@@ -1116,6 +1138,11 @@ RISE = '<SimpleType name="Rise"><Real relativeQuantity="true" unit="K"/></Simple
             '<Unit name="m"><BaseUnit m="1" factor="0.001"/></Unit>',
             "defines as 0.001 m",
         ),
+        (
+            'unit="K"',
+            '<Unit name="K"><BaseUnit K="1" offset="273.15"/></Unit>',
+            "zero the model defines at 273.15 K",
+        ),
         ('unit="N"', '<Unit name="N"><BaseUnit kg="1" m="1" s="-2" factor="1000"/></Unit>', "1000"),
         ('unit="rpm"', '<Unit name="rpm"><BaseUnit s="-1" factor="0.016667"/></Unit>', 0.0),
     ],
@@ -1143,6 +1170,23 @@ def test_units_are_what_the_model_says_of_them(attributes, units, size, build, t
         (output,) = load_system(tmp_path / "new").outputs
         largest = pd.read_csv(log)[header].max()
         assert output.scale == pytest.approx(largest + size, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("declared", "unit", "remedy"),
+    [("%", "1", "unit = '%'"), ("degC", "K", "unit = '1'"), ("bar", "Pa", "unit = 'bar'")],
+)
+def test_a_unit_that_is_another_than_the_models_is_refused_with_what_to_write(
+    declared: str, unit: str, remedy: str, build: Build
+) -> None:
+    """A share of 0.3 was compared with 30 %, without a word."""
+    variables = VARIABLES.replace('<Real start="291"/>', f'<Real start="291" unit="{declared}"/>')
+    path = build("RELAYS", variables=variables).with_name("system.toml")
+    noise, scale = ("0.05", "10") if unit == "1" else (f'"0.05 {unit}"', f'"10 {unit}"')
+    line = f'outputs.T = {{ unit = "{unit}", noise = {noise}, scale = {scale} }}'
+    path.write_text(re.sub("(?m)^outputs.T = .*$", line, path.read_text()))
+    with pytest.raises(InputError, match=re.escape(f"[{declared}]") + f".*write {remedy}"):
+        load_system(path)
 
 
 def test_what_needs_modelica_asks_for_the_class(build):

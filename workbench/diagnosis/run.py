@@ -77,7 +77,7 @@ def diagnose(
     """
     refuse_too_few(problem.cases, problem.system, len(problem.held_out))
     with open_model(problem.system) as fmu:
-        doubts = doubts_along(fmu, problem.system, problem.cases)
+        doubts = doubts_along(fmu, problem.system, problem.cases, moved=fmu.parameters)
     outcome = _with_effects(problem, engine, every_platform, certainty)
     return replace(outcome, warned="; ".join(filter(None, (doubts, outcome.warned))))
 

@@ -98,8 +98,8 @@ class Description:
     # sizes of the files of all platforms [bytes], by name in the archive
     binaries: Mapping[str, int]
     variables: tuple[Variable, ...]
-    # by name of a unit that it defines: SI units, "kg.m-1.s-2", and how many of them it is
-    units: Mapping[str, tuple[str, float]]
+    # by name of a unit that it defines: SI units, "kg.m-1.s-2", how many of them it is, its zero
+    units: Mapping[str, tuple[str, float, float]]
     # states, rates: names of the continuous states and their derivatives, in FMI's order
     states: tuple[str, ...]
     rates: tuple[str, ...]
@@ -452,13 +452,13 @@ def _relative(root: ElementTree.Element) -> set[str]:
     return types
 
 
-def _in_si(base: "fmpy.model_description.BaseUnit") -> tuple[str, float]:
-    """SI units as a product, 1 for none, and how many of them a unit is."""
+def _in_si(base: "fmpy.model_description.BaseUnit") -> tuple[str, float, float]:
+    """SI units as a product, 1 for none, how many of them a unit is, and its zero in them."""
     powers = {
         name: int(getattr(base, name)) for name in ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
     }
     factors = [name + f"{power}" * (power != 1) for name, power in powers.items() if power]
-    return ".".join(factors) or "1", float(base.factor)
+    return ".".join(factors) or "1", float(base.factor), float(base.offset or 0.0)
 
 
 def _interface(element: ElementTree.Element, version: str) -> Interface:

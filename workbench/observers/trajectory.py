@@ -17,6 +17,10 @@ from workbench.recordings.case import Case
 from workbench.system.system import System
 
 _POINTS = 200  # of a recording, along which a model is led
+# Shares of their values by which parameters are moved where derivatives are compared once more:
+# each by its own, as a quotient of two would else stay as it is.
+_MOVED = (0.2, 0.5)
+_GOLDEN = 0.618  # steps of it never come back to where they were
 
 
 @dataclass(frozen=True)
@@ -46,7 +50,9 @@ def trajectory(fmu: FMU, system: System, case: Case) -> Trajectory | None:
     return Trajectory(kept, states_that_follow(fmu, system, case.time[kept], held, values, u), u)
 
 
-def check_along(fmu: FMU, system: System, case: Case, *, walks: bool = True) -> str:
+def check_along(
+    fmu: FMU, system: System, case: Case, *, walks: bool = True, moved: Sequence[str] = ()
+) -> str:
     """Check a model along a recording, before anything rests on it.
 
     It is refused if rates and outputs follow from other calls, as of a hysteresis in code, or a
@@ -57,6 +63,7 @@ def check_along(fmu: FMU, system: System, case: Case, *, walks: bool = True) -> 
     Parameters
     ----------
     walks : whether states walk at random by their size, so that it may not be too small, either.
+    moved : parameters that will have other values, at which derivatives may be wrong, too.
 
     Returns
     -------
@@ -87,7 +94,9 @@ def check_along(fmu: FMU, system: System, case: Case, *, walks: bool = True) -> 
             driven = [name for name in driving_names(system) if fmu.is_continuous(name)]
             corrected = np.column_stack([u, np.zeros((time.size, len(system.corrections)))])
             places = [driving_names(system).index(name) for name in driven]
-            fmu.check_derivatives(driven, outputs, at, x, corrected[:, places])
+            for parameters in ({}, _elsewhere(fmu, moved)):
+                fmu.start(begin, parameters)
+                fmu.check_derivatives(driven, outputs, at, x, corrected[:, places])
     except NoFunctionError:
         raise
     except (InputError, FMUError, np.linalg.LinAlgError):
@@ -96,9 +105,26 @@ def check_along(fmu: FMU, system: System, case: Case, *, walks: bool = True) -> 
     return doubt
 
 
-def doubts_along(fmu: FMU, system: System, cases: Sequence[Case]) -> str:
+def _elsewhere(fmu: FMU, parameters: Sequence[str]) -> dict[str, float]:
+    """Other values of those parameters that are Real, by what the model allows."""
+    variables = {variable.name: variable for variable in fmu.description.variables}
+    least, most = _MOVED
+    values = {}
+    for k, name in enumerate(filter(fmu.is_real, parameters)):
+        variable, value = variables[name], fmu.defaults.get(name, 0.0)
+        low = -np.inf if variable.minimum is None else variable.minimum
+        high = np.inf if variable.maximum is None else variable.maximum
+        share = least + (most - least) * (k * _GOLDEN % 1.0)
+        other = float(np.clip(value * (1.0 + share), low, high))
+        values[name] = other if other != value else float(np.clip(value / (1.0 + share), low, high))
+    return values
+
+
+def doubts_along(
+    fmu: FMU, system: System, cases: Sequence[Case], *, moved: Sequence[str] = ()
+) -> str:
     """Check a model along recordings, see `check_along`; what is said of it, each once."""
-    doubts = dict.fromkeys(check_along(fmu, system, case) for case in cases)
+    doubts = dict.fromkeys(check_along(fmu, system, case, moved=moved) for case in cases)
     return "; ".join(filter(None, doubts))
 
 

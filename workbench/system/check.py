@@ -24,7 +24,7 @@ from workbench.system.parts import (
 )
 from workbench.system.stopping import ASKED, MOVED, OUTSIDE, RISING
 from workbench.system.system import System
-from workbench.system.units import si_factor
+from workbench.system.units import check_unit, si_factor
 
 _ROUNDED = 1e-3  # share by which a unit may be defined otherwise, as calories are
 
@@ -79,12 +79,14 @@ def check_model(system: System, model: Description) -> None:
                 + _NAME_IT.format(ours),
             )
         declared = variables[ours].unit
-        if declared and unit not in ("1", "") and si_factor(declared, unit, where) != 1.0:
+        if declared and unit and not _is_same(declared, unit, where):
+            taken = declared if _is_known(declared) else "1"
             raise InputError(
                 where=where,
                 found=f"unit [{declared}]",
                 expected=f"[{unit}] for {ours}; nothing is converted silently",
-                remedy=f"export the model with this variable in {unit}",
+                remedy=f"write unit = '{taken}' for it in {system.source.name}, and record it in "
+                f"[{declared}], or export the model with this variable in {unit}",
             )
         _check_unit(declared or "1", model, where)
     _check_aliases(system, model)
@@ -104,13 +106,44 @@ def check_model(system: System, model: Description) -> None:
             )
 
 
+def _is_same(declared: str, unit: str, where: str) -> bool:
+    """Whether a unit of a model is one of a system; 1 is also that of values as they are.
+
+    Raises
+    ------
+    InputError
+        If it is of another dimension.
+    """
+    try:
+        return si_factor(declared, unit, where) == 1.0
+    except InputError:
+        if unit != "1" and _is_known(declared):
+            raise
+        return unit == "1"
+
+
+def _is_known(unit: str) -> bool:
+    try:
+        check_unit(unit, "")
+    except InputError:
+        return False
+    return True
+
+
 def _check_unit(name: str, model: Description, where: str) -> None:
-    """Refuse a unit that the model defines as many times what its name says."""
-    base, size = model.units.get(name, ("", 1.0))
+    """Refuse a unit that the model defines as many times what its name says, or with a zero."""
+    base, size, zero = model.units.get(name, ("", 1.0, 0.0))
     try:
         factor = si_factor(name, base, where) if base else size
     except InputError:  # of an unknown unit, or one that counts radians otherwise
         return
+    if zero:
+        raise InputError(
+            where=where,
+            found=f"unit [{name}], whose zero the model defines at {zero:g} {base}",
+            expected=f"0 {base}, as its name says",
+            remedy="correct the unit in the model, such as degC for K, and export it again",
+        )
     if abs(factor / size - 1.0) > _ROUNDED:
         raise InputError(
             where=where,

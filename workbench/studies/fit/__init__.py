@@ -136,7 +136,8 @@ def fit(
     entries = resolve_parameters(system, description, parameters)
     with open_model(system) as fmu:
         spreads = dict(zip(fmu.states, start_spreads(fmu, system), strict=True))
-        runs = [_run(case, system, fmu) for case in (*cases, *held_out)]
+        moved = [entry.name for entry in entries if entry.name in fmu.parameters]
+        runs = [_run(case, system, fmu, moved) for case in (*cases, *held_out)]
         jumps = fmu.has_events or fmu.interface != MODEL_EXCHANGE
     unknowns = _unknowns(entries, description, system, runs[: len(cases)], spreads)
     workers = min(engine.workers, max(len(cases), len(unknowns)))
@@ -212,8 +213,8 @@ def resolve_parameters(
     return list(entries.values())
 
 
-def _run(case: Case, system: System, fmu: FMU) -> _Run:
-    doubt = check_along(fmu, system, case, walks=False)
+def _run(case: Case, system: System, fmu: FMU, moved: Sequence[str]) -> _Run:
+    doubt = check_along(fmu, system, case, walks=False, moved=moved)
     y = np.column_stack([case[output.name] for output in system.outputs])
     sigma = np.column_stack(
         [

@@ -286,7 +286,7 @@ def own_model(problem: Problem, everything: Path, form_error: float = 0.0) -> Ow
     """
     refuse_too_few(problem.cases, problem.system)
     with open_model(problem.system) as fmu:
-        doubt = doubts_along(fmu, problem.system, problem.cases)
+        doubt = doubts_along(fmu, problem.system, problem.cases, moved=fmu.parameters)
     with ResidualModel(_source(problem, everything), problem.cases) as model:
         known = {effect.name: effect for effect in shown_effects(problem, model).effects}
         # Recordings of a sensor that does not go in steps may yet be made to.
