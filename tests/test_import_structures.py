@@ -1,8 +1,11 @@
 """MAT and JSON files as people of identification, Simulink and Modelica tools write them."""
 
+import io
 import json
+import time
 from collections.abc import Mapping
 from pathlib import Path
+from struct import pack
 from typing import Any, Literal
 
 import h5py
@@ -147,6 +150,22 @@ def test_timetables_and_dates_of_matlab_are_read(tmp_path, version):
         clock = channels["Time" if name == "a.mat" else "t"]
         assert_allclose(clock.values, TIME)
         assert iso(clock.start) == "2024-03-05T10:00:00.000000"
+
+
+def test_a_damaged_length_that_means_a_minute_of_work_is_refused_in_seconds(tmp_path):
+    """An array of 200 million structures without a field, of 700 bytes."""
+    stream = io.BytesIO()
+    savemat(stream, {"t": TIME[:50], "s": np.array([[(1.0,)]], dtype=[("a", object)])})
+    content = bytearray(stream.getvalue())
+    names = content.rfind(pack("<HHi", 5, 4, 2))  # length of names of fields
+    size = content.rfind(pack("<II2i", 5, 8, 1, 1), 0, names)
+    content[size + 8 : size + 16] = pack("<2i", 200_000_000, 1)
+    content[names + 4 : names + 8] = pack("<i", 1000)
+    (tmp_path / "a.mat").write_bytes(content)
+    begin = time.monotonic()
+    with pytest.raises(InputError, match=r"cannot be read \((WorkerError: .* than 10|MemoryError)"):
+        read_recorded_file(tmp_path / "a.mat")
+    assert time.monotonic() - begin < 60.0  # with what a busy machine takes to load scipy
 
 
 def test_a_signal_without_a_label_has_the_name_of_its_structure(tmp_path):

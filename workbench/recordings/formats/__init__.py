@@ -12,8 +12,8 @@ import struct
 import warnings
 import zipfile
 import zlib
-from collections.abc import Callable
-from contextlib import nullcontext, redirect_stdout
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, redirect_stdout
 from functools import partial
 from importlib import import_module
 from pathlib import Path
@@ -29,6 +29,7 @@ from workbench.recordings.formats.text import read as read_as_text
 from workbench.runtime.files import read_bytes
 from workbench.runtime.pool import Pool
 from workbench.runtime.resources import installing
+from workbench.runtime.supervision import limited_memory
 
 __all__ = ["FileChannel", "Group", "RecordedFile", "is_other_format", "read_recorded_file"]
 
@@ -51,7 +52,8 @@ _PACKAGES = {
 # Their libraries hand what a file says to compiled code, which may end the process or never return.
 _NATIVE = frozenset({"hdf5", "matlab5", "mdf", "netcdf3", "parquet", "workbooks.read_others"})
 _MAT_4 = struct.Struct("<5i")  # type, rows, columns, imaginary, length of the name
-_START, _RATE = 60.0, 1e6  # [s] and [byte/s], a twentieth of what they read on a busy machine
+_START, _RATE = 10.0, 1e6  # [s] and [byte/s], a twentieth of what they read on a busy machine
+_ROOM = 1 << 30  # [byte] beside a hundred times what a file has, of compressed samples
 _MESSAGES = "a trace of bus messages{}, whose signals are not decoded"
 _UNREAD = {  # how files begin that are told, and not read
     b"\x93NUMPY": "an array of NumPy (.npy)",
@@ -247,8 +249,21 @@ def _here(module: str, path: Path, raw: bytes) -> Contents:
 
 def _in_own_process(module: str, path: Path, raw: bytes) -> Contents:
     """Read a file in a process of its own."""
-    with Pool(1, nullcontext, module, limit=_START + len(raw) / _RATE) as pool:
-        return pool.submit(_here, path, raw).result()
+    with Pool(1, _loaded, module, limit=_START + len(raw) / _RATE) as pool:
+        return pool.submit(_read_limited, path, raw).result()
+
+
+@contextmanager
+def _loaded(module: str) -> Iterator[str]:
+    """A module whose library is loaded, which may take longer than to read a file."""
+    import_module(f"workbench.recordings.formats.{module.partition('.')[0]}")
+    yield module
+
+
+def _read_limited(module: str, path: Path, raw: bytes) -> Contents:
+    """Read a file in a process of its own, whose memory a damaged length cannot exhaust."""
+    with limited_memory(_ROOM + 100 * len(raw)):
+        return _here(module, path, raw)
 
 
 def _read_whole(reader: _Reader, called: str, path: Path, raw: bytes) -> Contents:
