@@ -8,7 +8,7 @@ from workbench.diagnosis import problem_of
 from workbench.diagnosis.run import with_effects
 from workbench.recordings.case import Case
 from workbench.runtime.engine import silent
-from workbench.studies.power.diagnosing import distances_in_set
+from workbench.studies.power.run import distances_in_set
 from workbench.system.system import System
 
 

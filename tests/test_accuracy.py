@@ -45,7 +45,7 @@ from workbench.machines.wheelset.validity import PeakForce
 from workbench.observers import Estimator
 from workbench.observers import estimators_of as all_estimators
 from workbench.observers.estimators.kalman import ExtendedKalmanFilter
-from workbench.observers.gains_file import usual_gains
+from workbench.observers.gains import usual_gains
 from workbench.observers.replay import replay
 from workbench.observers.run import Ending, Run
 from workbench.observers.score import score

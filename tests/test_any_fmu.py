@@ -28,7 +28,7 @@ from workbench.models.simulation import Drive, Simulation
 from workbench.observers import choose, estimators_of
 from workbench.observers.contract import Estimator
 from workbench.observers.fmpy_comparison import RIGHT, compare_with_fmpy
-from workbench.observers.gains_file import usual_gains
+from workbench.observers.gains import usual_gains
 from workbench.observers.operating import DesignPointError, linearised, start_spreads, walks
 from workbench.observers.replay import replay
 from workbench.observers.simulation import prepare

@@ -18,8 +18,13 @@ from workbench.arrays import Matrix
 from workbench.benchmark.calls import points
 from workbench.benchmark.horizon import HorizonTimes, time_horizon
 from workbench.benchmark.memory import peak_memory, watch_command
-from workbench.benchmark.observers import ObserverTimes, ProcessTimes, plain_filters, resample
-from workbench.benchmark.other_loops import open_loop
+from workbench.benchmark.observers import (
+    ObserverTimes,
+    ProcessTimes,
+    open_loop,
+    plain_filters,
+    resample,
+)
 from workbench.benchmark.tuning import (
     EvaluationTimes,
     TuningMemory,

@@ -14,7 +14,7 @@ from workbench.models.fmu import FMU
 from workbench.observers import Estimator, Gains, estimators_of
 from workbench.observers.estimators.disturbance import DisturbanceObserver
 from workbench.observers.estimators.parameter import ParameterEstimator
-from workbench.observers.gains_file import read_gains, usual_gains
+from workbench.observers.gains import read_gains, usual_gains
 from workbench.recordings.case import read_cases
 from workbench.system.registry import open_model
 from workbench.system.system import System

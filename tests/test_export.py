@@ -18,7 +18,7 @@ from workbench.models.compiler.assembly import PLATFORMS
 from workbench.models.compiler.flat import flatten
 from workbench.observers import Estimator, Gains, choose
 from workbench.observers.export import build_observer, write_package
-from workbench.observers.gains_file import format_gains
+from workbench.observers.gains import format_gains
 from workbench.system.registry import open_model
 
 from .exported import Exported, run_fmu, with_all_gains, write_fmu

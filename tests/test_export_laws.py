@@ -24,7 +24,7 @@ from workbench.models.fmu import FMU
 from workbench.observers import Estimator, choose
 from workbench.observers.estimators.kalman import ExtendedKalmanFilter
 from workbench.observers.export import build_observer
-from workbench.observers.gains_file import format_gains
+from workbench.observers.gains import format_gains
 from workbench.recordings.case import Case, read_case, read_cases
 from workbench.system.registry import load_system, open_model
 from workbench.system.system import System

@@ -15,7 +15,7 @@ from workbench.errors import InputError
 from workbench.models.checks import CheckResult, check, is_fit
 from workbench.models.fmu import FMU
 from workbench.observers import estimators_of
-from workbench.observers.gains_file import usual_gains
+from workbench.observers.gains import usual_gains
 from workbench.observers.replay import replay
 from workbench.runtime.supervision import Limits
 

@@ -27,11 +27,22 @@ from workbench.machines.train.stops import write_stop as write_virtual
 from workbench.pages.provenance import run_of
 from workbench.recordings.case import read_case
 from workbench.runtime.files import check_checksum, with_checksum
-from workbench.studies.monitoring import STATE, MonitoringResult
-from workbench.studies.monitoring.cause import known_from_before, recordings_after
-from workbench.studies.monitoring.chart import LARGEST, Chart, Scatter, run_length, threshold
+from workbench.studies.monitoring import (
+    STATE,
+    MonitoringResult,
+    known_from_before,
+    recordings_after,
+)
 from workbench.studies.monitoring.report import write_monitoring
-from workbench.studies.monitoring.watch import Track, watch
+from workbench.studies.monitoring.watch import (
+    LARGEST,
+    Chart,
+    Scatter,
+    Track,
+    run_length,
+    threshold,
+    watch,
+)
 
 from .page_rules import check_page, script
 from .schemas import check

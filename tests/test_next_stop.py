@@ -37,7 +37,7 @@ from workbench.studies.design.candidates import (
     settings_fraction,
 )
 from workbench.studies.design.prediction import discrimination_chance, precision, refitted
-from workbench.studies.power.diagnosing import distance
+from workbench.studies.power.run import distance
 from workbench.system.experiments import (
     RELEASE,
     SINE,

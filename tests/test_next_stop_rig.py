@@ -25,7 +25,7 @@ from workbench.recordings.case import Case, read_case, read_cases
 from workbench.runtime.engine import ALONE, silent
 from workbench.studies.design import NextStop, RankedExperiment, next_stop, predict_experiments
 from workbench.studies.design.candidates import Experiment, all_settings
-from workbench.studies.power.diagnosing import (
+from workbench.studies.power.run import (
     diagnose_set,
     rivals_of_set,
 )

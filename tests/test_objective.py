@@ -16,8 +16,7 @@ from workbench.observers.simulation import prepare
 from workbench.recordings.case import Case, read_cases
 from workbench.system.system import System
 from workbench.tuning.cost import evaluators
-from workbench.tuning.recipe import pose
-from workbench.tuning.validation import evaluate_gains
+from workbench.tuning.recipe import evaluate_gains, pose
 
 from . import heater
 from .built import declare, machine

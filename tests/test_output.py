@@ -18,8 +18,9 @@ import pytest
 
 from workbench.__main__ import main
 from workbench.errors import InputError
-from workbench.pages.templates import number_of
+from workbench.pages.parts import number_of
 from workbench.runtime import files
+from workbench.runtime.engine import ProgressReporter, StepReporter
 from workbench.runtime.files import (
     locked_folder,
     replacing,
@@ -28,7 +29,6 @@ from workbench.runtime.files import (
     write_json,
     write_whole,
 )
-from workbench.runtime.progress import ProgressReporter, StepReporter
 
 COMMANDS = {
     "simulate": ["simulate", "cases/01_dry_80_1.5"],

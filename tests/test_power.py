@@ -40,9 +40,6 @@ from workbench.studies.power import (
     summarise,
 )
 from workbench.studies.power.campaign import SURE, clear, limits_of_effects, predict_campaign
-from workbench.studies.power.diagnosing import (
-    information_of_set,
-)
 from workbench.studies.power.following import SHARES, summarise_following
 from workbench.studies.power.planting import Group, Kind
 from workbench.studies.power.report import (
@@ -53,7 +50,10 @@ from workbench.studies.power.report import (
     oracle_check,
     write_power,
 )
-from workbench.studies.power.run import Setup
+from workbench.studies.power.run import (
+    Setup,
+    information_of_set,
+)
 from workbench.studies.power.statistics import intervals_cover, named_all, named_right
 from workbench.system.template import write_system
 
@@ -421,7 +421,7 @@ def test_what_is_clear_is_found_in_19_of_20(unknowns):
 def test_a_signature_by_recordings_is_that_by_derivatives(all_effects):
     """An effect that is taken for one that the catalogue lacks: the same information on it."""
     study = sets.study()
-    setup = Setup(study.rig, PROBLEM, all_effects)
+    setup = Setup(PROBLEM, study.rig, all_effects)
     gain = 0.016
 
     def made(gains: dict[str, float]) -> list[Case]:
@@ -429,7 +429,7 @@ def test_a_signature_by_recordings_is_that_by_derivatives(all_effects):
         return setup.record(planting, study.rig.simulate(1, gains))
 
     lacking, known = ("fx_gain", "lacking"), ("FxGain", "gain")
-    given = setup.problem(made({})), all_effects
+    given = setup.problem_of(made({})), all_effects
     joint, _ = information_of_set(*given, {lacking: (gain, made({"fx_gain": gain}))})
     at = [joint.shared.index(lacking), joint.shared.index(known)]
     left = beside(joint.total().N, range(len(joint.known)))[np.ix_(at, at)]

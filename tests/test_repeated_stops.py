@@ -20,7 +20,7 @@ from workbench.observers.replay import replay
 from workbench.observers.run import Run
 from workbench.recordings.case import Case, read_case
 from workbench.studies.design.candidates import Experiment, all_settings, other_profiles
-from workbench.studies.design.simulation import predict_recording
+from workbench.studies.design.prediction import predict_recording
 from workbench.system.experiments import RELEASE
 from workbench.system.expression import Expression
 from workbench.system.registry import model_path

@@ -19,8 +19,7 @@ from numpy.testing import assert_allclose
 from workbench.observers import choose
 from workbench.observers.report import standings, summarise_runs, write_estimates, write_page
 from workbench.observers.simulation import CaseResult, case_figure, prepare
-from workbench.pages.drawing import drawing, extremes, pack_samples
-from workbench.pages.figures import DARK, LIGHT
+from workbench.pages.figures import DARK, LIGHT, drawing, extremes, pack_samples
 from workbench.pages.provenance import run_of
 
 from .systems import WHEELSET

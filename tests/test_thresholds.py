@@ -22,10 +22,9 @@ from workbench.studies.power import (
     diagnose_sets,
     open_virtual_rig,
 )
-from workbench.studies.power.diagnosing import diagnose_set
 from workbench.studies.power.planting import draw_sets, plan_sheet_errors
 from workbench.studies.power.report import sheet_check, thresholds_check
-from workbench.studies.power.run import PowerStudy, Setup
+from workbench.studies.power.run import PowerStudy, Setup, diagnose_set
 from workbench.studies.power.sensitivity import (
     FACTORS,
     ThresholdSensitivity,
@@ -105,11 +104,12 @@ def test_one_threshold_is_changed_and_no_other(name, factor):
 def test_what_is_clear_is_said_by_half_and_by_twice_of_a_threshold(tmp_path):
     """Two short stops, a load cell's gain of 1.6 %; simulations that are kept change nothing."""
     rig = PlantedStops((short("01_dry_80_1.5", 30.0), short("03_dry_120_3.6", 40.0)), REFERENCE)
-    setup = Setup(rig, *with_effects(PROBLEM, tmp_path, silent))
+    problem, everything = with_effects(PROBLEM, tmp_path, silent)
+    setup = Setup(problem, rig, everything)
     planting = Planting("single", 12, 8.0, {"fx_gain": 0.016}, ("FxGain",))
     effect = vary(setup, planting, ["fall"])
     cases = setup.record(planting, rig.simulate(planting.seed, planting.gains))
-    plain = diagnose_set(setup.problem(cases), setup.everything)
+    plain = diagnose_set(setup.problem_of(cases), setup.everything)
     assert effect.said == (plain.verdict, *(cause.effect.name for cause in plain.causes))
     assert (effect.said[0], effect.changed) == ("found", ())
 

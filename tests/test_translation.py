@@ -12,8 +12,7 @@ import pytest
 from workbench.errors import InputError
 from workbench.models.native import compiled
 from workbench.observers.export.translation import Array, Data, Number, Program
-from workbench.observers.export.translation.data import contents
-from workbench.observers.export.translation.values import DOUBLE
+from workbench.observers.export.translation.values import DOUBLE, contents
 
 from .processes import COMPILER
 

@@ -14,7 +14,7 @@ from workbench.__main__ import main
 from workbench.errors import InputError
 from workbench.observers import Gains, estimators_of
 from workbench.observers.estimators.disturbance import DisturbanceObserver
-from workbench.observers.gains_file import format_gains, read_gains, usual_gains
+from workbench.observers.gains import format_gains, read_gains, usual_gains
 from workbench.observers.replay import replay
 from workbench.observers.score import score
 from workbench.observers.simulation import prepare

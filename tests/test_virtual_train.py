@@ -23,7 +23,7 @@ from workbench.observers.estimators.kalman import ExtendedKalmanFilter
 from workbench.recordings.case import Case, read_case, read_cases
 from workbench.runtime.engine import silent
 from workbench.studies.power import Planting, Repertoire, read_recorded_sets
-from workbench.studies.power.diagnosing import diagnose_set
+from workbench.studies.power.run import diagnose_set
 from workbench.system.registry import load_system, model_path, open_model
 from workbench.system.system import OBSERVER
 

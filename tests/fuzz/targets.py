@@ -22,8 +22,7 @@ from workbench.diagnosis.inference.rivals import Rival, Rivals
 from workbench.models.description import Description, read_description
 from workbench.models.fmu import FMU
 from workbench.models.modelica import check, read_library
-from workbench.observers.gains import Gains
-from workbench.observers.gains_file import read_gains
+from workbench.observers.gains import Gains, read_gains
 from workbench.recordings.case import Case, read_case, read_file
 from workbench.recordings.channels import NamedChannel, RecordingOptions
 from workbench.runtime import resources

@@ -1,8 +1,13 @@
-"""Times of the observers: compiled laws beside FMPy's methods and plain C, in one run."""
+"""Times of the observers: compiled laws beside FMPy's methods and plain C, in one run.
+
+The model alone is there for any system as a loop of FMPy's own methods and numpy; a system's plugin
+may have more.
+"""
 
 import json
 import math
 import os
+import shutil
 import statistics
 import subprocess
 import sys
@@ -10,20 +15,117 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
+from ctypes import POINTER, c_double
 from dataclasses import dataclass, replace
 from functools import partial
+from types import ModuleType
+from typing import Any
 
 import numpy as np
+from fmpy import extract, instantiate_fmu, read_model_description
 
 from workbench.arrays import Matrix, Vector
 from workbench.benchmark.memory import peak_memory
-from workbench.benchmark.other_loops import Loop, by_c, by_fmpy
-from workbench.observers import Estimator, choose
+from workbench.models.fmu import FMU
+from workbench.observers import Estimator, Gains, choose
 from workbench.observers.estimators.open_loop import OpenLoop
 from workbench.recordings.case import Case
 from workbench.runtime.pool import Pool
+from workbench.system.plugins import find_plugin, load
 from workbench.system.registry import open_model
 from workbench.system.system import FULL, OBSERVER, System
+
+Loop = Callable[..., object]  # of time, u and y, as Estimator.run
+
+
+@contextmanager
+def by_fmpy(
+    estimator: str, fmu: FMU, system: System, gains: Gains
+) -> Iterator[Callable[..., Any] | None]:
+    """The loop of an estimator with FMPy's methods and numpy; None where there is none.
+
+    That of the model alone is there for any system.
+    """
+    if estimator == OpenLoop.name:
+        with open_loop(fmu, system) as alone:
+            yield alone
+        return
+    module = _loops(system)
+    if module is None or estimator not in module.LOOPS:
+        yield None
+        return
+    with module.by_fmpy(estimator, fmu, system, gains) as loop:
+        yield loop
+
+
+def by_c(estimator: str, fmu: FMU, system: System, gains: Gains) -> Loop | None:
+    """The loop of an estimator in C without FMI; None where there is none."""
+    module = _loops(system)
+    return module.by_c(estimator, fmu, system, gains) if module else None
+
+
+def _loops(system: System) -> ModuleType | None:
+    module: ModuleType | None = load(find_plugin(system.plugin).loops)
+    return module
+
+
+@contextmanager
+def open_loop(fmu: FMU, system: System) -> Iterator[Callable[[Vector, Matrix, Matrix], Matrix]]:
+    """A loop like that of `OpenLoop`, over time, u and y; it returns outputs and reported, (n, k).
+
+    Parameters
+    ----------
+    fmu : of FMI 2.0, whose file is loaded a second time.
+    """
+    description = read_model_description(str(fmu.path))
+    known = {v.name: v.valueReference for v in description.modelVariables}
+    rates = [unknown.variable for unknown in description.derivatives]
+    states = [known[rate.derivative.name] for rate in rates]
+    rows, n = [rate.valueReference for rate in rates], len(rates)
+
+    def references(*names: str) -> list[int]:
+        return [known[fmu.names.get(name, name)] for name in names]
+
+    inputs = references(*(signal.name for signal in system.inputs))
+    read = references(*(output.name for output in system.outputs), *system.reported)
+    given = references(*system.given)
+    places = [j for j, output in enumerate(system.outputs) if output.name in fmu.states]
+    seen = references(*(system.outputs[j].name for j in places))
+    x, dx = np.zeros(n), np.zeros(n)
+    at_x, at_dx = (buffer.ctypes.data_as(POINTER(c_double)) for buffer in (x, dx))
+    folder = extract(str(fmu.path))
+    model = instantiate_fmu(folder, description, "ModelExchange")
+
+    def begin(y: Vector) -> None:
+        model.reset()
+        model.setupExperiment()
+        model.setReal([*given, *seen], [*system.given.values(), *y[places]])
+        model.enterInitializationMode()
+        model.exitInitializationMode()
+        model.newDiscreteStates()
+        model.enterContinuousTimeMode()
+        model.getContinuousStates(at_x, n)
+
+    def run(time: Vector, u: Matrix, y: Matrix) -> Matrix:
+        begin(y[0])
+        values = np.empty((time.size, len(read)))
+        for k, h in enumerate(np.diff(time, prepend=time[0])):
+            model.setReal(inputs, u[k])
+            if h > 0.0:
+                model.getDerivatives(at_dx, n)
+                columns = [model.getDirectionalDerivative(rows, [j], [1.0]) for j in states]
+                x[:] += np.linalg.solve(np.eye(n) - h * np.array(columns).T, h * dx)
+                model.setContinuousStates(at_x, n)
+            values[k] = model.getReal(read)
+        return values
+
+    try:
+        yield run
+    finally:
+        model.terminate()
+        model.freeInstance()
+        shutil.rmtree(folder, ignore_errors=True)
+
 
 RATES = (200.0, 1000.0, 5000.0)  # Hz
 LENGTH = 4  # times the recording, for the growth with length

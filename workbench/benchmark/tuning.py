@@ -15,8 +15,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from workbench.benchmark.memory import watch_command
-from workbench.benchmark.observers import in_turns
-from workbench.benchmark.other_loops import by_fmpy
+from workbench.benchmark.observers import by_fmpy, in_turns
 from workbench.observers import Estimate, Estimator, choose
 from workbench.observers.score import samples
 from workbench.recordings.case import Case

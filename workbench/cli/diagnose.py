@@ -71,19 +71,14 @@ def add(commands: arguments.Commands, text: str) -> argparse.ArgumentParser:
 
 def run(options: argparse.Namespace, output: Output) -> CommandResult:
     """Diagnose the recordings, or list the effects."""
-    from workbench.cli.inputs import given_cases, split_held_out
+    from workbench.cli.inputs import given_cases, modelled_system, split_held_out
     from workbench.diagnosis import Problem, catalogue, choose, library_of
     from workbench.diagnosis.effects.candidates import COEFFICIENT
     from workbench.models.modelica import read_library
-    from workbench.system.reader import with_model
-    from workbench.system.registry import load_system
-    from workbench.system.system import OBSERVER
 
-    system = load_system(options.system)
+    system = modelled_system(options)
     if options.library is not None:
         system = replace(system, library=options.library)
-    if options.fmu is not None:
-        system = with_model(system, OBSERVER, options.fmu)
     library = library_of(system) if options.library is None else read_library(options.library)
     effects = choose(options.effects, catalogue(system, library))
     if options.list:

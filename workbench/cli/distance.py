@@ -57,17 +57,13 @@ def add(commands: arguments.Commands, text: str) -> argparse.ArgumentParser:
 
 def run(options: argparse.Namespace, output: Output) -> CommandResult:
     """Predict one stop, and each past one from the others."""
-    from workbench.cli.inputs import given_cases
+    from workbench.cli.inputs import given_cases, modelled_system
     from workbench.pages.provenance import models, run_of, software, sources
     from workbench.studies.distance import Effort, distance_of_stop
     from workbench.studies.distance.report import write_distance
-    from workbench.system.reader import with_model
-    from workbench.system.registry import load_system
     from workbench.system.system import OBSERVER
 
-    system = load_system(options.system)
-    if options.fmu is not None:
-        system = with_model(system, OBSERVER, options.fmu)
+    system = modelled_system(options)
     asked = dict(map(_read_quantity, options.ask))
     cases = given_cases(options, system)
     effort = Effort(options.samples, options.safety, options.seed, options.plain)

@@ -146,7 +146,7 @@ def _choose(system: System, name: str | None, path: Path | None) -> _Choice:
     """The estimator that is named, that of the gains, or the first that has a class."""
     from workbench.observers import choose, estimators_of
     from workbench.observers.estimators.kalman import ExtendedKalmanFilter
-    from workbench.observers.gains_file import estimator_of, format_gains, read_gains, tuned_file
+    from workbench.observers.gains import estimator_of, format_gains, read_gains, tuned_file
     from workbench.system.registry import open_model
 
     known = estimators_of(system)

@@ -92,17 +92,13 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
 
 def run(options: argparse.Namespace, output: Output) -> CommandResult:
     """Fit the parameters, and write what was found."""
-    from workbench.cli.inputs import given_cases, split_held_out
+    from workbench.cli.inputs import given_cases, modelled_system, split_held_out
     from workbench.pages.provenance import models, run_of, software, sources
     from workbench.studies.fit import FitSettings, fit
     from workbench.studies.fit.report import format_fit, write_fit
-    from workbench.system.reader import with_model
-    from workbench.system.registry import load_system
     from workbench.system.system import OBSERVER
 
-    system = load_system(options.system)
-    if options.fmu is not None:
-        system = with_model(system, OBSERVER, options.fmu)
+    system = modelled_system(options)
     parameters = _parameters(options, system)
     cases, held_out = split_held_out(given_cases(options, system), options.held_out)
     if not cases:

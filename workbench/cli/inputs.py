@@ -80,6 +80,12 @@ def given_cases(options: argparse.Namespace, system: System) -> list[Case]:
     return cases
 
 
+def modelled_system(options: argparse.Namespace) -> System:
+    """The system that is asked for, with the observer model of --fmu if that is given."""
+    system = load_system(options.system)
+    return system if options.fmu is None else with_model(system, OBSERVER, options.fmu)
+
+
 def chosen_system(options: argparse.Namespace) -> tuple[System, list[Case]]:
     """The system that is asked for, with the models and names that are given, and the cases."""
     system = _load(options)

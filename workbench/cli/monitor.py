@@ -114,7 +114,7 @@ def _diagnose_change(
     from workbench.diagnosis import diagnose, problem_of
     from workbench.diagnosis.report import write_diagnosis
     from workbench.recordings.datasets import read_recorded
-    from workbench.studies.monitoring.cause import known_from_before, recordings_after
+    from workbench.studies.monitoring import known_from_before, recordings_after
 
     system, out = known_from_before(result), options.out / "cause"
     names = recordings_after(result)

@@ -254,11 +254,10 @@ def _provenance(
 
 def _repertoire(options: argparse.Namespace, study: PowerStudy) -> Repertoire:
     """All that the rig can plant, or what --effects names in sizes by an oracle."""
-    from workbench.studies.power import Repertoire
     from workbench.studies.power.campaign import by_oracle
 
     if options.sigmas is None:
-        return Repertoire(study.rig.plantables, tuple(study.effects))
+        return study.repertoire
     sigmas = sorted({*(options.sigmas or _SIGMAS)})
     return by_oracle(study, _select(options.effects, study.rig), sigmas, options.seed)
 
@@ -266,11 +265,11 @@ def _repertoire(options: argparse.Namespace, study: PowerStudy) -> Repertoire:
 def _plan_sets(
     options: argparse.Namespace, study: PowerStudy, repertoire: Repertoire | None = None
 ) -> list[Group]:
-    from workbench.studies.power import Repertoire, plan
+    from workbench.studies.power import plan
 
     if repertoire is None or not repertoire.scale.chances:
         sizes = sorted({*options.sizes})
-        wanted = Repertoire(_select(options.effects, study.rig), tuple(study.effects))
+        wanted = replace(study.repertoire, plantables=_select(options.effects, study.rig))
     else:
         sizes, wanted = [float(size) for size in repertoire.scale.chances], repertoire
     groups = plan(wanted, options.clean, sizes, options.repeats, options.pairs, options.seed)

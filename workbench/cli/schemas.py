@@ -30,7 +30,7 @@ from workbench.system.parts import Condition, StepTracking
 from workbench.system.plugins import load
 from workbench.system.reference import schema
 from workbench.system.system import System
-from workbench.tuning.validation import Fold
+from workbench.tuning.recipe import Fold
 
 Schema = dict[str, Any]
 

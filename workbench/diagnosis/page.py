@@ -39,12 +39,12 @@ from workbench.pages.parts import (
     Source,
     Table,
     Text,
+    anchor,
     joined,
     number,
     term,
     zoomable,
 )
-from workbench.pages.templates import anchor
 from workbench.pages.views import called, capital, named, per_shown, shown_unit
 from workbench.system.system import System
 from workbench.system.units import si_factor

@@ -45,9 +45,8 @@ from workbench.observers.estimators.kalman import ExtendedKalmanFilter
 from workbench.observers.replay import replay
 from workbench.observers.score import score
 from workbench.observers.trajectory import doubts_along
-from workbench.runtime.engine import Engine
+from workbench.runtime.engine import Engine, ProgressReporter
 from workbench.runtime.files import write_whole
-from workbench.runtime.progress import ProgressReporter
 from workbench.system.reader import with_model
 from workbench.system.registry import open_file, open_model
 from workbench.system.system import OBSERVER, System

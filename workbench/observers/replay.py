@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from workbench.arrays import Matrix, Vector
 from workbench.errors import FMUError
 from workbench.observers import Estimate, Estimator, Gains
-from workbench.observers.gains_file import usual_gains
+from workbench.observers.gains import usual_gains
 from workbench.observers.run import Ending, Run
 from workbench.observers.trajectory import check_along
 from workbench.recordings.case import Case

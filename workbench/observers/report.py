@@ -26,11 +26,11 @@ from workbench.pages.parts import (
     Part,
     Table,
     Text,
+    anchor,
     number,
     term,
     zoomable,
 )
-from workbench.pages.templates import anchor
 from workbench.pages.views import (
     below,
     called,

@@ -16,7 +16,7 @@ from workbench.models.fmu import FMU, EventError
 from workbench.observers import Estimator, Gains, label
 from workbench.observers.estimators.open_loop import OpenLoop
 from workbench.observers.estimators.smoother import Smoother
-from workbench.observers.gains_file import read_gains, usual_gains
+from workbench.observers.gains import read_gains, usual_gains
 from workbench.observers.observability import guesses, information
 from workbench.observers.operating import DesignPointError
 from workbench.observers.replay import replay, run_on_model

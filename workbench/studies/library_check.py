@@ -25,7 +25,7 @@ from workbench.models.description import read_description
 from workbench.models.fmu import FMU
 from workbench.models.modelica import Library, read_library
 from workbench.observers.estimators.open_loop import OpenLoop
-from workbench.observers.gains_file import usual_gains
+from workbench.observers.gains import usual_gains
 from workbench.observers.replay import replay
 from workbench.observers.run import Ending
 from workbench.recordings.case import Case

@@ -18,7 +18,10 @@ from workbench.tuning.recipe import Lines as Lines
 from workbench.tuning.recipe import Problem as Problem
 from workbench.tuning.recipe import Progress as Progress
 from workbench.tuning.recipe import TuningResult as TuningResult
+from workbench.tuning.recipe import cross_validate as cross_validate
+from workbench.tuning.recipe import evaluate_gains as evaluate_gains
 from workbench.tuning.recipe import pose as pose
+from workbench.tuning.recipe import sensitivities as sensitivities
 from workbench.tuning.recipe import summarise_tuning as summarise_tuning
 from workbench.tuning.recipe import tunable as tunable
 from workbench.tuning.recipe import tune as tune
@@ -27,6 +30,3 @@ from workbench.tuning.search import Checkpointing as Checkpointing
 from workbench.tuning.search import Plan as Plan
 from workbench.tuning.search import Search as Search
 from workbench.tuning.search import search as search
-from workbench.tuning.validation import cross_validate as cross_validate
-from workbench.tuning.validation import evaluate_gains as evaluate_gains
-from workbench.tuning.validation import sensitivities as sensitivities

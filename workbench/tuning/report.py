@@ -31,7 +31,7 @@ from workbench.pages.parts import (
 from workbench.pages.views import capital, percent
 from workbench.runtime.files import replacing, warning_if_unwritable
 from workbench.tuning.checkpoint import Generation
-from workbench.tuning.validation import NEGLIGIBLE, STEP
+from workbench.tuning.recipe import NEGLIGIBLE, STEP
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -30,9 +30,8 @@ from workbench.diagnosis.simulation.simulator import (
 from workbench.errors import InputError
 from workbench.models.fmu import FMU, EventError
 from workbench.recordings.case import Case
-from workbench.runtime.engine import ALONE, Engine
+from workbench.runtime.engine import ALONE, Engine, ProgressReporter
 from workbench.runtime.pool import Pool
-from workbench.runtime.progress import ProgressReporter
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")

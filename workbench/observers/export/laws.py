@@ -4,29 +4,35 @@ The law is translated from Python (`observers.export.translation`); the compiler
 model, and `law.c` takes the place of the integrator. Settings become constants, but gains that
 stand in them as they are stay parameters; memory is a part of the FMU's state, so that nothing is
 allocated after the start and a saved state has all of it.
+
+What is remembered from the start, and which of it the first sample says, is found by starting the
+estimator itself. What it begins with must be linear in the first sample, as a speed that is
+measured and one that rolls along with it are.
 """
 
+import copy
 import math
 import xml.etree.ElementTree as ET
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
 
+from workbench.arrays import Matrix, Vector
+from workbench.errors import InputError
 from workbench.models import native
 from workbench.models.compiler import PLATFORMS, BuiltFMU, SteppingLaw, assemble
-from workbench.models.compiler.explicit import StateSpace
-from workbench.models.compiler.flat import FlatVariable
+from workbench.models.compiler.ccode import generate
+from workbench.models.compiler.explicit import StateSpace, make_explicit
+from workbench.models.compiler.flat import FlatVariable, flatten
+from workbench.models.fmu import FMU
 from workbench.models.modelica import read_library
+from workbench.models.native import Instance
 from workbench.observers import Estimator
-from workbench.observers.export.beginning import (
-    gains_in_settings,
-    memory_after,
-    usual_sample,
-    values_of_first_sample,
-)
-from workbench.observers.export.plant import plant_code, plant_of
 from workbench.observers.export.translation import (
     Array,
     Data,
@@ -36,8 +42,283 @@ from workbench.observers.export.translation import (
     Record,
     Several,
 )
-from workbench.observers.export.translation.data import contents
-from workbench.observers.export.translation.values import DOUBLE
+from workbench.observers.export.translation.values import DOUBLE, contents, literal, name_in_c
+
+
+def plant_of(estimator: Estimator) -> StateSpace:
+    """The model of an estimator from the library, with the outputs that its law reads."""
+    system, fmu = estimator.system, estimator.fmu
+    library = read_library(system.library).name
+    name = f"{library}.{system.model(estimator.role).name}"
+    space = make_explicit(flatten(system.library, name))
+    states = [state.name for state in space.states]
+    ours = [fmu.names.get(state, state) for state in fmu.states]
+    known = {fmu.names.get(default, default) for default in fmu.defaults}
+    missing = [
+        variable.name
+        for variable in (*space.parameters, *space.inputs)
+        if variable.name not in known
+    ]
+    if states != ours or missing:
+        raise InputError(
+            where=fmu.place,
+            found=f"no {missing[0]}" if missing else f"states {', '.join(ours)}",
+            expected=f"what {name} has, {', '.join(missing or states)}",
+            remedy="build the FMU from the library of the system",
+        )
+    if ca.depends_on(ca.vertcat(space.f, space.w), space.t):
+        raise InputError(
+            where=name,
+            found="explicit time in the model",
+            expected="a model of states, inputs and parameters: an exported law has no time",
+            remedy="make what depends on time an input of the model",
+        )
+    listed = [output.name for output in space.outputs]
+    read = [listed.index(name) for name in _read(estimator) if name not in states]
+    return replace(
+        space,
+        w=ca.vertcat(ca.SX(0, 1), *(space.w[k] for k in read)),
+        outputs=[space.outputs[k] for k in read],
+        assertions=ca.SX(0, 1),
+        assertion_texts=[],
+    )
+
+
+def plant_code(plant: StateSpace, estimator: Estimator) -> dict[str, str]:
+    """Text of plant_code.h, the model, and of plant.h, how the law sees it."""
+    code = generate(plant, "", "plant")
+    fmu, system = estimator.fmu, estimator.system
+    states, inputs = (
+        [variable.name for variable in group] for group in (plant.states, plant.inputs)
+    )
+    known = [*(signal.name for signal in system.inputs), *system.corrections]
+    outputs, unknown = [], [*range(len(states))]
+    for column, name in enumerate(_read(estimator)):
+        if name in states:
+            outputs.append(-1 - states.index(name))
+        else:
+            outputs.append(len(unknown) - len(states))
+            unknown.append(len(states) + column)
+    ours = {theirs: name for name, theirs in fmu.names.items()}
+    names = [ours.get(parameter.name, parameter.name) for parameter in plant.parameters]
+    parameters = tuple(
+        np.array([model.defaults[name] for name in names] or [0.0]) for model in estimator.models
+    )
+    sizes = {
+        "NX": len(states),
+        "NW": len(plant.outputs),
+        "NNZ_XU": code.jacobian_xu.nnz(),
+    }
+    tables = [
+        f"/* How a law sees the model {plant.name}. */",
+        *(f"#define PLANT_{name} {size}" for name, size in sizes.items()),
+        _whole("plant_input", [inputs.index(fmu.names.get(name, name)) for name in known]),
+        _whole("plant_output", outputs),
+        _whole("plant_unknown", unknown),
+        f"static const double plant_parameter[][{parameters[0].size}] = {contents(parameters)};",
+        "",
+    ]
+    return {"plant.h": "\n".join(tables), "plant_code.h": code.source}
+
+
+def _read(estimator: Estimator) -> list[str]:
+    """The model's names of outputs that the law reads."""
+    system, fmu = estimator.system, estimator.fmu
+    unseen = [output.name for output in system.outputs if output.name not in fmu.states]
+    return [fmu.names.get(name, name) for name in (*system.reported, *unseen)]
+
+
+def _whole(name: str, values: Sequence[int]) -> str:
+    return f"static const int {name}[] = {contents(np.array(values or [0]))};"
+
+
+_ROUNDING = 1e-9  # share of what is told apart: rounding is a millionth of it
+_LARGEST = float(np.finfo(float).max) / 1e9  # sums of it are finite
+_TRIALS = (1.0, -1.0, 10.0)  # samples at which what was found is tried, in sizes of signals
+
+
+class ModelView(NamedTuple):
+    """What a law sees of its model, see `Instance`, and where the model stands."""
+
+    x: Vector
+    dx: Vector
+    u: Vector
+    y: Vector
+    jacobian: Matrix
+    number: int  # of the model, where there are several
+    # at_x, at_u: states and inputs of the model, all of them
+    at_x: Vector
+    at_u: Vector
+
+
+class Remembered(NamedTuple):
+    """All that a law remembers; `memory` is of the estimator's own kind."""
+
+    model: tuple[ModelView, ...]
+    memory: Any
+
+
+@dataclass(frozen=True)
+class FirstValue:
+    """A number that the first sample says: constant + slopes @ [u, y]."""
+
+    place: str  # in C
+    constant: float
+    slopes: Vector
+
+    @property
+    def text(self) -> str:
+        """Statement in C that gives it its value."""
+        terms = [literal(self.constant)] if self.constant else []
+        for k in np.flatnonzero(self.slopes):
+            slope = float(self.slopes[k])
+            terms.append(f"sample[{k}]" if slope == 1.0 else f"{literal(slope)} * sample[{k}]")
+        return f"{self.place} = {' + '.join(terms)};"
+
+
+def memory_after(estimator: Estimator, sample: Vector) -> Remembered:
+    """All that is remembered after a first sample, (m + l,)."""
+    m = len(estimator.system.inputs)
+    estimator.start(sample[:m], sample[m:])
+    parts = estimator.parts
+    _refuse_shared(estimator)
+    both = zip(parts.models, estimator.models, strict=True)
+    models = tuple(_model(model, fmu, number) for number, (model, fmu) in enumerate(both))
+    return copy.deepcopy(Remembered(models, parts.state))
+
+
+def usual_sample(estimator: Estimator) -> Vector:
+    """A sample at which the model is valid, (m + l,): its own start."""
+    system, defaults = estimator.system, estimator.fmu.defaults
+    return np.array(
+        [defaults.get(signal.name, 0.0) for signal in (*system.inputs, *system.outputs)]
+    )
+
+
+def values_of_first_sample(estimator: Estimator) -> list[FirstValue]:
+    """What the first sample says, of all that is remembered.
+
+    Raises
+    ------
+    InputError
+        If that is not linear in the sample.
+    """
+    usual = usual_sample(estimator)
+    signals = (*estimator.system.inputs, *estimator.system.outputs)
+    sizes = np.array([abs(signal.scale) or 1.0 for signal in signals])
+    places, begin = _flat(memory_after(estimator, usual))
+    # By powers of two, so that what is measured is found without rounding where zero is usual.
+    steps = 2.0 ** np.round(np.log2(sizes))
+    moved = [_flat(memory_after(estimator, usual + step))[1] for step in np.diag(steps)]
+    slopes = np.array([_change(begin, step) for step in moved]).T / steps
+    whole = np.round(slopes)
+    slopes = np.where(np.abs(slopes - whole) < _ROUNDING, whole, slopes)
+    share = np.random.default_rng(0).uniform(0.5, 1.0, sizes.size)  # of each signal another one
+    for trial in _TRIALS:
+        change = trial * share * sizes
+        changed = _change(begin, _flat(memory_after(estimator, usual + change))[1])
+        large = np.abs(slopes) @ np.abs(change) + np.abs(np.where(np.isfinite(begin), begin, 0.0))
+        if (bad := np.flatnonzero(np.abs(changed - slopes @ change) > _ROUNDING * large)).size:
+            raise InputError(
+                where=f"estimator {estimator.name}",
+                found=f"{places[bad[0]]}, which is not linear in the first sample",
+                expected="a start that follows the first sample linearly",
+                remedy="let the law make it of the first sample, where h is 0",
+            )
+    return [
+        FirstValue(places[k], _constant(begin[k], slopes[k], usual, sizes), slopes[k])
+        for k in np.flatnonzero(slopes.any(axis=1))
+    ]
+
+
+def gains_in_settings(estimator: Estimator) -> dict[str, list[str]]:
+    """Places in C among the settings, by gain; none if a gain does more than stand there as it is.
+
+    That is found by making the estimator anew with other gains: a law whose settings and memory
+    change by nothing else follows its gains when they change later.
+    """
+    system, gains, parts = estimator.system, estimator.gains, estimator.parts
+    if parts.several or not gains.names:
+        return {}
+    # Of each gain another share and another zero, so that no two have one value.
+    shares = np.random.default_rng(0).uniform(0.5, 1.0, (2, gains.values.size))
+    others = gains.with_values(gains.values * shares[0] + 1e-9 * shares[1])
+    moved = type(estimator)(estimator.fmu, system, others)
+    sample = usual_sample(estimator)
+    before, after = (_flat(memory_after(e, sample))[1] for e in (estimator, moved))
+    numbers = list(_numbers(parts.settings, "settings"))
+    changed = [number for _, number in _numbers(moved.parts.settings, "settings")]
+    places: dict[str, list[str]] = {name: [] for name in gains.names}
+    index = {value: k for k, value in enumerate(others.values.tolist())}
+    for (place, number), other in zip(numbers, changed, strict=True):
+        k = index.get(other)
+        if k is not None and number == gains.values[k]:
+            places[gains.names[k]].append(place)
+        elif _change(np.array(number), np.array(other)) != 0.0:
+            return {}
+    return places if not np.any(_change(before, after)) and all(places.values()) else {}
+
+
+def _change(before: Vector, after: Vector) -> Vector:
+    """Difference; where one of them alone is no number, as large as a number can be."""
+    same = (before == after) | (np.isnan(before) & np.isnan(after))
+    with np.errstate(invalid="ignore"):
+        return np.where(same, 0.0, np.nan_to_num(after - before, nan=_LARGEST))
+
+
+def _constant(value: float, slopes: Vector, usual: Vector, sizes: Vector) -> float:
+    constant = value - float(slopes @ usual)
+    rounding = _ROUNDING * float(np.abs(slopes) @ (np.abs(usual) + sizes))
+    return 0.0 if abs(constant) < rounding else constant
+
+
+def _model(instance: Instance, fmu: FMU, number: int) -> ModelView:
+    at_u = np.array([fmu.defaults.get(name, 0.0) for name in fmu.inputs])
+    buffers = instance.x, instance.dx, instance.u, instance.y, instance.jacobian
+    return ModelView(*buffers, number=number, at_x=fmu.get_states(), at_u=at_u)
+
+
+def _refuse_shared(estimator: Estimator) -> None:
+    """Refuse memory that is in two places, which would be two in C."""
+    parts = estimator.parts
+    arrays = [*_arrays(tuple(parts.settings)), *_arrays(tuple(map(tuple, parts.models)))]
+    for array in _arrays(parts.state):
+        if any(np.shares_memory(array, other) for other in arrays):
+            raise InputError(
+                where=f"estimator {estimator.name}",
+                found="an array that stands in two places of its memory, or in its settings",
+                expected="memory in which each array is another one",
+                remedy="make two arrays",
+            )
+        arrays.append(array)
+
+
+def _arrays(value: Any) -> Iterator[NDArray[Any]]:
+    if isinstance(value, np.ndarray):
+        yield value
+    elif isinstance(value, tuple):
+        for entry in value:
+            yield from _arrays(entry)
+
+
+def _flat(value: Remembered) -> tuple[list[str], Vector]:
+    """Places in C of all numbers, and the numbers, (n,)."""
+    listed = list(_numbers(value, "law"))
+    return [place for place, _ in listed], np.array([number for _, number in listed])
+
+
+def _numbers(value: Any, place: str) -> Iterator[tuple[str, float]]:
+    if isinstance(value, tuple) and hasattr(value, "_fields"):
+        mark = "->" if isinstance(value, Remembered) else "."
+        for name, entry in zip(value._fields, value, strict=True):
+            yield from _numbers(entry, f"{place}{mark}{name_in_c(name)}")
+    elif isinstance(value, tuple | np.ndarray):
+        listed = value.ravel().tolist() if isinstance(value, np.ndarray) else value
+        for k, entry in enumerate(listed):
+            yield from _numbers(entry, f"{place}[{k}]")
+    elif isinstance(value, int | float | np.generic):  # all else is refused where it becomes C
+        yield place, float(value)
+
 
 _HERE = Path(__file__).parent
 _SOURCES = {"integrator.c": _HERE / "law.c", "memory.h": _HERE / "law.h"}

@@ -43,14 +43,16 @@ _PACKAGES = {
     "workbooks.read_others": ("python_calamine", "a workbook (.ods, .xlsb)"),
     "parquet": ("pyarrow", "a Parquet or Arrow file"),
     "matlab5": ("scipy", "a MAT file"),
-    "netcdf3": ("scipy", "a NetCDF file"),
-    "numpy_arrays": ("numpy", "arrays of NumPy (.npz)"),
+    "hdf5.read_netcdf": ("scipy", "a NetCDF file"),
+    "arrays.read_npz": ("numpy", "arrays of NumPy (.npz)"),
     "hdf5": ("h5py", "a MAT 7.3 or HDF5 file"),
     "mdf": ("asammdf", "an MDF file"),
     "tdms": ("nptdms", "a TDMS file"),
 }
 # Their libraries hand what a file says to compiled code, which may end the process or never return.
-_NATIVE = frozenset({"hdf5", "matlab5", "mdf", "netcdf3", "parquet", "workbooks.read_others"})
+_NATIVE = frozenset(
+    {"hdf5", "hdf5.read_netcdf", "matlab5", "mdf", "parquet", "workbooks.read_others"}
+)
 _MAT_4 = struct.Struct("<5i")  # type, rows, columns, imaginary, length of the name
 _START, _RATE = 10.0, 1e6  # [s] and [byte/s], a twentieth of what they read on a busy machine
 _ROOM = 1 << 30  # [byte] beside a hundred times what a file has, of compressed samples
@@ -97,8 +99,8 @@ _FORMS = {  # of the begin of others
     re.compile(rb"\(\d+\.\d+\) \w+ [0-9A-Fa-f]+#"): _MESSAGES.format(" (candump)"),
 }
 _BEGINS = {  # how files begin, whatever their ending
-    b"CDF\x01": "netcdf3",
-    b"CDF\x02": "netcdf3",
+    b"CDF\x01": "hdf5.read_netcdf",
+    b"CDF\x02": "hdf5.read_netcdf",
     b"PAR1": "parquet",
     b"ARROW1": "parquet",
     b"MDF     ": "mdf",
@@ -176,7 +178,7 @@ def _reader(path: Path, raw: bytes) -> _Reader:
     ):
         module = "workbooks.read_others"
     if module == "workbooks.read_excel" and b".npy" in raw[:2000]:
-        module = "numpy_arrays"
+        module = "arrays.read_npz"
     _refuse_unread(path, raw, is_workbook=module == "workbooks.read_excel")
     if not module:
         if is_json(raw):

@@ -1,14 +1,16 @@
-"""Named arrays, as MAT files have them, to groups of channels."""
+"""Named arrays, as MAT and NumPy files have them, to groups of channels."""
 
+import io
 import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from workbench.recordings.formats.contents import FileChannel, Group
+from workbench.recordings.formats.contents import Contents, FileChannel, Group
 from workbench.recordings.formats.spelling import conversion, name_and_unit, spell_unit
 from workbench.recordings.formats.stamps import is_stamp, read_stamps
 
@@ -308,3 +310,27 @@ def _flat(value: np.ndarray) -> np.ndarray:
 def by_place(entries: Sequence[Any]) -> dict[str, Any]:
     """Structures of an array of them, by the place that MATLAB gives them."""
     return {f"({number})": entry for number, entry in enumerate(entries, 1)}
+
+
+def read_npz(path: Path, raw: bytes) -> Contents:
+    """Kind, groups and notes of a file."""
+    content: dict[str, Any] = {}
+    with np.load(io.BytesIO(raw), allow_pickle=False) as arrays:
+        for name in arrays.files:
+            try:
+                array = arrays[name]
+            except ValueError:  # of objects
+                content[name] = Opaque("an array of objects of Python")
+                continue
+            if array.dtype.names:
+                content[name] = {field: array[field] for field in array.dtype.names}
+            elif array.dtype.kind in "mM":
+                content[name] = np.datetime_as_string(array) if array.dtype.kind == "M" else array
+                content[name] = [str(value) for value in content[name].ravel()]
+            elif array.dtype.kind in "US":
+                texts = [str(value) for value in np.char.asarray(array).ravel()]
+                content[name] = texts if array.ndim else texts[0]
+            else:
+                content[name] = array
+    groups, notes = read_groups(content)
+    return Contents("arrays of NumPy", groups, notes)

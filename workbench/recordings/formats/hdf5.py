@@ -1,17 +1,89 @@
-"""MAT 7.3, which is HDF5, and plain HDF5 with units in attributes."""
+"""MAT 7.3, which is HDF5, plain HDF5 with units in attributes, and NetCDF.
+
+Frames and series that pandas wrote are read with the names of their columns, whole or as tables.
+Lists of names are pickled there, and are read as text: nothing is unpickled.
+Source: pandas 2.2, pandas/io/pytables.py.
+"""
 
 import io
-from collections.abc import Collection, Mapping
+import re
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
+from scipy.io import netcdf_file
 
 from workbench.recordings.formats.arrays import Opaque, by_place, read_groups
 from workbench.recordings.formats.contents import Contents
-from workbench.recordings.formats.frames import read_frame
 from workbench.recordings.formats.matlab_objects import read_objects
+
+_PICKLED_NAME = re.compile(rb"V([^\n]*)\n")  # of protocol 0
+_INDEX_NAME = re.compile(rb"Vindex_name\np\d+\nV([^\n]*)\n")
+_COUNTED = re.compile(r"datetime64\[(ns|us|ms|s)\]")
+
+
+def read_frame(group: h5py.Group) -> dict[str, Any] | None:
+    """Columns of a group by name, the index first; None where pandas did not write it."""
+    kind = _text(group.attrs.get("pandas_type", b""))
+    if kind == "frame_table" and isinstance(group.get("table"), h5py.Dataset):
+        return _table(group["table"])
+    if kind == "series" and "values" in group and "index" in group:
+        name = _text(group.attrs.get("name", b"")) or group.name.rpartition("/")[2]
+        return {**_index(group["index"]), name: group["values"][()]}
+    if kind != "frame" or "axis1" not in group:
+        return None
+    columns = _index(group["axis1"])
+    for number in range(int(group.attrs.get("nblocks", 0))):
+        names, values = group[f"block{number}_items"][()], group[f"block{number}_values"]
+        if values.dtype.kind in "fiub":
+            columns |= _named([_text(name) for name in names], values[()])
+    return columns
+
+
+def _table(table: h5py.Dataset) -> dict[str, Any]:
+    """Columns of a table, some of which hold several of a frame."""
+    rows = table[()]
+    columns: dict[str, Any] = {}
+    called = _INDEX_NAME.search(_bytes(table.parent.attrs.get("info", b"")))
+    for field in rows.dtype.names or ():
+        values = rows[field]
+        names = _PICKLED_NAME.findall(_bytes(table.attrs.get(f"{field}_kind", b"")))
+        if field == "index":
+            name = _text(called[1]) if called else field
+            columns |= _of_index(name, _text(table.attrs.get("index_kind", b"")), values)
+        elif values.dtype.kind in "fiub":
+            wide = values.reshape(len(values), -1)
+            columns |= _named([_text(name) for name in names] or [field], wide)
+    return columns
+
+
+def _index(item: h5py.Dataset) -> dict[str, Any]:
+    name = _text(item.attrs.get("name", b""))
+    return _of_index(name, _text(item.attrs.get("kind", b"")), item[()])
+
+
+def _of_index(name: str, kind: str, values: Any) -> dict[str, Any]:
+    """An index by its name, as a time where it counts from 1970."""
+    if counted := _COUNTED.match(kind):
+        return {f"time [{counted[1]}]": values}
+    return {name if name not in ("", "N.") else "index": values}
+
+
+def _named(names: Sequence[str], values: Any) -> dict[str, Any]:
+    return {
+        name: np.ascontiguousarray(column) for name, column in zip(names, values.T, strict=True)
+    }
+
+
+def _bytes(value: Any) -> bytes:
+    return value if isinstance(value, bytes) else str(value).encode()
+
+
+def _text(value: Any) -> str:
+    return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
+
 
 _CLASS = "MATLAB_class"
 _DECODED = "MATLAB_object_decode"
@@ -157,3 +229,19 @@ def _value(item: h5py.Dataset, file: h5py.File) -> Any:
         return None
     # MATLAB counts columns first.
     return value.T
+
+
+def read_netcdf(path: Path, raw: bytes) -> Contents:
+    """Kind, groups and notes of a file."""
+    content: dict[str, Any] = {}
+    with netcdf_file(io.BytesIO(raw), mmap=False) as file:
+        for name, variable in file.variables.items():
+            values, stated = variable.data, vars(variable)["_attributes"]
+            if values.dtype.kind not in "fiub":
+                continue
+            native = np.asarray(values).astype(values.dtype.newbyteorder("="))
+            content[name] = scaled(native, stated)
+            if unit := stated.get("units"):
+                content[f"{name}_unit"] = unit.decode("utf-8", "replace")
+    groups, notes = read_groups(content)
+    return Contents("NetCDF", groups, notes)

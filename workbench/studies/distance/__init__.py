@@ -14,9 +14,8 @@ import numpy as np
 from workbench.errors import InputError
 from workbench.observers.trajectory import doubts_along
 from workbench.recordings.case import Case
-from workbench.runtime.engine import Engine, Reporter
+from workbench.runtime.engine import Engine, ProgressReporter, Reporter
 from workbench.runtime.pool import Pool
-from workbench.runtime.progress import ProgressReporter
 from workbench.studies.distance.forecast import (
     Forecaster,
     Question,

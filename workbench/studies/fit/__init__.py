@@ -24,9 +24,8 @@ from workbench.models.simulation import Drive, Simulation
 from workbench.observers.operating import ShownStart, shown_states, start_spreads
 from workbench.observers.trajectory import check_along
 from workbench.recordings.case import Case
-from workbench.runtime.engine import Engine
+from workbench.runtime.engine import Engine, ProgressReporter, StepReporter
 from workbench.runtime.pool import Pool
-from workbench.runtime.progress import ProgressReporter, StepReporter
 from workbench.studies.fit.outcome import (
     LOSSES,
     Direction,

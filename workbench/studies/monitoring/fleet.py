@@ -13,9 +13,8 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from workbench.errors import InputError
-from workbench.runtime.engine import Engine
+from workbench.runtime.engine import Engine, StepReporter
 from workbench.runtime.files import write_whole
-from workbench.runtime.progress import StepReporter
 from workbench.studies.monitoring import STATE, MonitoringResult, Reader, monitor
 from workbench.system.system import System
 

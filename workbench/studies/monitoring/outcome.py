@@ -11,10 +11,9 @@ import numpy as np
 from workbench.arrays import Matrix, Vector
 from workbench.errors import InputError
 from workbench.pages.answer import finite
-from workbench.studies.monitoring.chart import LevelChange
 from workbench.studies.monitoring.estimate import watched
 from workbench.studies.monitoring.state import RecordingResult
-from workbench.studies.monitoring.watch import Track, watch
+from workbench.studies.monitoring.watch import LevelChange, Track, watch
 from workbench.system.system import System
 from workbench.system.units import BAND
 

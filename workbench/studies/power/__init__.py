@@ -6,7 +6,6 @@ plan -> sets of recordings by the virtual rig -> verdicts -> statistics
 from workbench.studies.power.journal import Journal as Journal
 from workbench.studies.power.journal import NamedCause as NamedCause
 from workbench.studies.power.journal import SetVerdict as SetVerdict
-from workbench.studies.power.planting import Findable as Findable
 from workbench.studies.power.planting import Plantable as Plantable
 from workbench.studies.power.planting import Planting as Planting
 from workbench.studies.power.planting import Repertoire as Repertoire

@@ -14,9 +14,8 @@ from workbench.diagnosis.inference.score_test import shapes
 from workbench.diagnosis.inference.thresholds import Thresholds, of_system
 from workbench.errors import InputError
 from workbench.recordings.case import Case
-from workbench.studies.power.diagnosing import diagnose_set, information_of_set
 from workbench.studies.power.planting import Plantable, Planting, Repertoire, Scale
-from workbench.studies.power.run import PowerStudy, Setup
+from workbench.studies.power.run import PowerStudy, Setup, diagnose_set, information_of_set
 
 SURE = 0.95  # chance from which on a size is called found
 _ALIKE = 1e-9  # share of a signature that is rounding: the other has the same
@@ -53,7 +52,7 @@ def predict_campaign(
     with study.setup() as setup:
         clean = Planting("clean", seed, 0.0, {}, ())
         cases = setup.record(clean, study.rig.simulate(seed, {}))
-        diagnosis = diagnose_set(setup.problem(cases), setup.everything)
+        diagnosis = diagnose_set(setup.problem_of(cases), setup.everything)
     decides = of_system(study.system.comparison, len(study.effects))
     known = {effect.name: effect for effect in study.effects}
     return [
@@ -96,7 +95,7 @@ def limits_of_effects(
     seed : of the machine's tolerances and the sensors' noise.
     """
     names = {effect.name for effect in study.effects}
-    repertoire = Repertoire(study.rig.plantables, tuple(study.effects))
+    repertoire = study.repertoire
     with study.setup() as setup:
         clean = Planting("clean", seed, 0.0, {}, ())
         cases = setup.record(clean, study.rig.simulate(seed, {}))
@@ -105,7 +104,7 @@ def limits_of_effects(
             for plantable in wanted
             if plantable.effect not in names and np.isfinite(size := repertoire.size(plantable))
         }
-        joint, effects = information_of_set(setup.problem(cases), setup.everything, others)
+        joint, effects = information_of_set(setup.problem_of(cases), setup.everything, others)
     at = _columns_of_effects(effects, joint)
     at |= {name: [[joint.shared.index((name, _LACKING))]] for name, _ in others}
     left = beside(joint.total().N, range(len(joint.known)))
@@ -177,7 +176,7 @@ def by_oracle(
     decides = of_system(study.system.comparison, len(study.effects))
     chances = {f"{size:g}": chance(size, 1, decides) for size in sizes}
     scale = Scale(ORACLE, clear(1, decides), chances)
-    return Repertoire(planted, tuple(study.effects), scale)
+    return replace(study.repertoire, plantables=planted, scale=scale)
 
 
 def _columns_of_effects(effects: Sequence[Effect], joint: Joint) -> dict[str, list[list[int]]]:

@@ -10,17 +10,18 @@ from workbench.diagnosis import Diagnosis
 from workbench.diagnosis.inference.rivals import Rivals
 from workbench.errors import InputError, WorkerError
 from workbench.recordings.case import Case
-from workbench.runtime.engine import ALONE, Engine
-from workbench.runtime.progress import StepReporter
+from workbench.runtime.engine import ALONE, Engine, StepReporter
 from workbench.studies.design import RankedExperiment, next_stop, predict_experiments, with_sensor
 from workbench.studies.design.candidates import draw_experiment
-from workbench.studies.power.diagnosing import (
+from workbench.studies.power.planting import Group, Planting
+from workbench.studies.power.run import (
+    PowerStudy,
+    Setup,
     distance,
     distances_in_set,
     rivals_of_set,
+    work_off,
 )
-from workbench.studies.power.planting import Group, Planting
-from workbench.studies.power.run import PowerStudy, Setup, work_off
 from workbench.studies.power.statistics import share
 from workbench.studies.power.virtual_rig import FollowingRig
 
@@ -170,7 +171,7 @@ def _row(setup: Setup, planting: Planting) -> FollowingRow:
 def _follow(row: FollowingRow, setup: Setup, planting: Planting) -> None:
     (planted,) = planting.effects
     cases = setup.record(planting, setup.rig.simulate(planting.seed, planting.gains))
-    diagnosis, rivals = rivals_of_set(setup.problem(cases), setup.everything)
+    diagnosis, rivals = rivals_of_set(setup.problem_of(cases), setup.everything)
     row.verdict, row.group = diagnosis.verdict, _names(diagnosis)
     if rivals is None or len(rivals.models) == 1:
         return
@@ -192,8 +193,8 @@ def _follow(row: FollowingRow, setup: Setup, planting: Planting) -> None:
         for sensor in experiments.sensors:
             sensed = proposal.sensors.get(sensor.label)
             if sensed is not None and (at,) in sensed.prediction.groups:
-                asked = replace(setup.asked, system=with_sensor(setup.system, sensor))
-                fitted = replace(setup, asked=asked)
+                asked = replace(setup.problem, system=with_sensor(setup.system, sensor))
+                fitted = replace(setup, problem=asked)
                 row.sensed = {"sensor": sensor.label, **make(sensed, fitted)}
                 break
     row.drawn = list(map(make, predict_experiments(setup.system, rivals, plan, 1)))
@@ -214,7 +215,7 @@ def _diagnose_with(
     rig = setup.rig.following(experiment.to_dict(), setup.system)
     more = replace(setup, rig=rig).record(planting, rig.simulate(planting.seed, planting.gains))
     others = [name for name in names if name != planted]
-    asked = setup.problem([*cases, *more])
+    asked = setup.problem_of([*cases, *more])
     diagnosis, shown = distances_in_set(asked, setup.everything, planted, others)
     named = _names(diagnosis)
     return {

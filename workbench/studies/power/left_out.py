@@ -20,8 +20,7 @@ from workbench.diagnosis.laws.scan import watching
 from workbench.diagnosis.laws.writing import extended_library
 from workbench.diagnosis.simulation.residual_model import ResidualModel
 from workbench.recordings.case import read_cases
-from workbench.runtime.engine import Engine
-from workbench.runtime.progress import StepReporter
+from workbench.runtime.engine import Engine, StepReporter
 from workbench.studies.power.planting import Group, Planting
 from workbench.studies.power.run import PowerStudy
 from workbench.studies.power.statistics import share

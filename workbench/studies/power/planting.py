@@ -4,37 +4,17 @@ import math
 import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Literal, Protocol
+from typing import Literal
 
 import numpy as np
 
-from workbench.diagnosis import Diagnosis
+from workbench.diagnosis import Diagnosis, Effect
 from workbench.diagnosis.inference.score_test import CandidateScore
 from workbench.errors import InputError, unknown_name
 
 _ALIKE = 0.2  # of a shape, within which it is the same: readings of each set have own noise
 
 Kind = Literal["clean", "single", "pair", "outside", "sheet"]
-
-
-class Findable(Protocol):
-    """What is asked of an effect of the library, which the diagnosis may find."""
-
-    @property
-    def name(self) -> str:
-        """Of the effect."""
-
-    @property
-    def label(self) -> str:
-        """Of its size in results."""
-
-    @property
-    def matters(self) -> float:
-        """Least size that is worth a finding, SI."""
-
-    @property
-    def hidden(self) -> str:
-        """Why recordings cannot show it; empty if they can."""
 
 
 @dataclass(frozen=True)
@@ -134,7 +114,7 @@ class Repertoire:
     """What can be planted, and what can be found."""
 
     plantables: tuple[Plantable, ...]  # of the virtual rig
-    effects: tuple[Findable, ...]  # of the library
+    effects: tuple[Effect, ...]  # of the library
     scale: Scale = Scale()  # of all sizes
 
     def plantable(self, name: str) -> Plantable:
@@ -149,7 +129,7 @@ class Repertoire:
 
     def label(self, effect: str) -> str:
         """Name of the size of an effect of the library in results."""
-        return next(findable.label for findable in self.effects if findable.name == effect)
+        return next(known.label for known in self.effects if known.name == effect)
 
     @property
     def hidden(self) -> frozenset[str]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from workbench.arrays import Matrix
+from workbench.diagnosis import Effect
 from workbench.diagnosis.outcome import draw_heat
 from workbench.pages.answer import Answer, Measure, share_measure, share_with_interval, with_answer
 from workbench.pages.figures import LIGHT, in_style, save_figure, styled
@@ -25,7 +26,7 @@ from workbench.pages.parts import (
 )
 from workbench.pages.views import capital
 from workbench.runtime.files import write_json
-from workbench.studies.power import CLEAR, Findable, following, left_out
+from workbench.studies.power import CLEAR, following, left_out
 from workbench.studies.power.campaign import SURE, EffectChance, EffectLimit
 from workbench.studies.power.sensitivity import FACTORS, ThresholdSensitivity
 from workbench.system.units import with_unit
@@ -358,7 +359,7 @@ _LINE, _MARK = LIGHT["2"], LIGHT["0"]
 
 def write_power(
     summary: Mapping[str, Any],
-    effects: Sequence[Findable],
+    effects: Sequence[Effect],
     provenance: Mapping[str, Any],
     out: Path,
 ) -> None:

@@ -20,8 +20,7 @@ from workbench.diagnosis.simulation.residual_model import ResidualModel
 from workbench.diagnosis.simulation.simulator import WhitenedResiduals
 from workbench.errors import InputError, WorkerError
 from workbench.recordings.case import Case
-from workbench.runtime.engine import Engine, silent
-from workbench.runtime.progress import StepReporter
+from workbench.runtime.engine import Engine, StepReporter, silent
 from workbench.studies.power.planting import Planting
 from workbench.studies.power.run import PowerStudy, Setup, work_off
 from workbench.system.system import System
@@ -110,7 +109,7 @@ def _key(points: Sequence[Mapping[str, float]]) -> tuple[frozenset[tuple[str, fl
 def vary(setup: Setup, planting: Planting, names: Sequence[str]) -> ThresholdSensitivity:
     """Make one set of recordings, and diagnose it by half and twice of each threshold named."""
     cases = setup.record(planting, setup.rig.simulate(planting.seed, planting.gains))
-    usual = of_system(setup.system.comparison, len(setup.asked.effects))
+    usual = of_system(setup.system.comparison, len(setup.problem.effects))
     variants = {(name, factor): scaled(usual, name, factor) for name in names for factor in FACTORS}
     by_samples: dict[Soundness, list[Thresholds]] = {}
     for thresholds in (usual, *variants.values()):
@@ -136,7 +135,7 @@ def _verdicts(
     verdicts: dict[Thresholds, tuple[str, ...]] = {}
     try:
         with CachedResidualModel(setup.everything, setup.system, cases, samples) as simulations:
-            effects = shown_effects(setup.problem(cases), simulations).effects
+            effects = shown_effects(setup.problem_of(cases), simulations).effects
             for variant in variants:
                 diagnosis = conclude(Fit(simulations, effects, variant), effects, silent)
                 causes = (cause.effect.name for cause in diagnosis.causes)

@@ -65,7 +65,7 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
     from workbench.machines.wheelset.truth import read_truth
     from workbench.observers import choose, estimators_of
     from workbench.observers.estimators.block_filter.filter import BlockKalmanFilter
-    from workbench.observers.gains_file import usual_gains
+    from workbench.observers.gains import usual_gains
     from workbench.pages.provenance import run_of, sources
     from workbench.system.registry import load_system, open_model
 

@@ -6,8 +6,14 @@ of an estimator all shapes are known, so that each function becomes plain C over
 each set of types that it is called with.
 """
 
-from workbench.observers.export.translation.data import Data
 from workbench.observers.export.translation.functions import Primitive, Program
-from workbench.observers.export.translation.values import Array, Number, Record, Several, Value
+from workbench.observers.export.translation.values import (
+    Array,
+    Data,
+    Number,
+    Record,
+    Several,
+    Value,
+)
 
 __all__ = ["Array", "Data", "Number", "Primitive", "Program", "Record", "Several", "Value"]
