@@ -4,14 +4,18 @@ A worker of the suite finds what another one has built, and so does the next run
 """
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from string import Template
 
+import numpy as np
 import pandas as pd
 
+from workbench.api import diagnose, read_cases
 from workbench.arrays import Vector
+from workbench.diagnosis import Outcome
 from workbench.models import compiler, fmu_cache
+from workbench.recordings.case import Case
 from workbench.system.registry import load_system
 from workbench.system.system import System
 
@@ -83,3 +87,20 @@ def declare(folder: Path, library: str, system: str, **fmus: str) -> System:
         build_here(folder / "package.mo", model, folder / f"{name}.fmu")
     (folder / "system.toml").write_text(system)
     return load_system(folder)
+
+
+def diagnosed(
+    system: System, cases: Sequence[Case] | Path, out: Path, *effects: str, **given: Sequence[Case]
+) -> Outcome:
+    """What is missing in recordings or those of a folder, quietly; written in `out`."""
+    cases = read_cases(cases, system) if isinstance(cases, Path) else cases
+    quiet = {"workers": 1, "report": lambda line: None}
+    return diagnose(system, cases, effects=effects, out=out, **quiet, **given)
+
+
+def lagged(u: Vector, step: float, k: float, start: float) -> Vector:
+    """Solution of der(x) = u - k x at samples, (n,), by the closed form of each; u is held."""
+    x = [start]
+    for held in u[:-1]:
+        x.append(held / k + (x[-1] - held / k) * np.exp(-k * step))
+    return np.array(x)

@@ -9,7 +9,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from workbench.__main__ import main
-from workbench.api import diagnose, observe
+from workbench.api import observe
 from workbench.arrays import Matrix, Vector
 from workbench.diagnosis.data.motion import ModelSource
 from workbench.diagnosis.simulation.residual_model import ResidualModel
@@ -25,7 +25,7 @@ from workbench.studies.monitoring.estimate import watched
 from workbench.system.registry import load_system, open_model
 from workbench.system.system import System
 
-from .built import build_text, declare, machine, write_case
+from .built import build_text, declare, diagnosed, lagged, machine, machine_file, write_case
 from .systems import TRAIN
 
 
@@ -315,19 +315,7 @@ def test_a_diagnosis_counts_the_samples_that_an_aid_has(tmp_path):
     It is there in each third sample of two thirds of the recording. Means of so many samples are
     white, of variance one, and of weight elsewhere is none.
     """
-    text = """model Lag
-  parameter Real k = 0.5 "loss";
-  input Real u(start=1.0);
-  Real x(start=2.0, fixed=true);
-  output Real coarse;
-  output Real fine;
-equation
-  der(x) = u - k*x;
-  coarse = x;
-  fine = x;
-end Lag;
-"""
-    build_text(tmp_path, text)
+    build_text(tmp_path, machine_file("lag_alone/Lag.mo", outputs="coarse = x, fine"))
     (tmp_path / "system.toml").write_text(
         'title = "Lag"\nsample_time = "0.2 s"\nmodels.observer = { fmu = "Lag.fmu" }\n'
         'inputs.u = { unit = "1", noise = 0.0, scale = 2.0, held = true }\n'
@@ -337,31 +325,23 @@ end Lag;
     )
     system, time = load_system(tmp_path), np.arange(0.0, 120.1, 0.2)
     u = 1.0 + np.floor(time / 8.0 + 1e-9) % 2
-
-    def course(k: float) -> Vector:
-        x = [2.0]
-        for held in u[:-1]:
-            x.append(held / k + (x[-1] - held / k) * np.exp(-k * 0.2))
-        return np.array(x)
-
     true, rng = 0.51, np.random.default_rng(1)
     there = (np.arange(time.size) % 3 == 0) & ((time < 40.0) | (time > 80.0))
-    fine = np.where(there, course(true) + 0.01 * rng.standard_normal(time.size), np.nan)
+    fine = np.where(
+        there, lagged(u, 0.2, true, 2.0) + 0.01 * rng.standard_normal(time.size), np.nan
+    )
     columns = {"time [s]": time, "u [1]": u}
-    columns["coarse [1]"] = course(true) + rng.standard_normal(time.size)
+    columns["coarse [1]"] = lagged(u, 0.2, true, 2.0) + rng.standard_normal(time.size)
     write_case(tmp_path / "without", columns, "Steps")
     write_case(tmp_path / "with", {**columns, "fine [1]": fine}, "Steps")
     cases = read_cases([tmp_path / "without", tmp_path / "with"], system)
-    without, outcome = (
-        diagnose(system, [case], out=tmp_path / "out", workers=1, report=lambda line: None)
-        for case in cases
-    )
+    without, outcome = (diagnosed(system, [case], tmp_path / "out") for case in cases)
     assert without.diagnosis.causes == ()
     (cause,) = outcome.diagnosis.causes
     change = cause.parameters[cause.effect.size]
     assert (cause.effect.name, change.low < true - 0.5 < change.high) == ("k", True)
     shown = {error.channel: (error.samples, error.rms[0]) for error in outcome.errors}
-    away = np.sqrt(np.nanmean(np.square(fine - course(0.5))))
+    away = np.sqrt(np.nanmean(np.square(fine - lagged(u, 0.2, 0.5, 2.0))))
     assert shown["fine"] == (there.sum(), pytest.approx(away, rel=1e-3))
     source = ModelSource(tmp_path / "Lag.fmu", system, {})
     with ResidualModel(source, cases[1:]) as simulations:

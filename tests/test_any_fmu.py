@@ -941,28 +941,22 @@ def test_values_outside_of_the_ranges_of_the_model_are_refused(build):
             load_system(file)
 
 
-def test_a_model_that_waits_for_clocks_is_refused(tmp_path):
-    """Its clocked equations would stand still."""
-    text = machine_file("arrays_fmu/modelDescription.xml")
-    clock = '<Clock name="tick" valueReference="5" causality="input" intervalVariability="%s"/>'
-    for kind in ("constant", "triggered"):
-        with zipfile.ZipFile(tmp_path / "Clocked.fmu", "w") as archive:
-            clocked = text.replace("</ModelVariables>", f"{clock % kind}</ModelVariables>")
-            archive.writestr("modelDescription.xml", clocked)
-        with pytest.raises(InputError, match="found input clocks, tick"):
-            FMU(tmp_path / "Clocked.fmu")
-
-
-def test_a_clock_that_follows_time_within_a_model_is_refused(tmp_path):
-    """FMI has such clocks as inputs alone: whoever ticks this one, it is not the FMU."""
-    text = machine_file("arrays_fmu/modelDescription.xml")
-    clock = (
-        '<Clock name="own" valueReference="5" causality="local" intervalVariability="countdown"/>'
-    )
+@pytest.mark.parametrize(
+    ("causality", "kind", "found"),
+    [
+        ("input", "constant", "input clocks, tick"),
+        ("input", "triggered", "input clocks, tick"),
+        ("local", "countdown", "a clock 'tick' that follows time and is no input"),
+    ],
+)
+def test_a_model_with_clocks_is_refused(causality, kind, found, tmp_path):
+    """Equations that wait for them would stand still; those of time FMI has as inputs alone."""
+    clock = f'<Clock name="tick" valueReference="5" causality="{causality}" '
+    clock += f'intervalVariability="{kind}"/></ModelVariables>'
+    text = machine_file("arrays_fmu/modelDescription.xml").replace("</ModelVariables>", clock)
     with zipfile.ZipFile(tmp_path / "Clocked.fmu", "w") as archive:
-        clocked = text.replace("</ModelVariables>", f"{clock}</ModelVariables>")
-        archive.writestr("modelDescription.xml", clocked)
-    with pytest.raises(InputError, match="found a clock 'own' that follows time and is no input"):
+        archive.writestr("modelDescription.xml", text)
+    with pytest.raises(InputError, match=f"found {found}"):
         FMU(tmp_path / "Clocked.fmu")
 
 
@@ -1259,16 +1253,13 @@ def test_whole_simulations_of_co_simulation_alone_have_derivatives(integrator):
 def test_co_simulation_with_steps_of_one_size_goes_in_those_or_is_refused(tmp_path, compiled):
     """Four steps of 0.25 s fit into a sample; after samples of 1 s, one of 0.5 s does not."""
     folder = build_integrator(tmp_path, compiled("co_simulation.c", "-DONLY=0.25"))
-    path = folder / "Alone.fmu"
-    with zipfile.ZipFile(path) as archive:
-        parts = {name: archive.read(name) for name in archive.namelist()}
-    stated = b'startTime="0.0" stepSize="0.25"'
-    parts["modelDescription.xml"] = parts["modelDescription.xml"].replace(
-        b'startTime="0.0"', stated
-    )
-    with zipfile.ZipFile(path, "w") as archive:
-        for name, data in parts.items():
-            archive.writestr(name, data)
+
+    def change(folder: Path) -> None:
+        file = folder / "modelDescription.xml"
+        stated = 'startTime="0.0" stepSize="0.25"'
+        file.write_text(file.read_text().replace('startTime="0.0"', stated))
+
+    path = rewritten(folder / "Alone.fmu", tmp_path / "Stepping.fmu", change)
     with CoSimulation(path) as fmu:
         simulation = Simulation(fmu, ["u"], ["x"], [True])
         even = simulation.run(Drive(np.arange(4.0), np.ones((4, 1))), {})

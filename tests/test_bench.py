@@ -5,7 +5,6 @@ import functools
 import shutil
 import subprocess
 import sys
-import zipfile
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
@@ -49,6 +48,7 @@ from workbench.observers.estimators.open_loop import OpenLoop
 from workbench.recordings.case import Case
 from workbench.system.registry import open_model
 
+from .hostile_fmus import rewritten
 from .processes import python
 
 STEP = 0.005  # [s]
@@ -65,14 +65,13 @@ def timed(path: Path, at: Matrix) -> CallTimes:
 
 def change_source(fmu: Path, changed: Path, name: str, right: str, wrong: str) -> Path:
     """Copy an FMU with other text in one of its sources."""
-    with zipfile.ZipFile(fmu) as source, zipfile.ZipFile(changed, "w") as target:
-        for entry in source.namelist():
-            data = source.read(entry)
-            if entry == f"sources/{name}":
-                assert right.encode() in data
-                data = data.replace(right.encode(), wrong.encode())
-            target.writestr(entry, data)
-    return changed
+
+    def change(folder: Path) -> None:
+        text = (folder / "sources" / name).read_text()
+        assert right in text
+        (folder / "sources" / name).write_text(text.replace(right, wrong))
+
+    return rewritten(fmu, changed, change)
 
 
 def test_calls_of_the_minimal_model_take_nanoseconds(minimal_path, at):

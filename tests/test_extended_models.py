@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from workbench.api import diagnose
 from workbench.diagnosis import Outcome
 from workbench.diagnosis.effects.extension import build
 from workbench.diagnosis.inference.best_estimate import bands, best_estimate
@@ -23,8 +22,9 @@ from workbench.observers.replay import replay
 from workbench.observers.run import Ending
 from workbench.observers.score import score
 from workbench.observers.simulation import CaseResult
-from workbench.recordings.case import Case, read_case, read_cases
+from workbench.recordings.case import Case, read_case
 
+from .built import diagnosed
 from .recordings import record
 from .systems import WHEELSET as SYSTEM
 
@@ -195,9 +195,7 @@ def outcome(system, once) -> Outcome:
     def run(folder: Path) -> Outcome:
         for scenario in select(STOPS):
             record(scenario, 3, Effects(torque_gain=GAIN), folder / "stops" / scenario.name)
-        cases, out = read_cases([folder / "stops"], system), folder / "out"
-        effects = ("DriveTorqueGain", "WheelRadius")
-        return diagnose(system, cases, effects=effects, out=out, workers=1, report=lambda _: None)
+        return diagnosed(system, folder / "stops", folder / "out", "DriveTorqueGain", "WheelRadius")
 
     return once("diagnosis of a wrong torque", run)
 

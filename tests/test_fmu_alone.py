@@ -5,7 +5,6 @@ Recordings are made by SciPy from equations of their own; the FMU is used as one
 
 import json
 import re
-import zipfile
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,7 +16,7 @@ from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
 from workbench.__main__ import main
-from workbench.api import diagnose, read_cases
+from workbench.api import read_cases
 from workbench.diagnosis import Outcome, Problem, catalogue, choose, problem_of
 from workbench.diagnosis.data.clocks import held_otherwise
 from workbench.diagnosis.effects.candidates import rate_terms
@@ -34,7 +33,9 @@ from workbench.studies.power.own_model import own_model
 from workbench.system.registry import load_system
 from workbench.system.system import System
 
-from .built import build_text, machine_file, write_case
+from . import built
+from .built import build_text, lagged, machine_file, write_case
+from .hostile_fmus import rewritten
 from .schemas import check
 
 # The level has another name than the output, so that no output's name tells where it begins.
@@ -97,8 +98,7 @@ def tank(tmp_path_factory) -> System:
 
 def quietly(system: System, recordings: Path, *effects: str) -> Outcome:
     """A diagnosis of recordings, which writes beside them."""
-    cases, out = read_cases(recordings, system), recordings.parent / "out"
-    return diagnose(system, cases, effects=effects, out=out, workers=1, report=lambda line: None)
+    return built.diagnosed(system, recordings, recordings.parent / "out", *effects)
 
 
 def diagnosed(system: System, folder: Path, **truth: float) -> Outcome:
@@ -249,8 +249,7 @@ def test_what_nothing_shows_and_what_is_exact_are_no_candidates(tmp_path):
     names = [effect.name for effect in catalogue(system, None)]
     assert "Start[x]" not in names
     assert "SensorQuantisation[second]" in names
-    cases = read_cases(record(tmp_path / "recordings", seed=2), system)
-    outcome = diagnose(system, cases, out=tmp_path / "out", workers=1, report=lambda line: None)
+    outcome = diagnosed(system, tmp_path, seed=2)
     tried = [score.effect.name for score in outcome.diagnosis.scores]
     assert not [name for name in tried if name.startswith("Sensor") and name.endswith("[second]")]
 
@@ -476,32 +475,18 @@ def test_dry_friction_stops_a_body_within_a_sample(swing, tmp_path):
 
 def test_a_single_recording_that_forgets_its_start_names_the_parameter(tmp_path):
     """40 s of c der(x) = u - k x from x = u/k: what is left out first says how it began."""
-    text = """model Lag
-  parameter Real k = 0.5 "loss";
-  input Real u(start=1.0);
-  Real x(start=2.0, fixed=true);
-  output Real y;
-equation
-  der(x) = u - k*x;
-  y = x;
-end Lag;
-"""
-    build_text(tmp_path, text)
+    build_text(tmp_path, machine_file("lag_alone/Lag.mo", outputs="y"))
     (tmp_path / "system.toml").write_text(
         'title = "Lag"\nsample_time = "0.2 s"\nmodels.observer = { fmu = "Lag.fmu" }\n'
         'inputs.u = { unit = "1", noise = 0.0, scale = 2.0, held = true }\n'
         'outputs.y = { unit = "1", noise = 0.01, scale = 2.0 }\n'
     )
     system, time = load_system(tmp_path), np.arange(0.0, 40.1, 0.2)
-    u, x = 1.0 + np.floor(time / 8.0 + 1e-9) % 2, [1.0 / 0.6]
-    for held in u[:-1]:
-        x.append(held / 0.6 + (x[-1] - held / 0.6) * np.exp(-0.6 * 0.2))
-    y = np.array(x) + 0.01 * np.random.default_rng(1).standard_normal(time.size)
+    u = 1.0 + np.floor(time / 8.0 + 1e-9) % 2
+    y = lagged(u, 0.2, 0.6, 1.0 / 0.6) + 0.01 * np.random.default_rng(1).standard_normal(time.size)
     columns = {"time [s]": time, "u [1]": u, "y [1]": y}
     write_case(tmp_path / "recordings/0", columns, "Steps")
-    cases = read_cases(tmp_path / "recordings", system)
-    outcome = diagnose(system, cases, out=tmp_path / "out", workers=1, report=lambda line: None)
-    (cause,) = outcome.diagnosis.causes
+    (cause,) = quietly(system, tmp_path / "recordings").diagnosis.causes
     assert "k" in {cause.effect.name, *cause.confusable_with}
     change = cause.parameters[cause.effect.size]
     assert change.low < 0.1 < change.high < change.low + 0.03
@@ -636,16 +621,14 @@ def test_an_fmu_around_another_has_its_rates_and_derivatives_with_terms(swing, t
 
 def test_another_tools_fmu_is_asked_for_derivatives_of_outputs_and_rates_alone(swing, tmp_path):
     """FMI grants no others, and some tools end with an error; v is no output of the swing."""
-    with zipfile.ZipFile(swing.source.parent / "Swing.fmu") as archive:
-        files = {name: archive.read(name) for name in archive.namelist()}
-    described = re.sub(
-        rb'generationTool="[^"]*"', b'generationTool="Other"', files["modelDescription.xml"]
-    )
-    path = tmp_path / "Other.fmu"
-    with zipfile.ZipFile(path, "w") as archive:
-        for name, content in (files | {"modelDescription.xml": described}).items():
-            archive.writestr(name, content)
-    with FMU(path) as model:
+
+    def change(folder: Path) -> None:
+        file = folder / "modelDescription.xml"
+        other = re.sub('generationTool="[^"]*"', 'generationTool="Other"', file.read_text())
+        file.write_text(other)
+
+    original = swing.source.parent / "Swing.fmu"
+    with FMU(rewritten(original, tmp_path / "Other.fmu", change)) as model:
         assert model.description.tool == "Other"
         model.start({})
         assert model.states_derivatives(np.append(model.rate_references, model.references(["s"])))

@@ -3,7 +3,7 @@
 import builtins
 import json
 import tomllib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +11,6 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from workbench.__main__ import main
-from workbench.api import diagnose
-from workbench.diagnosis import Outcome
 from workbench.errors import InputError
 from workbench.observers import choose
 from workbench.recordings.case import read_cases
@@ -23,7 +21,7 @@ pytest.importorskip("casadi", reason="needs the extra [compiler]")
 pytest.importorskip("rumoca", reason="needs the extra [compiler]")
 pytest.importorskip("ziglang", reason="needs the extra [compiler]")
 
-from .built import build_text, machine_file
+from .built import build_text, diagnosed, machine_file
 
 NOISE = 0.05  # K
 
@@ -234,14 +232,8 @@ def test_it_is_simulated_on_its_recordings(folder, tmp_path):
         assert max(errors.values()) < 0.2 * alone
 
 
-def diagnosed(folder: Path, out: Path, effects: Sequence[str] = ()) -> Outcome:
-    system = load_system(folder)
-    cases = read_cases([folder / "recordings"], system)
-    return diagnose(system, cases, effects=effects, out=out, workers=1, report=lambda line: None)
-
-
 def test_the_wall_that_seeps_is_named(folder, tmp_path):
-    diagnosis = diagnosed(folder, tmp_path).diagnosis
+    diagnosis = diagnosed(load_system(folder), folder / "recordings", tmp_path).diagnosis
     assert diagnosis.verdict == "found"
     (cause,) = diagnosis.causes
     assert cause.effect.name == "Seepage"

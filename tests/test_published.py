@@ -18,7 +18,6 @@ from scipy.optimize import least_squares
 
 import workbench as wb
 from workbench.__main__ import main
-from workbench.api import diagnose
 from workbench.arrays import Vector
 from workbench.diagnosis import Outcome
 from workbench.errors import InputError
@@ -33,15 +32,12 @@ from workbench.machines.published import (
 from workbench.recordings.case import Case, read_case, read_cases
 from workbench.recordings.datasets import PREPARED, PublishedRecording, PublishedSet, write_cases
 from workbench.system.registry import load_system
-from workbench.system.system import System
+
+from .built import diagnosed
 
 
 def by_name(folder: Path, system: str) -> dict[str, Case]:
     return {case.name: case for case in read_cases([folder], load_system(system))}
-
-
-def diagnosed(system: System, cases: list[Case], out: Path, **more: list[Case]) -> Outcome:
-    return diagnose(system, cases, out=out, workers=1, report=lambda line: None, **more)
 
 
 @pytest.mark.parametrize(

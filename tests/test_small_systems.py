@@ -1,7 +1,6 @@
 """Systems without states, without inputs, and with few samples go the way of all others."""
 
 import shutil
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,7 +10,6 @@ import pytest
 from numpy.testing import assert_allclose
 
 from workbench.__main__ import main
-from workbench.api import diagnose
 from workbench.diagnosis import Outcome
 from workbench.diagnosis.data.cleaning import deviation_of
 from workbench.diagnosis.data.motion import led_by, motion
@@ -25,6 +23,7 @@ from workbench.recordings.case import check_recording, read_cases
 from workbench.system.registry import load_system, open_model
 from workbench.system.units import quantity
 
+from . import built
 from .built import build_here, machine, write_case
 
 BALANCE, BALANCE_FILE = machine("balance")
@@ -76,10 +75,8 @@ def status_of(command: str, folder: Path, out: Path, name: str = "") -> int:
     return main([command, *given, "--workers", "1"])
 
 
-def diagnosed(folder: Path, out: Path, effects: Sequence[str] = ()) -> Outcome:
-    system = load_system(folder)
-    cases = read_cases([folder / "recordings"], system)
-    return diagnose(system, cases, effects=effects, out=out, workers=1, report=lambda line: None)
+def diagnosed(folder: Path, out: Path, *effects: str) -> Outcome:
+    return built.diagnosed(load_system(folder), folder / "recordings", out, *effects)
 
 
 def test_a_unit_may_begin_with_one_over():
@@ -175,7 +172,7 @@ def test_a_model_without_anything_to_estimate_is_refused(balance, capsys, tmp_pa
     shutil.copytree(balance / "recordings", folder / "recordings")
     assert status_of("simulate", folder, tmp_path / "out") == 2
     assert "expected something to estimate" in capsys.readouterr().err
-    outcome = diagnosed(folder, tmp_path, ["DryFriction"])
+    outcome = diagnosed(folder, tmp_path, "DryFriction")
     assert outcome.diagnosis.verdict == "found"
     assert best_estimate(outcome, "00_pull") is None
 
@@ -216,10 +213,8 @@ def test_the_pore_is_named_and_not_the_wall(bottle, tmp_path):
 
 
 def test_a_single_recording_will_do(bottle, tmp_path):
-    system = load_system(bottle)
-    cases = read_cases([bottle / "recordings" / "01_leak"], system)
-    diagnosis = diagnose(system, cases, out=tmp_path, workers=1, report=lambda line: None).diagnosis
-    (cause,) = diagnosis.causes
+    one = bottle / "recordings" / "01_leak"
+    (cause,) = built.diagnosed(load_system(bottle), one, tmp_path).diagnosis.causes
     assert cause.effect.name == "Pore"
     assert cause.parameters["k"].value == pytest.approx(LEAK, rel=2e-3)
 
@@ -238,14 +233,8 @@ def test_what_is_before_only_leads_to_what_counts(bottle, tmp_path):
     toml = (case / "case.toml").read_text()
     (case / "case.toml").write_text(f'{toml}counts_from = "150 s"\n')
     system = load_system(bottle)
-    outcome = diagnose(
-        *(system, read_cases([bottle / "recordings" / "00_leak"], system)),
-        held_out=read_cases([case], system),
-        effects=["Pore"],
-        out=tmp_path / "out",
-        workers=1,
-        report=lambda line: None,
-    )
+    held_out, fitted = read_cases([case], system), bottle / "recordings" / "00_leak"
+    outcome = built.diagnosed(system, fitted, tmp_path / "out", "Pore", held_out=held_out)
     (error,) = [error for error in outcome.errors if error.held_out]
     assert error.samples == 50
     # From the start on: a tight bottle would then stand at 5.6 bar, this one is below 1.3.

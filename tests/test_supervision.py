@@ -48,6 +48,14 @@ def home() -> Iterator[Path]:
         yield Path(folder)
 
 
+def shell(line: str, folder: Path, longest: float = LONGEST) -> subprocess.CompletedProcess[str]:
+    """What a shell makes of a line, in a folder, within some seconds."""
+    given = {"cwd": folder, "env": {**os.environ, "PYTHONPATH": str(ROOT)}, "timeout": longest}
+    return subprocess.run(
+        ["bash", "-c", line], capture_output=True, text=True, check=False, **given
+    )
+
+
 def left(folder: Path) -> list[Path]:
     return list((folder / "tmp").iterdir())
 
@@ -168,15 +176,7 @@ def test_of_a_process_that_a_model_has_doubled_one_tells_the_results(hostile_pat
 @pytest.mark.parametrize("limit", ["d", "v"])
 def test_memory_that_is_short_is_told_before_libraries_hang(limit, home):
     """OpenBLAS tries again for minutes to get what it needs, where 150 MB are allowed."""
-    run = subprocess.run(
-        ["bash", "-c", f"ulimit -{limit} 150000; {sys.executable} -m workbench systems"],
-        cwd=home,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=60,
-    )
+    run = shell(f"ulimit -{limit} 150000; {sys.executable} -m workbench systems", home, 60.0)
     assert run.returncode == 1
     assert "memory is short: 146 MB are allowed, and a command takes 350 MB" in run.stderr
 
@@ -192,15 +192,8 @@ def test_a_recording_that_does_not_fit_is_refused_before_the_work(home):
         there_and_back = itertools.cycle([*samples, *reversed(samples)])
         for number, row in zip(range(400_000), there_and_back, strict=False):
             table.write(f"{number * 0.005:.3f},{row}\n")
-    command = ("simulate", "long", "--estimator", "open_loop", "--out", "out")
-    run = subprocess.run(
-        ["bash", "-c", f"ulimit -d 400000; {sys.executable} -m workbench {' '.join(command)}"],
-        cwd=home,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    command = f"{sys.executable} -m workbench simulate long --estimator open_loop --out out"
+    run = shell(f"ulimit -d 400000; {command}", home)
     assert run.returncode == 2, run.stderr
     assert "found 400000 samples, whose run takes about 402 MB; expected what fits" in run.stderr
 
@@ -208,15 +201,7 @@ def test_a_recording_that_does_not_fit_is_refused_before_the_work(home):
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a full device")
 @pytest.mark.parametrize("output", [">/dev/full", ">&-", "--json >/dev/full", "--json >&-"])
 def test_results_that_cannot_be_printed_are_told(output, home):
-    run = subprocess.run(
-        f"{sys.executable} -m workbench systems {output}",
-        shell=True,
-        cwd=home,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    run = shell(f"{sys.executable} -m workbench systems {output}", home)
     assert run.returncode == 1
     assert re.fullmatch(r"error: standard output (takes no more|is closed).*\n", run.stderr)
 
