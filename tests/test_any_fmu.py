@@ -1183,6 +1183,20 @@ def test_a_unit_that_is_another_than_the_models_is_refused_with_what_to_write(
         load_system(path)
 
 
+def test_an_fmu_of_one_instance_in_a_process_has_no_variant(build, tmp_path):
+    """A second one has the values of the first in FMUs that keep them in globals."""
+
+    def change(folder: Path) -> None:
+        text = (folder / "modelDescription.xml").read_text()
+        once = 'modelIdentifier="Room" canBeInstantiatedOnlyOncePerProcess="true"/>'
+        text = text.replace('modelIdentifier="Room"/>', once)
+        (folder / "modelDescription.xml").write_text(text)
+
+    path = rewritten(build("RELAYS"), tmp_path / "Once.fmu", change)
+    with FMU(path) as fmu, pytest.raises(InputError, match="two instances are needed here"):
+        fmu.variant({"G": 40.0})
+
+
 def test_what_needs_modelica_asks_for_the_class(build):
     system = load_system(renamed_system(build("RELAYS")))
     with pytest.raises(InputError, match=r"found the FMU Room.fmu, and no 'class'"):

@@ -196,7 +196,8 @@ class Description:
                 where=str(self.path),
                 found=f"binaries for {', '.join(self.platforms) or 'no platform'}",
                 expected=f"a binary for this machine ({fmpy.platform_tuple})",
-                remedy="compile the FMU's sources, for instance with 'fmpy compile'",
+                remedy="export the model for this machine, or compile the FMU's sources if it has "
+                "any, for instance with 'fmpy compile'",
             )
         self.library(interface)
         return self.interfaces[interface]

@@ -709,7 +709,22 @@ class FMU(FMUInstance):
         super().close()
 
     def variant(self, parameters: Mapping[str, float]) -> "FMU":
-        """Another instance with some parameters changed, which is closed with this one."""
+        """Another instance with some parameters changed, which is closed with this one.
+
+        Raises
+        ------
+        InputError
+            If the FMU has one instance in a process alone.
+        """
+        if self.description.require(self.interface).one_instance_per_process:
+            raise InputError(
+                where=str(self.path),
+                found="canBeInstantiatedOnlyOncePerProcess, and two instances are needed here, "
+                "whose parameters differ",
+                expected="an FMU that can have several instances in a process",
+                remedy="export it so; simulate with other estimators than imm, fit and diagnose "
+                "need one alone",
+            )
         other = type(self)(self.path, self.names, {**self._given, **parameters})
         other.scales = self.scales
         self._variants.append(other)
