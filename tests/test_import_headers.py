@@ -78,6 +78,16 @@ def test_a_header_that_comes_again_on_each_page_is_no_table(tmp_path):
     assert_allclose(group.channels[0].values, np.arange(60))
 
 
+@pytest.mark.parametrize(("unit", "sizes"), [("mm", [60]), ("cm", [40, 20])])
+def test_a_row_of_other_units_below_a_header_that_comes_again_begins_a_table(tmp_path, unit, sizes):
+    rows = [f"{k};4.{k % 9};95{k % 7}.1" for k in range(60)]
+    names, units = "time;inflow;h", f"s;l/s;{unit}"
+    lines = [names, "s;l/s;mm", *rows[:40], names, units, *rows[40:]]
+    groups = read_recorded_file(table(tmp_path / "a.csv", lines)).groups
+    assert [group.channels[2].values.size for group in groups] == sizes
+    assert groups[-1].channels[2].unit == unit
+
+
 def test_marks_of_order_within_a_file_are_no_part_of_a_number(tmp_path):
     parts = [f"{k};4.{k % 9};95{k % 7}.1\n" for k in range(60)]
     text = "\ufefftime [s];inflow [l/s];h [mm]\n" + "\ufeff".join(

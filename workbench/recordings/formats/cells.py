@@ -206,6 +206,11 @@ def _begins_table(
     if any(len(_trim(row)) > len(names) or not _is_data(row) for row in following):
         return False
     if names == [cell.strip() for cell in _trim(table.names)]:
+        units = [
+            [spell_unit(cell) for cell in row] for row in rows[i + 1 : below] if _are_units(row)
+        ]
+        if any(_trim(own) != list(_trim(table.units)) for own in units):
+            return True
         last = table.rows[bisect_left(table.lines, lines[i]) - 1][0]
         pair = last.replace(",", "."), following[0][0].replace(",", ".")
         return all(map(is_number, pair)) and float(pair[1]) <= float(pair[0])
