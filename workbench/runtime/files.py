@@ -101,8 +101,10 @@ def _prove_room(folder: Path) -> None:
 def require_writable(path: Path) -> None:
     """Refuse a file that could not be written, before the work that leads to it."""
     with _refusing_in_words(path):
-        if path.is_dir():
-            raise IsADirectoryError(0, "a folder, and no file")
+        with suppress(FileNotFoundError):
+            # Path.is_dir() hides from Python 3.14 on why it cannot tell.
+            if stat.S_ISDIR(path.stat().st_mode):
+                raise IsADirectoryError(0, "a folder, and no file")
         path.parent.mkdir(parents=True, exist_ok=True)
         _prove_room(path.parent)
 
