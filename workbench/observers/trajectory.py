@@ -94,7 +94,7 @@ def check_along(
             driven = [name for name in driving_names(system) if fmu.is_continuous(name)]
             corrected = np.column_stack([u, np.zeros((time.size, len(system.corrections)))])
             places = [driving_names(system).index(name) for name in driven]
-            for parameters in ({}, _elsewhere(fmu, moved)):
+            for parameters in ({}, _elsewhere(fmu, moved)) if moved else ({},):
                 fmu.start(begin, parameters)
                 fmu.check_derivatives(driven, outputs, at, x, corrected[:, places])
     except NoFunctionError:
