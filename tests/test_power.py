@@ -85,6 +85,12 @@ def said(
     return SetVerdict(Planting(kind, 1, 4.0, gains, effects), verdict, causes, None, None, 1.0)
 
 
+def in_part(gains: dict[str, float], *parts: tuple[str, ...]) -> SetVerdict:
+    """A verdict that two effects, or what no catalogue has, are partly explained by causes."""
+    kind: Kind = "outside" if len(gains) == 1 else "pair"
+    return dataclasses.replace(said(gains, kind=kind, other="partly explained"), parts=parts)
+
+
 def named(effect: str, *twins: str, **intervals: tuple[float, float, float]) -> NamedCause:
     return NamedCause(effect, intervals, twins)
 
@@ -241,6 +247,8 @@ def test_summary_counts_what_was_said(tmp_path):
         said({"friction_step": 0.04}, named("WaterFilm"), kind="outside"),
         said({"friction_step": 0.04}, kind="outside", other="unexplained"),
         said({"drive_beat": 0.02}, kind="outside", other="failed"),
+        in_part({"friction_step": 0.04}, ("WaterFilm", "FxGain")),
+        in_part({"fx_gain": 0.008, "fade": 1e-4}, ("DriveTorqueGain", "FxGain"), ("WaterFilm",)),
     ]
     summary = summarise(results, REPERTOIRE)
     shares = (
@@ -250,19 +258,24 @@ def test_summary_counts_what_was_said(tmp_path):
         "right_alone",
         "unexplained",
         "coverage",
+        "partly_right",
     )
     assert {key: (summary[key]["hits"], summary[key]["of"]) for key in shares} == {
         "false_alarms": (1, 2),
         "right_first": (2, 5),  # the inertia cannot be seen, and is no miss
         "right_first_above_noise": (2, 4),
         "right_alone": (1, 5),
-        "unexplained": (1, 3),
+        "unexplained": (1, 4),
         "coverage": (1, 1),
+        "partly_right": (1, 2),
     }
-    assert [summary["pairs"][key]["of"] for key in ("both", "both_seen_alone")] == [1, 0]
-    assert summary["outside"]["friction_step"]["verdicts"] == {"4": {"found": 1, "unexplained": 1}}
+    assert [summary["pairs"][key]["of"] for key in ("both", "both_seen_alone")] == [2, 0]
+    assert summary["outside"]["friction_step"]["verdicts"] == {
+        "4": {"found": 1, "unexplained": 1, "partly explained": 1}
+    }
     assert summary["confusion"]["BrakeFade"] == {"BrakeFade": 1, "WaterFilm": 1}
     assert [one["said"] for one in summary["wrong"]] == [["WaterFilm"], ["WaterFilm"]]
+    assert [row["said"] for row in summary["partly_wrong"]] == [["WaterFilm"]]
     assert len(summary["failed"]) == 1
     write_power(summary, REPERTOIRE.effects, PROVENANCE, tmp_path)
     written = json.loads((tmp_path / "power.json").read_text())
@@ -298,7 +311,7 @@ def test_line_that_a_kill_cut_off_is_forgotten(tmp_path):
     path = tmp_path / "sets.jsonl"
     first, second = (
         said({"fx_gain": 0.1}, named("FxGain", "ApexOffset", gain=(0.1, 0.0, 0.2))),
-        said({}),
+        in_part({"friction_step": 0.04}, ("WaterFilm", "FxGain")),
     )
     journal = Journal(path, IDENTITY, resume=False)
     journal.append(first)

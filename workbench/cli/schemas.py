@@ -229,12 +229,13 @@ def power_summaries() -> dict[str, Schema]:
         "sets": WHOLE,
         "scale": declared(Scale),
         "failed": listed(closed({"rig error": TEXT})),
-        "false_alarms right_first right_first_above_noise right_alone unexplained coverage": SHARE,
+        "false_alarms right_first right_first_above_noise right_alone unexplained coverage "
+        "partly_right": SHARE,
         "pairs": closed({"both both_seen_alone": SHARE}),
         "effects": by_name(closed({**effect, "coverage": SHARE})),
         "outside": by_name(closed(outside)),
         "confusion": by_name(by_name(WHOLE)),
-        "wrong": listed(closed({"rig": TEXT, "said": TEXTS})),
+        "wrong partly_wrong": listed(closed({"rig": TEXT, "said": TEXTS})),
     }
     sheet = listed(closed({**wrong, "wrong_name": FLAG}))
     proposed = {" ".join(left_out.SHARES): SHARE, "sets": listed(declared(left_out.LeftOutRow))}

@@ -47,6 +47,8 @@ class SetVerdict:
     # size that was planted, over the standard deviation of its estimate about the nominal model;
     # None if that was not one effect of the catalogue
     clearness: float | None = None
+    # names of each cause of what is partly explained, strongest first: its own, then its twins'
+    parts: tuple[tuple[str, ...], ...] = ()
 
     @property
     def first(self) -> str:
@@ -77,8 +79,19 @@ def verdict_of(
         planted = repertoire.plantable(name)
         if (score := planted.score_of(diagnosis)) is not None:
             clearness = float(abs(size) / score.sigma)
+    parts = tuple(
+        (cause.effect.name, *cause.confusable_with)
+        for cause in diagnosis.causes * (diagnosis.verdict == "partly explained")
+    )
     return SetVerdict(
-        planting, diagnosis.verdict, causes, before, after, seconds, clearness=clearness
+        planting,
+        diagnosis.verdict,
+        causes,
+        before,
+        after,
+        seconds,
+        clearness=clearness,
+        parts=parts,
     )
 
 
@@ -158,4 +171,5 @@ def _read_verdict(content: dict[str, Any]) -> SetVerdict:
     )
     planting = content["planting"]
     planting = Planting(**{**planting, "effects": tuple(planting["effects"])})
-    return SetVerdict(**{**content, "planting": planting, "causes": causes})
+    parts = tuple(map(tuple, content["parts"]))
+    return SetVerdict(**{**content, "planting": planting, "causes": causes, "parts": parts})

@@ -463,6 +463,7 @@ def format_power(summary: Mapping[str, Any]) -> str:
         f"... where it is above noise         {_text(summary['right_first_above_noise'])}   from "
         f"{CLEAR:g} standard deviations on",
         f"... and no other cause              {_text(summary['right_alone'])}",
+        f"right first, where partly explained {_text(summary['partly_right'])}",
         f"both of a pair                      {_text(summary['pairs']['both'])}",
         f"... each of which is found alone    {_text(summary['pairs']['both_seen_alone'])}",
         f'unknown cause is "unexplained"      {_text(summary["unexplained"])}',
@@ -485,8 +486,9 @@ def format_power(summary: Mapping[str, Any]) -> str:
         )
         size = with_unit(unknown["size"], unknown["unit"])
         lines.append(f"{name:<30}{size:>18}  {'; '.join(verdicts)}")
-    lines += ["", f"sets with a wrong name: {len(summary['wrong'])}"]
-    lines += [f"  {' and '.join(row['said'])} ({row['rig']})" for row in summary["wrong"]]
+    for of, rows in (("with", summary["wrong"]), ("partly explained by", summary["partly_wrong"])):
+        lines += ["", f"sets {of} a wrong name: {len(rows)}"]
+        lines += [f"  {' and '.join(row['said'])} ({row['rig']})" for row in rows]
     return "\n".join(lines)
 
 

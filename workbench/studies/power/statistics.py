@@ -40,6 +40,11 @@ def named_right(result: SetVerdict) -> bool:
     )
 
 
+def named_in_part(result: SetVerdict) -> bool:
+    """Whether what was planted, or its group, is the first cause of what is partly explained."""
+    return any(effect in group for group in result.parts[:1] for effect in result.planting.effects)
+
+
 def above_noise(result: SetVerdict) -> bool:
     """Whether a finding was possible: something was found, or the size is clear of its scatter.
 
@@ -122,6 +127,12 @@ def summarise(results: Sequence[SetVerdict], repertoire: Repertoire) -> dict[str
             {"rig": result.planting.options, "said": [cause.effect for cause in result.causes]}
             for result in results
             if result.causes and not named_right(result)
+        ],
+        "partly_right": share(named_in_part(result) for result in results if result.parts),
+        "partly_wrong": [
+            {"rig": result.planting.options, "said": [group[0] for group in result.parts]}
+            for result in results
+            if result.parts and not named_in_part(result)
         ],
     }
 
