@@ -96,17 +96,9 @@ def test_what_all_others_are_early_against_is_late(monkeypatch):
 
 
 def test_signals_that_are_late_by_different_times_are_listed(monkeypatch):
-    printed = said({"u": 3e-3, "v": 2e-3, "w": 8e-3, "x": 5e-3}, monkeypatch)
-    assert printed.skews == {"u": 3e-3, "v": 2e-3, "w": 8e-3, "x": 5e-3}
+    printed = said({"u": 3e-3, "v": -2e-3, "w": 8e-3, "x": 5e-3}, monkeypatch)
+    assert printed.skews == {"u": 3e-3, "v": -2e-3, "w": 8e-3, "x": 5e-3}
     assert printed.signals == ("u", "v", "w", "x")
-
-
-def test_what_others_are_early_against_is_late_with_what_is_later_still(monkeypatch):
-    """Of four signals in two times, those are late that are fewest, and that are not early."""
-    printed = said({"u": -3e-3, "v": -3e-3, "w": 2e-3}, monkeypatch)
-    assert printed.skews == pytest.approx({"i": 3e-3, "w": 5e-3})
-    printed = said({"u": -3e-3, "v": 2e-3}, monkeypatch)
-    assert printed.skews == pytest.approx({"i": 3e-3, "v": 5e-3})
 
 
 def test_clocks_that_are_right_are_no_cause(monkeypatch):
@@ -191,26 +183,6 @@ def test_one_late_signal_is_named_and_its_advice_leads_to_the_cause(signal, ms, 
     assert skew.low <= 1e-3 * ms <= skew.high
 
 
-@pytest.mark.parametrize(
-    "late", [{"i": 2, "w": 5}, pytest.param({"i": 5, "w": 3}, marks=pytest.mark.long)]
-)
-def test_two_late_signals_are_named_and_their_loggers_are_causes(late, tmp_path):
-    """All but the voltage, which drives the motor: it is none of them that is early."""
-    for name in ("as it was", "as advised"):
-        (tmp_path / name).mkdir()
-    skews = {signal: 1e-3 * ms for signal, ms in late.items()}
-    undeclared = diagnosis(late, tmp_path / "as it was").diagnosis
-    assert undeclared.late.skews == pytest.approx(skews, abs=1e-4)
-    advised = diagnosis(
-        late, tmp_path / "as advised", '[loggers]\ni = ["i"]\nw = ["w"]\n'
-    ).diagnosis
-    assert (advised.verdict, advised.late) == ("found", None)
-    for cause in advised.causes:
-        skew = cause.parameters["skew"]
-        assert skew.low <= skews[cause.effect.late[0]] <= skew.high
-    assert {cause.effect.late[0] for cause in advised.causes} == {*late}
-
-
 @pytest.mark.parametrize("signal", ["i", "w"])
 def test_a_clock_that_explains_what_is_wrong_is_a_cause_from_the_least_time_on(signal, tmp_path):
     """One sample late, of which 0.6 matter; a cause beside others has to be twice as late."""
@@ -252,7 +224,7 @@ def test_a_clock_tells_nothing_of_an_input_that_moves_nothing(tmp_path):
             joint = fit.quadratics(lin)
             tells = dict(zip(joint.shared, np.diag(joint.total().N), strict=True))
             assert tells["TimeSkew[room]", "skew"] == 0.0
-            assert tells["TimeSkew[i]", "skew"] > (1.0 / SAMPLE) ** 2
+            assert tells["TimeSkew[u]", "skew"] > (1.0 / SAMPLE) ** 2
 
 
 def test_signals_in_time_are_not_late(tmp_path):

@@ -503,10 +503,9 @@ def _late(late: LateSignals) -> str:
     """Signals that are late, and what to do, for people."""
     if len({*late.skews.values()}) > 1:
         each = ", ".join(f"{name} by {with_unit(skew, 's')}" for name, skew in late.skews.items())
-        loggers = ", ".join(f'{name} = ["{name}"]' for name in late.skews)
         return (
-            f"Signals are late by different times: {each}. Add {loggers} to [loggers], in one list "
-            "those that share a logger, and diagnose again."
+            f"Signals are late by different times: {each}. Say in [loggers] which signals share a "
+            "logger, and diagnose again."
         )
     size, reach = abs(late.skew), BAND * late.sigma
     by = with_interval(size, size - reach, size + reach, "s")

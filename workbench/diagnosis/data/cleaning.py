@@ -92,8 +92,7 @@ def _out_and_back(values: Vector, mask: Mask, scale: Vector, sound: Soundness) -
     """Of samples off a running median, those that leave the lines on both sides of them.
 
     A signal that turns fast is off the median too, but comes or goes along a line; or, at the end
-    of a swing, along a curve, which differences of high order leave nothing of. One that begins to
-    swing goes on so without its first samples; beside a wrong one, only noise does.
+    of a swing, along a curve, which differences of high order leave nothing of.
     """
     jump = sound.spike * scale
     padded = np.pad(values, 2, constant_values=np.nan)  # at an end, one side has to do
@@ -103,26 +102,23 @@ def _out_and_back(values: Vector, mask: Mask, scale: Vector, sound: Soundness) -
     for first, end in runs(mask):
         sides = [side for side in (before[first], after[end - 1]) if np.isfinite(side)]
         leaves = min(sides, default=0.0) > 1.0 or max(sides, default=0.0) < -1.0
-        if leaves:
-            rough, without = _rough(values, mask, first, end)
-            kept[first:end] = rough > sound.held * scale[first:end].min() > without
+        kept[first:end] = (
+            leaves and _rough(values, first, end) > sound.held * scale[first:end].min()
+        )
     return kept
 
 
-def _rough(values: Vector, mask: Mask, first: int, end: int) -> tuple[float, float]:
-    """Largest difference of high order about samples, with and without what is off.
+def _rough(values: Vector, first: int, end: int) -> float:
+    """Largest difference of high order about samples, as noise of which size makes it.
 
-    Each as noise of which size makes it. Without are the values that leave least squares of
-    differences. Infinite and zero at an end, of which differences hardly depend.
+    Infinite at an end, of which it hardly depends.
     """
     if first == 0 or end == values.size:
-        return np.inf, 0.0
-    near = slice(max(first - 2 * _ORDER, 0), end + 2 * _ORDER)
-    of_samples = np.diff(np.eye(values[near].size), _ORDER, axis=0)
-    of_samples /= math.sqrt(math.comb(2 * _ORDER, _ORDER))
-    differences, slopes = of_samples @ values[near], of_samples[:, mask[near]]
-    left = differences - slopes @ np.linalg.lstsq(slopes, differences, rcond=None)[0]
-    return float(np.abs(differences).max(initial=0.0)), float(np.abs(left).max(initial=0.0))
+        return np.inf
+    near = values[max(first - _ORDER, 0) : end + _ORDER]
+    return float(
+        np.abs(np.diff(near, _ORDER)).max(initial=0.0) / math.sqrt(math.comb(2 * _ORDER, _ORDER))
+    )
 
 
 def bridge(time: Vector, values: Vector, wrong: Mask) -> Vector:

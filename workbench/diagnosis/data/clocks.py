@@ -31,12 +31,9 @@ def clocks(system: System) -> tuple[Effect, ...]:
 
 
 def reference(system: System) -> str:
-    """The signal by whose clock a model runs: what leads its motion, or else what drives it.
-
-    An input that is moved bends between other samples, as no output does.
-    """
+    """The signal by whose clock a model runs: that which leads its motion, if one does."""
     leading = system.comparison.leading
-    return (*system.inputs, *system.outputs)[0].name if leading is None else leading.output
+    return system.outputs[0].name if leading is None else leading.output
 
 
 def own_clocks(system: System) -> tuple[Effect, ...]:

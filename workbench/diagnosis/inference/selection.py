@@ -172,11 +172,8 @@ def _needs_fewer(fit: Fit, best: FittedModel, model: FittedModel) -> bool:
 def _idle(
     fit: Fit, validation: CrossValidation, best: FittedModel, less: Mapping[Effect, FittedModel]
 ) -> Effect | None:
-    """A cause that beside others explains next to nothing on held-out stops, if there is one.
-
-    Clocks bend to nothing that others leave: each moves signals of its own.
-    """
-    if len(best.active) < 2 or all(effect.late for effect in best.active):
+    """A cause that beside others explains next to nothing on held-out stops, if there is one."""
+    if len(best.active) < 2:
         return None
     shares = {
         effect: validation.explained(reduced, best, fast=effect.order_locked)[0]

@@ -31,27 +31,12 @@ class LateSignals:
     sigma: float
     skews: Mapping[str, float]  # by how much each of them is late [s]
 
-    def by_clocks(
-        self, clocks: Sequence[Effect], recorded: Sequence[str], least: float, most: int
-    ) -> dict[Effect, float]:
-        """The fewest clocks by which these signals are so late, and each's time [s]; or none.
-
-        Clocks are late against each other: all signals may be late by one more time.
-
-        Parameters
-        ----------
-        recorded : all signals.
-        least : time that matters [s].
-        most : clocks.
-        """
-        late = np.array([self.skews.get(name, 0.0) for name in recorded])
-        for count in range(1, min(most, len(clocks)) + 1):
-            for chosen in combinations(clocks, count):
-                moves = np.array([[*(n in c.late for c in chosen), True] for n in recorded], float)
-                times = np.linalg.lstsq(moves, late, rcond=None)[0]
-                if np.abs(moves @ times - late).max() < least:
-                    return dict(zip(chosen, map(float, times), strict=False))
-        return {}
+    def skew_of(self, signals: Sequence[str], recorded: Sequence[str]) -> float:
+        """How late a clock of some of the recorded signals is [s]; 0 where others are late."""
+        of, late = {*signals} & {*recorded}, {*self.signals}
+        if of == late:
+            return self.skew
+        return -self.skew if of == {*recorded} - late else 0.0
 
 
 def by_themselves(
@@ -78,13 +63,14 @@ def by_themselves(
     starts: dict[Key, float] = {}
     # Beside causes that leave nothing, clocks have to explain as much.
     sought = best.linearised.deviance + fit.decides.form if clean else np.inf
-    # Between samples they are right but for their form.
-    most = max(fit.decides.wrong, 1.0 + fit.decides.left * (_wrong(base) - 1.0))
     while True:
         if not clocks:
             return None
         model = _fitted(other, base, clocks, starts, sought)
-        explains = _wrong(model) < most
+        lin = model.linearised
+        # What swings about zero may have no mean that lasts.
+        wrong = max(float(lin.variance_factors.max()), float(lin.squares.max()))
+        explains = wrong < fit.decides.wrong
         if not explains and not starts and not clean:
             # By more than a machine's shortest time, derivatives point elsewhere.
             starts = fit.apparent_skews(base.point)
@@ -95,12 +81,6 @@ def by_themselves(
         if late == clocks:
             return _together(other, clocks, model, least)
         clocks = late
-
-
-def _wrong(fitted: FittedModel) -> float:
-    """Variance of errors over noise; what swings about zero may have no mean that lasts."""
-    lin = fitted.linearised
-    return max(float(lin.variance_factors.max()), float(lin.squares.max()))
 
 
 def _fitted(
@@ -158,15 +138,5 @@ def _together(fit: Fit, clocks: Sequence[Effect], fitted: FittedModel, least: fl
             # Between samples, time is a matter of form: within the least that matters.
             sigma = float(np.hypot(1.0 / np.sqrt(information), least / BAND))
             return LateSignals(signals, skew, sigma, dict.fromkeys(signals, skew))
-    at_all = {name: 0.0 for clock in fit.own_clocks for name in (fit.reference, *clock.late)}
-    each = _from_fewest(at_all | dict(zip(names[1:], map(float, skews), strict=True)), least)
+    each = dict(zip(names[1:], map(float, skews), strict=True))
     return LateSignals(tuple(each), 0.0, 0.0, each)
-
-
-def _from_fewest(skews: Mapping[str, float], least: float) -> dict[str, float]:
-    """Signals that are late [s] by the clock by which fewest are, and least of them early."""
-    against = [
-        {name: skew - clock for name, skew in skews.items() if abs(skew - clock) > least}
-        for clock in skews.values()
-    ]
-    return min(against, key=lambda late: (len(late), sum(skew < 0.0 for skew in late.values())))

@@ -254,9 +254,9 @@ def _concluded(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagn
         report("clocks of signals by themselves")
         late = by_themselves(fit, chosen.base, chosen.best, clean=_clean(fit, chosen))
         if late is not None and (begun := _with_clock(fit, catalogue, chosen, late)) is not None:
-            report(f"with {' and '.join(begun.names)}, where the fits above did not get")
+            report(f"with {begun.active[0].name}, where the fits above did not get")
             timed = _selected_with(fit, catalogue, chosen, begun, report)
-            if {*begun.active} <= {*timed.best.active}:
+            if begun.active[0] in timed.best.active:
                 chosen, late = timed, None
         verdict = _verdict(fit, chosen) if late is None else "unexplained"
     base, best = chosen.base, chosen.best
@@ -345,16 +345,16 @@ def _verdict(fit: Fit, chosen: Selection) -> Verdict:
 def _with_clock(
     fit: Fit, catalogue: Sequence[Effect], chosen: Selection, late: LateSignals
 ) -> FittedModel | None:
-    """The nominal model with clocks of the declared loggers whose signals are late, if any are.
+    """The nominal model with the clock of the declared logger whose signals are late, if any is.
 
     By more than a machine's shortest time, no derivative about the nominal model points there.
     """
-    clocks = [effect for effect in catalogue if effect.late]
-    skews = late.by_clocks(clocks, fit.recorded, fit.least_skew, fit.decides.most)
-    if not skews or {*skews} <= {*chosen.best.active}:
-        return None
-    sizes = {(clock.name, clock.size): skew for clock, skew in skews.items()}
-    return fitted(fit, fit.at(replace(chosen.base.point, sizes=sizes)), tuple(skews))
+    for clock in (effect for effect in catalogue if effect.late and late.skew):
+        skew = late.skew_of(clock.late, fit.recorded)
+        if skew and clock not in chosen.best.active:
+            point = replace(chosen.base.point, sizes={(clock.name, clock.size): skew})
+            return fitted(fit, fit.at(point), (clock,))
+    return None
 
 
 def _selected_with(
