@@ -479,8 +479,8 @@ class _Reader:
                 if "quotient_owner" in body:  # div, mod and rem, whatever of
                     place = storage["conditions"][body["quotient_owner"]["owner"]]
                     remedy = (
-                        "of parameters, write floor(a/b) for div(a, b), or ceil(a/b) where a/b is "
-                        "below 0, and a - b*floor(a/b) for mod(a, b); else use a smooth expression"
+                        "of parameters, write floor(a/b) for div(a, b) and a - b*floor(a/b) for "
+                        "mod(a, b); else use a smooth expression"
                     )
                 raise refuse("an expression that causes events", place, expected, remedy)
         for kind, name in (
