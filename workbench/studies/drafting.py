@@ -39,7 +39,7 @@ from workbench.recordings.channels.names import (
 from workbench.recordings.formats import FileChannel, RecordedFile
 from workbench.recordings.formats.spelling import conversion, spell_unit
 from workbench.system.reader import system_of
-from workbench.system.units import check_unit
+from workbench.system.units import is_known_unit
 
 _TYPICAL = 10.0  # times its nominal value, or a tenth, is what a variable's largest sample may be
 _NOISELESS = 1e-4  # of its range: below the error of usual sensors; only a simulation is finer
@@ -164,7 +164,7 @@ def _match(
         if channel := named.get(own):
             _refuse_unconverted(own, variable, channel, places)
             unit = spell_unit(variable.unit or "") or channel.unit or "1"
-            unit = unit if _is_known(unit) else "1"
+            unit = unit if is_known_unit(unit) else "1"
             signals[own] = DraftSignal(own, variable, role, unit, channel, "named by you")
             continue
         called = [variable.name, own, variable.name.split(".")[-1], variable.text]
@@ -228,7 +228,7 @@ def _refuse_unconverted(
     own = spell_unit(variable.unit or "")
     place = places.get(channel.channel)
     stated = channel.unit or (place.channel.unit if place else "")
-    if own and not _is_known(own) and stated not in ("", "1", own):
+    if own and not is_known_unit(own) and stated not in ("", "1", own):
         raise InputError(
             where=f"column '{channel.channel}'",
             found=f"[{stated}], and [{own}] in the model's variable '{variable.name}'",
@@ -244,14 +244,6 @@ def _is_time(channel: FileChannel) -> bool:
     return channel.stamp or (is_time(channel.name) and timely)
 
 
-def _is_known(unit: str) -> bool:
-    try:
-        check_unit(unit, "")
-    except InputError:
-        return False
-    return True
-
-
 def _candidate(
     name: str, variable: Variable, role: str, place: PlacedChannel, likeness: int
 ) -> tuple[DraftSignal | None, str]:
@@ -262,7 +254,7 @@ def _candidate(
     doubt = "" if likeness else f"{name}: nothing but its unit speaks for '{place.channel.name}'"
     why = f"its name, '{place.channel.name}'" if likeness else "the only one of its unit"
     unit, read_in = own or stated or "1", stated or own or "1"
-    if own and not _is_known(own):  # such as degC, which has a zero of its own
+    if own and not is_known_unit(own):  # such as degC, which has a zero of its own
         if stated not in ("", own):
             return None, (
                 f"'{place.channel.name}' is in [{stated}], the model's variable in [{own}], "
@@ -338,7 +330,7 @@ def _without_unit(variable: Variable, values: Vector, stated: str) -> tuple[str,
         if typical and 1.0 / _TYPICAL <= largest / typical <= _TYPICAL:
             fitting.append(unit)
     unit = fitting[0] if len(fitting) == 1 else base
-    known = unit if _is_known(unit) else "1"
+    known = unit if is_known_unit(unit) else "1"
     if len(fitting) == 1:
         return known, f"the model says no unit; its value {typical:g} fits [{unit}]", True
     return known, f"the model says no unit; [{unit}] is taken, and [{stated}] in the file", False
@@ -427,7 +419,10 @@ def _reported(draft: Draft) -> list[str]:
     names = [
         v.name
         for v in model.variables
-        if v.causality == "output" and v.real and v.name not in taken and _is_known(v.unit or "1")
+        if v.causality == "output"
+        and v.real
+        and v.name not in taken
+        and is_known_unit(v.unit or "1")
     ]
     plain = [name for name in names if name.isidentifier()]
     return [_entry("reported", plain, "outputs of the model that were not measured")] * bool(plain)

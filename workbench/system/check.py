@@ -24,7 +24,7 @@ from workbench.system.parts import (
 )
 from workbench.system.stopping import ASKED, MOVED, OUTSIDE, RISING
 from workbench.system.system import System
-from workbench.system.units import check_unit, si_factor
+from workbench.system.units import is_known_unit, si_factor
 
 _ROUNDED = 1e-3  # share by which a unit may be defined otherwise, as calories are
 
@@ -80,7 +80,7 @@ def check_model(system: System, model: Description) -> None:
             )
         declared = variables[ours].unit
         if declared and unit and not _is_same(declared, unit, where):
-            taken = declared if _is_known(declared) else "1"
+            taken = declared if is_known_unit(declared) else "1"
             raise InputError(
                 where=where,
                 found=f"unit [{declared}]",
@@ -117,17 +117,9 @@ def _is_same(declared: str, unit: str, where: str) -> bool:
     try:
         return si_factor(declared, unit, where) == 1.0
     except InputError:
-        if unit != "1" and _is_known(declared):
+        if unit != "1" and is_known_unit(declared):
             raise
         return unit == "1"
-
-
-def _is_known(unit: str) -> bool:
-    try:
-        check_unit(unit, "")
-    except InputError:
-        return False
-    return True
 
 
 def _check_unit(name: str, model: Description, where: str) -> None:

@@ -87,6 +87,15 @@ def check_unit(unit: str, where: str) -> None:
         )
 
 
+def is_known_unit(unit: str) -> bool:
+    """Whether a unit is one of SI, or known as multiple of one; degC, with its zero, is not."""
+    try:
+        check_unit(unit, "")
+    except InputError:
+        return False
+    return True
+
+
 def quotient(unit: str, divisor: str) -> str:
     """Unit of a quantity over another one, as Modelica writes it.
 
