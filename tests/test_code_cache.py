@@ -20,7 +20,7 @@ from workbench.models.compiler import source_hash
 from workbench.runtime.resources import fmus
 from workbench.system.installed import built_models
 
-from .processes import LONGEST, ROOT, python, running
+from .processes import ELSEWHERE, LONGEST, ROOT, python, running
 
 PROGRAM = """
 import numba
@@ -132,15 +132,28 @@ def test_code_is_made_again_when_what_makes_it_changes(name, tmp_path, monkeypat
     assert jit._folder.__wrapped__() != before
 
 
-def test_what_two_processes_need_at_once_is_compiled_by_one(home):
-    with started(home) as first, started(home) as other:
+@pytest.mark.parametrize("path", [str(ROOT), ELSEWHERE], ids=["posix", "elsewhere"])
+def test_what_two_processes_need_at_once_is_compiled_by_one(home, path):
+    with started(home, PYTHONPATH=path) as first, started(home, PYTHONPATH=path) as other:
         outputs = [process.communicate(timeout=LONGEST) for process in (first, other)]
     assert sorted(outputs) == [("0 kept\n", ""), ("1 kept\n", "")]
     names = {file.name for file in home.rglob("*") if file.is_file()}
     assert {Path(name).suffix for name in names - {"turns", "key"}} == {".code"}
 
 
-@pytest.mark.skipif(os.name != "posix", reason="there each process compiles for itself")
+def test_the_file_of_one_that_died_while_it_compiled_is_of_no_effect_once_it_is_old(home):
+    assert solved(home, PYTHONPATH=ELSEWHERE) == "0 kept"
+    (file,) = files(home)
+    lock = file.with_suffix(".lock")
+    assert not lock.exists()
+    file.unlink()
+    lock.touch()
+    os.utime(lock, times=(0.0, 0.0))
+    assert solved(home, PYTHONPATH=ELSEWHERE) == "0 kept"
+    assert not lock.exists()
+
+
+@pytest.mark.skipif(os.name != "posix", reason="where a lock is a file, it has to become old")
 def test_who_dies_while_it_compiles_leaves_the_turn_to_the_next(home):
     with started(home, program=DYING) as first:
         assert first.stdout.readline() == "compiling\n"

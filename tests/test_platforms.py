@@ -1,15 +1,12 @@
 """Where there is no fork, no lock of files and no limit of processes, commands do their work."""
 
 import shutil
-from pathlib import Path
 
 import pytest
 
 from workbench.system.template import write_system
 
-from .processes import ROOT, python
-
-WITHOUT = f"{Path(__file__).with_name('platforms')}:{ROOT}"
+from .processes import ELSEWHERE, ROOT, python
 
 
 @pytest.fixture
@@ -37,6 +34,6 @@ def machine(tmp_path):
     ids=lambda value: value.partition(" ")[0],
 )
 def test_a_command_does_its_work_without_fork_locks_and_limits(machine, command, result):
-    process = python("-m", "workbench", *command.split(), cwd=machine, PYTHONPATH=WITHOUT)
+    process = python("-m", "workbench", *command.split(), cwd=machine, PYTHONPATH=ELSEWHERE)
     assert process.returncode == 0, process.stderr
     assert (machine / result).exists()

@@ -46,7 +46,7 @@ from workbench.models.fmu_cache import cache_folder, seal
 
 try:
     import fcntl
-except ImportError:  # Windows: there each process compiles for itself
+except ImportError:  # Windows
     fcntl = None  # type: ignore[assignment]
 
 _PACKAGE = Path(__file__).parents[1]
@@ -150,30 +150,48 @@ def _lock_descriptor() -> int:
 
 
 class _CompileLock:
-    """Lock for compiling one function; the system releases it with the process."""
+    """Lock for compiling one function; the system releases it with the process.
+
+    Where it locks no parts of files, a file is the lock, and of no effect once it is old.
+    """
 
     def __init__(self, path: Path) -> None:
         # Functions that share a byte wait for each other, which costs time alone.
         self._byte = int.from_bytes(hashlib.sha256(str(path).encode()).digest()[:4], "little")
+        self._file = path.with_suffix(".lock")
 
     def acquire(self) -> None:
         """Wait until no other process holds it, but not for one that is stopped while it does."""
         end = time.monotonic() + _PATIENCE
-        while fcntl is not None and time.monotonic() < end:
-            try:
-                fcntl.lockf(_lock_descriptor(), fcntl.LOCK_EX | fcntl.LOCK_NB, 1, self._byte)
-            except BlockingIOError:
-                time.sleep(0.02)
-            except OSError:  # no place for the file, or one on which nothing can be locked
-                return
-            else:
-                return
+        while self._is_held_elsewhere() and time.monotonic() < end:
+            time.sleep(0.02)
 
     def release(self) -> None:
         """Let the next one read what was compiled."""
-        if fcntl is not None:
-            with suppress(OSError):
+        with suppress(OSError):
+            if fcntl is None:
+                self._file.unlink()
+            else:
                 fcntl.lockf(_lock_descriptor(), fcntl.LOCK_UN, 1, self._byte)
+
+    def _is_held_elsewhere(self) -> bool:
+        """Whether another process holds it; else this one does, where there is a place for it."""
+        try:
+            if fcntl is not None:
+                fcntl.lockf(_lock_descriptor(), fcntl.LOCK_EX | fcntl.LOCK_NB, 1, self._byte)
+                return False
+            self._file.parent.mkdir(parents=True, exist_ok=True)
+            self._file.touch(exist_ok=False)
+        except BlockingIOError:
+            return True
+        except FileExistsError:
+            with suppress(OSError):  # it was released meanwhile
+                if time.time() - self._file.stat().st_mtime > _PATIENCE:
+                    self._file.unlink()
+            return True
+        except OSError:  # no place for the file, or one on which nothing can be locked
+            pass
+        return False
 
 
 class CodeCache(caching.FunctionCache):  # type: ignore[misc]

@@ -178,18 +178,23 @@ def find_tables(rows: Sequence[Sequence[str]], lines: Sequence[int], where: str)
     InputError
         See `find_table`.
     """
-    table = find_table(rows, lines, where)
+    tables = []
+    while (begin := _next_table(table := find_table(rows, lines, where), rows, lines)) is not None:
+        tables.append(find_table(rows[:begin], lines[:begin], where))
+        rows, lines = rows[begin:], lines[begin:]
+    return [*tables, table]
+
+
+def _next_table(table: Cells, rows: Sequence[Sequence[str]], lines: Sequence[int]) -> int | None:
+    """Row at which a table below begins, with its preamble."""
     samples = set(table.lines)
     others = (
         i for i, line in enumerate(lines) if line > table.lines[0] and line not in samples
     )  # none of a table whose channels are rows
     begin = next((i for i in others if _begins_table(rows, i, table, lines)), None)
-    if begin is None:
-        return [table]
-    while lines[begin - 1] not in samples:  # a preamble of its own
+    while begin is not None and lines[begin - 1] not in samples:
         begin -= 1
-    above = find_table(rows[:begin], lines[:begin], where)
-    return [above, *find_tables(rows[begin:], lines[begin:], where)]
+    return begin
 
 
 def _begins_table(
