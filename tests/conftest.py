@@ -9,6 +9,7 @@ import pickle
 import shutil
 import signal
 import subprocess
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
@@ -50,8 +51,10 @@ collect_ignore = ["platforms/sitecustomize.py"]
 ROOT = Path(__file__).parent.parent
 Result = TypeVar("Result")
 
-# Else each worker, and each program that tests start, compiles all modules of the repository anew.
+# Else each run, its workers and each program that tests start compile all modules of the
+# repository anew, and rewrite the asserts of all tests: a third of what collecting takes.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
 
 # Its sockets stay where the first of them was, which may be no folder of one test: that has a long
 # name, and goes.

@@ -66,14 +66,17 @@ def record(
     rng = np.random.default_rng(seed)
     time = np.arange(0.0, 200.25, 0.5)
     for number in range(4):
-        inflow = np.repeat(rng.uniform(2e-3, 7e-3, 5), 80)[: time.size - 1]
+        steps = rng.uniform(2e-3, 7e-3, 5)
         level, own = [rng.uniform(0.5, 1.5)], outlet * (1.0 + (number - 1.5) * apart)
-        for flow in inflow:
+        for flow in steps:  # of 80 samples
 
             def rate(_t, x, flow=flow, own=own):
                 return [(flow - own * np.sqrt(2.0 * 9.81 * x[0])) / area]
 
-            level.append(solve_ivp(rate, (0.0, 0.5), [level[-1]], rtol=1e-8, atol=1e-10).y[0, -1])
+            at = time[1:81]
+            solution = solve_ivp(rate, (0.0, 40.0), level[-1:], t_eval=at, rtol=1e-8, atol=1e-10)
+            level.extend(solution.y[0])
+        inflow = np.repeat(steps, 80)
         flows = np.append(inflow, inflow[-1])
         if lag:
             fine = np.arange(0.0, 200.005, 0.01)
