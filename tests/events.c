@@ -31,6 +31,10 @@ static void calculate(Room *m) {
     m->r[DT] = (r[P] - r[G] * (delayed(m, DELAY) - r[TA])) / r[C];
     return;
 #endif
+#ifdef UNKNOWN /* a power that is no number at the start */
+    m->r[DT] = r[G] * (r[TA] - r[T]) / r[C], m->r[P] = m->time > 0.0 ? r[G] * (r[TA] - r[T]) : NAN;
+    return;
+#endif
 #ifdef UNREAD
     m->r[DT] = r[G] * (r[TA] - r[T]) / r[C];
     return;

@@ -624,6 +624,23 @@ def test_a_run_that_draws_random_numbers_is_refused(build):
             run(fmu, "ukf", 100.0)
 
 
+def test_an_output_that_is_no_number_at_the_start_is_named(build):
+    """A fit ended with a traceback of its linear algebra."""
+    folder = build("FUSE", flags=["-DUNKNOWN"]).parent
+    own = 'outputs.P = { unit = "W", noise = "5 W", scale = "500 W" }\n[estimated'
+    text = (folder / "system.toml").read_text().replace("[estimated", own)
+    (folder / "system.toml").write_text(text)
+    system, time = load_system(folder), 10.0 * np.arange(361.0)
+    noise = np.random.default_rng(1).standard_normal((2, 361))
+    frame = {"time [s]": time, "Ta [K]": 280.0 + 0.05 * noise[0]}
+    frame |= {"T [K]": exact(0.0, time) + 0.05 * noise[1]}
+    frame |= {"P [W]": 50.0 * (280.0 - exact(0.0, time)) + 5.0 * noise[0]}
+    case = wb.case_from_frame(system, pd.DataFrame(frame))
+    settings = wb.FitSettings(starts=1, profiles=False)
+    with pytest.raises(InputError, match=r"'P' is no finite number \(nan\) at 0 s of"):
+        wb.fit(system, [case], ["G"], settings=settings, workers=1, report=lambda line: None)
+
+
 def test_a_switch_in_code_that_remembers_is_refused_along_a_recording(build):
     """A thermostat that no event tells: filters and simulations would switch it off their way."""
     folder = build("FUSE", flags=["-DHIDDEN"]).parent

@@ -344,6 +344,22 @@ def test_texts_of_parquet_and_arrow_are_dates_times_and_numbers(tmp_path, write)
     assert_allclose(level.values, np.arange(60.0) + 0.5)
 
 
+def test_a_stream_of_arrow_is_read_and_its_missing_end_is_told(tmp_path):
+    held = pa.table({"time [s]": np.arange(60.0), "h [mm]": 900.0 + np.arange(60.0)})
+    with pa.ipc.new_stream(tmp_path / "a.arrows", held.schema) as stream:
+        stream.write_table(held)
+    for left, said in ((0, ()), (8, ("the stream of Arrow has no end: batches may be missing",))):
+        raw = (tmp_path / "a.arrows").read_bytes()
+        (tmp_path / "b.arrows").write_bytes(raw[: len(raw) - left])
+        recorded = read_recorded_file(tmp_path / "b.arrows")
+        assert [(c.name, c.unit) for c in recorded.groups[0].channels] == [
+            ("time", "s"),
+            ("h", "mm"),
+        ]
+        assert_allclose(recorded.groups[0].channels[1].values, 900.0 + np.arange(60.0))
+        assert recorded.doubts == said
+
+
 @pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-16-be", "utf-32", "latin-1"])
 def test_encodings_are_found(tmp_path, encoding):
     text = "\n".join(["time [s];T [°C]", *(f"{k};2{k % 7}.5" for k in range(60))])

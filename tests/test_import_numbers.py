@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import openpyxl
 import pytest
-from nptdms import ChannelObject, TdmsWriter
+from nptdms import ChannelObject, GroupObject, TdmsWriter
 from numpy.testing import assert_allclose
 from scipy.io import savemat
 
@@ -52,6 +52,18 @@ def test_columns_beyond_the_header_may_be_empty(tmp_path):
     rows = [f"{i};{i}.5;;" for i in range(60)]
     (group,) = read_recorded_file(table(tmp_path / "a.csv", ["time [s];h [mm]", *rows])).groups
     assert [channel.name for channel in group.channels] == ["time", "h"]
+
+
+@pytest.mark.parametrize("zero", "\u0660\u06f0\u0966\uff10")
+def test_digits_of_other_scripts_are_numbers(tmp_path, zero):
+    """Arabic, Persian, Devanagari, and those as wide as Chinese characters."""
+    digits = {ord("0") + k: chr(ord(zero) + k) for k in range(10)}
+    rows = [f"{0.5 * k};{900 + k}.25".translate(digits) for k in range(60)]
+    if zero < "\u0900":
+        rows = [row.replace(".", "\u066b") for row in rows]
+    (group,) = read_recorded_file(table(tmp_path / "a.csv", ["time [s];h [mm]", *rows])).groups
+    assert_allclose(group.channels[0].values, 0.5 * np.arange(60.0))
+    assert_allclose(group.channels[1].values, 900.25 + np.arange(60.0))
 
 
 # --- times ---
@@ -147,6 +159,22 @@ def test_a_channel_of_times_that_contradicts_the_file_is_told(tmp_path, tank):
         clock(tmp_path / "a.tdms", tank)
     said = clock(tmp_path / "a.tdms", tank, time=NamedChannel("Time"))
     assert_allclose(said.times, MINUTE)
+
+
+@pytest.mark.parametrize(
+    "beside", [{"dt": 0.5}, {"Sampling rate [Hz]": 2.0}, {"SampleRate": "2"}, {"dt [ms]": 500}]
+)
+def test_a_step_of_a_waveform_that_another_statement_contradicts_is_refused(tmp_path, tank, beside):
+    """LabVIEW writes an increment of 1 where nobody set one."""
+    for step in (1.0, 0.5):
+        with TdmsWriter(tmp_path / "a.tdms") as file:
+            stated = {"unit_string": "mm", "wf_increment": step}
+            file.write_segment(
+                [GroupObject("G", properties=beside), ChannelObject("G", "h", MINUTE, stated)]
+            )
+        contradicted = pytest.raises(InputError, match="1 s, and beside them one of 0")
+        with contradicted if step == 1.0 else nullcontext():
+            assert_allclose(clock(tmp_path / "a.tdms", tank).times, MINUTE)
 
 
 def test_a_waveform_over_no_time_has_no_times(tmp_path, tank):

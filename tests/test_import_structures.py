@@ -94,6 +94,18 @@ def test_data_of_system_identification_has_its_names_units_and_steps(tmp_path, c
     assert recorded.step == 0.5
 
 
+def test_channels_of_catman_have_the_names_of_their_headers(tmp_path):
+    heads = {"inflow": ("l/s", U), "h": ("mm", Y)}
+    content: dict[str, Any] = {"File_Header": struct(SampleFrequency="2", Comment="x")}
+    for k, (name, (unit, values)) in enumerate(heads.items(), 1):
+        content[f"Channel_{k}_Header"] = struct(SignalName=name, Unit=unit, NoOfSamples=values.size)
+        content[f"Channel_{k}_Data"] = values
+    recorded = group(tmp_path / "a.mat", content)
+    assert [(c.name, c.unit) for c in recorded.channels] == [("inflow", "l/s"), ("h", "mm")]
+    assert_allclose(recorded.channels[1].values, LEVEL)
+    assert recorded.step == 0.5
+
+
 INFLOW = struct(Name="inflow", Values=struct(Time=TIME, Data=U, Units="l/s"))
 H = struct(Name="h", Values=struct(Time=TIME, Data=Y, Units="mm"))
 

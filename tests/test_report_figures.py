@@ -119,6 +119,14 @@ def test_speeds_are_told_in_kilometres_per_hour_beside(uncertain):
     assert not any(other["further"] for other in others if other["unit"] != "m/s")
 
 
+def test_a_panel_of_nothing_but_zeros_is_drawn(uncertain):
+    """A model of integers, as a counter, may be without any error."""
+    figure = case_figure(uncertain)
+    panel = replace(figure.panels[0], low=-0.0, high=0.0)
+    (drawn,) = drawing(replace(figure, panels=(panel,)))["panels"]
+    assert (drawn["low"], drawn["high"]) == (-1.0, 1.0)
+
+
 def test_samples_are_those_of_the_curves(uncertain):
     """What packing.py says of its codes, taken back by hand."""
     figure = case_figure(uncertain)

@@ -976,8 +976,11 @@ class FMU(FMUInstance):
             (forth[:, 0], forth[:, 2], "once a step is said to be over, without an event"),
             (again[:, 0], back[:, 0], "there if it was at later points before"),
         ):
-            sizes = np.maximum(np.abs(first), np.ptp(first, axis=0))
-            for k, i in np.argwhere(np.abs(other - first) > SAME_RATE * sizes):
+            known = np.where(np.isfinite(first), first, 0.0)  # one sample hides no other
+            sizes = np.maximum(np.abs(known), np.ptp(known, axis=0))
+            with np.errstate(invalid="ignore"):  # of what is infinite in both
+                moved = np.abs(other - first) > SAME_RATE * sizes
+            for k, i in np.argwhere(moved):
                 raise NoFunctionError(
                     f"{self.called}: '{names[i]}' is {first[k, i]:.6g} at {time[k]:.6g} s of its "
                     f"time, or {other[k, i]:.6g} {then}: the model remembers calls, and no event "

@@ -89,6 +89,13 @@ class Panel:
     height: float
     curves: tuple[Curve, ...]
 
+    def __post_init__(self) -> None:
+        """Give a panel without a height, as of nothing but zeros, that of 1 to both sides."""
+        if not self.low < self.high:
+            low, high = value_range([np.array([self.low, self.high])])
+            object.__setattr__(self, "low", low)
+            object.__setattr__(self, "high", high)
+
     @classmethod
     def around(cls, title: str, unit: str, height: float, *curves: Curve) -> Self:
         """A panel that shows all of its curves, without their bands."""

@@ -103,6 +103,7 @@ _BEGINS = {  # how files begin, whatever their ending
     b"CDF\x02": "hdf5.read_netcdf",
     b"PAR1": "parquet",
     b"ARROW1": "parquet",
+    b"\xff\xff\xff\xff": "parquet",
     b"MDF     ": "mdf",
     b"UnFinMF ": "mdf",
     b"TDSm": "tdms",

@@ -17,8 +17,11 @@ from workbench.recordings.formats.stamps import is_stamp, read_stamps
 _UNIT = re.compile(r"(?P<of>.*?)[_.]?(units?|einheit)", re.IGNORECASE)
 _VALUES = ("data", "values", "value", "val", "v", "daten", "y")
 _TIMES = ("time", "t", "zeit", "times", "x")
-_RATES = ("fs", "samplerate", "sample_rate", "samplingrate", "sampling_rate", "abtastrate")
-_STEPS = ("dt", "ts", "sampletime", "sample_time", "delta_t", "abtastzeit")
+_RATES = (
+    *("fs", "samplerate", "samplingrate", "abtastrate"),
+    *("samplefrequency", "samplingfrequency", "abtastfrequenz"),
+)
+_STEPS = ("dt", "ts", "sampletime", "deltat", "abtastzeit", "sampleinterval", "samplinginterval")
 _TIME_UNITS = ("timeunit", "time_unit")
 _PLACE = re.compile(r"\(\d+\)")  # of a structure in an array of them
 _SINCE = re.compile(r"(?P<unit>\w+) since (?P<date>.+)")  # as netCDF has units of time
@@ -53,8 +56,8 @@ def _collect(
     notes: list[str],
     step: float = math.nan,
 ) -> None:
-    content = _with_own_names(_plotted_signals(content))
-    units, step = _units(content), _step(content, step)
+    content = _with_own_names(_plotted_signals(_with_headers(content)))
+    units, step = _units(content), stated_step(content, step)
     by_size: dict[int, list[FileChannel]] = {}
     for key, value in content.items():
         name, unit = name_and_unit(key)
@@ -133,6 +136,36 @@ def _plotted_signals(content: Mapping[str, Any]) -> Mapping[str, Any]:
     return plotted
 
 
+def _with_headers(content: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Arrays `NAME_Data` by the names and units that `NAME_Header` says, as catman writes them.
+
+    What the header of the file states of its rate stands beside them.
+    """
+    heads = {key[:-6].lower(): key for key in content if key.lower().endswith("header")}
+    heads = {stem: key for stem, key in heads.items() if isinstance(content[key], Mapping)}
+    ends = {key: key[:-4].lower() for key in content if key.lower().endswith("data")}
+    named = {key: content[heads[stem]] for key, stem in ends.items() if stem in heads}
+    if not named:
+        return content
+    members: dict[str, Any] = {
+        key: entry
+        for stem, header in heads.items()
+        if stem not in ends.values()
+        for key, entry in content[header].items()
+        if not isinstance(entry, Mapping)
+    }
+    labels = [_entry(header, ("signalname", "channelname", "name"))[1] for header in named.values()]
+    for key, entry in content.items():
+        if key not in named:
+            members |= {key: entry} if key not in heads.values() else {}
+            continue
+        _, label = _entry(named[key], ("signalname", "channelname", "name"))
+        own = label if isinstance(label, str) and label and labels.count(label) == 1 else key
+        _, unit = _entry(named[key], ("unit", "units", "einheit"))
+        members |= {own: entry, f"{own}_unit": unit if isinstance(unit, str) else ""}
+    return members
+
+
 def _with_own_names(content: Mapping[str, Any]) -> Mapping[str, Any]:
     """Arrays of inputs and outputs by the names beside them, as of System Identification.
 
@@ -160,18 +193,25 @@ def _with_own_names(content: Mapping[str, Any]) -> Mapping[str, Any]:
     return members
 
 
-def _step(content: Mapping[str, Any], outer: float) -> float:
+def stated_step(content: Mapping[str, Any], outer: float = math.nan) -> float:
     """Time between samples that a number beside the arrays states [s]; else that further out."""
     unit = next((v for k, v in content.items() if k.lower() in _TIME_UNITS), "s")
     scale = conversion(spell_unit(unit), "s") if isinstance(unit, str) else None
     for key, value in content.items():
-        if np.size(value) != 1 or np.asarray(value).dtype.kind not in "fiu":
+        name, unit = name_and_unit(key)
+        name = name.lower().replace("_", "").replace(" ", "")
+        if name not in (*_RATES, *_STEPS) or np.size(value) != 1:
             continue
-        number = float(np.ravel(value)[0])
-        if key.lower() in _RATES and number > 0.0:
-            return 1.0 / number
-        if key.lower() in _STEPS and number > 0.0 and scale is not None:
-            return number * scale.factor
+        try:
+            number = float(np.ravel(value)[0])
+        except (TypeError, ValueError):
+            continue
+        own = conversion(unit, "Hz" if name in _RATES else "s") if unit else None
+        factor = own.factor if own else 1.0 if name in _RATES or scale is None else scale.factor
+        if number > 0.0 and name in _RATES:
+            return 1.0 / (factor * number)
+        if number > 0.0 and (own or scale):
+            return factor * number
     return outer
 
 

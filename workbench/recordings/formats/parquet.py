@@ -13,16 +13,22 @@ from workbench.recordings.formats.contents import Contents, FileChannel, Group
 from workbench.recordings.formats.spelling import name_and_unit, spell_unit
 
 _UNITS = (b"unit", b"units", b"Unit", b"Units", b"UNIT")
+_END = b"\xff\xff\xff\xff\0\0\0\0"  # of a stream
 _ABOUT = (b"description", b"comment", b"long_name")
 
 
 def read(path: Path, raw: bytes) -> Contents:
     """Kind, groups and notes of a file of Parquet or Arrow."""
-    called = "Arrow" if raw.startswith(b"ARROW1") else "Parquet"
-    stream = io.BytesIO(raw)
-    table = (
-        pa.ipc.open_file(stream).read_all() if called == "Arrow" else pq.ParquetFile(stream).read()
-    )
+    stream, called = io.BytesIO(raw), "Arrow"
+    doubts: tuple[str, ...] = ()
+    if raw.startswith(b"ARROW1"):
+        table = pa.ipc.open_file(stream).read_all()
+    elif raw.startswith(b"PAR1"):
+        called, table = "Parquet", pq.ParquetFile(stream).read()
+    else:
+        table = pa.ipc.open_stream(stream).read_all()
+        if _END not in raw[stream.tell() - len(_END) :]:
+            doubts = ("the stream of Arrow has no end: batches may be missing",)
     channels: list[FileChannel] = []
     notes: list[str] = []
     texts: dict[str, list[str]] = {}
@@ -52,7 +58,7 @@ def read(path: Path, raw: bytes) -> Contents:
         written, _, own = read_group(cells, "", str(path))
         channels = [*written.channels, *channels]
         left, notes = written.left, [*notes, *own]
-    return Contents(called, [Group("", tuple(channels), left=left)], notes)
+    return Contents(called, [Group("", tuple(channels), left=left)], notes, doubts)
 
 
 def _first(known: dict[bytes, bytes], keys: tuple[bytes, ...]) -> str:

@@ -12,6 +12,7 @@ import numpy as np
 from nptdms import TdmsFile
 from nptdms.log import log_manager
 
+from workbench.recordings.formats.arrays import stated_step
 from workbench.recordings.formats.contents import Contents, FileChannel, Group
 from workbench.recordings.formats.spelling import conversion, name_and_unit, spell_unit
 from workbench.recordings.formats.stamps import read_stamps
@@ -21,6 +22,7 @@ _SCALES = {"Linear", "Polynomial", "Table", "Add", "Subtract", "AdvancedAPI"} | 
 }
 # Properties of a waveform, and their bytes in the file with four that tell their type.
 _WAVEFORM = {"wf_start_time": 20, "wf_start_offset": 12, "wf_increment": 12}
+_SAME = 1e-3  # by which two statements of a step may differ, as rates are rounded
 _UNITS = ("unit_string", "NI_UnitDescription", "unit", "Unit", "units")
 
 
@@ -30,10 +32,11 @@ def read(path: Path, raw: bytes) -> Contents:
     notes: list[str] = []
     doubts: list[str] = []
     with _take_down(doubts):
-        held = TdmsFile.read(io.BytesIO(raw)).groups()
+        file = TdmsFile.read(io.BytesIO(raw))
+        held = file.groups()
         doubt = _doubt(raw, [channel.properties for group in held for channel in group.channels()])
         for group in held:
-            groups += _groups(group, doubt, notes)
+            groups += _groups(group, doubt, notes, {**file.properties, **group.properties})
     return Contents("TDMS", groups, notes, tuple(doubts))
 
 
@@ -61,8 +64,13 @@ def _doubt(raw: bytes, stated: Sequence[Mapping[str, Any]]) -> str:
     return ""
 
 
-def _groups(held: Any, doubt: str, notes: list[str]) -> list[Group]:
-    """A group of the file; channels with other times or lengths are groups of their own."""
+def _groups(held: Any, doubt: str, notes: list[str], around: Mapping[str, Any]) -> list[Group]:
+    """A group of the file; channels with other times or lengths are groups of their own.
+
+    Parameters
+    ----------
+    around : properties of the group and the file.
+    """
     by_times: dict[tuple[int, float, float, float], list[FileChannel]] = {}
     for recorded in held.channels():
         name, unit = name_and_unit(recorded.name)
@@ -75,6 +83,10 @@ def _groups(held: Any, doubt: str, notes: list[str]) -> list[Group]:
         unit = unit or spell_unit(str(next((stated[key] for key in _UNITS if key in stated), "")))
         values = recorded[:]
         step, offset = _waveform_clock(stated)
+        beside = stated_step({**around, **stated})
+        if step > 0.0 and abs(beside - step) > _SAME * step and not doubt:
+            # LabVIEW writes an increment of 1 where nobody set one.
+            doubt = f"waveforms with a step of {step:g} s, and beside them one of {beside:g} s"
         begun = stated.get("wf_start_time")
         start = _since_1970(begun) if begun is not None and step > 0.0 else np.nan
         if values.dtype.kind == "M":

@@ -2,6 +2,7 @@
 
 import csv
 import re
+import unicodedata
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -26,6 +27,7 @@ from workbench.recordings.formats.stamps import is_stamp
 _SEPARATORS = {";": "semicolons", "\t": "tabs", "|": "bars", ",": "commas", " ": "spaces"}
 _COMMENT = re.compile(r"(?!\"#\")\s*\"?(#+|%+|//+|!+|\*+)\s*")
 _RECEIVED = re.compile(r"(?P<time>\d\d:\d\d:\d\d\.\d{1,6}) -> ")
+_DIGIT = re.compile(r"(?![0-9])\d")
 _BEFORE_UNIT = re.compile(r"(?<=[^\s\])])\s+(?=[\[(])")  # between a name and its unit
 _SAMPLED = 200  # lines from the middle of a file, which tell how it is laid out
 _FOLDED = 5  # lines over which a name in quotation marks may go
@@ -43,6 +45,9 @@ def read(path: Path, raw: bytes) -> Contents:
     """
     text, encoding = _decode(path, raw)
     text = text.replace("\ufeff", "")  # of parts that were joined
+    if not text.isascii():  # digits of Arabic and other scripts mean what ours do
+        text = _DIGIT.sub(lambda digit: str(unicodedata.decimal(digit[0])), text)
+        text = text.replace("\u066b", ".")
     text = text.replace("\r\r\n", "\n").replace("\r\n", "\n").replace("\r", "\n")
     lines = text.rstrip("\n").split("\n")
     # Monitors of serial ports put a time before what they receive.

@@ -101,6 +101,7 @@ class _Run(NamedTuple):
     given: Mapping[str, float]  # parameters that its conditions set
     starts: Mapping[str, ShownStart]  # of states that outputs show, at the first sample
     doubt: str  # of the model along it, see `check_along`
+    outputs: tuple[str, ...]  # (l,) names
 
     @property
     def begin(self) -> dict[str, float]:
@@ -238,7 +239,8 @@ def _run(case: Case, system: System, fmu: FMU, moved: Sequence[str]) -> _Run:
     drive, given = Drive(case.time, u, case.model_time), system.set_by(case.conditions)
     fmu.begin_at(case.model_time)
     held = dict(zip((signal.name for signal in system.inputs), u[0], strict=True))
-    run = _Run(case, drive, y, sigma, counted, given, starts, doubt)
+    names = tuple(output.name for output in system.outputs)
+    run = _Run(case, drive, y, sigma, counted, given, starts, doubt, names)
     fmu.start(run.begin, {**given, **held})
     return run._replace(starts={**shown_states(fmu, system, u[0], first, starts), **starts})
 
@@ -301,6 +303,16 @@ def _simulate(simulation: Simulation, drive: Drive, values: Mapping[str, float])
     except FMUError as error:
         return str(error)
     return outputs
+
+
+def _lost(run: _Run, simulated: Matrix) -> str:
+    """Which output is no finite number at a sample that counts; empty: none."""
+    lost = run.counted & ~np.isfinite(simulated)
+    if not lost.any():
+        return ""
+    k, j = np.argwhere(lost)[0]
+    at = f"{run.case.time[k]:g} s of {run.case.name}"
+    return f"'{run.outputs[j]}' is no finite number ({simulated[k, j]:g}) at {at}"
 
 
 def _warning(simulation: Simulation, drive: Drive, values: Mapping[str, float]) -> str:
@@ -392,6 +404,7 @@ class _Problem:
                 self.failure = simulated
                 parts.append(np.full(int(run.counted.sum()), _FAILED))
                 continue
+            self.failure = self.failure or _lost(run, simulated)
             with np.errstate(over="ignore", invalid="ignore"):
                 away = ((simulated - run.y) / run.sigma)[run.counted]
             parts.append(np.where(np.abs(away) < _UNBOUNDED, away, _FAILED))
@@ -436,6 +449,8 @@ class _Problem:
         for number, columns, task in tasks:
             run, (by, unsure) = self.runs[number], task.result()
             slopes = (by / run.sigma[:, :, None])[run.counted] * self.size[columns]
+            if not np.isfinite(slopes).all():
+                raise FMUError(f"{run.case.name}: outputs or their slopes are no finite numbers")
             jacobian[rows[number] : rows[number + 1], columns] = slopes
             self.unsure[columns] = np.maximum(self.unsure[columns], unsure)
         for row, (q, (_, spread)) in enumerate(self._known, rows[-1]):
