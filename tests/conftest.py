@@ -45,9 +45,6 @@ from .processes import LONGEST  # noqa: E402
 from .runtime_instances import Fmu, compile_model  # noqa: E402
 from .systems import TRAIN, WHEELSET  # noqa: E402
 
-# Doctests are looked for in all files, by importing them: this one takes functions out of Python.
-collect_ignore = ["platforms/sitecustomize.py"]
-
 ROOT = Path(__file__).parent.parent
 Result = TypeVar("Result")
 

@@ -21,12 +21,13 @@ from workbench.diagnosis import read_effects
 from workbench.models.compiler import build, native
 from workbench.models.modelica import read_library
 
+from .processes import LONGEST
+
 _FENCE = re.compile(
     r"(?:<!-- (?P<mark>long|parsed)(?:: [^>]+)? -->\n)?^```(?P<kind>\w*)\n(?P<code>.*?)^```$",
     re.MULTILINE | re.DOTALL,
 )
 _PACKAGE = Path(workbench.system.template.__file__).with_name("package.mo")
-_LIMIT = 300  # [s] of one block
 _CALL = re.compile(r'^(?:\w+="[^"]*" )*(?:python -m )?workbench (.*)$')
 
 
@@ -104,7 +105,7 @@ def _run(command: Sequence[str], folder: Path, environment: dict[str, str], wher
         capture_output=True,
         text=True,
         check=False,
-        timeout=_LIMIT,
+        timeout=LONGEST,
     )
     assert run.returncode == 0, f"{where}: status {run.returncode}\n{run.stdout}\n{run.stderr}"
     return run.stdout

@@ -41,7 +41,7 @@ from workbench.tuning import (
 from workbench.tuning.checkpoint import Checkpoint, Generation, Population, load, save
 from workbench.tuning.search import identity
 
-from .processes import comes_true, python
+from .processes import LONGEST, comes_true, python
 
 SMALL = Plan(generations=4, population=1, seed=3)
 
@@ -246,14 +246,14 @@ def test_only_workers_with_the_same_code_get_work(scheduler, problem, alone, tmp
     warnings: list[str] = []
     with worker(address, lacking), worker(address, other):
         with distributed.Client(address) as client:
-            client.wait_for_workers(2, timeout=120)
+            client.wait_for_workers(2, timeout=LONGEST)
         refused = pytest.raises(InputError, match="code of workbench none, here")
         with refused, on_cluster(address, problem, warn=warnings.append):
             pass
         assert len(warnings) == 2
         warnings.clear()
         with worker(address), distributed.Client(address) as client:
-            client.wait_for_workers(3, timeout=120)
+            client.wait_for_workers(3, timeout=LONGEST)
             with on_cluster(address, problem, warn=warnings.append) as remote:
                 tuned = run(remote, problem, tmp_path / "remote.json", SMALL)
     assert len(warnings) == 2

@@ -57,7 +57,7 @@ class _Watch:
         finally:
             drawn = getattr(getattr(item, "obj", None), "is_hypothesis_test", False)
             texts = [] if drawn else sorted(self._texts)
-            item.user_properties.append((_PROPERTY, [_name(item), texts]))
+            item.user_properties.append((_PROPERTY, [item.name, texts]))
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         """Gather; tests of one name in several files count together, as files may be renamed."""
@@ -80,8 +80,3 @@ class _Watch:
             path.write_text(
                 json.dumps(content, indent=1, ensure_ascii=False) + "\n", encoding="utf-8"
             )
-
-
-def _name(item: pytest.Item) -> str:
-    """Name of a test with its parameters; of a doctest without the module, which may be renamed."""
-    return item.name if isinstance(item, pytest.Function) else item.name.rpartition(".")[2]
