@@ -18,8 +18,7 @@ if TYPE_CHECKING:
     from workbench.diagnosis import Outcome, Problem
 
 WORKERS_NEED = (
-    *("workbench.diagnosis", "workbench.diagnosis.laws"),
-    *("workbench.models.loops_ready", "scipy.signal"),
+    *("workbench.diagnosis", "workbench.diagnosis.laws", "workbench.models.loops_ready"),
 )
 
 
