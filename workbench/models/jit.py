@@ -17,7 +17,7 @@ import pickle
 import shutil
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from functools import cache, cached_property
 from pathlib import Path
@@ -26,6 +26,7 @@ from typing import Any, ClassVar
 import llvmlite
 import numba
 from llvmlite import ir
+from llvmlite.binding import parse_assembly
 from numba import types
 from numba.core import caching, cgutils, serialize
 from numba.core.codegen import JITCodeLibrary
@@ -96,6 +97,21 @@ class _Locator(caching.UserWideCacheLocator):  # type: ignore[misc]
 
 class _CodeCache(caching.CompileResultCacheImpl):  # type: ignore[misc]
     _locator_classes: ClassVar = [_Locator]
+
+    def reduce(self, code: Any) -> Any:
+        """What is kept of code: of that for LLVM the names alone, as nothing is linked with it."""
+        (name, kind, (machine, _)), *rest = super().reduce(code)
+        module = code.library._get_module_for_linking()
+        defined = [
+            *(f'define void @"{f.name}"() {{ ret void }}' for f in _defined(module.functions)),
+            *(f'@"{v.name}" = global i8 0' for v in _defined(module.global_variables)),
+        ]
+        names = parse_assembly("\n".join(defined)).as_bitcode()
+        return ((name, kind, (machine, names)), *rest)
+
+
+def _defined(symbols: Iterable[Any]) -> list[Any]:
+    return [symbol for symbol in symbols if not symbol.is_declaration]
 
 
 class _CodeFile:
