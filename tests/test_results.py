@@ -120,6 +120,7 @@ def test_a_run_compared_with_itself_is_unchanged(results):
         ({"value": 0.1}, "better"),
         ({"value": 0.9}, "worse"),
         ({"value": None}, "gone"),
+        ({"value": float("nan")}, "gone"),
         ({"value": 0.9, "better": ""}, "changed"),
         ({"value": 0.9, "better": "higher"}, "better"),
     ],

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from workbench.errors import InputError
-from workbench.pages.answer import SUMMARIES, Measure
+from workbench.pages.answer import SUMMARIES, Measure, finite
 from workbench.recordings.channels import listed
 from workbench.runtime.files import parse_table, read_text
 
@@ -112,7 +112,10 @@ def _read(path: Path, folder: Path) -> RunRecord:
         content = parse_table(read_text(path, _ANEW))
         run, answer = content["provenance"]["run"], content["answer"]
         headline, details = (
-            {name: Measure(**measure) for name, measure in answer[key].items()}
+            {
+                name: Measure(**dict(map(_known, measure.items())))
+                for name, measure in answer[key].items()
+            }
             for key in ("headline", "details")
         )
         _check(run, [*headline.values(), *details.values()])
@@ -136,6 +139,12 @@ def _read(path: Path, folder: Path) -> RunRecord:
             expected="one of this version",
             remedy=_ANEW,
         ) from None
+
+
+def _known(entry: tuple[str, Any]) -> tuple[str, Any]:
+    """An entry of a measure; of a number that is infinite or NaN, that it could not be had."""
+    key, value = entry
+    return key, finite(value) if isinstance(value, float) else value
 
 
 def _check(run: Mapping[str, Any], measures: list[Measure]) -> None:
