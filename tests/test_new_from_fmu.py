@@ -176,6 +176,16 @@ def test_a_signal_a_thousand_times_its_start_is_asked_about(tmp_path, ice):
     assert question in text
 
 
+def test_the_noise_of_what_never_moves_is_asked_for(tmp_path, ice):
+    log = tmp_path / "log.csv"
+    log.write_text(
+        "\n".join(["time [s],room [degC],box [degC]", *(f"{t},20,0" for t in range(99))])
+    )
+    text = drafted(ice, log)
+    assert "# QUESTION: it stays where it is in all recordings: what is the noise of its" in text
+    assert tomllib.loads(text)["outputs"]["box"]["noise"] == 1e-4
+
+
 def test_the_whole_name_and_outputs_go_before_parts_of_names(tmp_path):
     """Libraries of mechanics have many variables whose last part is v."""
     pendulum = build_text(

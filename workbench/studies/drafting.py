@@ -470,13 +470,17 @@ def _steps(samples: Sequence[Vector]) -> bool:
 
 def _noise(samples: Sequence[Vector], unit: str, span: float, *, may_be_exact: bool) -> list[str]:
     """Noise of a sensor, from differences of samples, and the step in which it is read."""
+    if span == 0.0:
+        noise = _NOISELESS * (abs(float(samples[0][0])) or 1.0)
+        question = "it stays where it is in all recordings: what is the noise of its sensor?"
+        return [f"# QUESTION: {question}", _entry("noise", _quantity(noise, unit), "a guess")]
     noise = float(np.median([deviation_of(values) for values in samples]))
     why = "from differences of samples; what lasts longer than a sample is not in it"
     lines = []
     if noise < _NOISELESS * span and may_be_exact:
         noise, why = 0.0, "its samples scatter by less than 1e-4 of its range: taken as exact"
     elif not noise > _NOISELESS * span:
-        noise = _NOISELESS * span or 1e-4 * max(float(np.abs(samples[0]).max()), 1e-6)
+        noise = _NOISELESS * span
         why = "its samples scatter by less: 1e-4 of its range, so that no sensor is trusted blindly"
     levels = np.unique(np.concatenate(samples))
     if 1 < levels.size < 0.25 * sum(map(np.size, samples)):
