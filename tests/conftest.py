@@ -10,7 +10,6 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
@@ -62,13 +61,6 @@ multiprocessing.util.get_temp_dir()
 def pytest_collection_finish() -> None:
     """Modules and tests are no garbage: to look through them now and then took a tenth of all."""
     gc.freeze()
-
-
-def pytest_runtest_setup(item: pytest.Item) -> None:
-    """Skip, and list as skipped, long tests that the time of a check no longer suffices for."""
-    end = float(os.environ.get("LONG_TESTS_END", "inf"))
-    if time.time() > end and item.get_closest_marker("long"):
-        pytest.skip("not run: the time for long tests was over, on a slow machine")
 
 
 # What workers of pools import most. Else the first pool of a session, which may need nothing,
