@@ -4,7 +4,6 @@ import json
 import re
 import shutil
 import tempfile
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -232,16 +231,14 @@ def test_the_trial_makes_no_call_that_a_sound_fmu_refuses(root, version, interfa
         assert trial.run_trial(description, interface, folder, Limits()) == ""
 
 
-def test_a_trial_takes_no_longer_than_0_3_s(minimal_path):
-    """The least of several, because other work on the machine only adds."""
-    description = read_description(minimal_path)
-    times = []
-    with trial.unpacked(description, "Model Exchange") as folder:
-        for _ in range(5):
-            begin = time.perf_counter()
-            trial.run_trial(description, "Model Exchange", folder, Limits())
-            times.append(time.perf_counter() - begin)
-    assert min(times) < 0.3
+@pytest.mark.parametrize("interface", ["Model Exchange", "Co-Simulation"])
+def test_a_trial_makes_each_call_at_most_a_hundred_times(hostile_path, plan, interface):
+    """So it takes what its process takes to start: an FMU that ends it at the next is sound."""
+    description = read_description(hostile_path)
+    with trial.unpacked(description, interface) as folder:
+        for call in [*CALLS[1:], "fmi2CompletedIntegratorStep", "fmi2DoStep"]:
+            plan(f"exit {call} 101")
+            assert trial.run_trial(description, interface, folder, Limits()) == "", call
 
 
 # --- the check ---
