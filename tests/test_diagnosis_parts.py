@@ -8,14 +8,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.optimize import lsq_linear
-from scipy.signal import lfilter
 
 from workbench.arrays import Matrix, Vector
 from workbench.diagnosis import build_everything, choose, given_values, read_effects
 from workbench.diagnosis.data.cleaning import outliers, smooth, uneven_steps
 from workbench.diagnosis.data.clocks import in_time
 from workbench.diagnosis.data.counting import count
-from workbench.diagnosis.data.filters import recursive
 from workbench.diagnosis.data.motion import ModelSource, OpenModel, motion, opened
 from workbench.diagnosis.data.samples import Samples, compared
 from workbench.diagnosis.data.samples import prepare as prepare_samples
@@ -347,16 +345,6 @@ def test_load_cells_behind_the_mode_follow_its_transfer_function():
         gain = abs(mode**2 / (s**2 + 2 * 0.05 * mode * s + mode**2))
         # Matched poles: 1 % of the amplitude, and 1 % for the samples missing the crest.
         assert np.abs(read).max() == pytest.approx(gain, rel=0.02)
-
-
-@pytest.mark.parametrize("shape", [(300,), (300, 2), (200, 2, 3)])
-@pytest.mark.parametrize("order", [1, 2])
-def test_a_recursive_filter_gives_what_that_of_scipy_gives_to_the_last_bit(order, shape):
-    rng = np.random.default_rng(order)
-    numerator, values = rng.standard_normal(order + 1), rng.standard_normal(shape)
-    denominator, begin = np.array([1.0, -0.9, 0.4])[: order + 1], np.ones((order, *shape[1:]))
-    expected, _ = lfilter(numerator, denominator, values, axis=0, zi=begin)
-    assert np.array_equal(recursive(numerator, denominator, values, begin), expected)
 
 
 def test_a_step_that_is_held_at_its_bound_lets_the_others_do_their_best():

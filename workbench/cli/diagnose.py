@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from workbench.diagnosis import Outcome, Problem
 
 WORKERS_NEED = (
-    *("workbench.diagnosis", "workbench.diagnosis.laws", "workbench.models.loops_ready"),
+    *("workbench.diagnosis", "workbench.diagnosis.laws"),
+    *("workbench.models.loops_ready", "scipy.signal"),
 )
 
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from workbench.diagnosis.inference.rivals import Rivals
 
 
-WORKERS_NEED = ("workbench.studies.design", "workbench.models.loops_ready")
+WORKERS_NEED = ("workbench.studies.design", "workbench.models.loops_ready", "scipy.signal")
 
 
 def add(commands: Commands, text: str) -> argparse.ArgumentParser:

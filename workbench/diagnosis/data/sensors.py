@@ -12,7 +12,6 @@ import numpy as np
 
 from workbench.arrays import Matrix, Vector
 from workbench.diagnosis.data.clocks import greatest_skew
-from workbench.diagnosis.data.filters import recursive
 from workbench.diagnosis.data.samples import Samples
 from workbench.diagnosis.effects.candidates import (
     GAIN,
@@ -92,10 +91,14 @@ def lagged(time: Vector, values: Matrix, lag: float) -> Matrix:
     """
     if lag == 0.0:
         return values
+    from scipy.signal import lfilter  # takes its time, and little else needs it
+
     h = float(np.median(np.diff(time)))
     q = np.exp(-h / lag)
     w = lag / h * (1.0 - q)
-    return recursive(np.array([1.0 - w, w - q]), np.array([1.0, -q]), values, w * values[:1])
+    rest = w * values[:1]
+    behind: Matrix = lfilter([1.0 - w, w - q], [1.0, -q], values, axis=0, zi=rest)[0]
+    return behind
 
 
 class SensorError(NamedTuple):

@@ -7,7 +7,6 @@ from itertools import product
 import numpy as np
 
 from workbench.arrays import Vector
-from workbench.diagnosis.data.filters import recursive
 from workbench.system.experiments import (
     RELEASE,
     SINE,
@@ -50,11 +49,12 @@ class Profile:
 
     def signal(self, time: Vector) -> Vector:
         """Input at each time, (n,) [unit]: the demand behind its lags."""
+        from scipy.signal import lfilter  # takes its time, and little else needs it
+
         values, h = self.demand(time), float(time[1] - time[0])
         for lag in self.input.lags:
             pole = np.exp(-h / lag)
-            numerator, denominator = np.array([1.0 - pole, 0.0]), np.array([1.0, -pole])
-            values = recursive(numerator, denominator, values, np.zeros(1))
+            values = lfilter([1.0 - pole], [1.0, -pole], values)
         return values
 
     def text(self, system: System) -> str:
