@@ -584,6 +584,7 @@ def test_a_recording_has_the_date_of_its_first_sample(tmp_path, tank, form, date
         ("GPS week;TOW [s]", 1.0, "2024-03-02T23:49:42"),
         ("GPSWeek;GPSMilliseconds", 1e3, "2024-03-02T23:49:42"),
         ("GWk;GMS", 1e3, "2024-03-02T23:49:42"),
+        ("GPS_Week;GPS_Time_s", 1.0, "2024-03-02T23:49:42"),
     ],
 )
 def test_weeks_of_satellites_go_on_with_what_has_gone_of_them(tmp_path, tank, names, factor, date):
@@ -598,6 +599,33 @@ def test_weeks_of_satellites_go_on_with_what_has_gone_of_them(tmp_path, tank, na
     read_clock = clock(path, tank)
     assert_allclose(np.diff(read_clock.times), QUARTER)
     assert iso(read_clock.start + read_clock.times[0]).startswith(date)
+
+
+def test_the_time_of_a_week_goes_round_with_it(tmp_path, tank):
+    stamps = [f"{(604200000 + 900000 * k) % 604800000}" for k in range(60)]
+    read = clock(table(tmp_path / "a.csv", stamps, "iTOW [ms]"), tank)
+    assert_allclose(read.times - read.times[0], QUARTER * np.arange(60))
+
+
+def test_figures_of_a_time_of_day_may_end_with_milliseconds(tmp_path, tank):
+    """Taken as a count of milliseconds, they were 40 s late at each full minute."""
+    stamps = local(datetime(2024, 3, 1, 10, tzinfo=UTC), 60, "%H%M%S250")
+    assert_allclose(clock(table(tmp_path / "a.csv", stamps), tank).times, QUARTER * np.arange(60))
+
+
+def test_short_durations_have_seconds_alone(tmp_path, tank):
+    stamps = [f"{k // 2}m{30 * (k % 2)}s" if k > 1 else f"{30 * k}.0s" for k in range(60)]
+    stamps[7] = ""
+    read = clock(table(tmp_path / "a.csv", stamps), tank)
+    expected = np.where(np.arange(60) == 7, np.nan, 30.0 * np.arange(60))
+    assert_allclose(read.times, expected)
+
+
+def test_a_recording_begins_as_its_preamble_says_where_its_times_begin_at_zero(tmp_path, tank):
+    stamps = [f"{k // 4:02d}:{15 * (k % 4):02d}:00" for k in range(60)]
+    path = table(tmp_path / "a.csv", stamps)
+    path.write_text("Start time: 2024-03-01 10:15:30\n" + path.read_text())
+    assert iso(clock(path, tank).dated)[:19] == "2024-03-01T10:15:30"
 
 
 @pytest.mark.parametrize(

@@ -329,6 +329,24 @@ def test_samples_beside_a_preamble_are_all_read(tmp_path, preamble, blank):
     assert_allclose(channels[1].values, 900.5 + np.arange(60.0))
 
 
+@pytest.mark.parametrize(
+    "recorder", [name for name in HEADERS if name.startswith("an oscilloscope")]
+)
+def test_a_step_behind_names_is_that_of_all_samples(tmp_path, recorder):
+    rows = [HEADERS[recorder]["row"].format(k) for k in range(60)]
+    path = table(tmp_path / "a.csv", [*HEADERS[recorder]["head"].strip().split("\n"), *rows])
+    recorded = read_recorded_file(path)
+    assert recorded.groups[0].step == 1e-3
+    assert recorded.groups[0].channels[-1].values.size == 60
+
+
+@pytest.mark.parametrize("write", [pq.write_table, feather.write_feather])
+def test_zeros_behind_the_end_of_a_table_are_none_of_it(tmp_path, write):
+    write(pa.table({"time [s]": np.arange(60.0), "h [mm]": np.arange(60.0)}), tmp_path / "a")
+    (tmp_path / "b").write_bytes((tmp_path / "a").read_bytes() + bytes(512))
+    assert channels(tmp_path / "b") == [("time", "s"), ("h", "mm")]
+
+
 @pytest.mark.parametrize("write", [pq.write_table, feather.write_feather])
 def test_texts_of_parquet_and_arrow_are_dates_times_and_numbers(tmp_path, write):
     moments = [datetime.datetime(2024, 3, 5, 10) + datetime.timedelta(seconds=k) for k in range(60)]

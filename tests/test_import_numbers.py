@@ -562,6 +562,8 @@ def test_a_signal_that_holds_texts_says_which(tmp_path, tank):
     path.write_text(path.read_text().replace("\n", " high\n").replace("h [mm] high", "h [mm]"))
     (problem,) = proposed(path, tank).problems
     assert "'h' holds texts such as '900.000 high', no numbers" in problem
+    with pytest.raises(InputError, match=r"'h' holds texts .*To do: export it as numbers"):
+        proposed(path, tank, "h=h")
 
 
 def test_two_columns_of_one_name_can_be_told(tmp_path, tank):

@@ -22,11 +22,15 @@ from workbench.system.system import System
 # the one that is meant. Where several are as likely, as seconds and minutes often are, none is.
 _UNSTATED = ("ns", "us", "ms", "s", "min", "h", "d")
 _LIKE = math.sqrt(1000.0)
-# Counters that go round: bits in counts, ms or us of the unit; and parts of a day.
+# Counters that go round: bits in counts, ms or us of the unit; parts of a day, and a week.
 _ROUNDS = tuple(
     sorted(
         {float(2**bits) * part for bits in (16, 24, 32) for part in (1.0, 1e-3, 1e-6)}
-        | {float(rest) * part for rest in (60, 3600, 43200, 86400) for part in (1.0, 1e3, 1e6)}
+        | {
+            float(rest) * part
+            for rest in (60, 3600, 43200, 86400, 604800)
+            for part in (1.0, 1e3, 1e6)
+        }
         | {12.0, 24.0, 1440.0}
     )
 )
@@ -41,7 +45,7 @@ _EPOCHS = {
 _GPS = 315964800.0 - 18.0  # [s] from 1970 to the zero of GPS, less leap seconds since 2017
 _WEEK = re.compile("(gps)?(week|wk|wn|weeknumber|weekno)|gwk")
 _OF_WEEK = re.compile(
-    "(gps|i)?(tow|sow|timeofweek|secondsofweek)(ms|s)?|gps(seconds|milliseconds|secs|ms|time)|gms"
+    "(gps|i)?(tow|sow|timeofweek|secondsofweek)(ms|s)?|gps(seconds|milliseconds|secs|ms|time(ms|s)?)|gms"
 )
 # Days: that of the year 1970, and what they count in recordings.
 _DAYS = {
@@ -53,6 +57,7 @@ _DAYS = {
 _FROM_1904 = 1462 * 86400.0  # s that the other zero of workbooks is later: their option date1904
 # Figures of dates and times, as of Unix' date: 1015, 101500, 240305101500, 202403051015.
 _PACKED = ("%H%M", "%H%M%S", "%y%m%d%H%M", "%y%m%d%H%M%S", "%Y%m%d%H%M", "%Y%m%d%H%M%S")
+_PACKED_MS = "%H%M%S%f"  # with three figures of milliseconds
 _DAY = 86400.0  # s
 _MIDNIGHT = 0.5  # of a day, by which times go back at its end
 _UNITS_APART = (60.0, 3600.0, 86400.0, 1e3, 1e6, 1e9)
@@ -106,7 +111,8 @@ def read_clock(
         return clock
     shown = next((c.shown for c in group.channels if c.name == clock.channel), math.nan)
     day = group.begun - group.begun % _DAY
-    return replace(clock, dated=day + shown if math.isfinite(shown) else group.begun)
+    # Times that begin at zero have gone since the begin.
+    return replace(clock, dated=day + shown if shown > 0.0 else group.begun)
 
 
 def _read_clock(
@@ -338,9 +344,11 @@ def _packed_clock(channel: FileChannel) -> Clock | None:
     whole, parts = np.floor(channel.values), channel.values % 1.0
     known = np.isfinite(channel.values)
     uneven = _unevenness(held)
-    for form in _PACKED:
-        digits = {"%H%M": 4, "%H%M%S": 6}.get(form, 2 * len(form) // 2 + ("%Y" in form) * 2)
-        if held.max() >= 10.0**digits or (len(form) > 6 and held.min() < 10.0 ** (digits - 2)):
+    for form in (*_PACKED, _PACKED_MS):
+        digits = {"%H%M": 4, "%H%M%S": 6, _PACKED_MS: 9}.get(
+            form, 2 * len(form) // 2 + ("%Y" in form) * 2
+        )
+        if held.max() >= 10.0**digits or ("%d" in form and held.min() < 10.0 ** (digits - 2)):
             continue
         try:
             moments = [datetime.strptime(f"{int(v):0{digits}d}", form) for v in whole[known]]

@@ -103,13 +103,14 @@ def propose(
     """
     places = [PlacedChannel(*placed) for placed in placed_channels(files)]
     where = ", ".join(str(file.path) for file in files)
+    texts = [channel for file in files for group in file.groups for channel in group.left]
+    _refuse_texts(given, texts, places, where)
     assigned = {
         name: _as_named(channel, system.signals[name], places, system, where)
         for name, channel in given.items()
         if name != TIME
     }
     _refuse_shared(assigned, where)
-    texts = [channel for file in files for group in file.groups for channel in group.left]
     notes = [note for file in files for note in file.notes]
     if TIME in given and given[TIME].channel not in {channel.name for channel in texts}:
         _find(given[TIME], TIME, places, where)
@@ -145,17 +146,39 @@ def _text_of(signal: Signal, texts: Sequence[FileChannel], notes: Sequence[str])
     """Why a signal has no channel: one of its name may hold texts, or was left out."""
     for channel in texts:
         if likeness_to(channel.name, channel.about, signal.names):
-            example = next(filter(None, channel.texts), "")
-            if not example:
-                return (
-                    f"'{channel.name}' holds nothing; of formulas that were never computed there "
-                    "is no number: open and save the file in a program of spreadsheets"
-                )
-            return f"'{channel.name}' holds texts such as '{example}', no numbers"
+            return _held_by(channel)
     for note in notes:  # '...' has a formula that is not understood
         if (match := _LEFT_OUT.match(note)) and likeness_to(match["name"], "", signal.names):
             return note
     return "no channel whose name or unit tells"
+
+
+def _held_by(channel: FileChannel) -> str:
+    """What a channel without numbers holds, in words."""
+    if example := next(filter(None, channel.texts), ""):
+        return f"'{channel.name}' holds texts such as '{example}', no numbers"
+    return (
+        f"'{channel.name}' holds nothing; of formulas that were never computed there is no number: "
+        "open and save the file in a program of spreadsheets"
+    )
+
+
+def _refuse_texts(
+    given: Mapping[str, NamedChannel],
+    texts: Sequence[FileChannel],
+    places: Sequence[PlacedChannel],
+    where: str,
+) -> None:
+    """Refuse a channel that a user names for a signal, and that holds no numbers."""
+    numbers = {place.channel.name for place in places}
+    held = {channel.name: channel for channel in texts if channel.name not in numbers}
+    for name in (name for name, own in given.items() if name != TIME and own.channel in held):
+        raise InputError(
+            where=f"{where}, channel '{given[name].channel}'",
+            found=_held_by(held[given[name].channel]),
+            expected=f"numbers for {name}, in one unit",
+            remedy="export it as numbers, in one unit, or name another channel",
+        )
 
 
 def _find(

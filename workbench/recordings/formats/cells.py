@@ -70,15 +70,15 @@ _FEWEST = 3  # samples one after the other
 _FEW = 50  # rows that tell whether times go back
 # Labels of rows: of names, of units; and of a column that holds remarks.
 _NAME_ROW = re.compile(
-    r"((channel|kanal|signal|trace|sensor|long)[ _]?)?(names?|bezeichnung)\W*|kanal|channel|signal"
-    r"|path",
+    r"((channel|kanal|signal|trace|sensor|long)[ _]?)?(names?|title|bezeichnung)\W*"
+    r"|kanal|channel|signal|path",
     re.IGNORECASE,
 )
 _UNIT_ROW = re.compile(
-    r"(y[ _]|v|eng(ineering)?[ _]?)?(units?|unit[ _]label|einheit(en)?)\W*", re.IGNORECASE
+    r"(y[ _]|v|eng(ineering)?[ _]?)?(units?|unit[ _]?(label|name)|einheit(en)?)\W*", re.IGNORECASE
 )
 _TIME_NAME = re.compile(r"(time|zeit|date|datum)", re.IGNORECASE)
-_RULE = re.compile(r"[-=_+]+")  # of a table that is drawn
+_RULE = re.compile(r"[-=_+]+|\[data\]", re.IGNORECASE)  # of a table that is drawn, or follows
 _REMARK = re.compile(r"comments?|remarks?|notes?|kommentar|bemerkung", re.IGNORECASE)
 _WITH_UNIT = re.compile(
     r"\s*(?P<number>[+-]?\s?[\d.,]*\d([eE][+-]?\d+)?)\s*(?P<unit>[^\W\d][^\s;,|]{0,9}|%|°\S)\s*"
@@ -438,7 +438,10 @@ def _header(above: Sequence[Sequence[str]], width: int) -> tuple[list[str], list
         return names_and_units
     # Below units stand kinds, such as Avg; channel numbers are no names.
     named = [row for row in rows[:at] if not all(is_number(cell) for cell in row if cell)]
-    labelled = _labelled_row(above, _UNIT_ROW, width) if at is None else []
+    is_labelled = at is None or (
+        _UNIT_ROW.fullmatch(rows[at][0]) and not _NAME_ROW.fullmatch(rows[at - 1][0])
+    )
+    labelled = _labelled_row(above, _UNIT_ROW, width) if is_labelled else []
     if labelled and (own := _labelled_row(above, _NAME_ROW, width)):
         named = [own]
     if not named:

@@ -19,7 +19,9 @@ _ABOUT = (b"description", b"comment", b"long_name")
 
 def read(path: Path, raw: bytes) -> Contents:
     """Kind, groups and notes of a file of Parquet or Arrow."""
-    stream, called = io.BytesIO(raw), "Arrow"
+    bare = raw.rstrip(b"\0")  # with which some recorders fill what they have reserved
+    stream = io.BytesIO(bare if bare.endswith((b"ARROW1", b"PAR1")) else raw)
+    called = "Arrow"
     doubts: tuple[str, ...] = ()
     if raw.startswith(b"ARROW1"):
         table = pa.ipc.open_file(stream).read_all()

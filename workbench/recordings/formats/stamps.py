@@ -75,11 +75,12 @@ _OF_HOUR = re.compile(
     _BEFORE + r"(?P<m>\d{1,2}):(?P<s>\d\d)[.,](?P<f>\d{1,12})"
 )  # as spreadsheets save it
 _OF_MINUTES = re.compile(r"(?P<m>\d{1,4}):(?P<s>\d\d)")  # where it is said that they are minutes
-_DURATION = re.compile(  # PT1H15M, 1h 15m 0s
-    r"(?=P|.*\d\s*[hm].*\d)P?((?P<days>\d+)\s*d\s*)?T?((?P<h>\d+)\s*h\s*)?((?P<m>\d+)\s*m(in)?\s*)?"
-    r"((?P<s>\d+)([.,](?P<f>\d{1,12}))?\s*s(ec)?)?",
-    re.IGNORECASE,
+_OF_DURATION = (
+    r"(?=.*\d)P?((?P<days>\d+)\s*d\s*)?T?((?P<h>\d+)\s*h\s*)?((?P<m>\d+)\s*m(in)?\s*)?"
+    r"((?P<s>\d+)([.,](?P<f>\d{1,12}))?\s*s(ec)?)?"
 )
+_DURATION = re.compile(rf"(?=P|.*\d\s*[hm].*\d){_OF_DURATION}", re.IGNORECASE)  # PT1H15M, 1h 15m 0s
+_SHORT_DURATION = re.compile(_OF_DURATION, re.IGNORECASE)  # beside these, 5.2s
 # What a sample most often is, and no time is: the shortest without a mark has 14 figures.
 _NUMBER = re.compile(r"[+-]?\d{0,13}([.,]\d*)?([eE][+-]?\d+)?")
 _OF_CONTROLLERS = re.compile(r"^(DATE_AND_TIME|DT|TIME_OF_DAY|TOD|TIME|T)#", re.IGNORECASE)
@@ -179,7 +180,7 @@ def read_stamps(name: str, cells: Sequence[str], how: str = "") -> FileChannel |
     if first is None:
         return None
     if first.re in _TIMES_ALONE:
-        return _of_day(name, texts, first.re)
+        return _of_day(name, texts, _SHORT_DURATION if first.re is _DURATION else first.re)
     return _by_date(name, texts, first.re, order, zone)
 
 

@@ -27,7 +27,9 @@ from workbench.recordings.formats.stamps import is_stamp
 _SEPARATORS = {";": "semicolons", "\t": "tabs", "|": "bars", ",": "commas", " ": "spaces"}
 _COMMENT = re.compile(r"(?!\"#\")\s*\"?(#+|%+|//+|!+|\*+)\s*")
 _RECEIVED = re.compile(r"(?P<time>\d\d:\d\d:\d\d\.\d{1,6}) -> ")
+_QUOTED = re.compile(r'"([^"]*)"')
 _DIGIT = re.compile(r"(?![0-9])\d")
+_INCREMENT = re.compile(r"\s*(increment|tInc\s*=\s*(?P<value>\S+?)s?)\s*", re.IGNORECASE)
 _BEFORE_UNIT = re.compile(r"(?<=[^\s\])])\s+(?=[\[(])")  # between a name and its unit
 _SAMPLED = 200  # lines from the middle of a file, which tell how it is laid out
 _FOLDED = 5  # lines over which a name in quotation marks may go
@@ -56,6 +58,7 @@ def read(path: Path, raw: bytes) -> Contents:
         lines = [_RECEIVED.sub(rf"\g<time>{mark}", line) for line in lines]
     separator = _separator(path, lines)
     rows, numbers, broken = _rows(lines, separator)
+    rows, numbers = _with_step(rows, numbers)
     rows, padded = (rows, 0) if separator == " " else _filled(rows)
     if beside := _preamble_beside(rows):
         height, width = beside
@@ -90,7 +93,7 @@ def read(path: Path, raw: bytes) -> Contents:
     words = ["CSV", _SEPARATORS[separator], reading, encoding]
     begin = tables[0].lines[0]
     kept = {line for own in tables for line in own.lines}
-    below = [number for number in numbers if number >= begin]
+    below = sorted({number for number in numbers if number >= begin})
     heads = sum(len(own.head) for own in tables[1:])
     broken += max(0, len(below) - len(kept) - heads - bool(cut))
     if broken:
@@ -147,15 +150,23 @@ def _separator(path: Path, lines: Sequence[str]) -> str:
     middle_lines = middle[begin : begin + _SAMPLED]
     scores: dict[str, float] = {}
     for mark in _SEPARATORS:
-        bare = middle_lines if mark == " " else [line.replace('"', "") for line in middle_lines]
-        rows = [line.split(None if mark == " " else mark) for line in bare]
+        if mark == " ":
+            rows = [line.split() for line in middle_lines]
+        else:  # a mark within quotation marks parts no cells
+            rows = [
+                [cell.strip().replace("\0", mark) for cell in line.split(mark)]
+                for line in (
+                    _QUOTED.sub(lambda match: match[1].replace(mark, "\0"), line)  # noqa: B023
+                    for line in middle_lines
+                )
+            ]
         widths = [len(row) for row in rows]
         if not widths or max(widths) < 2:
             continue
         width = max(set(widths), key=widths.count)
         cells = [cell for row in rows for cell in row]
         good = sum(
-            is_missing(cell) or is_number(cell) or is_stamp(cell.strip()) or is_quantity(cell)
+            is_missing(cell) or is_number(cell) or is_stamp(cell) or is_quantity(cell)
             for cell in cells
         )
         even = widths.count(width) / len(widths)
@@ -238,7 +249,7 @@ def _split_quoted(line: str, below: Sequence[str], separator: str) -> tuple[list
         count += 1
     # A quoted part of a name is none of a cell: "PLC_1".flow
     strict = line.count('"') % 2 > 0 or re.search(r'"\.\w', line) is None
-    (cells,) = csv.reader([line], delimiter=separator, strict=strict)
+    (cells,) = csv.reader([line], delimiter=separator, strict=strict, skipinitialspace=True)
     return cells, count
 
 
@@ -277,11 +288,26 @@ def _preamble_beside(rows: Sequence[Sequence[str]]) -> tuple[int, int] | None:
     width = max(map(len, rows), default=0)
     if len(rows) < _SAMPLED // 10 or {len(row) for row in rows} != {width}:
         return None
-    columns = list(zip(*rows, strict=True))
+    columns = [[cell.strip() for cell in column] for column in zip(*rows, strict=True)]
     first = next((i for i, cells in enumerate(columns) if all(map(is_number, cells))), 0)
     left = [k for k, row in enumerate(rows) if any(cell.strip() for cell in row[:first])]
     height = left[-1] + 1 if left else 0
     return (height, first) if 1 < height < len(rows) // 2 and left[0] == 0 else None
+
+
+def _with_step(rows: list[list[str]], numbers: list[int]) -> tuple[list[list[str]], list[int]]:
+    """The same rows, with begin and step that stand behind names as a line above them.
+
+    So oscilloscopes write samples without times: X,CH1,Start,Increment or CH1(V),t0 =0,tInc = 1e-6.
+    """
+    names, below = [*rows, [], []][:2]
+    at = next((i for i, cell in enumerate(names) if _INCREMENT.fullmatch(cell)), 0)
+    match = _INCREMENT.fullmatch(names[at]) if at > 1 else None
+    value = "".join((match["value"] or "", *below[at : at + 1])).strip() if match else ""
+    if match is None or not is_number(value):
+        return rows, numbers
+    first = [names[: at - 1], below if match["value"] else below[: at - 1]]
+    return [[f"dt {value} s"], *first, *rows[2:]], [numbers[0], *numbers]
 
 
 def _of_labview(table: Cells) -> Cells:
