@@ -365,6 +365,7 @@ UNIX = 1709281000  # s, of 2024-03-01T08:16:40
         ("ticks", every(lambda k: 638448778000000000 + 9 * 10**9 * k), "2024-03-01"),
         ("Time_ms", every(lambda k: f"{45352e6 + k / 96e-6:.3f}"), "2024-03-01"),  # of WinCC
         ("GPS time", every(lambda k: 1393316218 + 900 * k), "2024-03-01T08:16:40"),
+        ("gps_time_us", every(lambda k: (1393316218 + 900 * k) * 10**6), "2024-03-01T08:16:40"),
         ("Time", local(datetime(2024, 3, 1, tzinfo=UTC), 300, "%H%M"), ""),
         ("Time", local(datetime(2024, 3, 1, tzinfo=UTC), 300, "%H%M%S"), ""),
         ("Time", local(datetime(2024, 3, 1, tzinfo=UTC), 300, "%y%m%d%H%M%S"), "2024-03-01"),

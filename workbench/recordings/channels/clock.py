@@ -385,6 +385,8 @@ def _count_clock(channel: FileChannel, unit: str, factor: float, reason: str) ->
         pass  # the file says from when times count
     elif _UNIX[0] <= first * factor <= _UNIX[1] and is_time(channel.name):
         values, start = values - first, first * factor
+        if "gps" in words(channel.name):
+            start, reason = start + _GPS, f"{unit} of GPS"
     with np.errstate(over="ignore"):  # what no clock counts
         times = factor * values
     return Clock(
@@ -436,8 +438,6 @@ def _since(channel: FileChannel, system: System) -> Clock | None:
     for unit, factor in (("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)):
         if _UNIX[0] <= held.min() * factor and held.max() * factor <= _UNIX[1]:
             clock = _count_clock(channel, unit, factor, f"{unit} since 1970")
-            if "gps" in words(channel.name):
-                clock = replace(clock, start=clock.start + _GPS, reason="s of GPS")
     for reason, (zero, factor) in _EPOCHS.items():
         if _UNIX[0] <= held.min() * factor - zero and held.max() * factor - zero <= _UNIX[1]:
             times = (channel.values - held[0]) * factor
