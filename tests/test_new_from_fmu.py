@@ -10,9 +10,12 @@ import numpy as np
 import pytest
 
 from workbench.__main__ import main
+from workbench.cli import inputs
 from workbench.errors import InputError
 from workbench.observers import choose
+from workbench.recordings import formats
 from workbench.recordings.case import read_cases
+from workbench.runtime.files import read_bytes
 from workbench.system.registry import load_system, open_model
 from workbench.system.template import SEEPAGE, write_system
 
@@ -59,6 +62,18 @@ def answer(monkeypatch) -> Callable[[str], list[str]]:
         return asked
 
     return answers
+
+
+def test_each_log_is_read_once_and_a_large_one_is_told_before(tmp_path, fmu, monkeypatch, capsys):
+    """A million samples were read twice, for minutes without a word."""
+    read = []
+    monkeypatch.setattr(formats, "read_bytes", lambda p, r: read.append(p) or read_bytes(p, r))
+    monkeypatch.setattr(inputs, "_LARGE", 5000)
+    log = write_log(tmp_path / "day.csv", 1)
+    folder = tmp_path / "oven"
+    assert main(["new", str(folder), "--fmu", str(fmu), "--recordings", str(log), "--yes"]) == 0
+    assert read == [log]
+    assert "reading day.csv, 0 MB" in capsys.readouterr().err
 
 
 def test_two_commands_lead_from_an_fmu_and_logs_to_an_open_loop(tmp_path, fmu, answer):

@@ -17,6 +17,7 @@ from workbench.runtime.files import locked_folder
 
 if TYPE_CHECKING:
     from workbench.recordings.channels import RecordingOptions
+    from workbench.recordings.formats import RecordedFile
     from workbench.recordings.importing import Import
     from workbench.system.system import System
 
@@ -59,12 +60,20 @@ def add(commands: Commands, text: str) -> argparse.ArgumentParser:
     return parser
 
 
-def run(options: argparse.Namespace, output: Output) -> CommandResult:
-    """Import files, each by itself; what is refused leaves the others."""
-    from workbench.cli.inputs import recording_options
+def run(
+    options: argparse.Namespace, output: Output, read: Mapping[Path, RecordedFile] | None = None
+) -> CommandResult:
+    """Import files, each by itself; what is refused leaves the others.
+
+    Parameters
+    ----------
+    read : files that were read before.
+    """
+    from workbench.cli.inputs import read_files, recording_options
     from workbench.recordings.importing import IMPORTED, imported
     from workbench.system.registry import load_system
 
+    read = dict(read or {})
     system = load_system(options.system)
     known = recording_options(options, system)
     if options.together or options.apart:
@@ -75,7 +84,9 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
         record = before = imported(options.out)
         for paths in together:
             try:
-                record, errors = _import(paths, record, system, known, options, output)
+                files = read_files([path for path in paths if path not in read], output) | read
+                own = [files[path] for path in paths]
+                record, errors = _import(own, record, system, known, options, output)
             except InputError as error:
                 errors = [error]
             for refusal in errors:
@@ -89,7 +100,7 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
 
 
 def _import(
-    paths: Sequence[Path],
+    files: Sequence[RecordedFile],
     record: list[dict[str, Any]],
     system: System,
     known: RecordingOptions,
@@ -100,7 +111,6 @@ def _import(
     from workbench.cli.import_confirmation import confirm
     from workbench.cli.import_figure import draw_cuts
     from workbench.recordings.channels import stored_columns
-    from workbench.recordings.formats import read_recorded_file
     from workbench.recordings.importing import (
         describe,
         import_recording,
@@ -109,7 +119,6 @@ def _import(
         write_record,
     )
 
-    files = [read_recorded_file(path) for path in paths]
     stored = stored_columns(options.out, system)
     proposed, conditions = confirm(files, system, stored, known, output, options.yes)
     hashes = [file.sha256 for file in files]
@@ -123,7 +132,7 @@ def _import(
     refused = list(proposed.refused)
     warned: set[str] = set()
     for recording in proposed.held:
-        name = _free_name(paths[0], recording.name, kept)
+        name = _free_name(files[0].path, recording.name, kept)
         try:
             imported = import_recording(name, recording, system, conditions, whole=options.whole)
         except InputError as error:

@@ -7,14 +7,27 @@ from pathlib import Path
 from typing import Any
 
 from workbench.cli.arguments import nearby
-from workbench.cli.output import warn
+from workbench.cli.output import Output, warn
 from workbench.errors import InputError, unknown_name
 from workbench.recordings.case import UNKNOWN, Case, check_names, read_cases
 from workbench.recordings.channels import RecordingOptions, parse_named
+from workbench.recordings.formats import RecordedFile, read_recorded_file
 from workbench.system.reader import with_model
 from workbench.system.registry import load_system
 from workbench.system.system import FULL, OBSERVER, System
 from workbench.system.units import quantity
+
+_LARGE = 2_000_000  # bytes of a file, which take about a second to read
+
+
+def read_files(paths: Sequence[Path], output: Output) -> dict[Path, RecordedFile]:
+    """Read files of recorders; says before which large ones take long."""
+    files = {}
+    for path in paths:
+        if path.is_file() and (size := path.stat().st_size) > _LARGE:
+            output.stage(f"reading {path.name}, {size / 1e6:.0f} MB")
+        files[path] = read_recorded_file(path)
+    return files
 
 
 def recording_options(options: argparse.Namespace, system: System) -> RecordingOptions:

@@ -69,14 +69,14 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
 def _from_fmu(options: argparse.Namespace, output: Output) -> CommandResult:
     from importlib import import_module
 
+    from workbench.cli.inputs import read_files
     from workbench.models.description import MODEL_EXCHANGE, read_description
-    from workbench.recordings.formats import read_recorded_file
     from workbench.runtime.files import write_whole
     from workbench.studies.drafting import system_text
 
     description = read_description(options.fmu)
-    files = [read_recorded_file(path) for path in options.recordings]
-    draft = _confirmed(options, output, files)
+    files = read_files(options.recordings, output)
+    draft = _confirmed(options, output, list(files.values()))
     folder, fmu = options.folder, options.folder / options.fmu.name
     folder.mkdir(parents=True, exist_ok=True)
     if not (fmu.exists() and fmu.samefile(options.fmu)):
@@ -95,7 +95,7 @@ def _from_fmu(options: argparse.Namespace, output: Output) -> CommandResult:
         together=False,
         whole=False,
     )
-    imports = import_module("workbench.cli.import").run(importing, output)
+    imports = import_module("workbench.cli.import").run(importing, output, files)
     smooth = MODEL_EXCHANGE in description.interfaces and not description.event_indicators
     which = "" if smooth else " --estimator open_loop"
     output.result(

@@ -243,7 +243,9 @@ def find_table(rows: Sequence[Sequence[str]], lines: Sequence[int], where: str) 
     width = Counter(len(rows[i]) for i in samples).most_common(1)[0][0] if samples else 0
     # A line of a preamble may hold numbers, too, but not several one after the other.
     # Between samples of slow channels, those of fast ones may have a time alone.
-    known = sorted({*samples, *(i for i, row in enumerate(rows) if _is_time_alone(row, width))})
+    taken = set(samples)
+    others = (i for i, row in enumerate(rows) if i not in taken and _is_time_alone(row, width))
+    known = sorted({*samples, *others})
     runs = (i for i, j in zip(known, known[2:], strict=False) if j == i + 2)
     first = next((i for i in runs if samples), None)
     if first is None or width < 2:
@@ -545,11 +547,11 @@ def parted(table: Cells) -> list[tuple[str, Cells]]:
     Rows may hold one value of one signal that a column names, as historians of plants export: a
     tag, a time and a value, perhaps with its unit. Or columns of times stand before others each.
     """
-    columns = [[cell.strip() for cell in column] for column in zip(*table.rows, strict=True)]
     labels = [name_and_unit(name)[0].casefold() for name in table.names]
     at = {part: i for i, name in enumerate(labels) if (part := _PARTS_OF_TAGS.get(name))}
     if not at.keys() >= {"tag", "value"}:
         return _by_clock(table)
+    columns = [[cell.strip() for cell in column] for column in zip(*table.rows, strict=True)]
     tags = list(dict.fromkeys(columns[at["tag"]]))
     if not 1 < len(tags) <= len(table.rows) / _FEWEST or any(map(is_number, tags)):
         return [("", table)]

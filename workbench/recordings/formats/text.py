@@ -220,8 +220,11 @@ def _filled(rows: list[list[str]]) -> tuple[list[list[str]], int]:
     Where the longest rows of numbers have as many cells as the names above them. A few short rows
     are accidents, and may end within a number; so may the last one.
     """
+    lengths = sorted({len(row) for row in rows if len(row) > 1}, reverse=True)
+    width = next((n for n in lengths if any(_are_numbers(r) for r in rows if len(r) == n)), 0)
+    if all(len(row) >= width or not _are_numbers(row) for row in rows):
+        return rows, 0  # as nearly always
     numeric = [i for i, row in enumerate(rows) if len(row) > 1 and _are_numbers(row)]
-    width = max((len(rows[i]) for i in numeric), default=0)
     short = [i for i in numeric if len(rows[i]) < width and i < len(rows) - 1]
     habit = len(short) >= _HABIT * len(numeric)
     if habit and rows and len(rows[-1]) in {len(rows[i]) for i in short} and _are_numbers(rows[-1]):
@@ -286,6 +289,8 @@ def _preamble_beside(rows: Sequence[Sequence[str]]) -> tuple[int, int] | None:
     Samples go on from the first row to the last; on their left all cells are empty but the first.
     """
     width = max(map(len, rows), default=0)
+    if not any(is_number(cell.strip()) for row in rows[:1] for cell in row):
+        return None  # names, as nearly always
     if len(rows) < _SAMPLED // 10 or {len(row) for row in rows} != {width}:
         return None
     columns = [[cell.strip() for cell in column] for column in zip(*rows, strict=True)]
