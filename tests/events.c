@@ -93,8 +93,8 @@ fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *e) {
 }
 fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean n, fmi2Boolean *event, fmi2Boolean *end) {
     Room *m = c;
-#ifdef MOVES /* a window that cools it at the end of a step, which is no event */
-    if (m->r[T] > 295.0) m->r[T] -= 0.2;
+#ifdef MOVES /* a window that cools it at the end of a step, which is no event; 2: once */
+    if (m->r[T] > 295.0 && !(MOVES == 2 && m->relay)) m->r[T] -= 0.2, m->relay = 1;
 #endif
 #ifdef LATER /* a heat loss that steps change, from 50 s on */
     if (m->time > 50.0) m->r[G] = m->r[T] - 241.0;
@@ -104,6 +104,9 @@ fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean n, fmi2Boole
     m->r[P] = m->r[T] - m->r[TA];
 #endif
     *event = WHAT == FUSE && !m->relay && m->r[T] > 295.0, *end = fmi2False;
+#ifdef ONCE /* a fuse that is told at the end of one step alone */
+    if (*event) m->relay = 1;
+#endif
     return fmi2OK;
 }
 fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component c, fmi2Real x[], size_t n) { x[0] = 300.0; return fmi2OK; }
@@ -116,6 +119,9 @@ fmi2Status fmi2GetDerivatives(fmi2Component c, fmi2Real x[], size_t n) {
     x[0] = m->r[DT];
 #ifdef UNREAD /* an output that follows where derivatives are read */
     m->r[P] = m->r[T] - m->r[TA];
+#endif
+#ifdef DISCARDS /* below its table */
+    if (m->r[T] < DISCARDS) return fmi2Discard;
 #endif
 #ifdef LOST /* above its table */
     if (m->r[T] > LOST) x[0] = NAN;

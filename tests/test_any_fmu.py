@@ -18,7 +18,7 @@ import pytest
 import workbench as wb
 from workbench.__main__ import main
 from workbench.diagnosis.data.motion import ModelSource
-from workbench.diagnosis.effects.candidates import candidates
+from workbench.diagnosis.effects.candidates import candidates, rate_terms
 from workbench.diagnosis.simulation.residual_model import ResidualModel
 from workbench.errors import FMUError, InputError
 from workbench.models.added import CONSTANT, RateTerm, write_extended
@@ -180,8 +180,29 @@ def test_the_open_loop_goes_through_events(what, build):
 def test_a_model_without_derivatives_at_the_design_point_is_told(build):
     """A traceback came of it."""
     system = load_system(build("RELAYS", flags=["-DLOST=0.0"]).parent)
-    with open_model(system) as fmu, pytest.raises(DesignPointError, match="no finite numbers"):
+    said = r"a derivative of 'T' that is nan; at 0 s of its time, at the design point, .*: T = 291"
+    with open_model(system) as fmu, pytest.raises(DesignPointError, match=said):
         linearised(fmu, system)
+
+
+def test_a_model_that_discards_calls_beyond_its_table_works_within_it(build):
+    """At rest at inputs of zero it is beyond, which left no estimator, and no diagnosis."""
+    system = load_system(build("RELAYS", flags=["-DDISCARDS=290.5"]).parent)
+    kinds = {name: estimators_of(system)[name] for name in ("open_loop", "parameter_estimator")}
+    left_out = {}
+    assert list(prepare(system, kinds, leave_out=left_out.__setitem__).gains) == ["open_loop"]
+    said = "fmi2GetDerivatives returned discard"
+    assert re.search(rf"{said}.* at the design point, .*: T = ", str(left_out.popitem()[1]))
+    time = 10.0 * np.arange(60.0)
+    with open_model(system) as fmu:
+        terms = rate_terms(fmu, system)
+        assert terms
+        assert all(np.isfinite(term.typical) for term in terms)
+        within, beyond = np.full((60, 1), 280.0), np.full((60, 1), 200.0)
+        warm = np.asarray(estimator(fmu, "open_loop").run(time, within, beyond + 91.0).values)
+        assert warm[-1, 0] == pytest.approx(exact(1500.0, 590.0), abs=0.03)
+        with pytest.raises(FMUError, match=said):
+            estimator(fmu, "open_loop").run(time, beyond, beyond + 91.0)
 
 
 @pytest.mark.parametrize(
@@ -559,8 +580,28 @@ def test_states_that_change_without_an_event_are_refused(build):
         with pytest.raises(FMUError, match=r"changes 'T' at the end of a step without an event"):
             run(fmu, "open_loop", 900.0)
         law, warm = estimator(fmu, "ekf"), np.full((9, 1), 296.0)
-        with pytest.raises(EventError, match="an event of the model"):
+        with pytest.raises(FMUError, match=r"changes 'T' at the end of a step without an event"):
             law.run(10.0 * np.arange(9.0), warm - 16.0, warm)
+
+
+def test_what_an_fmu_does_once_at_the_end_of_a_step_is_not_passed_over(build):
+    """Compiled steps told it that the step was over; a second way through it had no jump, or event.
+
+    From 291 K the room heats towards 310 K, and is at 295 K after 473 s.
+    """
+    drive = Drive(10.0 * np.arange(100.0), np.full((100, 1), 280.0))
+    with (
+        FMU(build("TIMETABLE", flags=["-DMOVES=2"])) as fmu,
+        pytest.raises(FMUError, match=r"changes 'T' at the end of .* by 480 s of its time"),
+    ):
+        Simulation(fmu, ["Ta"], ["T"], [0.0]).run(drive, {})
+    with FMU(build("FUSE", flags=["-DONCE"])) as fmu:
+        simulated = Simulation(fmu, ["Ta"], ["T"], [0.0]).run(drive, {})[:, 0]
+    hot = exact(1500.0, 480.0)
+    right = np.where(
+        drive.time <= 480.0, exact(1500.0, drive.time), exact(0.0, drive.time - 480.0, hot)
+    )
+    np.testing.assert_allclose(simulated, right, atol=1e-5)
 
 
 CONTINUOUS_POWER = VARIABLES.replace('variability="discrete"><Real/>', "><Real/>")
@@ -1299,6 +1340,31 @@ def test_co_simulation_with_steps_of_one_size_goes_in_those_or_is_refused(tmp_pa
             FMUError, match=r"steps of one size only.*of 0\.25 s, and samples are 0\.3 s apart"
         ):
             simulation.run(Drive(np.array([0.0, 1.0, 1.3]), np.ones((3, 1))), {})
+
+
+def test_co_simulation_with_steps_of_a_size_that_nothing_says_goes_in_those(tmp_path, compiled):
+    """Its trial, in steps of 1 ms, refused it for all samples."""
+    path = build_integrator(tmp_path, compiled("co_simulation.c", "-DONLY=0.25")) / "Alone.fmu"
+    with CoSimulation(path) as fmu:
+        simulation = Simulation(fmu, ["u"], ["x"], [True])
+        right = simulation.run(Drive(0.25 * np.arange(4.0), np.ones((4, 1))), {})
+        np.testing.assert_allclose(right[:, 0], [1, 1.25, 1.5, 1.75])
+        with pytest.raises(FMUError, match=r"its description does not say of which: record at"):
+            simulation.run(Drive(np.arange(4.0), np.ones((4, 1))), {})
+
+
+def test_a_step_that_a_co_simulation_discards_says_how_far_it_came(tmp_path, compiled):
+    folder = build_integrator(tmp_path, compiled("co_simulation.c", "-DLONGEST=0.25"))
+
+    def change(folder: Path) -> None:
+        file = folder / "modelDescription.xml"
+        able = 'modelIdentifier="Alone" canHandleVariableCommunicationStepSize="true"'
+        file.write_text(file.read_text().replace('modelIdentifier="Alone"', able))
+
+    path = rewritten(folder / "Alone.fmu", tmp_path / "Short.fmu", change)
+    said = r"step of 1 s from 0 s of its time, of which it made 0\.25 s\. Record at steps"
+    with CoSimulation(path) as fmu, pytest.raises(FMUError, match=said):
+        Simulation(fmu, ["u"], ["x"], [True]).run(Drive(np.arange(4.0), np.ones((4, 1))), {})
 
 
 @pytest.mark.parametrize("name", ["ekf", "mhe", "smoother"])

@@ -64,6 +64,7 @@ class _Space(NamedTuple):
     begin: Vector
     before: Vector
     after: Vector
+    t: Vector  # (1,) end of the last step that is over [s]
 
 
 class Samples(NamedTuple):
@@ -79,18 +80,20 @@ class Samples(NamedTuple):
 class State(NamedTuple):
     """Where the FMU is."""
 
-    x: Vector  # (n,) states, which steps change
+    t: Vector  # (1,) time [s]
+    x: Vector  # (n,) states
     nominal: Vector  # (n,) their typical sizes
     signs: Vector  # (z,) of event indicators: -1, 0, 1
 
 
 def go_on(
     model: Instance, samples: Samples, state: State, part: slice, outputs: Matrix, tolerance: float
-) -> int:
-    """Go on through a part of the samples; returns the first that is not reached, or its end.
+) -> tuple[int, int]:
+    """Go on through a part of the samples; returns the first that is not reached, and a status.
 
-    The states become those at the last sample that was reached. If that is not the last of the
-    part, the FMU is at any point.
+    The state becomes that at the last sample that was reached, or at the end of a step after it
+    that the FMU was told to be over: it is not told so twice. If that is not the last of the part,
+    the FMU is at any point.
 
     Parameters
     ----------
@@ -100,30 +103,36 @@ def go_on(
     tolerance : of a step, relative to states and their nominal values.
     """
     n = model.x.size
-    space = _Space(np.zeros((7, n)), np.zeros(n), np.zeros(n), np.zeros(n))
-    model.x[:] = state.x
+    space = _Space(np.zeros((7, n)), np.zeros(n), np.zeros(n), np.zeros(n), state.t)
+    model.x[:], model.ended[:] = state.x, 0
     bounds = tolerance * state.nominal, tolerance
-    last: int = _go_on(
+    ended: tuple[int, int] = _go_on(
         model, _METHOD, space, samples, state.signs, (part.start, part.stop), bounds, outputs
     )
     state.x[:] = model.x
-    return last
+    return ended
 
 
 @compiled
 def _go_on(model, method, space, samples, signs, part, bounds, outputs):  # type: ignore[no-untyped-def]
-    """Samples of a part; returns the first that is not reached, with x as at the one before."""
+    """Samples of a part; returns the first that is not reached, with x as at the one before.
+
+    Or, where the FMU is told of steps, as at the end of the last one; and a status.
+    """
     for k in range(part[0], part[1]):
         assign(space.begin, model.x)
+        space.t[0] = samples.time[k - 1]
         status = _interval(model, method, space, samples, signs, k, bounds)
         for j in range(model.measured):
             model.u[j] = samples.u[k, j]
         status = status or set_inputs(model, 0, model.measured) or read(model)
         if status != OK:
-            assign(model.x, space.begin)
-            return k
+            if model.complete_step == 0:
+                space.t[0] = samples.time[k - 1]
+                assign(model.x, space.begin)
+            return k, status
         assign(outputs[k], model.y)
-    return part[1]
+    return part[1], OK
 
 
 @compiled
@@ -131,6 +140,8 @@ def _interval(model, method, space, samples, signs, k, bounds):  # type: ignore[
     """To the sample k from the one before, at model.x; a status.
 
     EVENT : one is due within the interval or at its end, or steps become too many.
+
+    Otherwise than OK, model.x and space.t are at the end of the last step that is over.
     """
     begin, end = samples.time[k - 1], samples.time[k]
     if end >= model.next_event[0]:
@@ -145,8 +156,13 @@ def _interval(model, method, space, samples, signs, k, bounds):  # type: ignore[
             continue
         status = _look(model, method, space, samples, signs, k, t, h) if signs.size else OK
         assign(model.x, space.after)
-        t = end if last else t + h
-        status = status or _place(model, samples, k, t) or end_step(model) or _cross(model, signs)
+        after = end if last else t + h
+        status = status or _place(model, samples, k, after) or _cross(model, signs)
+        if status:
+            assign(model.x, space.before)
+            return status
+        t = space.t[0] = after
+        status = end_step(model)
         if status or last:
             return status
         h *= min(_GROWTH, _SAFETY * error**-0.2) if error > 0.0 else _GROWTH

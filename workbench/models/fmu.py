@@ -87,8 +87,15 @@ _ACCESSORS = {
     },
 }
 
-_STATUSES: Mapping[int | str, str] = {2: "discard", 3: "error", 4: "fatal", 5: "pending"}
-_WARNING, _LOGGED = 1, 3  # status of FMI; messages that an error shows
+_STATUSES: Mapping[int | str, str] = {
+    2: "discard (it cannot do that at these values)",
+    3: "error",
+    4: "fatal",
+    5: "pending",
+}
+# Places in `FMU.notes`.
+WARNED, REFUSED_BY, STATUS, STATE = range(4)
+_WARNING, _DISCARD, _LOGGED = 1, 2, 3  # status of FMI; messages that an error shows
 _SAME_STEP = 1e-4  # by which sample times may differ: what rounding of time stamps leaves
 _STEP = float(np.finfo(float).eps) ** (1 / 3)  # of differences, relative
 SAME_RATE = 1e-4  # of its size, by which iterations within a model may change a rate
@@ -193,7 +200,7 @@ class FMUInstance:
         identifier = description.require(self.interface).identifier
         self.version = description.version  # of FMI
         self.description = description
-        self.warned = np.zeros(1, np.int64)  # (1,) calls that it answered with a warning
+        self.notes = np.zeros(4, np.int64)
         self._log: deque[str] = deque(maxlen=_LOGGED)
         self._warning_messages, self._first_warning = 0, ""
         self._number = max(_LOGGING, default=0) + 1
@@ -280,13 +287,13 @@ class FMUInstance:
 
     def _note_call(self, text: str) -> None:
         """Count warnings of calls that FMPy makes, which it passes over."""
-        self.warned[0] += text.endswith("-> WARNING")
+        self.notes[WARNED] += text.endswith("-> WARNING")
 
     def take_warning(self) -> str:
         """How often the FMU warned since this was asked last, and its first message; or nothing."""
-        count = max(int(self.warned[0]), self._warning_messages)
+        count = max(int(self.notes[WARNED]), self._warning_messages)
         first = self._first_warning or "no message, but the status of a call"
-        self.warned[0], self._warning_messages, self._first_warning = 0, 0, ""
+        self.notes[WARNED], self._warning_messages, self._first_warning = 0, 0, ""
         if not count:
             return ""
         times = f"{count} times, first" if count > 1 else "once"
@@ -386,7 +393,7 @@ class FMUInstance:
                 return EventUpdate(next_time, nominals_changed)
         raise FMUError(
             f"{_called(self.description)}: its discrete states are not stable after "
-            f"{_MOST_ITERATIONS} iterations"
+            f"{_MOST_ITERATIONS} iterations{self.at()}"
         )
 
     def complete_step(self) -> bool:
@@ -402,7 +409,7 @@ class FMUInstance:
     def end_error(self) -> FMUError:
         """The error for an FMU that asks to end the simulation, with what it logged."""
         name = _called(self.description)
-        return FMUError(f"{name}: it asks to end the simulation: {self._logged()}")
+        return FMUError(f"{name}: it asks to end the simulation: {self._logged()}{self.at()}")
 
     def get_whole(self, variable: Variable) -> float:
         """Value of a variable whose type is not Real or Float64, as a number."""
@@ -464,12 +471,16 @@ class FMUInstance:
         InputError
             If it has no such function: Co-Simulation alone does not let states be set.
         """
+        if (status := self.try_call(use, *arguments)) > _WARNING:
+            raise self.refusal(_FUNCTIONS[use][self.version], status)
+
+    def try_call(self, use: str, *arguments: object) -> int:
+        """Call the function for a use, see `call`; returns its status."""
         if use not in self._call:
             raise co_simulation_alone(self.description, _FUNCTIONS[use][self.version])
-        status = self._call[use](self._component, *arguments)
-        self.warned[0] += status == _WARNING
-        if status > _WARNING:
-            raise self.refusal(_FUNCTIONS[use][self.version], status)
+        status = int(self._call[use](self._component, *arguments))
+        self.notes[WARNED] += status == _WARNING
+        return status
 
     @property
     def instance_address(self) -> int:
@@ -481,12 +492,21 @@ class FMUInstance:
         call = self._call.get(use)
         return int(ctypes.cast(call, ctypes.c_void_p).value or 0) if call else 0
 
+    def function_at(self, address: int) -> str:
+        """Name of the FMU's function at an address."""
+        uses = (use for use in self._call if self.function_address(use) == address)
+        return next((_FUNCTIONS[use][self.version] for use in uses), "a function")
+
     def refusal(self, function: str, status: int | str) -> FMUError:
         """The error for a call that returned `status`, with what the FMU logged."""
         name = _STATUSES.get(status, status)
         return FMUError(
-            f"{_called(self.description)}: {function} returned {name}: {self._logged()}"
+            f"{_called(self.description)}: {function} returned {name}: {self._logged()}{self.at()}"
         )
+
+    def at(self) -> str:
+        """When something failed, as the end of a message."""
+        return ""
 
     def _logged(self) -> str:
         text = "; ".join(self._log) or "the FMU logged nothing"
@@ -575,7 +595,8 @@ class FMU(FMUInstance):
     event_signs : (z,) whether event indicators were above 0 at the last start.
     time : (1,) that the FMU was set to last [s].
     next_event : (1,) time of the next time event [s], of the last start; infinite for none.
-    warned : (1,) calls that it answered with a warning.
+    notes : (4,) calls that it answered with a warning. Of what a compiled loop ended at: address of
+        the function that refused, its status, and the state that moved without an event.
     directional_fmi : (1,) version of FMI whose directional derivatives are taken, 0 for none.
     rate_references : (n,) value references of the derivatives of the states.
     scales : typical size of signals that a system declares, in the FMU's units; see `sizes`.
@@ -690,6 +711,11 @@ class FMU(FMUInstance):
         """Where a refusal says it is: its file, or its model where it was built to be kept."""
         called = self.called
         return str(self.path) if called == self.path.name else called
+
+    def at(self) -> str:
+        """See FMUInstance; a Co-Simulation keeps its time to itself."""
+        exchange = self.interface == MODEL_EXCHANGE
+        return f"; at {self.time[0]:.9g} s of its time" if exchange else ""
 
     @property
     def called(self) -> str:
@@ -1059,12 +1085,16 @@ class FMU(FMUInstance):
         after = self.get_states()
         moved = np.flatnonzero((after != before) & (np.isfinite(after) | np.isfinite(before)))
         if moved.size and not event:
-            raise FMUError(
-                f"{self.called}: it changes '{self.states[moved[0]]}' at the end of a step "
-                f"without an event, by {self.time[0]:.9g} s of its time, which no integrator can "
-                "follow. Export it with an event there (enterEventMode)"
-            )
+            raise self.moved_error(int(moved[0]))
         return event
+
+    def moved_error(self, state: int) -> FMUError:
+        """The error for a state, by its place, that moved where there was no event."""
+        return FMUError(
+            f"{self.called}: it changes '{self.states[state]}' at the end of a step "
+            f"without an event, by {self.time[0]:.9g} s of its time, which no integrator can "
+            "follow. Export it with an event there (enterEventMode)"
+        )
 
     def nominals(self) -> Vector:
         """Typical sizes of the states at the present point, (n,)."""
@@ -1113,10 +1143,7 @@ class FMU(FMUInstance):
 
     def derivatives(self) -> Vector:
         """Derivatives of the states, (n,)."""
-        try:
-            self._states("derivatives", self._dx)
-        except FMUError as error:
-            raise FMUError(f"{error}; at {self.time[0]:.9g} s of its time") from None
+        self._states("derivatives", self._dx)
         return self._dx.copy()
 
     def _states(self, use: str, buffer: Vector) -> None:
@@ -1307,23 +1334,49 @@ class CoSimulation(FMU):
             t, span = ctypes.c_double(begin + part * h / parts), ctypes.c_double(h / parts)
             reached.value = t.value + span.value
             # The zero: the state may be rolled back to before this point.
-            try:
-                self.call("do_step", t, span, ctypes.c_int(0), *tail)
-                if end.value:
-                    raise self.end_error()
-                short = begin + (part + 1) * h / parts - reached.value
-                if early.value or event.value or abs(short) > _SAME_STEP * span.value:
-                    raise FMUError(
-                        f"{self.called}: it ends the step at {reached.value:.9g} s"
-                        f"{' and asks for Event Mode' * event.value}, where it was told that "
-                        "steps are whole and without events (earlyReturnAllowed, eventModeUsed)"
-                    )
-            except FMUError as error:
-                raise FMUError(
-                    f"{error}; in its step of {span.value:.9g} s from {t.value:.9g} s of its time"
-                ) from None
+            status = self.try_call("do_step", t, span, ctypes.c_int(0), *tail)
+            short = begin + (part + 1) * h / parts - reached.value
+            if status > _WARNING:
+                error = self.refusal(_FUNCTIONS["do_step"][self.version], status)
+            elif end.value:
+                error = self.end_error()
+            elif early.value or event.value or abs(short) > _SAME_STEP * span.value:
+                error = FMUError(
+                    f"{self.called}: it ends the step at {reached.value:.9g} s"
+                    f"{' and asks for Event Mode' * event.value}, where it was told that "
+                    "steps are whole and without events (earlyReturnAllowed, eventModeUsed)"
+                )
+            else:
+                continue
+            raise FMUError(
+                f"{error}; in its step of {span.value:.9g} s from {t.value:.9g} s of its time"
+                f"{self._step_advice(t.value, status)}"
+            )
         self._t = begin + h
         return self.get_typed(self._typed_states)
+
+    def _step_advice(self, begin: float, status: int) -> str:
+        """What is known of a step that failed, which began at a time [s], and what to do."""
+        offered, reached = self.description.interfaces[CO_SIMULATION], ctypes.c_double(math.nan)
+        if status <= _WARNING:
+            return ""
+        if not (offered.variable_steps or self.description.step):
+            return (
+                ". It takes steps of one size only (canHandleVariableCommunicationStepSize is not "
+                "true), and its description does not say of which: record at such steps, or export "
+                "the model with a stepSize in its default experiment"
+            )
+        asked = getattr(self._instance.dll, "fmi2GetRealStatus", None)
+        last_successful_time = 2  # fmi2StatusKind
+        if status != _DISCARD or asked is None:
+            return ""
+        kind = ctypes.c_int(last_successful_time)
+        if asked(self._component, kind, ctypes.byref(reached)) or not reached.value > begin:
+            return ""
+        return (
+            f", of which it made {reached.value - begin:.9g} s. Record at steps that are no longer "
+            "than that, or export the model with a solver that makes longer ones"
+        )
 
 
 def open_fmu(

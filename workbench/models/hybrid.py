@@ -24,7 +24,7 @@ from workbench.models.fmu import (
     TypedVariables,
     central_differences,
 )
-from workbench.models.native import Instance, instance
+from workbench.models.native import MOVED, OK, Instance, instance, raise_on_failure
 
 # Of a step, relative to the state and to its nominal value: far below what a sensor resolves.
 TOLERANCE = 1e-8
@@ -92,6 +92,10 @@ class HybridSimulation:
         self._jump(np.where(self._holds < 0.0, u, self._before))
         self._begin, self._end = self._t, t
         self._after = np.where(self._holds > 0.0, self._before, u)
+        return self._go_through(t, u)
+
+    def _go_through(self, t: float, u: Vector) -> Vector:
+        """Go on within an interval to the sample at its end; see `advance`."""
         while self._t < t:
             self._go_on(t)
             while self._fmu.next_event[0] <= self._t:
@@ -121,23 +125,45 @@ class HybridSimulation:
         while k < time.size:
             stop = int(stops[np.searchsorted(stops, k)])
             if model is not None and stop > k >= tried:
-                state = State(self._x, self._nominal, self._signs)
-                reached = go_on(model, samples, state, slice(k, stop), rows, TOLERANCE)
+                state = State(np.zeros(1), self._x, self._nominal, self._signs)
+                reached, status = go_on(model, samples, state, slice(k, stop), rows, TOLERANCE)
                 # Where a motion is stiff, it soon is again: the next trial is ever further away.
                 patience = 1 if reached > k else 2 * patience
                 k, tried = reached, reached + patience
                 self._t, self._before = float(time[k - 1]), u[k - 1].copy()
+                if status != OK and state.t[0] > self._t:
+                    self._begin, self._end = self._t, float(time[k])
+                    self._before, self._after = begin[k].copy(), end[k].copy()
+                    self._end_step(float(state.t[0]), status, model)
+                    self._go_through(float(time[k]), u[k])
+                    rows[k] = self._fmu.get_typed(outputs)
+                    k += 1
+                    continue
             if k < time.size:
                 self.advance(float(time[k]), u[k])
                 rows[k] = self._fmu.get_typed(outputs)
                 k += 1
         return rows
 
+    def _end_step(self, t: float, status: int, model: Instance) -> None:
+        """Take over at t [s], where compiled code told the FMU that a step is over."""
+        self._events, self._piled = 0, self._begin
+        self._t, self._step = t, None
+        self._place(t, self._x)
+        if status == MOVED:
+            raise_on_failure(status, self._fmu)
+        event, end = model.ended
+        if end:
+            raise self._fmu.end_error()
+        if event:
+            self._handle_event()
+
     def _compiled(self, outputs: TypedVariables) -> Instance | None:
         """The FMU for compiled steps; None if they cannot set and read all that there is."""
         fmu = self._fmu
         others = outputs.others or self._continuous.others
-        if others or not self._x.size or not all(map(fmu.is_real, fmu.states)):
+        compilable = self._x.size and all(map(fmu.is_real, fmu.states)) and not others
+        if not compilable or fmu.remembers_steps:
             return None
         return instance(fmu, self._continuous.names, [], outputs.names)
 
@@ -329,10 +355,7 @@ class HybridSimulation:
             if left * _PILED > took * (_MOST_EVENTS - self._events) and self._events > _PILED:
                 raise self._error(f"has more than {_MOST_EVENTS} events between two samples")
             self._piled = self._t
-        try:
-            update = self._fmu.handle_event(self._inputs, u)
-        except FMUError as error:
-            raise FMUError(f"{error}; at {self._t:.9g} s of its time") from None
+        update = self._fmu.handle_event(self._inputs, u)
         self._x = self._fmu.get_states()  # some tools change them, and do not say so
         if update.nominals_changed:
             self._nominal = self._fmu.nominals()

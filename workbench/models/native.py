@@ -17,14 +17,23 @@ from numpy.typing import NDArray
 
 from workbench.arrays import Matrix, Vector
 from workbench.errors import FMUError, InputError
-from workbench.models.description import CO_SIMULATION, MODEL_EXCHANGE
-from workbench.models.fmu import FMU, CoSimulation, References, co_simulation_alone
+from workbench.models.description import CO_SIMULATION
+from workbench.models.fmu import (
+    FMU,
+    REFUSED_BY,
+    STATE,
+    STATUS,
+    WARNED,
+    CoSimulation,
+    References,
+    co_simulation_alone,
+)
 from workbench.models.jit import jit
 
 compiled = jit()
 inlined = jit(inline=True)
 
-OK, REFUSED, SINGULAR, EVENT = 0, 1, 2, 3
+OK, REFUSED, SINGULAR, EVENT, MOVED = 0, 1, 2, 3, 4
 WARNING = 1  # of FMI: the call did what it is for
 
 
@@ -52,11 +61,14 @@ def _returned(typing, address, words):  # type: ignore[no-untyped-def]
 
 @inlined
 def _call(model, function, words):  # type: ignore[no-untyped-def]
-    """Call a function of an FMU, by its address; returns a status. Warnings are counted."""
+    """Call a function of an FMU, by its address; a status. Warnings and refusals are noted."""
     status = _returned(function, words)
     if status == WARNING:
-        model.warned[0] += 1
-    return REFUSED if status > WARNING else OK
+        model.notes[WARNED] += 1
+    if status <= WARNING:
+        return OK
+    model.notes[REFUSED_BY], model.notes[STATUS] = function, status
+    return REFUSED
 
 
 class Instance(NamedTuple):
@@ -85,7 +97,7 @@ class Instance(NamedTuple):
     indicators: Vector
     event_signs: NDArray[np.bool_]
     next_event: Vector  # (1,) time of the next time event [s], infinite for none
-    warned: NDArray[np.int64]  # (1,) calls that the FMU answered with a warning
+    notes: NDArray[np.int64]  # see `FMU.notes`
     # (2,) whether the step ends at an event, and whether the FMU asks to end
     ended: NDArray[np.int32]
     kept: Matrix  # (2, n) states before and after the end of a step
@@ -156,7 +168,7 @@ def instance(
         indicators=np.zeros(fmu.event_signs.size),
         event_signs=fmu.event_signs,
         next_event=fmu.next_event,
-        warned=fmu.warned,
+        notes=fmu.notes,
         ended=np.zeros(2, np.int32),
         kept=np.zeros((2, n)),
         x=np.zeros(n),
@@ -189,7 +201,7 @@ def _refuse_discrete(fmu: FMU, names: Sequence[str]) -> None:
 class CoSimulationInstance(NamedTuple):
     """One instance of a Co-Simulation FMU, as `Instance`."""
 
-    # address, set_real, get_real, inputs, outputs, u, y, warned: see `Instance`
+    # address, set_real, get_real, inputs, outputs, u, y, notes: see `Instance`
     address: int
     set_real: int
     get_real: int
@@ -200,7 +212,7 @@ class CoSimulationInstance(NamedTuple):
     u: Vector
     y: Vector
     time: Vector  # (1,) where the next step begins [s]
-    warned: NDArray[np.int64]
+    notes: NDArray[np.int64]
     # flags, reached: (3,) and (1,) what FMI 3.0 says of a step
     flags: NDArray[np.bool_]
     reached: Vector
@@ -221,7 +233,7 @@ def co_simulation_instance(
         u=np.zeros(len(inputs)),
         y=np.zeros(len(outputs)),
         time=np.full(1, fmu.start_time),
-        warned=fmu.warned,
+        notes=fmu.notes,
         flags=np.zeros(3, np.bool_),
         reached=np.zeros(1),
     )
@@ -278,7 +290,7 @@ def set_time(model, t):  # type: ignore[no-untyped-def]
 
 @inlined
 def check_state_events(model):  # type: ignore[no-untyped-def]
-    """EVENT if the FMU, at the end of a step, is beyond a state event or at a step event.
+    """EVENT if the FMU, at the end of a step, is beyond a state event or at a step event; a status.
 
     A state event: an indicator has another sign than at the start.
     """
@@ -293,7 +305,7 @@ def check_state_events(model):  # type: ignore[no-untyped-def]
 def end_step(model):  # type: ignore[no-untyped-def]
     """Tell the FMU that a step is over; EVENT if it says that a step event is due.
 
-    Also if it moves its states, which it may at an event alone.
+    MOVED if it moves its states, which it may at an event alone.
     """
     if model.complete_step != 0:
         n, before, after = model.x.size, model.kept[0], model.kept[1]
@@ -308,8 +320,9 @@ def end_step(model):  # type: ignore[no-untyped-def]
         if model.ended[0] != 0 or model.ended[1] != 0:
             return EVENT
         for i in range(n):
-            if after[i] != before[i]:
-                return EVENT
+            if after[i] != before[i] and not (np.isnan(after[i]) and np.isnan(before[i])):
+                model.notes[STATE] = i
+                return MOVED
     return OK
 
 
@@ -551,15 +564,14 @@ def raise_on_failure(status: int, fmu: FMU) -> None:
     Raises
     ------
     FMUError
-        If the FMU refused a call, with what it logged; an implicit step had no solution; or the
-        model has an event, at which estimators do not stop.
+        If the FMU refused a call, with what it logged; an implicit step had no solution; the model
+        moved a state without an event, or has one, at which estimators do not stop.
     """
-    # A Co-Simulation keeps its time to itself.
-    at = f"; at {fmu.time[0]:.9g} s of its time" * (fmu.interface == MODEL_EXCHANGE)
     if status == REFUSED:
-        refusal = fmu.refusal("a call of the observer's loop", "discard, error or fatal")
-        raise FMUError(f"{refusal}{at}")
+        raise fmu.refusal(fmu.function_at(int(fmu.notes[REFUSED_BY])), int(fmu.notes[STATUS]))
+    if status == MOVED:
+        raise fmu.moved_error(int(fmu.notes[STATE]))
     if status == SINGULAR:
-        raise FMUError(f"{fmu.called}: the implicit step has no solution{at}")
+        raise FMUError(f"{fmu.called}: the implicit step has no solution{fmu.at()}")
     if status == EVENT:
         raise fmu.event_error()

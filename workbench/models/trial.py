@@ -262,6 +262,7 @@ def _task(description: Description, interface: str, folder: Path, limits: Limits
         "time": description.start or 0.0,
         "span": max((description.stop or 0.0) - (description.start or 0.0), 0.0) or _SPAN,
         "step": description.step or 1e-3,
+        "any_step": offered.variable_steps or bool(description.step),
         "directional": [pair for pair in wanted if all(pair)]
         if exchange and offered.directional_derivatives
         else [],

@@ -25,8 +25,8 @@ _STEP, _LEAST = 6e-6, 1e-3  # relative step of differences, cube root of eps; an
 _EPSILON = sys.float_info.epsilon
 _BENDS, _WRONG = 0.01, 0.1  # shares of a derivative: more is a bend, or no derivative of that rate
 _MOVED, _SAME = 0.01, 1e-4  # iterations within models end at 1e-6, calls that add up do not
-_OK, _WARNING, _DISCARD, _FATAL = 0, 1, 2, 4
-_STATUS = {_DISCARD: "discard", 3: "error", _FATAL: "fatal", 5: "pending"}
+_OK, _WARNING, _DISCARD, _ERROR, _FATAL = range(5)
+_STATUS = {_DISCARD: "discard", _ERROR: "error", _FATAL: "fatal", 5: "pending"}
 _DIE_WITH_PARENT, _ADOPT = 1, 36  # PR_SET_PDEATHSIG, PR_SET_CHILD_SUBREAPER
 _SIZE, _DOUBLE, _TEXT, _POINTER = ctypes.c_size_t, ctypes.c_double, ctypes.c_char_p, ctypes.c_void_p
 _LOG2 = ctypes.CFUNCTYPE(None, _POINTER, _TEXT, ctypes.c_int, _TEXT, _TEXT)
@@ -452,7 +452,8 @@ def _try(task: dict[str, Any], tell: Callable[[str], None]) -> tuple[str, bool, 
                 _require_counts(call, task)
             remembers = _remembers_steps(call, task)
     except _RefusedError as error:
-        if call.component is None or error.status != _DISCARD or task["exchange"]:
+        borne = (_DISCARD,) if task["any_step"] else (_DISCARD, _ERROR)
+        if call.component is None or error.status not in borne or task["exchange"]:
             raise
         call.refused.append(str(error))  # of a step whose size its solver does not take
     finally:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from workbench.arrays import Matrix, Vector
-from workbench.errors import InputError
+from workbench.errors import FMUError, InputError
 from workbench.models.description import CO_SIMULATION
 from workbench.models.fmu import FMU
 from workbench.observers.layout import layout
@@ -15,6 +15,7 @@ from workbench.system.parts import OperatingPoint
 from workbench.system.system import System
 
 _STEPS = 400  # of implicit Euler, which takes any model to rest
+_SHOWN = 6  # values of a point that a message has
 _NEGLIGIBLE = 1e-6  # share of an output that differences of an FMU leave of what does not act on it
 
 
@@ -53,7 +54,33 @@ def settle(
     -------
     x : (n,) states.
     u : (m + q,) measured inputs and corrections.
+
+    Raises
+    ------
+    DesignPointError
+        If the model cannot be evaluated on the way there.
     """
+    try:
+        x, u = _settle(fmu, system, point, extensions=extensions)
+        _require_rates(fmu)
+    except FMUError as error:
+        raise DesignPointError.at(fmu, system, str(error)) from None
+    except np.linalg.LinAlgError:
+        raise DesignPointError.at(fmu, system, "equations without a solution") from None
+    return x, u
+
+
+def _require_rates(fmu: FMU) -> None:
+    """Refuse derivatives that are no finite numbers where the FMU is, by name."""
+    rates = fmu.derivatives()
+    if not np.isfinite(rates).all():
+        i = int(np.argmin(np.isfinite(rates)))
+        raise FMUError(f"a derivative of '{fmu.states[i]}' that is {rates[i]:g}{fmu.at()}")
+
+
+def _settle(
+    fmu: FMU, system: System, point: OperatingPoint, *, extensions: bool
+) -> tuple[Vector, Vector]:
     rolling, names = system.rolling, [signal.name for signal in system.inputs]
     places = layout(fmu, system)
     held = {name: float(formula(fmu.defaults)) for name, formula in point.held.items()}
@@ -74,6 +101,7 @@ def settle(
         alone = (A.diagonal() < 0.0) & (np.count_nonzero(A, axis=1) == 1)
         rests = alone | np.array([name in corrected for name in fmu.states], bool)
     free = [i for i, name in enumerate(fmu.states) if rests[i] and name not in held]
+    _require_rates(fmu)
     h = system.settles / _STEPS
     for _ in range(_STEPS if free else 0):
         A = fmu.state_jacobian()[np.ix_(free, free)]
@@ -84,6 +112,24 @@ def settle(
 
 class DesignPointError(InputError):
     """A design point where what is estimated moves no output in its own way, or a model fails."""
+
+    @classmethod
+    def at(cls, fmu: FMU, system: System, what: str) -> "DesignPointError":
+        """Say what is wrong where the FMU is, on its way to rest at the inputs of a point."""
+        names = [*fmu.states, *(signal.name for signal in system.inputs)]
+        values = fmu.get_typed(fmu.typed(names))
+        pairs = zip(names[:_SHOWN], values, strict=False)
+        place = ", ".join(f"{name} = {value:.4g}" for name, value in pairs)
+        more = ", ..." * (len(names) > _SHOWN)
+        return cls(
+            where=fmu.place,
+            found=f"{what.removeprefix(f'{fmu.called}: ')}, at the design point, where states come "
+            f"to rest at given inputs: {place}{more}",
+            expected="a model that can be evaluated and linearised there",
+            remedy="give inputs at which the model works, such as those of a recording, in "
+            "[points.design] inputs of the system file, and states that are held in 'held'. "
+            "Estimators that need no such point are open_loop, ekf and ukf; fit needs none",
+        )
 
     @classmethod
     def of(cls, fmu: FMU, hidden: str) -> "DesignPointError":
@@ -111,12 +157,7 @@ def linearised(fmu: FMU, system: System) -> LinearModel:
         else:
             C[j], D[j] = linear.C[unseen.index(name)], linear.D[unseen.index(name)]
     if not all(np.isfinite(part).all() for part in (linear.A, linear.B, C, D)):
-        raise DesignPointError(
-            where=fmu.place,
-            found="derivatives that are no finite numbers at the design point",
-            expected="a model that can be linearised there",
-            remedy="choose another [points.design], or run 'workbench fmu check' on the model",
-        )
+        raise DesignPointError.at(fmu, system, "derivatives that are no finite numbers")
     return LinearModel(
         fmu.states,
         linear.A,

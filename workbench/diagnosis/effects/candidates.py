@@ -16,7 +16,7 @@ import numpy as np
 
 from workbench.arrays import Vector
 from workbench.diagnosis.effects.catalogue import Effect
-from workbench.errors import unknown_name
+from workbench.errors import FMUError, unknown_name
 from workbench.models.added import (
     CONSTANT,
     COULOMB,
@@ -164,11 +164,13 @@ def rate_terms(model: FMU, system: System) -> tuple[RateTerm, ...]:
     # The start, and each state moved by its scale to either side, (2s + 1, s); rates there.
     points = np.vstack([x, x + np.diag(scale), x - np.diag(scale)])
     rates = np.array([_rates(model, point) for point in points])
+    works = np.isfinite(rates).all(axis=1)
+    points, rates = points[works], rates[works]
     terms = []
     for i, state in enumerate(model.states):
         if any(np.array_equal(rates[:, i], other) for other in points.T):
             continue
-        typical = float(np.abs(rates[:, i]).max()) or float(scale[i])
+        typical = float(np.abs(rates[:, i]).max(initial=0.0)) or float(scale[i])
         own = model.units.get(state, "")
         rate = model.units.get(model.description.rates[i]) or (f"{own}/s" if own else "")
         for form, text in _FORMS.items():
@@ -199,8 +201,12 @@ def _scales(model: FMU, system: System) -> Vector:
 
 
 def _rates(model: FMU, states: Vector) -> Vector:
-    model.set_states(states)
-    return model.derivatives().copy()
+    """Rates at states, NaN where the model does not work."""
+    try:
+        model.set_states(states)
+        return model.derivatives()
+    except FMUError:
+        return np.full(states.size, np.nan)
 
 
 def with_starts(system: System, model: FMU) -> System:

@@ -15,7 +15,7 @@ from workbench.diagnosis.simulation.steps import step as advance
 from workbench.errors import FMUError
 from workbench.models.fmu import FMU
 from workbench.models.native import (
-    EVENT,
+    MOVED,
     OK,
     check_state_events,
     compiled,
@@ -28,7 +28,7 @@ from workbench.system.stopping import Stopping
 from workbench.system.system import System
 
 GRID = 5.0  # [m] between two values of what drives the model along the way; shorter than a vehicle
-_MOVING = EVENT + 1  # status: not at rest when the time was over
+_MOVING = MOVED + 1  # status: not at rest when the time was over
 
 
 @dataclass(frozen=True, eq=False)
