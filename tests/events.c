@@ -78,6 +78,9 @@ fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *e) {
     Room *m = c;
     memset(e, 0, sizeof *e);
     if (WHAT == THERMOSTAT) m->r[P] = m->r[T] < 293.0 ? 1500.0 : m->r[T] > 295.0 ? 0.0 : m->r[P];
+#ifdef CHATTERS /* a relay without hysteresis */
+    m->r[P] = m->r[T] < 295.0 ? 1500.0 : 0.0;
+#endif
     if (WHAT == TIMETABLE) {
         const int part = (int)floor(m->time / 600.0 + 1e-9);
         m->r[P] = part % 2 == 0 ? 1500.0 : 0.0;
@@ -137,6 +140,9 @@ fmi2Status fmi2GetDerivatives(fmi2Component c, fmi2Real x[], size_t n) {
 fmi2Status fmi2GetEventIndicators(fmi2Component c, fmi2Real z[], size_t n) {
     const double *r = ((Room *)c)->r;
     z[0] = r[P] > 0.0 ? 295.0 - r[T] : r[T] - 293.0;
+#ifdef CHATTERS
+    z[0] = 295.0 - r[T];
+#endif
     return fmi2OK;
 }
 fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference k[], size_t n, fmi2Real v[]) {

@@ -27,7 +27,7 @@ from workbench.models.native import OK, instance, linearise, place, read
 from workbench.models.simulation import Drive, Simulation
 from workbench.observers import choose, estimators_of
 from workbench.observers.contract import Estimator
-from workbench.observers.fmpy_comparison import RIGHT, compare_with_fmpy
+from workbench.observers.fmpy_comparison import REFUSED, RIGHT, compare_with_fmpy
 from workbench.observers.gains import usual_gains
 from workbench.observers.operating import DesignPointError, linearised, start_spreads, walks
 from workbench.observers.replay import replay
@@ -232,9 +232,31 @@ def test_a_time_event_that_stays_due_is_told(build):
     """At a sample, where no time is left for it to pass: the open loop did not end."""
     with (
         FMU(build("STUCK")) as fmu,
-        pytest.raises(FMUError, match=r"more than 500 events at one time at 30 s of its time"),
+        pytest.raises(
+            FMUError, match=r"more than 500 events at one time at 30 s of .*: time events"
+        ),
     ):
         run(fmu, "open_loop", 100.0)
+
+
+def test_a_relay_that_chatters_is_told_with_what_switches_it(build):
+    """At 295 K it heats and cools without end: from 291 K after 2000 s ln(19 / 15) = 472.8 s."""
+    said = r"events between two samples at 472\.7.*: its event indicator 1 of 1 changes sign again"
+    with FMU(build("THERMOSTAT", flags=["-DCHATTERS"])) as fmu, pytest.raises(FMUError, match=said):
+        run(fmu, "open_loop", 600.0)
+
+
+def test_an_fmu_of_neither_interface_is_refused_by_a_comparison(build, tmp_path):
+    """As of scheduled execution alone; it was a traceback."""
+
+    def change(folder: Path) -> None:
+        text = (folder / "modelDescription.xml").read_text()
+        text = text.replace('<ModelExchange modelIdentifier="Room"/>', "")
+        (folder / "modelDescription.xml").write_text(text)
+
+    comparison = compare_with_fmpy(rewritten(build("RELAYS"), tmp_path / "None.fmu", change))
+    assert (comparison.verdict, comparison.difference) == (REFUSED, None)
+    assert "neither Model Exchange nor Co-Simulation" in comparison.reason
 
 
 def test_a_jump_of_an_input_is_an_event_where_it_happens(build):

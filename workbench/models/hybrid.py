@@ -351,9 +351,10 @@ class HybridSimulation:
         if self._events % _PILED == 0:
             left, took = self._end - self._t, self._t - self._piled
             if not took > 0.0:  # the next one is due by now, each time
-                raise self._error(f"has more than {_PILED} events at one time")
+                raise self._error(f"has more than {_PILED} events at one time", self._cause())
             if left * _PILED > took * (_MOST_EVENTS - self._events) and self._events > _PILED:
-                raise self._error(f"has more than {_MOST_EVENTS} events between two samples")
+                found = f"has more than {_MOST_EVENTS} events between two samples"
+                raise self._error(found, self._cause())
             self._piled = self._t
         update = self._fmu.handle_event(self._inputs, u)
         self._x = self._fmu.get_states()  # some tools change them, and do not say so
@@ -362,8 +363,21 @@ class HybridSimulation:
         self._signs = np.sign(self._fmu.event_indicators())
         self._step = None
 
-    def _error(self, what: str) -> FMUError:
-        return FMUError(f"{self._fmu.called}: it {what} at {self._t:.9g} s of its time")
+    def _cause(self) -> str:
+        """What brings the present event about, and how a model is made that goes on."""
+        changed = np.flatnonzero(np.sign(self._fmu.event_indicators()) != self._signs)
+        if self._fmu.next_event[0] <= self._t:
+            return ": time events, each as soon as the one before. Correct nextEventTime"
+        if not changed.size:
+            return ": step events. Let the model ask for Event Mode only where something changes"
+        return (
+            f": its event indicator {changed[0] + 1} of {self._signs.size} changes sign again and "
+            "again (chattering, or ever shorter jumps). Give the switch a hysteresis, or make it "
+            "smooth, or let the model come to rest"
+        )
+
+    def _error(self, what: str, more: str = "") -> FMUError:
+        return FMUError(f"{self._fmu.called}: it {what} at {self._t:.9g} s of its time{more}")
 
 
 class CoSimulationRun:

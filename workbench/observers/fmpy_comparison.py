@@ -127,7 +127,8 @@ class _Problem:
             stop = self._begin + _DURATION
         self._step = (stop - self._begin) / _INTERVALS
         self._alone = MODEL_EXCHANGE not in description.interfaces
-        if self._alone and not description.interfaces[CO_SIMULATION].variable_steps:
+        offered = description.interfaces.get(CO_SIMULATION)
+        if self._alone and offered and not offered.variable_steps:
             self._step = description.step or self._step  # FMPy steps from sample to sample
         self.time = self._begin + self._step * np.arange(_INTERVALS + 1)
         self._inputs = [
