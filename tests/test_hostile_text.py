@@ -1,5 +1,6 @@
 """Files that no person writes: each is refused in a few lines that name it, and none hangs."""
 
+import io
 import json
 import os
 import shutil
@@ -10,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from workbench.__main__ import main
+from workbench.cli.output import Output
 from workbench.errors import InputError
 from workbench.machines.train.recorded import _planting
 from workbench.machines.wheelset.rig.proposed import proposed_stop
@@ -218,6 +220,21 @@ def test_a_name_gives_a_terminal_no_commands(name, root, tmp_path, monkeypatch, 
     for text in shown:
         assert name.encode("unicode_escape").decode() in text
         assert all(line.isprintable() for line in text.splitlines())
+
+
+def test_a_name_that_is_no_utf_8_is_refused_before_the_work(tmp_path, capsys):
+    (tmp_path / "b\udcff.csv").write_text("time [s],inflow [l/s],h [mm]\n0,4,950\n1,4,951\n")
+    out = ["--out", str(tmp_path / "out"), "--yes"]
+    message = refused(["import", str(tmp_path / "b\udcff.csv"), *out], capsys)
+    assert "b\\udcff.csv, a name that is no UTF-8" in message
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_name_that_standard_output_cannot_hold_is_written_in_its_place(monkeypatch):
+    held = io.BytesIO()
+    monkeypatch.setattr("sys.stdout", io.TextIOWrapper(held, "ascii"))
+    Output(json=False, quiet=False).result("r_\u00fc/index.html")
+    assert held.getvalue() == b"r_\\xfc/index.html\n"
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="a folder of somebody else is made by root")

@@ -438,6 +438,16 @@ def saved(tmp_path) -> tuple[Path, Checkpoint]:
     return path, checkpoint
 
 
+def test_a_folder_that_has_gone_costs_a_warning_and_not_the_search(saved):
+    """A search warns of an InputError and goes on; another error lost the best gains."""
+    path, checkpoint = saved
+    path.unlink()
+    path.parent.rmdir()
+    path.parent.write_text("a file in its place")
+    with pytest.raises(InputError, match="cannot be written"):
+        save(checkpoint, path)
+
+
 def test_no_damage_of_a_checkpoint_goes_unseen(saved):
     """Bytes replaced, cut out, doubled: what is read is what was written, or refused."""
     path, checkpoint = saved

@@ -65,6 +65,13 @@ def main(arguments: Sequence[str] | None = None, *, confined: bool = False) -> i
     if short := short_memory():
         return output.fail(command, 1, f"error: {short}")
     try:
+        if odd := next((word for word in given if re.search("[\ud800-\udfff]", word)), ""):
+            raise InputError(
+                where="command line",
+                found=f"{odd}, a name that is no UTF-8",
+                expected="one that files and pages can hold",
+                remedy="rename the file or folder",
+            )
         if isolated:
             folders = json.dumps([str(folder) for folder in _written(options)])
             return run_program([sys.executable, "-c", _CONFINED, folders, *given])

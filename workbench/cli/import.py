@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import shlex
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -94,7 +95,8 @@ def run(
                 refused.append(str(refusal))
     if record is not before:
         output.result(f"see {IMPORTED} in {nearby(options.out)}")
-        output.result(f"next: workbench simulate --system {options.system} {nearby(options.out)}")
+        again = shlex.join(["--system", options.system, str(nearby(options.out))])
+        output.result(f"next: workbench simulate {again}")
     result = {"out": options.out, "imports": record, "refused": refused}
     return CommandResult(result, {"begins": "s", "ends": "s", "seconds": "s"}, 2 if refused else 0)
 

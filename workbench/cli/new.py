@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import shlex
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -62,7 +63,7 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
         return _from_fmu(options, output)
     written = [nearby(path) for path in write_system(options.folder)]
     output.result("\n".join(map(str, written)))
-    output.result(f"next: workbench simulate --system {options.folder}")
+    output.result(f"next: workbench simulate --system {shlex.quote(str(options.folder))}")
     return CommandResult({"written": written})
 
 
@@ -102,9 +103,10 @@ def _from_fmu(options: argparse.Namespace, output: Output) -> CommandResult:
         f"wrote {nearby(path)}: read its comments"
         + (f", {len(draft.questions)} of them questions" if draft.questions else "")
     )
-    output.result(f"next: workbench simulate --system {folder}{which}")
-    output.result(f"      workbench fit --system {folder}")
-    output.result(f"      workbench diagnose --system {folder}")
+    quoted = shlex.quote(str(folder))
+    output.result(f"next: workbench simulate --system {quoted}{which}")
+    output.result(f"      workbench fit --system {quoted}")
+    output.result(f"      workbench diagnose --system {quoted}")
     result = {
         "written": [nearby(path), nearby(fmu)],
         "signals": {signal.name: signal.channel.channel for signal in draft.signals},

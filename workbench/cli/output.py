@@ -99,8 +99,9 @@ def _print(text: str) -> None:
     end_copy()
     if sys.stdout is None:
         raise OSError("standard output is closed, so that no result can be printed")
+    encoding = sys.stdout.encoding or "utf-8"  # which may lack characters of names
     try:
-        print(text, flush=True)
+        print(text.encode(encoding, "backslashreplace").decode(encoding), flush=True)
     except OSError as error:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         if not isinstance(error, BrokenPipeError):

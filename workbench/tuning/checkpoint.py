@@ -61,7 +61,7 @@ class Checkpoint:
 
 def save(checkpoint: Checkpoint, path: Path) -> None:
     """Write a checkpoint in place of the one before, which is kept beside it."""
-    with suppress(FileNotFoundError, InputError):
+    with suppress(OSError, InputError):  # there is none, or its folder has gone
         last = path.read_text()
         _parse(last, path)  # a damaged one does not take the place of a sound one
         write_whole(previous_path(path), last)
