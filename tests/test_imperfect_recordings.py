@@ -23,8 +23,18 @@ from workbench.errors import InputError
 from workbench.pages.provenance import run_of
 from workbench.system.system import System
 
+from .built import declare, machine
 from .heater import NOISE, cases, diagnosed, system
 
+ZERO = """  model Zero "a zero that is off"
+    extends Effects.Signals.Offset(offset(unit="K", min=-20.0, max=20.0));
+    annotation (__Workbench(effect(size="offset", matters=0.2, separation="a second sensor")));
+  end Zero;
+
+"""
+SENSOR = """output Real read(unit="K") = sensor.y "As read";
+    replaceable Effects.Signals.Unchanged sensor(u=T)
+      constrainedby Effects.Interfaces.Signal(u=T) "Of the block";"""
 LOSS, SECONDS = 0.2, 1200  # [W/K] planted; [s]
 
 
@@ -98,6 +108,25 @@ def test_a_state_that_nobody_measured_starts_where_the_recording_says(heater, tm
     fitted = [30.0 * outcome.deviations[case.name]["Tc"] for case in recordings]
     # By noise alone a casing is known to some 0.1 K; its prior draws it to zero by less.
     assert fitted == pytest.approx(starts, abs=0.5)
+
+
+def test_what_a_wrong_sensor_read_at_the_start_is_where_no_state_began(tmp_path):
+    """Beside a draught, a zero is off by 60 times the noise; no effect stands for the start."""
+    library, file = machine("heater", sensor='reading = "read"')
+    library = library.replace("  model Draught", f"  import Effects;\n\n{ZERO}  model Draught")
+    library = library.replace(
+        "end Heater;", 'annotation (uses(Effects(version="1.0")));\nend Heater;'
+    )
+    library = library.replace("    replaceable", f"    {SENSOR}\n    replaceable")
+    of = declare(tmp_path / "zero", library, file)
+    frames = [simulated(k, LOSS, 10.0 * k) for k in range(3)]
+    for frame in frames:
+        frame["T [K]"] += 60.0 * NOISE
+    causes = diagnosed(of, cases(of, frames), tmp_path / "out").diagnosis.causes
+    found = {cause.effect.name: cause.parameters[cause.effect.size] for cause in causes}
+    assert {*found} == {"Draught", "Zero"}
+    assert found["Draught"].low <= LOSS <= found["Draught"].high
+    assert found["Zero"].low <= 60.0 * NOISE <= found["Zero"].high
 
 
 @pytest.fixture(scope="module")

@@ -226,6 +226,13 @@ class Predictor:
             states = [fmu.states.index(name) for name in (leading.output, *others)]
         column = list(signals).index(leading.output) if leading is not None else 0
         self._leading = np.array(states, np.intp), column
+        # States that sensors of the model read; what leads a run lets it forget its start.
+        self._read = [
+            signal
+            for signal in (system.outputs if leading is None else ())
+            if signal.name in fmu.states and signal.reading != signal.name
+        ]
+        self._readings = fmu.variables([signal.reading for signal in self._read])
 
     def begin(self, samples: Samples) -> dict[str, float]:
         """Start values of states, as known at the start of a recording."""
@@ -282,11 +289,17 @@ class Predictor:
         fmu.start({**dict(zip(samples.inputs, samples.u[0], strict=True)), **values})
         errors = np.zeros_like(samples.y)
         self._model.u[:] = 0.0
+        seen = self._as_read(values)
         x0 = fmu.get_states()
         end = int(np.flatnonzero(samples.told)[-1]) + 2  # one more, for rates at the last one told
         work = self._steps()
         varied = [column.variables for column in columns]
         along = tangent(fmu, self._model, varied, samples.time.size, work.stiff, absent)
+        for q, names in enumerate(varied) if seen else ():
+            acting = fmu.variables([name for name in names if name not in fmu.states])
+            by = fmu.jacobian(self._readings.references, acting).sum(axis=1)
+            for at, (j, slope) in seen.items():
+                along.states[at, q] = (along.states[at, q] - by[j]) / slope
         if courses is not None:
             along = following(along, courses)
         restarts = samples.restarts
@@ -306,6 +319,31 @@ class Predictor:
         if not np.isfinite(along.states).all():  # once lost, they stay so
             raise FMUError(f"{fmu.called}: derivatives of {samples.name} grow beyond all bounds")
         return errors, along
+
+    def _as_read(self, values: Mapping[str, float]) -> dict[int, tuple[int, float]]:
+        """Let states begin where sensors read what is given of them; number and slope, by state.
+
+        Not where a sensor bends, or has states: what it reads then follows from what was before.
+        """
+        fmu, seen = self._fmu, {}
+        known = {j: signal for j, signal in enumerate(self._read) if signal.name in values}
+        if not known:
+            return {}
+        slopes = fmu.jacobian(self._readings.references, fmu.variables(fmu.states))
+        read_ = fmu.get(self._readings).copy()
+        for j, signal in known.items():
+            at, value = fmu.states.index(signal.name), values[signal.name]
+            if np.flatnonzero(slopes[j]).tolist() != [at]:
+                continue
+            begin = fmu.get_states()
+            x0 = begin.copy()
+            x0[at] += (value - read_[j]) / slopes[j, at]
+            fmu.set_states(x0)
+            if abs(fmu.get(self._readings)[j] - value) <= signal.noise_at_scale:
+                seen[at] = j, float(slopes[j, at])
+            else:
+                fmu.set_states(begin)
+        return seen
 
     def _led(self, samples: Samples) -> _Led:
         lead, restarts = samples.lead, samples.restarts
