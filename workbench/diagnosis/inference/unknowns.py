@@ -205,12 +205,11 @@ class Unknowns:
         return [self._values(point, k) for k in range(self.count)]
 
     def starts(self, point: Point) -> dict[str, dict[str, float]]:
-        """All that a simulation of each recording starts with: states as measured, and `values`."""
-        begins, values = self._simulations.begin, self.values(point)
-        return {
-            name: {**begin, **known}
-            for name, begin, known in zip(self.names, begins, values, strict=True)
-        }
+        """All that a simulation of each recording starts with: states as they were, and `values`.
+
+        They are what sensors measured, unless an effect at this point says that one read wrong.
+        """
+        return dict(zip(self.names, self._simulations.started(self.values(point)), strict=True))
 
     def _values(self, point: Point, k: int) -> dict[str, float]:
         case = self._simulations.cases[k]

@@ -64,6 +64,10 @@ class FreePredictor:
             able = {v.name for v in variables if v.initial in ("exact", "approx")}
         return {name: value for name, value in samples.begin.items() if name in able}
 
+    def started(self, samples: Samples, values: Mapping[str, float]) -> dict[str, float]:
+        """Nothing: states start as they were read; see `Predictor.started`."""
+        return {}
+
     def errors(self, samples: Samples, values: Mapping[str, float]) -> Matrix:
         """Measured minus simulated, (n, c); see `Predictor.errors`."""
         simulated = self._run(samples, values)[:, : len(self._signals)]

@@ -284,12 +284,9 @@ class Predictor:
         fmu, values = self._fmu, {**self.begin(samples), **values}
         for column in columns:
             values |= column.setting
-        fmu.begin_at(samples.model_time)
-        # What a model calculates at its start may depend on inputs.
-        fmu.start({**dict(zip(samples.inputs, samples.u[0], strict=True)), **values})
+        seen = self._start(samples, values)
         errors = np.zeros_like(samples.y)
         self._model.u[:] = 0.0
-        seen = self._as_read(values)
         x0 = fmu.get_states()
         end = int(np.flatnonzero(samples.told)[-1]) + 2  # one more, for rates at the last one told
         work = self._steps()
@@ -320,12 +317,21 @@ class Predictor:
             raise FMUError(f"{fmu.called}: derivatives of {samples.name} grow beyond all bounds")
         return errors, along
 
-    def _as_read(self, values: Mapping[str, float]) -> dict[int, tuple[int, float]]:
-        """Let states begin where sensors read what is given of them; number and slope, by state.
+    def started(self, samples: Samples, values: Mapping[str, float]) -> dict[str, float]:
+        """States at the start that sensors read as `values` and the recording say."""
+        seen = self._start(samples, {**self.begin(samples), **values})
+        x0 = self._fmu.get_states()
+        return {self._fmu.states[at]: float(x0[at]) for at in seen}
+
+    def _start(self, samples: Samples, values: Mapping[str, float]) -> dict[int, tuple[int, float]]:
+        """Start the FMU, with states where sensors read what is given; number and slope, by state.
 
         Not where a sensor bends, or has states: what it reads then follows from what was before.
         """
-        fmu, seen = self._fmu, {}
+        fmu, seen = self._fmu, dict[int, tuple[int, float]]()
+        fmu.begin_at(samples.model_time)
+        # What a model calculates at its start may depend on inputs.
+        fmu.start({**dict(zip(samples.inputs, samples.u[0], strict=True)), **values})
         known = {j: signal for j, signal in enumerate(self._read) if signal.name in values}
         if not known:
             return {}

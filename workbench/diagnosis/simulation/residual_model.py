@@ -184,6 +184,11 @@ class ResidualModel:
         self.begin = [self._forms[at][1] for at in self._at]
         self.simulated = self.simulated._replace(recordings=tuple(self.recordings))
 
+    def started(self, points: Sequence[Mapping[str, float]]) -> list[dict[str, float]]:
+        """All that a simulation of each recording starts with at a point, states as they were."""
+        own = self._simulator(self.simulated)
+        return [own.started(k, values) for k, values in enumerate(points)]
+
     def count_restarted(self, numbers: Collection[int], *, counting: bool) -> None:
         """Let samples of some recordings count, or not, where states can be restarted."""
         at = list(self._at)

@@ -172,6 +172,12 @@ class Simulator:
         """Start values of states that a recording's outputs show."""
         return self._predictor.begin(self._recordings[number])
 
+    def started(self, number: int, values: Mapping[str, float]) -> dict[str, float]:
+        """All that a simulation of one recording starts with, states as they were."""
+        known, begin = self._known(number, values), self.begin(number)
+        read_ = self._predictor.started(self._recordings[number], known)
+        return {**begin, **values, **{n: known[n] for n in begin if n in known}, **read_}
+
     def at(self, number: int, values: Mapping[str, float]) -> WhitenedResiduals:
         """Errors of one recording at a point, and their derivatives by delays, which cost nothing.
 
