@@ -239,6 +239,16 @@ def test_a_time_event_that_stays_due_is_told(build):
         run(fmu, "open_loop", 100.0)
 
 
+def test_a_derivative_that_is_lost_on_the_way_is_named_with_its_time(build):
+    """The room is at 295 K after 473 s; it said that a step has no solution, or is too small."""
+    drive = Drive(10.0 * np.arange(60.0), np.full((60, 1), 280.0))
+    with FMU(build("RELAYS", flags=["-DLOST=295.0"])) as fmu:
+        with pytest.raises(FMUError, match=r"came to a derivative of 'T' that is nan; at 47\d"):
+            Simulation(fmu, ["Ta"], ["T"], [0.0]).run(drive, {})
+        with pytest.raises(FMUError, match=r"no solution, with a derivative of 'T' that is nan"):
+            run(fmu, "open_loop", 600.0)
+
+
 def test_a_relay_that_chatters_is_told_with_what_switches_it(build):
     """At 295 K it heats and cools without end: from 291 K after 2000 s ln(19 / 15) = 472.8 s."""
     said = r"events between two samples at 472\.7.*: its event indicator 1 of 1 changes sign again"

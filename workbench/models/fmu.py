@@ -1146,6 +1146,14 @@ class FMU(FMUInstance):
         self._states("derivatives", self._dx)
         return self._dx.copy()
 
+    def unknown_rate(self) -> str:
+        """A derivative that is no finite number where the FMU is, with the time; empty: none."""
+        rates = self.derivatives()
+        if np.isfinite(rates).all():
+            return ""
+        i = int(np.argmin(np.isfinite(rates)))
+        return f"a derivative of '{self.states[i]}' that is {rates[i]:g}{self.at()}"
+
     def _states(self, use: str, buffer: Vector) -> None:
         if buffer.size:
             self.call(use, ctypes.c_void_p(buffer.ctypes.data), ctypes.c_size_t(buffer.size))

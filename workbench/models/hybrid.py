@@ -72,6 +72,7 @@ class HybridSimulation:
         self._begin, self._end = self._t, np.inf
         self._signs = np.sign(fmu.event_indicators())
         self._step: float | None = None
+        self._unknown = ""  # of a rate on the way of the step, see `FMU.unknown_rate`
         self._events, self._piled = 0, self._t  # in this interval, and when so many were over
         self.passed = 0  # events but for jumps of inputs, since `start_from`, one it was beyond too
         self._kept: _Kept | None = None
@@ -261,6 +262,7 @@ class HybridSimulation:
         if (whole := self._one_step(end)) is not None:
             yield end, whole
             return
+        self._unknown = ""
         first = self._step if self._step is None else min(self._step, end - self._t)
         try:
             solver = Radau(
@@ -275,12 +277,12 @@ class HybridSimulation:
             )
             while solver.status == "running":
                 if message := solver.step():
-                    raise self._error(f"cannot be integrated ({message})")
+                    raise self._error(f"cannot be integrated ({message})", self._unknown)
                 if solver.t < end:  # the last one is cut
                     self._step = solver.h_abs
                 yield solver.t, solver.dense_output()
         except (ValueError, np.linalg.LinAlgError) as error:  # of derivatives that are not finite
-            raise self._error(f"cannot be integrated ({error})") from None
+            raise self._error(f"cannot be integrated ({error})", self._unknown) from None
 
     def _one_step(self, end: float) -> Callable[[float], Vector] | None:
         """States within one explicit step to the end, None where its error is too large.
@@ -305,7 +307,10 @@ class HybridSimulation:
 
     def _rates(self, t: float, x: Vector) -> Vector:
         self._place(t, x)
-        return self._fmu.derivatives()
+        rates = self._fmu.derivatives()
+        if not np.isfinite(rates).all():
+            self._unknown = f". It came to {self._fmu.unknown_rate()}"
+        return rates
 
     def _jacobian(self, t: float, x: Vector) -> Matrix:
         self._place(t, x)

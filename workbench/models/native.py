@@ -572,6 +572,8 @@ def raise_on_failure(status: int, fmu: FMU) -> None:
     if status == MOVED:
         raise fmu.moved_error(int(fmu.notes[STATE]))
     if status == SINGULAR:
-        raise FMUError(f"{fmu.called}: the implicit step has no solution{fmu.at()}")
+        unknown = fmu.unknown_rate()
+        reason = f", with {unknown}" if unknown else fmu.at()
+        raise FMUError(f"{fmu.called}: the implicit step has no solution{reason}")
     if status == EVENT:
         raise fmu.event_error()
