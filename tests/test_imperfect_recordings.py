@@ -289,16 +289,3 @@ def test_the_ends_of_a_clear_swing_are_no_spikes(heater):
     values = NOISE * (20.0 * swing + noise)
     values[[100, 731, 1502]] += NOISE * np.array([60.0, -60.0, 60.0])
     assert list(np.flatnonzero(outliers(values, sensor, SOUND))) == [100, 731, 1502]
-
-
-@pytest.mark.parametrize("period", [5.0, 6.0, 20.0])
-def test_what_rings_after_a_knock_is_no_spike(period, heater):
-    """It goes on as linear prediction says, backwards from what follows; what is wrong does not."""
-    sensor, time, rng = heater.signals["T"], np.arange(800), np.random.default_rng(3)
-    values = NOISE * rng.standard_normal(time.size)
-    for knock in (93, 161, 616):
-        after = np.maximum(time - knock, 0.0)
-        values += NOISE * 700.0 * np.exp(-after / 20.0) * np.sin(2.0 * np.pi * after / period)
-    assert not outliers(values, sensor, SOUND).any()
-    values[[300, 450, 451, 730]] += NOISE * np.array([60.0, -60.0, -60.0, 40.0])
-    assert list(np.flatnonzero(outliers(values, sensor, SOUND))) == [300, 450, 451, 730]

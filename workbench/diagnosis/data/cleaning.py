@@ -18,8 +18,6 @@ _FEW = 6  # samples; three fourth differences have no median to speak of
 # Order of differences: of a swing of 12 samples a period they leave a fiftieth, of a sample beside
 # others 20 times what it is off, and 30 standard deviations of noise.
 _ORDER = 6
-# Samples by which linear prediction goes on: two modes, by six samples for each coefficient.
-_PREDICTS, _RINGS = 4, 24
 # Share of equal samples, beyond what rounding makes, from which a channel does repeat itself.
 _OFTEN = 0.2
 _MOVED = 0.5  # of what second differences say: noise comes below in a thousandth of 20 samples
@@ -94,7 +92,7 @@ def _out_and_back(values: Vector, mask: Mask, scale: Vector, sound: Soundness) -
     """Of samples off a running median, those that leave the lines on both sides of them.
 
     A signal that turns fast is off the median too, but comes or goes along a line; or, at the end
-    of a swing, along a curve, which differences of high order leave nothing of; or as what rings.
+    of a swing, along a curve, which differences of high order leave nothing of.
     """
     jump = sound.spike * scale
     padded = np.pad(values, 2, constant_values=np.nan)  # at an end, one side has to do
@@ -104,31 +102,10 @@ def _out_and_back(values: Vector, mask: Mask, scale: Vector, sound: Soundness) -
     for first, end in runs(mask):
         sides = [side for side in (before[first], after[end - 1]) if np.isfinite(side)]
         leaves = min(sides, default=0.0) > 1.0 or max(sides, default=0.0) < -1.0
-        least = scale[first:end].min()
-        rough = leaves and _rough(values, first, end) > sound.held * least
-        kept[first:end] = rough and not _rings(values, first, end, sound.spike * least)
+        kept[first:end] = (
+            leaves and _rough(values, first, end) > sound.held * scale[first:end].min()
+        )
     return kept
-
-
-def _rings(values: Vector, first: int, end: int, within: float) -> bool:
-    """Whether samples follow from those before them, or those after, by linear prediction.
-
-    Its coefficients are least squares over the samples on that side. After a knock a body rings,
-    and backwards its first samples follow, too; beside a sample that is wrong there is only noise.
-    """
-    for side, at, beyond in (
-        (values, first, end),
-        (values[::-1], values.size - end, values.size - first),
-    ):
-        if at < _RINGS:
-            continue
-        near = side[at - _RINGS : beyond] - side[at - _RINGS : at].mean()
-        rows = np.lib.stride_tricks.sliding_window_view(near, _PREDICTS + 1)
-        before, after = np.split(rows, [_RINGS - _PREDICTS])
-        slopes = np.linalg.lstsq(before[:, :-1], before[:, -1], rcond=None)[0]
-        if np.abs(after[:, -1] - after[:, :-1] @ slopes).max() < within:
-            return True
-    return False
 
 
 def _rough(values: Vector, first: int, end: int) -> float:
