@@ -298,7 +298,7 @@ def _limit(limits: Limits) -> None:
 
 COMMUNICATION_STEPS = 100
 _ALONE = "the FMU has no Co-Simulation"
-_VISITS, _OFF = 10, 0.01  # points that are visited twice, and shares of nominal values they are off
+_VISITS, _OFF = 10, 0.1  # points that are visited twice, and shares of what is borne they are off
 
 
 @dataclass(frozen=True)
@@ -307,6 +307,7 @@ class Excitation:
 
     states: Vector  # (n,) start values, off the FMU's own by up to a tenth of a nominal value
     nominal: Vector  # (n,) typical size of the states
+    reach: float  # share of it by which states may be moved further
     inputs: Variables  # the real inputs that may change in continuous time
     # first, second: (m,) inputs, and those after a jump
     first: Vector
@@ -320,8 +321,10 @@ def excite(fmu: FMU) -> Excitation:
     inputs = continuous_variables(fmu, fmu.inputs)
     fmu.start({})
     states = origin = fmu.get_states()
-    rest = fmu.get(inputs).copy()
-    for share in (0.1, 0.01, 0.001):
+    rest, reach = fmu.get(inputs).copy(), 0.0
+    for share in (0.1, 0.01, 0.001, -0.1, -0.01, -0.001):
+        if share < 0.0 < reach:  # below is for a model that bears nothing above, as a full tank
+            break
         try:  # whether the model bears these states
             fmu.set_states(origin + share * nominal)
             rates = fmu.derivatives()
@@ -329,12 +332,12 @@ def excite(fmu: FMU) -> Excitation:
             continue
         if not np.isfinite(rates).all():
             continue
-        states = origin + share * nominal
+        states, reach = origin + share * nominal, _OFF * abs(share)
         if np.all(np.abs(rates) < 100.0 * nominal):  # farther out, it flies off within 10 ms
             break
     fmu.set_states(states)
     levels = np.array([_level(fmu, inputs, rest, j, nominal) for j in range(rest.size)])
-    excitation = Excitation(states, nominal, inputs, rest + levels, rest + levels / 3)
+    excitation = Excitation(states, nominal, reach, inputs, rest + levels, rest + levels / 3)
     fmu.set(inputs, excitation.first)
     return excitation
 
@@ -376,7 +379,7 @@ def step_size(fmu: FMU) -> float:
 
 
 def walk(fmu: FMU, excitation: Excitation, begin: float) -> tuple[Matrix, float]:
-    """Follow the derivatives for 40 steps, inputs jumping half way.
+    """Follow the derivatives for 40 steps, as far as the model bears, inputs jumping half way.
 
     Each step is at most a hundredth of a nominal value long, which no stiffness makes unstable,
     and rests on states, inputs and derivatives alone.
@@ -386,17 +389,22 @@ def walk(fmu: FMU, excitation: Excitation, begin: float) -> tuple[Matrix, float]
     (40, k) all real variables, and the time at the end [s].
     """
     everything = real_variables(fmu)
-    t, rows = begin, []
+    t, rows, x = begin, [], fmu.get_states()
     for k in range(40):
         if k == 20:
             fmu.set(excitation.inputs, excitation.second)
-        rates = fmu.derivatives()
+        try:
+            rates = fmu.derivatives()
+            x = fmu.get_states()
+        except FMUError:
+            fmu.set_states(x)
+            rates = np.zeros(x.size)
         rows.append(fmu.get(everything).copy())
         pace = float(np.max(np.abs(rates) / excitation.nominal, initial=0.0))
         h = min(step_size(fmu), 0.01 / pace if pace > 0.0 else np.inf)
         t += h
         fmu.set_time(t)
-        fmu.set_states(fmu.get_states() + h * rates)
+        fmu.set_states(x + h * rates)
         fmu.complete_step()
     return np.array(rows), t
 
@@ -503,7 +511,8 @@ def time_calls(path: Path, instantiations: int) -> Iterator[CheckResult]:
         excitation = excite(fmu)
         outputs = real_variables(fmu, fmu.outputs)
         # New values at each call, because FMUs keep the results of the last ones.
-        points = (excitation.states, excitation.states + 1e-6 * excitation.nominal)
+        shift = min(1e-6, excitation.reach) * excitation.nominal
+        points = (excitation.states, excitation.states + shift)
         levels = (excitation.first, excitation.second)
 
         def at_points(read: Callable[[], object]) -> None:
@@ -636,7 +645,7 @@ def _revisit(path: Path, instantiations: int) -> Iterator[CheckResult]:
     with FMU(path) as fmu:
         excitation, reason = excite(fmu), ""
         # About the excited point, the inputs jumping half way.
-        shares = np.array([_OFF, -_OFF] * (_VISITS // 2))
+        shares = excitation.reach * np.array([1.0, -1.0] * (_VISITS // 2))
         x = excitation.states + shares[:, None] * excitation.nominal
         u = np.where(
             np.arange(_VISITS)[:, None] < _VISITS // 2, excitation.first, excitation.second
@@ -678,19 +687,27 @@ def _inject(path: Path, instantiations: int) -> Iterator[CheckResult]:
         excitation = excite(fmu)
         others = set(fmu.states)
         shown = fmu.variables([y for y in fmu.outputs if fmu.is_real(y) and y not in others])
-        before = np.concatenate([fmu.derivatives(), fmu.get(shown)])
-        wanted = fmu.get_states() + 0.01 * excitation.nominal
+
+        def read() -> Vector:
+            if fmu.event_signs.size:  # what depends on states may follow the mode of their place
+                fmu.handle_event()
+            return np.concatenate([fmu.derivatives(), fmu.get(shown)])
+
+        before = read()
+        wanted = fmu.get_states() + excitation.reach * excitation.nominal
         fmu.set_states(wanted)
         by_vector = np.abs(fmu.get_states() - wanted)
         by_reference = np.abs(fmu.get_typed(fmu.typed(fmu.states)) - wanted)
-        ignored = np.array_equal(np.concatenate([fmu.derivatives(), fmu.get(shown)]), before)
-        ignored = ignored and not fmu.remembers_steps  # they may follow later
+        # Of a model that remembers steps they may follow later.
+        ignored = np.array_equal(read(), before) and not fmu.remembers_steps
+        unknown = not excitation.reach
         # A model may only integrate its inputs; then its own Jacobian or structure says so.
         if ignored and fmu.has_directional_derivatives and all(map(fmu.is_real, fmu.states)):
             ignored = bool(fmu.state_jacobian().any())
         elif ignored:
             known = [fmu.description.dependencies.get(rate) for rate in fmu.description.rates]
-            ignored = any(names is None or others.intersection(names) for names in known)
+            unknown = unknown or None in known
+            ignored = any(names and others.intersection(names) for names in known)
     name = fmu.states[int(np.argmax(np.maximum(by_vector, by_reference)))]
     if by_vector.any():
         reason = f"'{name}' was set, but the FMU returns another state"
@@ -700,6 +717,13 @@ def _inject(path: Path, instantiations: int) -> Iterator[CheckResult]:
         reason = "states were set, but derivatives and outputs stay" if ignored else ""
     if reason:
         reason += "; the exporter protects its states: look for an option, or take another exporter"
+    elif unknown:
+        reason = (
+            "not measured: where the model was started nothing follows from its states, and its "
+        )
+        reason += "description does not say whether something should"
+        yield replace(INJECTION, reason=reason)
+        return
     value = float(max(by_vector.max(), by_reference.max()))
     yield replace(INJECTION, passed=not reason, value=value, reason=reason)
 
@@ -782,7 +806,10 @@ def _differentiate(path: Path, instantiations: int) -> Iterator[CheckResult]:
         # step confirms it.
         for share in (1e-3, 1e-5, 1e-7):
             steps = share * size
-            measured = central_differences(evaluate, centre, steps)
+            try:
+                measured = central_differences(evaluate, centre, steps)
+            except FMUError:  # farther than the model bears
+                continue
             entry = np.maximum(np.abs(jacobian), np.abs(measured))
             # Below these, an entry is rounding of the differences, or nothing beside others.
             rounding = 1e6 * np.finfo(float).eps * scale / steps
