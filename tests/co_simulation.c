@@ -1,7 +1,8 @@
 /* FMI 2.0 Co-Simulation without Model Exchange: der(x) = u, each step exact. */
+#include <math.h>
 #include <stdlib.h>
 #include "fmi2FunctionTypes.h"
-enum { X, U, SIZE };
+enum { X, U, SLOPE, SIZE };
 const char *fmi2GetTypesPlatform(void) { return fmi2TypesPlatform; }
 const char *fmi2GetVersion(void) { return "2.0"; }
 fmi2Component fmi2Instantiate(fmi2String a, fmi2Type b, fmi2String c, fmi2String d, const fmi2CallbackFunctions *e, fmi2Boolean f, fmi2Boolean g) {
@@ -18,6 +19,16 @@ fmi2Status fmi2Terminate(fmi2Component c) { return fmi2OK; }
 #ifndef ONLY /* size of a step, 0 for any */
 #define ONLY 0.0
 #endif
+#ifdef LAGS /* der(x) = u - x, u a straight line */
+fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference k[], size_t n, const fmi2Integer o[], const fmi2Real v[]) { ((double *)c)[SLOPE] = v[0]; return o[0] == 1 ? fmi2OK : fmi2Error; }
+#else
+fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference k[], size_t n, const fmi2Integer o[], const fmi2Real v[]) { return fmi2Error; }
+#endif
+#ifdef ENDS /* time by which it asks to end */
+fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind s, fmi2Boolean *v) { *v = s == fmi2Terminated; return fmi2OK; }
+#else
+fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind s, fmi2Boolean *v) { return fmi2Error; }
+#endif
 #ifdef LONGEST /* step that its solver makes whole */
 static double last;
 fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind s, fmi2Real *v) { *v = last; return fmi2OK; }
@@ -28,7 +39,19 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean n) {
 }
 #else
 fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind s, fmi2Real *v) { return fmi2Error; }
-fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean n) { if (ONLY && (h < 0.99 * ONLY || h > 1.01 * ONLY)) return fmi2Error; ((double *)c)[X] += h * ((double *)c)[U]; return fmi2OK; }
+fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean n) {
+#ifdef LAGS
+    double *r = c;
+    r[X] = (r[X] - r[U] + r[SLOPE]) * exp(-h) + r[U] + r[SLOPE] * (h - 1.0);
+    return fmi2OK;
+#endif
+#ifdef ENDS
+    if (t + h > ENDS) return fmi2Discard;
+#endif
+    if (ONLY && (h < 0.99 * ONLY || h > 1.01 * ONLY)) return fmi2Error;
+    ((double *)c)[X] += h * ((double *)c)[U];
+    return fmi2OK;
+}
 #endif
 fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference k[], size_t n, fmi2Real v[]) {
     for (size_t i = 0; i < n; i++) v[i] = ((double *)c)[k[i]];
@@ -43,6 +66,6 @@ fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference k[], size_t n, 
 NEVER(fmi2SetDebugLogging) NEVER(fmi2GetInteger) NEVER(fmi2GetBoolean) NEVER(fmi2GetString) NEVER(fmi2SetInteger)
 NEVER(fmi2SetBoolean) NEVER(fmi2SetString) NEVER(fmi2GetFMUstate) NEVER(fmi2SetFMUstate) NEVER(fmi2FreeFMUstate)
 NEVER(fmi2SerializedFMUstateSize) NEVER(fmi2SerializeFMUstate) NEVER(fmi2DeSerializeFMUstate)
-NEVER(fmi2GetDirectionalDerivative) NEVER(fmi2SetRealInputDerivatives) NEVER(fmi2GetRealOutputDerivatives)
+NEVER(fmi2GetDirectionalDerivative) NEVER(fmi2GetRealOutputDerivatives)
 NEVER(fmi2CancelStep) NEVER(fmi2GetStatus) NEVER(fmi2GetIntegerStatus)
-NEVER(fmi2GetBooleanStatus) NEVER(fmi2GetStringStatus)
+NEVER(fmi2GetStringStatus)

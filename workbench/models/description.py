@@ -37,6 +37,7 @@ class Interface:
     one_instance_per_process: bool
     completed_steps: bool
     variable_steps: bool
+    interpolates: bool  # takes derivatives of inputs (FMI 2.0)
 
 
 @dataclass(frozen=True)
@@ -484,6 +485,7 @@ def _interface(element: ElementTree.Element, version: str) -> Interface:
         if version == "3.0"
         else not has("completedIntegratorStepNotNeeded"),
         variable_steps=has("canHandleVariableCommunicationStepSize"),
+        interpolates=version == "2.0" and has("canInterpolateInputs"),
     )
 
 

@@ -1308,11 +1308,24 @@ class CoSimulation(FMU):
         """Say where the next step begins [s], after `restore`."""
         self._t = t
 
-    def step(self, h: float) -> Vector:
-        """Advance by h [s] with inputs held; returns the new states, (n,).
+    def set_slopes(self, inputs: Variables, slopes: Vector) -> None:
+        """Set time derivatives of real inputs, (k,), from where the next step begins (FMI 2.0)."""
+        try:
+            self._instance.setRealInputDerivatives(
+                inputs.references.tolist(), [1] * slopes.size, slopes.tolist()
+            )
+        except FMICallException as error:
+            raise self.refusal(error.function, error.status) from None
+
+    def step(self, h: float, drive: Callable[[float, float], None] | None = None) -> Vector:
+        """Advance by h [s]; returns the new states, (n,).
 
         An FMU that takes steps of one size only goes in those of its default experiment, or of the
         first h.
+
+        Parameters
+        ----------
+        drive : sets inputs for each step made, between two shares of h; without, they are held.
 
         Raises
         ------
@@ -1339,12 +1352,15 @@ class CoSimulation(FMU):
             tail = tuple(ctypes.byref(value) for value in (event, end, early, reached))
         begin = self._t
         for part in range(parts):
+            if drive is not None:
+                drive(part / parts, (part + 1) / parts)
             t, span = ctypes.c_double(begin + part * h / parts), ctypes.c_double(h / parts)
             reached.value = t.value + span.value
             # The zero: the state may be rolled back to before this point.
             status = self.try_call("do_step", t, span, ctypes.c_int(0), *tail)
             short = begin + (part + 1) * h / parts - reached.value
-            if status > _WARNING:
+            end.value = end.value or (status == _DISCARD and self._has_ended())
+            if status > _WARNING and not end.value:
                 error = self.refusal(_FUNCTIONS["do_step"][self.version], status)
             elif end.value:
                 error = self.end_error()
@@ -1358,10 +1374,20 @@ class CoSimulation(FMU):
                 continue
             raise FMUError(
                 f"{error}; in its step of {span.value:.9g} s from {t.value:.9g} s of its time"
-                f"{self._step_advice(t.value, status)}"
+                f"{'' if end.value else self._step_advice(t.value, status)}"
             )
         self._t = begin + h
         return self.get_typed(self._typed_states)
+
+    def _has_ended(self) -> bool:
+        """Whether a step was discarded because the FMU asks to end (FMI 2.0)."""
+        asked = getattr(self._instance.dll, "fmi2GetBooleanStatus", None)
+        terminated, ended = ctypes.c_int(3), ctypes.c_int()  # fmi2StatusKind
+        return (
+            asked is not None
+            and not asked(self._component, terminated, ctypes.byref(ended))
+            and bool(ended.value)
+        )
 
     def _step_advice(self, begin: float, status: int) -> str:
         """What is known of a step that failed, which began at a time [s], and what to do."""

@@ -6,6 +6,7 @@ Mode there. A Co-Simulation makes a step of its own from sample to sample.
 Source: FMI 2.0.4, section 3.2; FMI 3.0, sections 2.5 and 3.
 """
 
+import copy
 import ctypes
 from collections.abc import Callable
 from functools import cached_property
@@ -16,6 +17,7 @@ from scipy.integrate import RK45, Radau
 
 from workbench.arrays import Matrix, Vector
 from workbench.errors import FMUError
+from workbench.models.description import CO_SIMULATION
 from workbench.models.explicit_steps import Samples, State, go_on
 from workbench.models.fmu import (
     FMU,
@@ -187,6 +189,13 @@ class HybridSimulation:
             nominal=self._nominal,
             next_event=float(fmu.next_event[0]),
         )
+
+    def fork(self) -> "HybridSimulation":
+        """Another simulation of the same FMU, whose present point it keeps for itself."""
+        other = copy.copy(self)
+        other._kept = None
+        other.keep()
+        return other
 
     def start_from(self, x: Vector, held: Vector) -> None:
         """Go back to the point that was kept, with other states, (n,), and other last inputs, (q,).
@@ -393,7 +402,8 @@ class CoSimulationRun:
     fmu : after its start, whose inputs have the values of the first sample.
     inputs : what drives it, (m,).
     holds : (m,) 1 of an input that stays until the next sample, -1 of one whose sample is the mean
-        since the one before; of others the mean of a step acts.
+        since the one before; others go on in a straight line, of which the mean of each step of
+        the FMU acts where it takes no derivatives of inputs.
     """
 
     def __init__(self, fmu: CoSimulation, inputs: TypedVariables, holds: Vector) -> None:
@@ -402,6 +412,9 @@ class CoSimulationRun:
         still = ~np.array(moves, np.bool_)
         self._holds = np.where(still & (holds == 0.0), 1.0, holds)
         self._states = fmu.typed(fmu.states)
+        lines = fmu.description.interfaces[CO_SIMULATION].interpolates & (self._holds == 0.0)
+        self._lines_at = np.flatnonzero(lines & [fmu.is_real(name) for name in inputs.names])
+        self._lines = fmu.variables([inputs.names[i] for i in self._lines_at])
         self._t = fmu.start_time
         self._before = fmu.get_typed(inputs)
 
@@ -429,9 +442,17 @@ class CoSimulationRun:
             If the FMU refuses the step, or asks to end.
         """
         if t > self._t:
-            acting = 0.5 * ((1.0 + self._holds) * self._before + (1.0 - self._holds) * u)
-            self._fmu.set_typed(self._inputs, acting)
-            self._fmu.step(t - self._t)
+            first = np.where(self._holds < 0.0, u, self._before)
+            move, h = np.where(self._holds > 0.0, self._before, u) - first, t - self._t
+
+            def drive(begin: float, end: float) -> None:
+                acting = first + 0.5 * (begin + end) * move
+                acting[self._lines_at] = (first + begin * move)[self._lines_at]
+                self._fmu.set_typed(self._inputs, acting)
+                if self._lines_at.size:
+                    self._fmu.set_slopes(self._lines, move[self._lines_at] / h)
+
+            self._fmu.step(h, drive)
             self._t = t
         self._fmu.set_typed(self._inputs, u)
         self._before = u.copy()
