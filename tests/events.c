@@ -27,6 +27,10 @@ static double delayed(const Room *m, double by) { /* T, on a straight line betwe
 }
 static void calculate(Room *m) {
     const double *r = m->r;
+#ifdef INTEGRATES /* a room that loses no heat */
+    m->r[DT] = r[P] / r[C];
+    return;
+#endif
 #ifdef DELAY /* of the heat loss, whose steps it remembers */
     m->r[DT] = (r[P] - r[G] * (delayed(m, DELAY) - r[TA])) / r[C];
     return;
@@ -81,11 +85,17 @@ fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *e) {
 #ifdef CHATTERS /* a relay without hysteresis */
     m->r[P] = m->r[T] < 295.0 ? 1500.0 : 0.0;
 #endif
+#ifndef CONTROLS
     if (WHAT == TIMETABLE) {
         const int part = (int)floor(m->time / 600.0 + 1e-9);
         m->r[P] = part % 2 == 0 ? 1500.0 : 0.0;
         e->nextEventTimeDefined = fmi2True, e->nextEventTime = 600.0 * (part + 1);
     }
+#else /* the temperature, every 20 s, by a power per deviation */
+    const int sample = 1 + (int)floor(m->time / 20.0 + 1e-9);
+    if (sample != m->relay) m->r[P] = CONTROLS * (295.0 - m->r[T]), m->relay = sample;
+    e->nextEventTimeDefined = fmi2True, e->nextEventTime = 20.0 * sample;
+#endif
     if (WHAT == STUCK) e->nextEventTimeDefined = fmi2True, e->nextEventTime = m->time < 30.0 ? 30.0 : 20.0;
     if (WHAT == RELAYS) {
         m->r[P] = m->relay ? 1500.0 : 0.0;
@@ -126,6 +136,9 @@ fmi2Status fmi2GetDerivatives(fmi2Component c, fmi2Real x[], size_t n) {
 #ifdef DISCARDS /* below its table */
     if (m->r[T] < DISCARDS) return fmi2Discard;
 #endif
+#ifdef FULL /* above its start */
+    if (m->r[T] > FULL) return fmi2Discard;
+#endif
 #ifdef LOST /* above its table */
     if (m->r[T] > LOST) x[0] = NAN;
 #endif
@@ -163,7 +176,11 @@ fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *s) {
     memcpy(*s, c, sizeof(Room));
     return fmi2OK;
 }
+#ifdef FORGETS /* whether it heated */
+fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate s) { const double P_ = ((Room *)c)->r[P]; memcpy(c, s, sizeof(Room)), ((Room *)c)->r[P] = P_; return fmi2OK; }
+#else
 fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate s) { memcpy(c, s, sizeof(Room)); return fmi2OK; }
+#endif
 fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *s) { free(*s), *s = NULL; return fmi2OK; }
 /* FMPy looks for all functions; these are never called. */
 #define NEVER(name) fmi2Status name(void) { return fmi2Error; }

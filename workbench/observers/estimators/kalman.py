@@ -540,14 +540,21 @@ class ExtendedKalmanFilter(Estimator):
         if self._events is None:
             state, begin = self._state, self._model_time
             z, P, first = state.z.copy(), state.P.copy(), state.step.inputs[: u.shape[1]].copy()
+            # A model may tell of an event at the end of a step once.
+            saved = fmu.save() if fmu.needs_completed_steps and steps[0] != 0.0 else None
             try:
                 return super()._run(steps, u, y)
             except EventError as error:
+                if saved is not None:
+                    fmu.restore(saved)
                 if np.isfinite(self.system.learns) or self.system.rolling is not None:
                     raise EventError(
                         f"{error}. {self.name} goes through events only without the keys 'learns' "
                         "and 'rolls' of the system file"
                     ) from None
+            finally:
+                if saved is not None:
+                    fmu.release(saved)
             state.z[:], state.P[:], self._model_time = z, P, begin
             if steps[0] == 0.0:
                 self.start(u[0], y[0])
