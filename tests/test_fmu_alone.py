@@ -30,8 +30,8 @@ from workbench.models.fmu import FMU
 from workbench.models.native import instance
 from workbench.runtime.engine import Engine, silent
 from workbench.studies.power.own_model import own_model
-from workbench.system.registry import load_system
-from workbench.system.system import System
+from workbench.system.registry import load_system, model_path
+from workbench.system.system import OBSERVER, System
 
 from . import built
 from .built import build_text, lagged, machine_file, write_case
@@ -351,9 +351,9 @@ def test_a_term_that_is_wrong_in_form_changes_along_a_recording(recorded, tmp_pa
     system = load_system(recorded)
     exact = replace(system, comparison=replace(system.comparison, tolerances={}))
     problem = problem_of(exact, read_cases(recorded / "recordings", system), ["ViscousTerm[x]"])
-    _, sets = own_model(*with_effects(problem, tmp_path, silent), 0.5).simulate(
-        1, {problem.effects[0].name: 0.01}
-    )
+    made = with_effects(problem, tmp_path, silent)
+    assert made[1].name == model_path(system, OBSERVER).name  # which a refusal names
+    _, sets = own_model(*made, 0.5).simulate(1, {problem.effects[0].name: 0.01})
     sizes = []
     for read in sets:
         h, q = read["level"], read["inflow"]

@@ -213,6 +213,8 @@ def with_effects(
             terms = [term for term in rate_terms(model, problem.system) if term.name in asked]
         if terms:
             report(f"building an FMU around {model.path.name} with {len(terms)} terms")
+            # Under its name: it is the user's FMU that a refusal is about.
+            everything = folder / model.path.name
             write_extended(model.path, everything, terms, {}, {})
         return problem, everything if terms else model.path
     report(f"compiling {len(problem.effects)} effects")
