@@ -1412,11 +1412,38 @@ def test_co_simulation_that_takes_slopes_of_inputs_follows_straight_lines(able, 
     assert off < 1e-12 if able else 0.05 < off < 0.1
 
 
+def test_a_co_simulation_that_does_not_reach_its_samples_by_its_own_time_is_refused(
+    tmp_path, compiled
+):
+    """Its solver makes steps of 0.4 s; FMI 2.0 has no other word for how far a step came."""
+    shown = '<ScalarVariable name="time" valueReference="3" causality="independent"><Real/>'
+    folder = build_integrator(tmp_path, compiled("co_simulation.c", "-DSOLVES=0.4"))
+
+    def change(folder: Path) -> None:
+        file = folder / "modelDescription.xml"
+        text = file.read_text().replace(
+            "</ModelVariables>", f"{shown}</ScalarVariable></ModelVariables>"
+        )
+        able = 'modelIdentifier="Alone" canHandleVariableCommunicationStepSize="true"'
+        file.write_text(text.replace('modelIdentifier="Alone"', able))
+
+    with CoSimulation(rewritten(folder / "Alone.fmu", tmp_path / "Solver.fmu", change)) as fmu:
+        simulation, u = Simulation(fmu, ["u"], ["x"], [True]), np.ones((4, 1))
+        reached = simulation.run(Drive(0.8 * np.arange(4.0), u), {})[:, 0]
+        np.testing.assert_allclose(reached, [1.0, 1.8, 2.6, 3.4])
+        with pytest.raises(FMUError, match=r"ends the step at 0\.8 s.* record at multiples"):
+            simulation.run(Drive(np.arange(4.0), u), {})
+
+
 def test_a_co_simulation_that_asks_to_end_says_so(tmp_path, compiled):
     """FMI 2.0 calls that a step that was discarded."""
     path = build_integrator(tmp_path, compiled("co_simulation.c", "-DENDS=2.5")) / "Alone.fmu"
-    with CoSimulation(path) as fmu, pytest.raises(FMUError, match=r"asks to end .* from 2 s of"):
-        Simulation(fmu, ["u"], ["x"], [True]).run(Drive(np.arange(4.0), np.ones((4, 1))), {})
+    with CoSimulation(path) as fmu:
+        unmoved = Simulation(fmu, [], ["x"], []).run(Drive(np.arange(3.0), np.empty((3, 0))), {})
+        np.testing.assert_array_equal(unmoved[:, 0], 1.0)
+        simulation = Simulation(fmu, ["u"], ["x"], [True])
+        with pytest.raises(FMUError, match=r"asks to end .* from 2 s of"):
+            simulation.run(Drive(np.arange(4.0), np.ones((4, 1))), {})
 
 
 def test_co_simulation_with_steps_of_one_size_goes_in_those_or_is_refused(tmp_path, compiled):

@@ -11,6 +11,7 @@ import math
 import os
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path, PurePosixPath
@@ -1358,6 +1359,8 @@ class CoSimulation(FMU):
             reached.value = t.value + span.value
             # The zero: the state may be rolled back to before this point.
             status = self.try_call("do_step", t, span, ctypes.c_int(0), *tail)
+            if status <= _WARNING and not tail:
+                reached.value = self._clock(t.value + span.value)
             short = begin + (part + 1) * h / parts - reached.value
             end.value = end.value or (status == _DISCARD and self._has_ended())
             if status > _WARNING and not end.value:
@@ -1368,7 +1371,8 @@ class CoSimulation(FMU):
                 error = FMUError(
                     f"{self.called}: it ends the step at {reached.value:.9g} s"
                     f"{' and asks for Event Mode' * event.value}, where it was told that "
-                    "steps are whole and without events (earlyReturnAllowed, eventModeUsed)"
+                    "steps are whole and without events (earlyReturnAllowed, eventModeUsed). If "
+                    "its solver has steps of one size, record at multiples of that"
                 )
             else:
                 continue
@@ -1378,6 +1382,24 @@ class CoSimulation(FMU):
             )
         self._t = begin + h
         return self.get_typed(self._typed_states)
+
+    @cached_property
+    def _clocks(self) -> list[Variables]:
+        variables = self.description.variables
+        return [
+            self.variables([v.name]) for v in variables if v.causality == "independent" and v.real
+        ]
+
+    def _clock(self, end: float) -> float:
+        """Its own time [s] where it shows one that runs, else the end that a step should have.
+
+        FMI 2.0 does not say how far a step came: one of a solver with long steps may be none.
+        """
+        for clock in self._clocks:
+            with suppress(FMUError):
+                shown = float(self.get(clock)[0])
+                return end if shown == self.start_time else shown
+        return end
 
     def _has_ended(self) -> bool:
         """Whether a step was discarded because the FMU asks to end (FMI 2.0)."""

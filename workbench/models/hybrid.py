@@ -412,8 +412,10 @@ class CoSimulationRun:
         still = ~np.array(moves, np.bool_)
         self._holds = np.where(still & (holds == 0.0), 1.0, holds)
         self._states = fmu.typed(fmu.states)
-        lines = fmu.description.interfaces[CO_SIMULATION].interpolates & (self._holds == 0.0)
-        self._lines_at = np.flatnonzero(lines & [fmu.is_real(name) for name in inputs.names])
+        lines = zip(inputs.names, self._holds == 0.0, strict=True)
+        able = fmu.description.interfaces[CO_SIMULATION].interpolates
+        sloping = [able and straight and fmu.is_real(name) for name, straight in lines]
+        self._lines_at = np.flatnonzero(sloping)
         self._lines = fmu.variables([inputs.names[i] for i in self._lines_at])
         self._t = fmu.start_time
         self._before = fmu.get_typed(inputs)
