@@ -601,6 +601,7 @@ def test_a_twin_is_parted_by_what_is_proposed_for_it(
 ):
     monkeypatch.setattr(following, "_DRAWN", 0)  # of which nothing is asked here
     row = followed(planted, tmp_path)
+    assert row["drawn"] == []
     assert set(row["group"]) == {planted, twin}
     made = row["proposed"]
     assert answer in made["experiment"]

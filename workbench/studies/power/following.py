@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
+from functools import partial
 from typing import Any, TypedDict
 
 import numpy as np
@@ -122,7 +123,7 @@ def follow_proposals(
         progress.step(f"{row.planted}: {text}{row.error}")
 
     with study.setup() as setup:
-        interrupted = work_off(setup, engine, _row, sets, collect)
+        interrupted = work_off(setup, engine, partial(_row, _DRAWN), sets, collect)
     return [asdict(rows[k]) for k in sorted(rows)], interrupted
 
 
@@ -158,17 +159,17 @@ def _row_of(planting: Planting, error: str = "") -> FollowingRow:
     return FollowingRow(planting.options, planting.effects[0], planting.multiple, error=error)
 
 
-def _row(setup: Setup, planting: Planting) -> FollowingRow:
+def _row(drawn: int, setup: Setup, planting: Planting) -> FollowingRow:
     """Diagnose a set, make the recording that is proposed, and diagnose all of it."""
     row = _row_of(planting)
     try:
-        _follow(row, setup, planting)
+        _follow(row, drawn, setup, planting)
     except Exception as error:  # one set must not end a run of hours; it is counted
         row.error = repr(error)
     return row
 
 
-def _follow(row: FollowingRow, setup: Setup, planting: Planting) -> None:
+def _follow(row: FollowingRow, drawn: int, setup: Setup, planting: Planting) -> None:
     (planted,) = planting.effects
     cases = setup.record(planting, setup.rig.simulate(planting.seed, planting.gains))
     diagnosis, rivals = rivals_of_set(setup.problem_of(cases), setup.everything)
@@ -182,7 +183,7 @@ def _follow(row: FollowingRow, setup: Setup, planting: Planting) -> None:
         return
     assert experiments is not None  # or nothing were proposed
     rng = np.random.default_rng(planting.seed)
-    plan = [draw_experiment(experiments, rng) for _ in range(_DRAWN)]
+    plan = [draw_experiment(experiments, rng) for _ in range(drawn)]
 
     def make(experiment: RankedExperiment, fitted: Setup = setup) -> FollowingRecording:
         return _diagnose_with(experiment, fitted, planting, rivals, cases)
