@@ -660,3 +660,88 @@ def test_an_extended_fmu_without_units_is_valid(tmp_path):
     assert validate_fmu(str(tmp_path / "extended.fmu")) == []
     run = fmpy.simulate_fmu(str(tmp_path / "extended.fmu"), stop_time=1.0)
     assert run["x"][-1] == pytest.approx(np.exp(-2.0), rel=1e-3)  # of FMPy's integrator, 1e-4
+
+
+KETTLE = """model Kettle
+  parameter Real C(unit="J/K") = 3e5;
+  parameter Real Cj(unit="J/K") = 5e4;
+  parameter Real UA(unit="W/K") = 800.0;
+  parameter Real loss(unit="W/K") = 40.0;
+  input Real heater(unit="W", nominal=3e3);
+  input Real warmth(unit="W", nominal=3e3);
+  output Real T(unit="K", start=300.0, fixed=true, nominal=300.0);
+  output Real Tj(unit="K", start=300.0, fixed=true, nominal=300.0);
+equation
+  C*der(T) = heater - UA*(T - Tj);
+  Cj*der(Tj) = warmth + UA*(T - Tj) - loss*(Tj - 293.15);
+end Kettle;
+"""
+KETTLE_SYSTEM = """
+title = "Kettle"
+sample_time = "10 s"
+models.observer = { fmu = "Kettle.fmu" }
+inputs.heater = { unit = "W", noise = "0 W", scale = "3 kW", held = true }
+inputs.warmth = { unit = "W", noise = "0 W", scale = "3 kW", held = true }
+outputs.T = { unit = "K", noise = "0.03 K", scale = "300 K" }
+outputs.Tj = { unit = "K", noise = "0.03 K", scale = "300 K" }
+"""
+
+
+@pytest.fixture(scope="module")
+def kettle(tmp_path_factory) -> Path:
+    """Folder of an FMU whose states are temperatures, with its system file."""
+    folder = tmp_path_factory.mktemp("kettle")
+    build_text(folder, KETTLE)
+    (folder / "system.toml").write_text(KETTLE_SYSTEM)
+    return folder
+
+
+def heated(folder: Path, zero: float, gain: float, more: float) -> Path:
+    """Four recordings of an hour; a thermometer is wrong about 0 degC, or the heater does more."""
+    rng = np.random.default_rng(5)
+    time = 10.0 * np.arange(361.0)
+    for number in range(4):
+        heater, warmth = np.repeat(rng.uniform(0.0, 3e3, (2, 6)), 60, axis=1)
+        x = [np.array([300.0 + 5.0 * number, 300.0 + 4.0 * number])]
+        for P, Q in zip(heater, warmth, strict=True):
+
+            def rate(_, x, P=P, Q=Q):
+                through = 800.0 * (x[0] - x[1])
+                return [(P + more - through) / 3e5, (Q + through - 40.0 * (x[1] - 293.15)) / 5e4]
+
+            x.append(solve_ivp(rate, (0.0, 10.0), x[-1], rtol=1e-9, atol=1e-9).y[:, -1])
+        T, Tj = np.transpose(x)
+        T = T + zero + gain * (T - 273.15)
+        columns = {
+            "time [s]": time,
+            "heater [W]": np.append(heater, heater[-1]),
+            "warmth [W]": np.append(warmth, warmth[-1]),
+            "T [K]": T + 0.03 * rng.standard_normal(time.size),
+            "Tj [K]": Tj + 0.03 * rng.standard_normal(time.size),
+        }
+        write_case(folder / f"{number}", columns, "Kettle")
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("zero", "gain", "more", "name", "size"),
+    [
+        (1.0, 0.0, 0.0, "SensorOffset[T]", 1.0),
+        (0.0, 0.05, 0.0, "SensorGain[T]", 0.05),
+        (0.0, 0.0, 200.0, "SensorOffset[heater]", -200.0),
+    ],
+)
+def test_what_is_small_beside_absolute_temperatures_is_named(
+    kettle, tmp_path, zero, gain, more, name, size
+):
+    """One in a hundred of 300 K is 3 K, a hundred times the noise: not what a thermometer may err.
+
+    None errs in proportion to what is above absolute zero.
+    """
+    outcome = quietly(load_system(kettle), heated(tmp_path, zero, gain, more))
+    cause = outcome.diagnosis.causes[0]
+    assert len(outcome.diagnosis.causes) == 1
+    assert name in (cause.effect.name, *cause.confusable_with)
+    if name == cause.effect.name:
+        (found,) = cause.parameters.values()
+        assert found.low < size < found.high

@@ -9,6 +9,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from workbench.arrays import Vector
 from workbench.diagnosis.data.clocks import case_in_time, late_signals
 from workbench.diagnosis.data.counting import refuse_too_few
 from workbench.diagnosis.data.motion import ModelSource
@@ -17,7 +18,13 @@ from workbench.diagnosis.data.sensors import (
     fitting_recordings,
     sensor_errors,
 )
-from workbench.diagnosis.effects.candidates import COEFFICIENT, rate_terms, with_starts
+from workbench.diagnosis.effects.candidates import (
+    COEFFICIENT,
+    of_moving_states,
+    rate_terms,
+    with_starts,
+    zero,
+)
 from workbench.diagnosis.effects.catalogue import Effect
 from workbench.diagnosis.effects.extension import (
     ExtendedModel,
@@ -140,7 +147,31 @@ def shown_effects(problem: Problem, simulations: ResidualModel) -> Problem:
             )
     begun = simulations.begin[0]  # by what was measured, in each recording
     effects = [effect for effect in effects if effect.parameter not in begun]
+    if not simulations.free:
+        runs = _of_temperatures(simulations)
+        effects = list(of_moving_states(effects, runs, system.candidates.matters))
     return replace(problem, effects=tuple(fitting_recordings(effects, system, problem.cases)))
+
+
+def _of_temperatures(simulations: ResidualModel) -> dict[str, list[tuple[Vector, Vector]]]:
+    """Time and nominal course of states in each recording, of those that are temperatures.
+
+    What they are by themselves says nothing of how fast they change: no machine is at 0 K.
+    """
+    names = [name for name in simulations.states if simulations.units.get(name) == "K"]
+    if not names:
+        return {}
+    recordings = simulations.recordings
+    courses = simulations.along([{} for _ in recordings], names)
+    runs = {
+        name: [(own.time, course[:, j]) for own, course in zip(recordings, courses, strict=True)]
+        for j, name in enumerate(names)
+    }
+    return {
+        name: run
+        for name, run in runs.items()
+        if zero("K", max(float(np.abs(values).max()) for _, values in run))
+    }
 
 
 def _outcome(

@@ -313,7 +313,8 @@ class Candidates:
     )
     without: tuple[str, ...] = key("candidates to leave out", absent=())
     matters: float = key(
-        "least change worth reporting: over a parameter's value, of a gain, over a signal's scale",
+        "least change worth reporting: over a parameter's value, of a gain, over a signal's scale, "
+        "or over 30 K of a temperature",
         absent=0.01,
     )
 

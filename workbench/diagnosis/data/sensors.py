@@ -24,6 +24,7 @@ from workbench.diagnosis.effects.candidates import (
     STEP,
     WIDTH,
     wrong_sensors,
+    zero,
 )
 from workbench.diagnosis.effects.catalogue import Effect
 from workbench.recordings.case import Case
@@ -102,13 +103,14 @@ def lagged(time: Vector, values: Matrix, lag: float) -> Matrix:
 
 
 class SensorError(NamedTuple):
-    """One parameter of a wrong sensor: of which signal, a typical size, bounds, and its unit."""
+    """One parameter of a wrong sensor: of which signal, a typical size, bounds, unit, and zero."""
 
     signal: str
     parameter: str
     typical: float
     bounds: tuple[float, float]
     unit: str
+    zero: float  # about which a gain is wrong
 
 
 def sensor_errors(system: System) -> dict[str, SensorError]:
@@ -133,7 +135,8 @@ def sensor_errors(system: System) -> dict[str, SensorError]:
                 RECTIFIED: (0.0, 3.0),
             }.get(parameter, (0.0, typical))
             name = f"{effect.name}.{parameter}"
-            errors[name] = SensorError(signal.name, parameter, typical, bounds, unit)
+            about = zero(signal.unit, signal.scale) if parameter == GAIN else 0.0
+            errors[name] = SensorError(signal.name, parameter, typical, bounds, unit, about)
     return errors
 
 
@@ -152,7 +155,11 @@ def readings(
         if value := values.get(name, 0.0):
             known = wrong.get(error.signal, SensorReading())
             wrong[error.signal] = known._replace(**{error.parameter: value})
-    return wrong
+    zeros = {error.signal: error.zero for error in errors.values() if error.parameter == GAIN}
+    return {
+        signal: reading._replace(offset=reading.offset - reading.gain * zeros[signal])
+        for signal, reading in wrong.items()
+    }
 
 
 def corrected(samples: Samples, wrong: Mapping[str, SensorReading]) -> Samples:

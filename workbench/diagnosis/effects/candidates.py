@@ -8,7 +8,7 @@ to the rates around it.
 
 import re
 import sys
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -30,6 +30,7 @@ from workbench.models.added import (
 from workbench.models.description import Variable
 from workbench.models.fmu import FMU, CoSimulation
 from workbench.observers.operating import start_spreads
+from workbench.recordings.channels.matching import COLD, ZERO_CELSIUS
 from workbench.system.parts import StateNoise
 from workbench.system.system import System
 from workbench.system.units import with_unit
@@ -80,9 +81,12 @@ _FORMS = {
     QUADRATIC: "a quadratic term, as of drag, in the rate of {state}",
     CONSTANT: "a constant term in the rate of {state}",
 }
+_POWERS = {VISCOUS: 1, QUADRATIC: 2}
 # Of the speed of a Stribeck term, over the state's size: what is fitted goes by shares from these.
 _SPEEDS = (0.05, 0.2, 1.0)
 _CHANGEABLE = ("fixed", "tunable")
+# K: a hundredth is what a resistance thermometer of class B may be off at 0 degC (IEC 60751).
+_TEMPERATURE = 30.0
 # Of the least time that matters: a logger that scans five channels has neighbours as far apart.
 LEAST_SKEWS = 2.0
 _FACTOR = 10.0  # by which a parameter is larger or smaller at most, if the FMU has no bounds
@@ -174,7 +178,7 @@ def rate_terms(model: FMU, system: System) -> tuple[RateTerm, ...]:
         own = model.units.get(state, "")
         rate = model.units.get(model.description.rates[i]) or (f"{own}/s" if own else "")
         for form, text in _FORMS.items():
-            power = {VISCOUS: 1, QUADRATIC: 2}.get(form, 0)
+            power = _POWERS.get(form, 0)
             terms.append(
                 RateTerm(
                     name=f"{TERM}{form}.{state}",
@@ -190,6 +194,36 @@ def rate_terms(model: FMU, system: System) -> tuple[RateTerm, ...]:
                 )
             )
     return tuple(terms)
+
+
+def of_moving_states(
+    effects: Sequence[Effect], runs: Mapping[str, Sequence[tuple[Vector, Vector]]], matters: float
+) -> Iterator[Effect]:
+    """Effects, of which terms beside the rates of some states matter by how these states move.
+
+    Parameters
+    ----------
+    runs : time [s] and values of a state in each recording, by its name.
+    matters : least change worth reporting, over what is typical.
+    """
+    for effect in effects:
+        form, _, state = effect.parameter.removeprefix(TERM).partition(".")
+        own = runs.get(state, ()) if effect.size == COEFFICIENT else ()
+        if way := float(sum(np.abs(np.diff(values)).sum() for _, values in own)):
+            rate = way / sum(float(np.ptp(time)) for time, _ in own)
+            size = max(float(np.abs(values).max()) for _, values in own)
+            effect = replace(effect, matters=matters * rate / size ** _POWERS.get(form, 0))
+        yield effect
+
+
+def zero(unit: str, size: float) -> float:
+    """Zero of a sensor: of temperatures that of Celsius, by which thermometers are calibrated."""
+    return ZERO_CELSIUS if unit == "K" and size >= COLD else 0.0
+
+
+def _moves(unit: str, size: float) -> float:
+    """By how much a quantity of a typical size differs from itself: no temperature by its own."""
+    return _TEMPERATURE if zero(unit, size) else size
 
 
 def _scales(model: FMU, system: System) -> Vector:
@@ -322,7 +356,8 @@ def wrong_sensors(system: System) -> Iterator[Effect]:
     inputs, compare = {signal.name for signal in system.inputs}, system.comparison
     for signal in system.signals.values():
         for form in (*_ZERO, *(_INPUT if signal.name in inputs else _OUTPUT)):
-            least = system.candidates.matters * (1.0 if form.size in SHARES else signal.scale)
+            moves = _moves(signal.unit, signal.scale)
+            least = system.candidates.matters * (1.0 if form.size in SHARES else moves)
             yield Effect(
                 name=f"{form.kind}[{signal.name}]",
                 model=form.kind,

@@ -116,7 +116,7 @@ class ResidualModel:
         if unsaid := [state for state in fmu.states if state not in fmu.defaults]:
             fmu.start({})  # as of what it calculates, and of elements of arrays
             self.nominal |= zip(unsaid, fmu.get_typed(fmu.typed(unsaid)), strict=True)
-        self.units = dict(fmu.units)
+        self.states, self.units = tuple(fmu.states), dict(fmu.units)
         self.bounds = {
             v.name: (
                 -np.inf if v.minimum is None else v.minimum,

@@ -167,13 +167,13 @@ def size_doubt(values: Vector, unit: str, signal: Signal, column: str) -> str:
         )
     if signal.unit != "K" or is_difference(signal):
         return ""
-    if signal.scale < _COLD and unit in ("degC", "degF"):
+    if signal.scale < COLD and unit in ("degC", "degF"):
         return (
             f"in [{unit}] it may be a temperature, or a difference of two; {confirms} for a "
             f"temperature, [K] takes 6 degC for 6 K"
         )
-    if signal.scale >= _COLD:
-        shift = ZERO_CELSIUS if middle < _COLD else -ZERO_CELSIUS
+    if signal.scale >= COLD:
+        shift = ZERO_CELSIUS if middle < COLD else -ZERO_CELSIUS
         if abs(middle + shift - signal.scale) < 0.5 * abs(middle - signal.scale):
             zero = "degC" if shift > 0.0 else "K"
             return f"its median is {middle:.4g} K, as if it were in [{zero}]; {confirms}"
@@ -420,7 +420,7 @@ _IN_BRACKETS = re.compile(r"[({<][^(){}<>\d]+[)}>]$")
 _GALLON = re.compile(r"\b(gal|gallon|gpm)\b")
 _WORDS = frozenset(("in", "atm"))  # units that mean something else in a name: h_in, p_atm
 _HUGE = 1e100  # no sample, and its square would be no number
-_COLD = 100.0  # K, below which no machine's temperature is
+COLD = 100.0  # K, below which no machine's temperature is
 _THOUSANDFOLD = 300.0  # times the typical size of a signal: a unit is another one
 _GAUGE = frozenset(("gauge", "gage", "rel", "relative", "relativ", "ueberdruck"))
 _ABSOLUTE = frozenset(("abs", "absolute", "absolut", "absolutdruck"))
