@@ -23,7 +23,7 @@ from workbench.diagnosis.simulation.residual_model import ResidualModel
 from workbench.errors import FMUError, InputError
 from workbench.models.added import CONSTANT, RateTerm, write_extended
 from workbench.models.checks import check
-from workbench.models.fmu import FMU, CoSimulation, EventError, NoFunctionError
+from workbench.models.fmu import FMU, TOLERANCE, CoSimulation, EventError, NoFunctionError
 from workbench.models.native import OK, instance, linearise, place, read
 from workbench.models.simulation import Drive, Simulation
 from workbench.observers import choose, estimators_of
@@ -1314,6 +1314,31 @@ def test_a_unit_that_is_another_than_the_models_is_refused_with_what_to_write(
         load_system(path)
 
 
+def test_a_unit_whose_definition_contradicts_its_name_is_refused_or_taken_as_it_is(build):
+    """A supplier's L/min was defined as 6e-4 m3/s, and nobody else can export it again."""
+    wrong = '<Unit name="L/min"><BaseUnit m="3" s="-1" factor="6e-4"/></Unit>'
+    unit = 'start="291" unit="L/min"'
+    path = build("RELAYS", variables=VARIABLES.replace('start="291"', unit))
+
+    def change(folder: Path) -> None:
+        file = folder / "modelDescription.xml"
+        defined = f"<UnitDefinitions>{wrong}</UnitDefinitions><ModelVariables>"
+        file.write_text(file.read_text().replace("<ModelVariables>", defined))
+
+    rewritten(path, path, change)
+    system = path.with_name("system.toml")
+
+    def declare(unit: str, noise: str, scale: str) -> None:
+        line = f'outputs.T = {{ unit = "{unit}", noise = {noise}, scale = {scale} }}'
+        system.write_text(re.sub("(?m)^outputs.T = .*$", line, system.read_text()))
+
+    declare("L/min", '"0.05 L/min"', '"10 L/min"')
+    with pytest.raises(InputError, match=r"defines as 0\.0006 m.*or write unit = '1'"):
+        load_system(system)
+    declare("1", "0.05", "10")
+    load_system(system)
+
+
 def test_an_fmu_of_one_instance_in_a_process_has_no_variant(build, tmp_path):
     """A second one has the values of the first in FMUs that keep them in globals."""
 
@@ -1375,6 +1400,20 @@ def test_the_open_loop_runs_on_co_simulation_alone(integrator):
         estimate = loop(fmu, system, usual_gains(loop, fmu, system)).run(time, u, u + np.nan)
     np.testing.assert_allclose(np.asarray(estimate.values)[:, 0], [1, 2, 3, 4, 4, 4, 4])
     assert compare_with_fmpy(integrator / "Alone.fmu").verdict == RIGHT
+
+
+def test_a_co_simulation_is_told_its_tolerance_and_that_no_step_is_undone(tmp_path, compiled):
+    """From 1 by 1 a second. Some integrate at 1e-2 unless told, or begin anew what may be undone.
+
+    FMUs of fmiCpp stayed at their first step; those of Dymola were off by 1.7 % of the range.
+    """
+    folder = build_integrator(tmp_path, compiled("co_simulation.c", "-DROUGH"))
+    with CoSimulation(folder / "Alone.fmu") as fmu:
+        simulated = Simulation(fmu, ["u"], ["x"], [True]).run(
+            Drive(np.arange(4.0), np.ones((4, 1))), {}
+        )
+    np.testing.assert_allclose(simulated[:, 0], [1, 2, 3, 4], rtol=TOLERANCE)
+    assert compare_with_fmpy(folder / "Alone.fmu").verdict == RIGHT
 
 
 def test_co_simulation_alone_takes_means_of_the_time_before(integrator):

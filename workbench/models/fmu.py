@@ -97,6 +97,9 @@ _STATUSES: Mapping[int | str, str] = {
 # Places in `FMU.notes`.
 WARNED, REFUSED_BY, STATUS, STATE = range(4)
 _WARNING, _DISCARD, _LOGGED = 1, 2, 3  # status of FMI; messages that an error shows
+# Of a step, relative to the state and to its nominal value: far below what a sensor resolves.
+# Integration here keeps it, and an FMU is asked to in its own: without, Dymola's stays at 1e-4.
+TOLERANCE = 1e-8
 _SAME_STEP = 1e-4  # by which sample times may differ: what rounding of time stamps leaves
 _STEP = float(np.finfo(float).eps) ** (1 / 3)  # of differences, relative
 SAME_RATE = 1e-4  # of its size, by which iterations within a model may change a rate
@@ -305,6 +308,11 @@ class FMUInstance:
         self._instance.freeInstance()
         self._scratch.close()
 
+    @property
+    def is_own(self) -> bool:
+        """Whether it was built here, from equations."""
+        return self.description.tool.startswith(OWN_TOOL)
+
     def renew(self, *, reload: bool) -> None:
         """Free the instance and make a new one; with `reload` of a library loaded anew."""
         if reload:
@@ -333,17 +341,19 @@ class FMUInstance:
             If the FMU refuses a call, or asks to end.
         """
         instance = self._instance
+        # Those built here keep 1e-6 by themselves, with which the recordings of the rig were made.
+        tolerance = None if self.is_own else TOLERANCE
         try:
             if self._used:
                 instance.reset()
             self._used = True
             if self.version == "2.0":
-                instance.setupExperiment(startTime=time)
+                instance.setupExperiment(tolerance=tolerance, startTime=time)
             prepare()
             if self.version == "2.0":
                 instance.enterInitializationMode()
             else:
-                instance.enterInitializationMode(startTime=time)
+                instance.enterInitializationMode(tolerance=tolerance, startTime=time)
             instance.exitInitializationMode()
             if self.interface == CO_SIMULATION:
                 return math.inf
@@ -697,11 +707,6 @@ class FMU(FMUInstance):
             asked = {*self.rate_references.tolist(), *outputs.tolist()}
             return asked.issuperset(unknowns.tolist())
         return self.has_directional_derivatives
-
-    @property
-    def is_own(self) -> bool:
-        """Whether it was built here, from equations."""
-        return self.description.tool.startswith(OWN_TOOL)
 
     @cached_property
     def _state_variables(self) -> Variables:
@@ -1290,7 +1295,7 @@ class CoSimulation(FMU):
     ) -> None:
         """Reset and initialise at `start_time`; see `FMU.start`."""
         super().start(states, parameters)
-        self._t, self._length = self.start_time, 0.0
+        self._t, self._length, self._goes_back = self.start_time, 0.0, False
 
     @cached_property
     def _typed_states(self) -> TypedVariables:
@@ -1317,6 +1322,11 @@ class CoSimulation(FMU):
             )
         except FMICallException as error:
             raise self.refusal(error.function, error.status) from None
+
+    def save(self, over: ctypes.c_void_p | None = None) -> ctypes.c_void_p:
+        """Save the complete state, see `FMU.save`; steps are then ones that may be undone."""
+        self._goes_back = True
+        return super().save(over)
 
     def step(self, h: float, drive: Callable[[float, float], None] | None = None) -> Vector:
         """Advance by h [s]; returns the new states, (n,).
@@ -1357,8 +1367,8 @@ class CoSimulation(FMU):
                 drive(part / parts, (part + 1) / parts)
             t, span = ctypes.c_double(begin + part * h / parts), ctypes.c_double(h / parts)
             reached.value = t.value + span.value
-            # The zero: the state may be rolled back to before this point.
-            status = self.try_call("do_step", t, span, ctypes.c_int(0), *tail)
+            # By noSetFMUStatePriorToCurrentPoint = false, some take a step for the last one again.
+            status = self.try_call("do_step", t, span, ctypes.c_int(not self._goes_back), *tail)
             if status <= _WARNING and not tail:
                 reached.value = self._clock(t.value + span.value)
             short = begin + (part + 1) * h / parts - reached.value

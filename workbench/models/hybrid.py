@@ -22,14 +22,13 @@ from workbench.models.explicit_steps import Samples, State, go_on
 from workbench.models.fmu import (
     FMU,
     SAME_RATE,
+    TOLERANCE,
     CoSimulation,
     TypedVariables,
     central_differences,
 )
 from workbench.models.native import MOVED, OK, Instance, instance, raise_on_failure
 
-# Of a step, relative to the state and to its nominal value: far below what a sensor resolves.
-TOLERANCE = 1e-8
 # Points within a step at which indicators are read, so that one that changes twice is found.
 _LOOKS = 4
 # Between two samples; a model that needs more comes to rest by ever more events (Zeno).

@@ -365,7 +365,7 @@ def do_step(model, h):  # type: ignore[no-untyped-def]
     """Advance a Co-Simulation FMU by h [s] with inputs held; returns a status."""
     t = model.time[0]
     model.time[0] = t + h
-    words, flags = (model.address, t, h, 0), model.flags
+    words, flags = (model.address, t, h, 1), model.flags  # 1: it never goes back
     if model.fmi == 2:
         return _call(model, model.do_step, words)
     return _call(model, model.do_step, (*words, flags, flags[1:], flags[2:], model.reached))

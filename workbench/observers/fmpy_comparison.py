@@ -193,7 +193,7 @@ class _Problem:
                 validate=False,
                 fmi_type="CoSimulation" if self._alone else "ModelExchange",
                 solver="CVode",
-                relative_tolerance=None if self._alone else tolerance,
+                relative_tolerance=tolerance,
                 start_time=self._begin,
                 stop_time=float(self.time[-1]),
                 output_interval=self._step / finer,
@@ -203,7 +203,7 @@ class _Problem:
                 timeout=_TIMEOUT,
             )
         columns = [
-            result[of or name].reshape(len(result), -1)[::finer, element]
+            result[of or name].reshape(len(result), -1)[::finer, element].astype(float)
             for name, (of, element) in self._places.items()
         ]
         return np.column_stack(columns)

@@ -40,6 +40,8 @@ _NAME_IT = (
     "in [variables], or --map {0}=NAME"
 )
 
+_AS_THEY_ARE = "or write unit = '1' in its table, which takes values as they are"
+
 
 def check_model(system: System, model: Description) -> None:
     """Refuse a model that estimators cannot work on; a variable without a unit is taken as SI.
@@ -88,7 +90,8 @@ def check_model(system: System, model: Description) -> None:
                 remedy=f"write unit = '{taken}' for it in {system.source.name}, and record it in "
                 f"[{declared}], or export the model with this variable in {unit}",
             )
-        _check_unit(declared or "1", model, where)
+        if unit != "1":  # which takes values as they are
+            _check_unit(declared or "1", model, where)
     _check_aliases(system, model)
     _check_ranges(system, model)
     _check_corrections(system, model)
@@ -134,14 +137,15 @@ def _check_unit(name: str, model: Description, where: str) -> None:
             where=where,
             found=f"unit [{name}], whose zero the model defines at {zero:g} {base}",
             expected=f"0 {base}, as its name says",
-            remedy="correct the unit in the model, such as degC for K, and export it again",
+            remedy="correct the unit in the model, such as degC for K, and export it again; "
+            f"{_AS_THEY_ARE}",
         )
     if abs(factor / size - 1.0) > _ROUNDED:
         raise InputError(
             where=where,
             found=f"unit [{name}], which the model defines as {size:g} {base}",
             expected=f"{factor:g} {base}, as its name says",
-            remedy="correct the unit in the model, and export it again",
+            remedy=f"correct the unit in the model, and export it again; {_AS_THEY_ARE}",
         )
 
 

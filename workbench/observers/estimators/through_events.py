@@ -6,8 +6,8 @@ import numpy as np
 
 from workbench.arrays import Matrix, Vector
 from workbench.errors import FMUError
-from workbench.models.fmu import FMU, SAME_RATE, EventError
-from workbench.models.hybrid import TOLERANCE, HybridSimulation
+from workbench.models.fmu import FMU, SAME_RATE, TOLERANCE, EventError
+from workbench.models.hybrid import HybridSimulation
 from workbench.observers.layout import Layout
 from workbench.system.system import System
 
