@@ -7,6 +7,7 @@ import json
 import subprocess
 import zipfile
 from pathlib import Path
+from typing import Any
 
 import fmpy
 import numpy as np
@@ -14,6 +15,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from workbench.__main__ import main
+from workbench.diagnosis.inference import search
 from workbench.models.fmu import CoSimulation
 
 from .built import machine_file, write_case
@@ -137,6 +139,23 @@ def test_a_wrong_heat_loss_is_named_with_an_interval_that_holds_it(tmp_path, the
     assert cause["effect"] == "G"
     assert change["low"] < 10.0 < change["high"]
     assert " % " not in change["text"]  # the FMU says no unit: nobody knows that it is a share
+
+
+def test_a_cause_that_the_search_passed_over_is_taken_up_where_it_leaves_noise(
+    tmp_path, monkeypatch
+):
+    """Of a controlled temperature of 20-sim, a capacity was "nearest", and all was unexplained."""
+    step = search._step
+
+    def blind(fit: Any, catalogue: Any, best: Any, *rest: Any) -> Any:
+        return step(fit, catalogue, best, *rest) if best.active else None
+
+    monkeypatch.setattr(search, "_step", blind)
+    write_fmu(tmp_path, alone=True)
+    summary = diagnosed(tmp_path, 60.0, thermostat=False)
+    assert summary["verdict"] == "found"
+    (cause,) = summary["causes"]
+    assert cause["effect"] == "G"
 
 
 @pytest.mark.parametrize("thermostat", [True, False], ids=[SWITCHING, ALWAYS])

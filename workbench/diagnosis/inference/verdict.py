@@ -247,6 +247,17 @@ def _concluded(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagn
     if unlikely and not chosen.interrupted:
         report(f"further from the data sheet: {', '.join(sorted(name for name, _ in unlikely))}")
         chosen, astray = _beyond_sheet(fit, catalogue, (chosen, astray), unlikely, report)
+    return _judged(fit, catalogue, chosen, astray, report)
+
+
+def _judged(
+    fit: Fit,
+    catalogue: Sequence[Effect],
+    chosen: Selection,
+    astray: Sequence[int],
+    report: Reporter,
+) -> Diagnosis:
+    """What the outcome of a search amounts to; begun again from a cause that it passed over."""
     chosen, outside = _within_bounds(fit, catalogue, chosen, report)
     verdict: Verdict = "unexplained" if astray or outside else _verdict(fit, chosen)
     late = None
@@ -295,7 +306,14 @@ def _concluded(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagn
     nearest: tuple[NearestCandidate, ...] = ()
     if verdict == "unexplained" and late is None:
         report("candidates that come nearest")
-        nearest = (outside,) if outside else _nearest(fit, chosen, objections)
+        fits = _nearest_fits(fit, chosen)
+        whole = None if astray or outside or chosen.interrupted else _passed_over(fit, chosen, fits)
+        if whole is not None:
+            report(f"with {whole.active[0].name}, where the fits above did not get")
+            other = _selected_with(fit, catalogue, chosen, whole, report)
+            if other.best.active and other.best.misfit < best.misfit:
+                return _judged(fit, catalogue, other, astray, report)
+        nearest = (outside,) if outside else _nearest(fit, chosen, fits, objections)
     remains = not noise_alone or (verdict == "unexplained" and late is None)
     part_of = verdict == "partly explained" or best.names in [
         candidate.effects for candidate in nearest
@@ -496,11 +514,9 @@ def _lacking(fit: Fit, chosen: Selection) -> str:
     return "what remains goes with other effects of the catalogue, but none explains it"
 
 
-def _nearest(
-    fit: Fit, chosen: Selection, objections: Sequence[str]
-) -> tuple[NearestCandidate, ...]:
-    """What would remove most of what is missing on held-out recordings, and why it is no answer."""
-    base, best, validation = chosen.base, chosen.best, chosen.validation
+def _nearest_fits(fit: Fit, chosen: Selection) -> dict[tuple[str, ...], FittedModel]:
+    """Fits that may come near to what is missing, by the names of their effects."""
+    base, best = chosen.base, chosen.best
     fits = {
         rival.names: rival
         for step in chosen.steps
@@ -521,6 +537,36 @@ def _nearest(
         }
     if best.active:
         fits[best.names] = best
+    return fits
+
+
+def _passed_over(
+    fit: Fit, chosen: Selection, fits: Mapping[tuple[str, ...], FittedModel]
+) -> FittedModel | None:
+    """A single effect that leaves noise alone, where the search did not get.
+
+    Of what switches, derivatives hold over so little that they say nothing of it.
+    """
+    able = [
+        model
+        for model in fits.values()
+        if len(model.active) == 1
+        and model is not chosen.best
+        and beyond(chosen.best, model) > fit.decides.needed
+        and model.linearised.variance_factors.max() < fit.decides.wrong
+        and chosen.validation.noise_alone(model, fast=model.active[0].order_locked)
+    ]
+    return min(able, key=lambda model: model.misfit, default=None)
+
+
+def _nearest(
+    fit: Fit,
+    chosen: Selection,
+    fits: Mapping[tuple[str, ...], FittedModel],
+    objections: Sequence[str],
+) -> tuple[NearestCandidate, ...]:
+    """What would remove most of what is missing on held-out recordings, and why it is no answer."""
+    base, best, validation = chosen.base, chosen.best, chosen.validation
     nearest = []
     for names, model in fits.items():
         fast = any(effect.order_locked for effect in model.active)
