@@ -720,8 +720,8 @@ def _inject(path: Path, instantiations: int) -> Iterator[CheckResult]:
     elif unknown:
         reason = (
             "not measured: where the model was started nothing follows from its states, and its "
+            "description does not say whether something should"
         )
-        reason += "description does not say whether something should"
         yield replace(INJECTION, reason=reason)
         return
     value = float(max(by_vector.max(), by_reference.max()))

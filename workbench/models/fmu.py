@@ -98,7 +98,7 @@ _STATUSES: Mapping[int | str, str] = {
 WARNED, REFUSED_BY, STATUS, STATE = range(4)
 _WARNING, _DISCARD, _LOGGED = 1, 2, 3  # status of FMI; messages that an error shows
 # Of a step, relative to the state and to its nominal value: far below what a sensor resolves.
-# Integration here keeps it, and an FMU is asked to in its own: without, Dymola's stays at 1e-4.
+# Integration here keeps it, and an FMU is asked to in its own: without, Dymola's is off by 6e-5.
 TOLERANCE = 1e-8
 _SAME_STEP = 1e-4  # by which sample times may differ: what rounding of time stamps leaves
 _STEP = float(np.finfo(float).eps) ** (1 / 3)  # of differences, relative

@@ -306,8 +306,8 @@ def _judged(
     nearest: tuple[NearestCandidate, ...] = ()
     if verdict == "unexplained" and late is None:
         report("candidates that come nearest")
-        fits = _nearest_fits(fit, chosen)
-        whole = None if astray or outside or chosen.interrupted else _passed_over(fit, chosen, fits)
+        fits = {} if outside else _nearest_fits(fit, chosen)
+        whole = None if astray or chosen.interrupted else _passed_over(fit, chosen, fits)
         if whole is not None:
             report(f"with {whole.active[0].name}, where the fits above did not get")
             other = _selected_with(fit, catalogue, chosen, whole, report)
