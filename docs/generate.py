@@ -258,7 +258,7 @@ def catalogue(systems: list[System]) -> str:
         for effect in effects:
             unit = _unit(library, effect)
             cells = (
-                f"`{effect.kind}`",
+                f"`{effect.class_name}`",
                 f"{effect.text} (any of {effect.places})" if effect.places else effect.text,
                 effect.label,
                 f"{effect.matters:g} {unit}",
@@ -266,7 +266,7 @@ def catalogue(systems: list[System]) -> str:
             )
             text.append(f"| {' | '.join(map(_cell, cells))} |")
         for effect in effects:
-            text += ["", f"### {system.name}: {effect.kind}", "", *_effect(library, effect)]
+            text += ["", f"### {system.name}: {effect.class_name}", "", *_effect(library, effect)]
     return "\n".join(text) + "\n"
 
 

@@ -652,7 +652,7 @@ def test_the_class_of_a_law_holds_the_heat_that_was_looked_at(
         points = unknowns.values(unknowns.start())
         (table,) = simulations.along(points, ["watched0", "watched1", "watched2", clock])
         (recording,) = simulations.recordings
-    moving = slice(0, int(np.flatnonzero(recording.told)[-1]))
+    moving = slice(0, int(np.flatnonzero(recording.reported)[-1]))
     *seen, held = table[moving].T
     course = dict(zip(names, seen, strict=True))
     heat = law.law.influence.course(pads, course, recording.time[moving])

@@ -303,7 +303,7 @@ def diagnose(
 
 
 def propose(
-    found: Outcome,
+    diagnosed: Outcome,
     *,
     held_out: Sequence[Case] = (),
     effects: Sequence[str] = (),
@@ -313,7 +313,7 @@ def propose(
 
     Parameters
     ----------
-    found : a diagnosis that left something unexplained, that needed several effects, or beside
+    diagnosed : a diagnosis that left something unexplained, that needed several effects, or beside
         whose one cause errors last.
     held_out, effects, work : as of `diagnose`.
 
@@ -322,15 +322,15 @@ def propose(
     InputError
         If nothing is missing, or one effect explains it.
     """
-    if not laws.needs_law(found):
+    if not laws.needs_law(diagnosed):
         raise InputError(
             where="the diagnosis",
-            found=f"the verdict '{found.diagnosis.verdict}'",
+            found=f"the verdict '{diagnosed.diagnosis.verdict}'",
             expected="'unexplained', several causes, or one beside which errors last",
             remedy="ask for no law: nothing is missing, or one effect explains it",
         )
-    problem = diagnosis.problem_of(found.system, found.cases, effects, held_out)
-    return laws.propose(found, problem, _writing("proposal", work))
+    problem = diagnosis.problem_of(diagnosed.system, diagnosed.cases, effects, held_out)
+    return laws.propose(diagnosed, problem, _writing("proposal", work))
 
 
 def monitor(
@@ -398,14 +398,14 @@ def fit(
     )
 
 
-def next_stop(found: Outcome, **work: Unpack[Work]) -> NextStop:
+def next_stop(diagnosed: Outcome, **work: Unpack[Work]) -> NextStop:
     """Find the recording that tells apart what a diagnosis could not.
 
     See `workbench.studies.design.next_stop`.
 
     Parameters
     ----------
-    found : a diagnosis that found a cause.
+    diagnosed : a diagnosis that found a cause.
     work : workers and report; see `Work`.
 
     Raises
@@ -413,14 +413,14 @@ def next_stop(found: Outcome, **work: Unpack[Work]) -> NextStop:
     InputError
         If nothing was found, or the system does not say what may be varied.
     """
-    if found.rivals is None:
+    if diagnosed.rivals is None:
         raise InputError(
             where="the diagnosis",
-            found=f"the verdict '{found.diagnosis.verdict}'",
+            found=f"the verdict '{diagnosed.diagnosis.verdict}'",
             expected="a named effect, whose candidates or size need another recording",
             remedy="diagnose more recordings first",
         )
-    return design.next_stop(found.system, found.rivals, _engine(**work))
+    return design.next_stop(diagnosed.system, diagnosed.rivals, _engine(**work))
 
 
 def distance(

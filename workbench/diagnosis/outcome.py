@@ -149,10 +149,10 @@ class Outcome:
         more = " The search was interrupted: more may be missing." if diagnosis.interrupted else ""
         if part:
             sizes = [size for cause in diagnosis.causes for size in cause.parameters.values()]
-            rest = f"no effect of the catalogue explains the rest{self._goes}"
+            remainder = f"no effect of the catalogue explains the rest{self._goes}"
             if any(np.isfinite(size.beyond) for size in sizes):
-                rest = "a size beyond its bound explains more"
-            more = f" This is a part: {rest}."
+                remainder = "a size beyond its bound explains more"
+            more = f" This is a part: {remainder}."
         return (
             f"The model lacks {'; and '.join(names)}; in cross-validation {diagnosis.gain.text}"
             f"{self._held_out}."
@@ -286,7 +286,7 @@ class Outcome:
             lines += ["", "not visible by these recordings:"]
             lines += [f"  {effect}: {reason}" for effect, reason in self.not_visible.items()]
         for cause in self.diagnosis.causes:
-            lines += ["", *_told(cause)]
+            lines += ["", *_cause_lines(cause)]
         if self.diagnosis.verdict == "unexplained" and self.diagnosis.late is None:
             lines += ["", "nearest candidates, in cross-validation:"]
             nearest = [candidate.text for candidate in self.diagnosis.nearest]
@@ -502,9 +502,9 @@ def _held(system: System, cause: Cause) -> str:
 def _late(late: LateSignals) -> str:
     """Signals that are late, and what to do, for people."""
     if len({*late.skews.values()}) > 1:
-        each = ", ".join(f"{name} by {with_unit(skew, 's')}" for name, skew in late.skews.items())
+        skews = ", ".join(f"{name} by {with_unit(skew, 's')}" for name, skew in late.skews.items())
         return (
-            f"Signals are late by different times: {each}. Say in [loggers] which signals share a "
+            f"Signals are late by different times: {skews}. Say in [loggers] which signals share a "
             "logger, and diagnose again."
         )
     size, reach = abs(late.skew), BAND * late.sigma
@@ -529,7 +529,7 @@ def duration(seconds: float) -> str:
     return f"{1e3 * seconds:g} ms" if seconds < 0.5 else f"{seconds:g} s"
 
 
-def _told(cause: Cause) -> list[str]:
+def _cause_lines(cause: Cause) -> list[str]:
     lines = [f"{cause.effect.name}: {cause.effect.text}"]
     lines += [
         f"  {name}: {p.text}" if p.limit else f"  {name} = {p.text}"
@@ -674,10 +674,10 @@ def shown_first(figures: Sequence[CaseFigure], recording: str) -> CaseFigure:
     return known[recording]
 
 
-def _clearness(residuals: Residuals, span: int, found: bool) -> float:
+def _clearness(residuals: Residuals, span: int, explained: bool) -> float:
     """How clearly a recording shows what was found, or else how wrong the nominal model is."""
     before, after = lasting(residuals, span).noises()
-    return float(np.max(before**2 - after**2 if found else before**2))
+    return float(np.max(before**2 - after**2 if explained else before**2))
 
 
 def recording_figure(
@@ -751,13 +751,13 @@ def draw_dependences(dependences: Sequence[Mapping[str, Any]], paths: Iterable[P
 
 
 def draw_confusability(
-    names: Sequence[str], cosines: Matrix, found: Sequence[str], paths: Iterable[Path]
+    names: Sequence[str], cosines: Matrix, causes: Sequence[str], paths: Iterable[Path]
 ) -> None:
     """Draw the similarity of the signatures of effects; those found are marked."""
     with styled(9.0, 9.0, axes_grid=False, font_size=7) as sheet:
         axes = sheet.subplots()
         draw_heat(axes, 100.0 * cosines, least=50.0)
-        marked = [f"▸ {name}" if name in found else name for name in names]
+        marked = [f"▸ {name}" if name in causes else name for name in names]
         axes.set_xticks(range(len(names)), names, rotation=90)
         axes.set_yticks(range(len(names)), marked)
         axes.set_title("Similarity of signatures in these data: 100 is indistinguishable")

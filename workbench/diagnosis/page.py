@@ -587,8 +587,8 @@ def _errors(system: System, summary: Mapping[str, Any]) -> Table:
 
 def _compared(summary: Mapping[str, Any]) -> str:
     """What corrects the simulations that are compared; empty for free runs."""
-    said = dict.fromkeys(e["corrected"] for e in summary["errors"] if e["corrected"])
-    return f"corrected by {' and by '.join(said)}" if said else ""
+    signals = dict.fromkeys(e["corrected"] for e in summary["errors"] if e["corrected"])
+    return f"corrected by {' and by '.join(signals)}" if signals else ""
 
 
 def _observers(system: System, cases: Sequence[str], observers: Mapping[str, Any]) -> Table:

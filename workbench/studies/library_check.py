@@ -132,7 +132,7 @@ def _all_at_zero(
     classes = {effect.model: effect for effect in effects}
     blamed = []
     for name, effect in classes.items():
-        alone = folder / f"{effect.kind}.fmu"
+        alone = folder / f"{effect.class_name}.fmu"
         places = [other for other in effects if other.model == name]
         build_everything(system, library, places, alone)
         if _Model(system, alone, cases).difference(nominal):

@@ -86,10 +86,10 @@ def held_otherwise(system: System, effects: Set[str], low: float, high: float) -
     }
 
 
-def _clock(system: System, kind: str, name: str, signals: tuple[str, ...]) -> Effect:
+def _clock(system: System, model: str, name: str, signals: tuple[str, ...]) -> Effect:
     return Effect(
-        name=f"{kind}[{name}]",
-        model=kind,
+        name=f"{model}[{name}]",
+        model=model,
         slots=(),
         size=SKEW,
         matters=LEAST_SKEWS * system.comparison.least_skew,

@@ -56,11 +56,11 @@ class CountedSamples:
         return measured
 
     @property
-    def told(self) -> Mask:
-        """(n,) samples whose errors are told: those at the limit of a sensor, too."""
+    def reported(self) -> Mask:
+        """(n,) samples whose errors are reported: those at the limit of a sensor, too."""
         others = [mask for why, mask in self.excluded.items() if why not in (FAULTY, BEYOND)]
-        told: Mask = self.usable | (self.excluded[BEYOND] & ~np.logical_or.reduce(others))
-        return told
+        reported: Mask = self.usable | (self.excluded[BEYOND] & ~np.logical_or.reduce(others))
+        return reported
 
     @property
     def set_aside(self) -> dict[str, int]:

@@ -55,8 +55,8 @@ class Samples:
     read: Matrix
     silent: Mask  # (c,) channels of signals that this one has not: their errors have no weight
     measured: Mask  # (n, c) samples that a channel has: all, but of what is measured at times
-    # (n,) samples whose errors are told: those that are not wrong and that no reason excludes
-    told: Mask
+    # (n,) samples whose errors are reported: those that are not wrong and that no reason excludes
+    reported: Mask
     limits: Matrix  # (2, c) of what the sensors read
     gain: Vector  # (n,) [1] of the correction of the led output, 0 where that was not measured
     lead: Lead | None  # how all outputs correct the states, or None where one leads alone
@@ -111,8 +111,8 @@ class Samples:
         from scipy.signal import lfilter, lfiltic  # takes its time, and little else needs it
 
         numerator, denominator = self._filters[column]
-        rest = lfiltic(numerator, denominator, np.ones(2), np.ones(2))
-        begin = np.multiply.outer(rest, values[0])
+        steady = lfiltic(numerator, denominator, np.ones(2), np.ones(2))
+        begin = np.multiply.outer(steady, values[0])
         read: Vector = lfilter(numerator, denominator, values, axis=0, zi=begin)[0]
         return read
 
@@ -121,9 +121,9 @@ class Samples:
 
         Where a sensor saturates, so does what the model says that it reads; NaN of what is silent.
         """
-        said = np.clip(self.y - errors, *self.limits)
-        measured = self.measured[self.told]
-        by_channel = np.where(measured, (self.read - said)[self.told] @ self.slopes.T, 0.0)
+        readings = np.clip(self.y - errors, *self.limits)
+        measured = self.measured[self.reported]
+        by_channel = np.where(measured, (self.read - readings)[self.reported] @ self.slopes.T, 0.0)
         counts = np.where(self.silent, np.nan, measured.sum(axis=0))
         sums = np.array([np.square(by_channel).sum(axis=0), np.abs(by_channel).sum(axis=0)])
         return np.array([np.sqrt(sums[0] / counts), sums[1] / counts])
@@ -262,7 +262,7 @@ def prepare(
         read=np.column_stack([read.get(name, nothing) for name in signals]),
         silent=silent,
         measured=measured,
-        told=counted.told,
+        reported=counted.reported,
         limits=np.array([system.signals[name].limits for name in signals]).T,
         gain=gain,
         lead=lead,
@@ -402,7 +402,7 @@ def standardised(recordings: Sequence[Samples]) -> list[Matrix]:
         np.column_stack([r.time - r.time[0], r.u, np.where(r.silent, np.nan, r.y)])
         for r in recordings
     ]
-    every = np.vstack([c[r.told] for c, r in zip(columns, recordings, strict=True)])
+    every = np.vstack([c[r.reported] for c, r in zip(columns, recordings, strict=True)])
     able = np.nanmax(every, axis=0) > np.nanmin(every, axis=0)
     mean, scale = np.nanmean(every, axis=0)[able], np.nanstd(every, axis=0)[able]
     courses = [np.clip((c[:, able] - mean) / scale, -_REACH, _REACH) for c in columns]

@@ -45,7 +45,7 @@ SHARES = (GAIN, LOSS, RECTIFIED)  # of a signal
 class _SensorForm(NamedTuple):
     """How a sensor of `{label}` may be wrong: class, size, and what it is, for people."""
 
-    kind: str
+    model: str
     size: str
     text: str
     shape: str = ""
@@ -359,8 +359,8 @@ def wrong_sensors(system: System) -> Iterator[Effect]:
             moves = _moves(signal.unit, signal.scale)
             least = system.candidates.matters * (1.0 if form.size in SHARES else moves)
             yield Effect(
-                name=f"{form.kind}[{signal.name}]",
-                model=form.kind,
+                name=f"{form.model}[{signal.name}]",
+                model=form.model,
                 slots=(),
                 size=form.size,
                 matters=LEAST_SKEWS * compare.least_skew if form.size == LAG else least,

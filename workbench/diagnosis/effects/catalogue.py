@@ -74,9 +74,9 @@ class AnnotationReader:
             raise self._wrong(key, expected)
         return values
 
-    def _of(self, key: str, kind: type, expected: str, default: Any) -> Any:
+    def _of(self, key: str, type_: type, expected: str, default: Any) -> Any:
         value = self.content.get(key, default)
-        if not isinstance(value, kind):
+        if not isinstance(value, type_):
             raise self._wrong(key, expected)
         return value
 
@@ -155,7 +155,7 @@ class Effect:
     late: tuple[str, ...] = ()
     sensor: str = ""  # measured signal whose sensor is wrong; the effect is then none of a model
     parameter: str = ""  # of the model itself, whose value is another one by the size
-    told: float = 0.0  # size that readings tell without a fit, which then begins there
+    size_read: float = 0.0  # size that readings tell without a fit, which then begins there
 
     @property
     def of_library(self) -> bool:
@@ -163,7 +163,7 @@ class Effect:
         return not (self.late or self.sensor or self.parameter)
 
     @property
-    def kind(self) -> str:
+    def class_name(self) -> str:
         """Name of the Modelica class, without a place."""
         return self.model.rpartition(".")[2]
 
@@ -210,11 +210,11 @@ def read_effects(library: Library, base: str) -> tuple[Effect, ...]:
     for cls in library.classes.values():
         if not cls.name.startswith(f"{library.name}."):
             continue
-        said = AnnotationReader(f"{cls.where}, __Workbench", cls.vendor)
-        said.only("effect")
+        annotation = AnnotationReader(f"{cls.where}, __Workbench", cls.vendor)
+        annotation.only("effect")
         if "effect" not in cls.vendor:
             continue
-        entry = said.part("effect")
+        entry = annotation.part("effect")
         effect = _read(library, slots, cls, entry)
         if effect.name in effects:
             raise InputError(
@@ -232,7 +232,7 @@ def read_effects(library: Library, base: str) -> tuple[Effect, ...]:
 
 def choose(names: Sequence[str], effects: Sequence[Effect]) -> tuple[Effect, ...]:
     """Effects by name, in their order; all of them if none is named."""
-    known = dict.fromkeys(name for effect in effects for name in (effect.kind, effect.name))
+    known = dict.fromkeys(name for effect in effects for name in (effect.class_name, effect.name))
     for name in names:
         if name not in known:
             raise unknown_name(
@@ -243,7 +243,7 @@ def choose(names: Sequence[str], effects: Sequence[Effect]) -> tuple[Effect, ...
                 expected=f"some of {', '.join(known)}",
             )
     return tuple(
-        effect for effect in effects if not names or {effect.name, effect.kind} & set(names)
+        effect for effect in effects if not names or {effect.name, effect.class_name} & set(names)
     )
 
 
@@ -272,34 +272,36 @@ def _placed(library: Library, effect: Effect) -> list[Effect]:
     return [replace(effect, name=name, place=k, places=int(count)) for k, name in names]
 
 
-def _read(library: Library, slots: Sequence[Slot], cls: Class, said: AnnotationReader) -> Effect:
-    said.only(
+def _read(library: Library, slots: Sequence[Slot], cls: Class, entry: AnnotationReader) -> Effect:
+    entry.only(
         *("size", "matters", "shapes", "separation", "hidden", "slots", "after"),
         *("where", "unless", "falling", "restarted"),
     )
-    size = said.content.get("size")
+    size = entry.content.get("size")
     if isinstance(size, tuple) and sorted(size) == sorted(_TURNING):
         size = _TURNING[0]
     else:
-        size = said.text("size")
-    shapes = said.part("shapes") if "shapes" in said.content else AnnotationReader(said.where, {})
-    where = _texts(said, "where", "condition", "is", "share")
-    unless = _texts(said, "unless", "condition", "is", "because")
-    falling = _texts(said, "falling", "signal", "because")
+        size = entry.text("size")
+    shapes = (
+        entry.part("shapes") if "shapes" in entry.content else AnnotationReader(entry.where, {})
+    )
+    where = _texts(entry, "where", "condition", "is", "share")
+    unless = _texts(entry, "unless", "condition", "is", "because")
+    falling = _texts(entry, "falling", "signal", "because")
     effect = Effect(
         name=cls.name.rpartition(".")[2],
         model=cls.name,
-        slots=_slots(library, slots, cls, said),
+        slots=_slots(library, slots, cls, entry),
         size=size,
-        matters=said.number("matters"),
+        matters=entry.number("matters"),
         text=_within_sentence(cls.description),
-        separation=said.text("separation"),
+        separation=entry.text("separation"),
         shapes=tuple((name, shapes.numbers(name)) for name in shapes.content),
-        hidden=said.text("hidden", ""),
+        hidden=entry.text("hidden", ""),
         where=Where(*where) if where else None,
         unless=Unless(*unless) if unless else None,
         falling=Falling(*falling) if falling else None,
-        restarted="".join(_texts(said, "restarted", "because")),
+        restarted="".join(_texts(entry, "restarted", "because")),
     )
     _check_parameters(library, cls, effect)
     _check_extends(library, cls)
@@ -307,7 +309,7 @@ def _read(library: Library, slots: Sequence[Slot], cls: Class, said: AnnotationR
 
 
 def _slots(
-    library: Library, slots: Sequence[Slot], cls: Class, said: AnnotationReader
+    library: Library, slots: Sequence[Slot], cls: Class, entry: AnnotationReader
 ) -> tuple[str, ...]:
     extended = library.ancestors(cls.name)
     # A class that adds inputs to the partial class of a slot is for one that has them.
@@ -324,24 +326,24 @@ def _slots(
             expected=f"one that extends {' or '.join(partials) or 'a slot, but there is none'}",
             remedy="let it extend the partial class of its slot, or remove its annotation",
         )
-    chosen = said.texts("slots") if "slots" in said.content else fitting
+    chosen = entry.texts("slots") if "slots" in entry.content else fitting
     for name in chosen:
         if name not in fitting:
             raise unknown_name(
                 name,
                 fitting,
-                where=said.where,
+                where=entry.where,
                 found=f"slot '{name}'",
                 expected=f"some of {', '.join(fitting)}, which it fits by the class it extends",
             )
     return tuple(name for name in fitting if name in chosen)
 
 
-def _texts(said: AnnotationReader, part: str, *keys: str) -> tuple[str, ...]:
+def _texts(entry: AnnotationReader, part: str, *keys: str) -> tuple[str, ...]:
     """Texts of a part of the annotation, in this order; none if it is not there."""
-    if part not in said.content:
+    if part not in entry.content:
         return ()
-    inner = said.part(part)
+    inner = entry.part(part)
     inner.only(*keys)
     return tuple(inner.text(key, "" if key == "share" else None) for key in keys)
 

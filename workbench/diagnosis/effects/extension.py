@@ -39,7 +39,9 @@ def variables(effect: Effect, parameter: str) -> tuple[str, ...]:
     if not effect.of_library:
         return (f"{effect.name}.{parameter}",)
     element = f"[{effect.place}]" if effect.place else ""
-    return tuple(f"{slot}.{component(effect.kind)}.{parameter}{element}" for slot in effect.slots)
+    return tuple(
+        f"{slot}.{component(effect.class_name)}.{parameter}{element}" for slot in effect.slots
+    )
 
 
 def sizes_by_component(effects: Iterable[Effect]) -> dict[str, list[str]]:

@@ -52,13 +52,13 @@ class DifferingStarts:
     @property
     def text(self) -> str:
         """What they would explain, and what to do, for people."""
-        each = " and ".join(
+        entries = " and ".join(
             f'spread = "{spread}" in [states.{name}]' for name, spread in self.spreads.items()
         )
         return (
             f"If recordings began with {' and '.join(self.spreads)} further from what is expected "
             f"than the system file says, that would explain {self.removed:.0%} of what remains. If "
-            f"they may, write {each}, and diagnose again."
+            f"they may, write {entries}, and diagnose again."
         )
 
 

@@ -490,8 +490,8 @@ class Fit:
         step, locals_ = joint.solve(low - at, high - at)
         sizes, levels = dict(point.sizes), dict(point.levels)
         for key, value, least, greatest in zip(joint.shared, at + step, low, high, strict=True):
-            kind = levels if key in levels else sizes
-            kind[key] = float(np.clip(value, least, greatest))  # of what rounding leaves
+            values = levels if key in levels else sizes
+            values[key] = float(np.clip(value, least, greatest))  # of what rounding leaves
         changes = np.array(locals_[: self.unknowns.count])
         locked = enumerate(name for name, parameter in joint.shared if parameter == "amplitude")
         phases = {name: point.phases[name] + changes[:, count + j] for j, name in locked}

@@ -74,11 +74,11 @@ class LinearizedPoint:
         its logarithm counts. To spoil one channel for another is no gain then.
         Source: Y. Bard, Nonlinear Parameter Estimation, 1974, section 4-8.
         """
-        count, mean = _told(self.residuals), self.squares
+        count, mean = _counts(self.residuals), self.squares
         noise = count * np.minimum(mean, 1.0 + self.excess)
         wrong = count / self.lasting * np.log(self.spread)
-        rest = sum(float(recording.rest @ recording.rest) for recording in self.residuals)
-        return float((noise + wrong).sum()) + rest + self.away
+        at_rest = sum(float(recording.rest @ recording.rest) for recording in self.residuals)
+        return float((noise + wrong).sum()) + at_rest + self.away
 
     @property
     def spread(self) -> Vector:
@@ -115,7 +115,7 @@ def slowness(residuals: Sequence[WhitenedResiduals], blocks: int) -> Vector:
     return slow
 
 
-def _told(residuals: Sequence[WhitenedResiduals]) -> Vector:
+def _counts(residuals: Sequence[WhitenedResiduals]) -> Vector:
     """Number of blocks that are told, by channel (m,)."""
     counts: Vector = np.sum([recording.blocks for recording in residuals], axis=0)
     return counts
@@ -123,7 +123,7 @@ def _told(residuals: Sequence[WhitenedResiduals]) -> Vector:
 
 def _share(residuals: Sequence[WhitenedResiduals]) -> Vector:
     """Blocks over those that are told, by channel (m,): silent ones have no errors."""
-    share: Vector = sum(len(recording.errors) for recording in residuals) / _told(residuals)
+    share: Vector = sum(len(recording.errors) for recording in residuals) / _counts(residuals)
     return share
 
 

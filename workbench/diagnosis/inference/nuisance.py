@@ -43,9 +43,11 @@ class ShiftedLevel:
         way = "above" if away > 0.0 else "below"
         by = f"{abs(away / self.sheet):.0%}" if self.sheet else with_unit(abs(away), self.unit)
         declared = "" if self.declared is None else f", declared as ±{self.declared:.2g} of it"
-        what = f"{self.name} ({self.choice})" if self.choice not in ("all", "sensor") else self.name
+        level = (
+            f"{self.name} ({self.choice})" if self.choice not in ("all", "sensor") else self.name
+        )
         text = (
-            f"{what} is {with_unit(self.value, self.unit)}, {by} {way} its data sheet of "
+            f"{level} is {with_unit(self.value, self.unit)}, {by} {way} its data sheet of "
             f"{with_unit(self.sheet, self.unit)}{declared}"
         )
         if not self.hides:

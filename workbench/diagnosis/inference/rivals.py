@@ -88,7 +88,7 @@ class Rival:
             "effects": list(self.effects),
             "sizes": [[*key, value] for key, value in self.sizes.items()],
             "levels": [[*key, value] for key, value in self.levels.items()],
-            "recordings": [_told(recording) for recording in self.recordings],
+            "recordings": [_as_dict(recording) for recording in self.recordings],
             "prior": {
                 "matrix": self.prior.N.tolist(),
                 "gradient": self.prior.g.tolist(),
@@ -156,7 +156,7 @@ def _rival(fit: Fit, base: FittedModel, fitted: FittedModel, variance_factors: V
     )
 
 
-def _told(system: RecordingSystem) -> dict[str, Any]:
+def _as_dict(system: RecordingSystem) -> dict[str, Any]:
     return {
         "errors": system.r.tolist(),
         "common": system.J.tolist(),
@@ -182,50 +182,51 @@ def _numbers(entry: Any, *shape: int | None, endless: bool = False) -> Vector | 
     return values
 
 
-def _system(said: Mapping[str, Any], unknowns: int) -> RecordingSystem:
-    """What `_told` told, of a number of common unknowns."""
-    errors = _numbers(said["errors"], None)
-    furthest = _numbers(said["furthest"], None, endless=True)
-    deviations = _numbers(said["deviations"], None)
+def _system(content: Mapping[str, Any], unknowns: int) -> RecordingSystem:
+    """What `_as_dict` wrote, of a number of common unknowns."""
+    errors = _numbers(content["errors"], None)
+    furthest = _numbers(content["furthest"], None, endless=True)
+    deviations = _numbers(content["deviations"], None)
     if deviations.size > furthest.size or (furthest < 0.0).any():
         raise ValueError("deviations that no unknown has")
     return RecordingSystem(
         r=errors,
-        J=_numbers(said["common"], errors.size, unknowns),
-        P=_numbers(said["own"], errors.size, furthest.size),
+        J=_numbers(content["common"], errors.size, unknowns),
+        P=_numbers(content["own"], errors.size, furthest.size),
         deviations=deviations,
         furthest=furthest,
         channels=1,
     )
 
 
-def _prior(said: Mapping[str, Any], unknowns: int) -> Quadratic:
-    matrix = _numbers(said["matrix"], unknowns, unknowns)
+def _prior(content: Mapping[str, Any], unknowns: int) -> Quadratic:
+    matrix = _numbers(content["matrix"], unknowns, unknowns)
     if (np.diag(matrix) < 0.0).any() or not np.allclose(matrix, matrix.T):
         raise ValueError("no matrix of information")
-    return Quadratic(matrix, _numbers(said["gradient"], unknowns), _number(said["constant"]), 0)
+    gradient, constant = _numbers(content["gradient"], unknowns), _number(content["constant"])
+    return Quadratic(matrix, gradient, constant, 0)
 
 
 def _number(entry: Any) -> float:
     return float(_numbers([entry], 1)[0])
 
 
-def _rival_of(said: Mapping[str, Any]) -> Rival:
+def _rival_of(content: Mapping[str, Any]) -> Rival:
     def keyed(rows: Sequence[Sequence[Any]]) -> dict[Key, float]:
         return {(_text(owner), _text(name)): _number(value) for owner, name, value in rows}
 
-    sizes, levels = keyed(said["sizes"]), keyed(said["levels"])
+    sizes, levels = keyed(content["sizes"]), keyed(content["levels"])
     unknowns = len(sizes) + len(levels)
-    effects = tuple(map(_text, said["effects"]))
-    if not effects or not said["recordings"] or {effect for effect, _ in sizes} - set(effects):
+    effects = tuple(map(_text, content["effects"]))
+    if not effects or not content["recordings"] or {effect for effect, _ in sizes} - set(effects):
         raise ValueError("no cause, no recording, or sizes of another cause")
     return Rival(
         effects=effects,
         sizes=sizes,
         levels=levels,
-        recordings=tuple(_system(recording, unknowns) for recording in said["recordings"]),
-        prior=_prior(said["prior"], unknowns),
-        explained=_number(said["explained"]),
+        recordings=tuple(_system(recording, unknowns) for recording in content["recordings"]),
+        prior=_prior(content["prior"], unknowns),
+        explained=_number(content["explained"]),
     )
 
 
@@ -235,7 +236,7 @@ def _text(entry: Any) -> str:
     return entry
 
 
-def read_rivals(said: Mapping[str, Any]) -> Rivals:
+def read_rivals(content: Mapping[str, Any]) -> Rivals:
     """Read what `Rivals.to_dict` wrote.
 
     Raises
@@ -243,9 +244,9 @@ def read_rivals(said: Mapping[str, Any]) -> Rivals:
     AttributeError, KeyError, TypeError, ValueError, OverflowError
         If it is something else, or holds what cannot be.
     """
-    models = tuple(map(_rival_of, said["models"]))
-    factors = _numbers(said["inflation"], None)
-    effects, signals = (tuple(map(_text, said[name])) for name in ("effects", "signals"))
+    models = tuple(map(_rival_of, content["models"]))
+    factors = _numbers(content["inflation"], None)
+    effects, signals = (tuple(map(_text, content[name])) for name in ("effects", "signals"))
     if not models or not signals or (factors <= 0.0).any():
         raise ValueError("no model, no signal, or no variance")
     if {effect for model in models for effect in model.effects} - set(effects):
@@ -253,7 +254,7 @@ def read_rivals(said: Mapping[str, Any]) -> Rivals:
     return Rivals(
         models=models,
         effects=effects,
-        given={name: _number(value) for name, value in said["given"].items()},
+        given={name: _number(value) for name, value in content["given"].items()},
         signals=signals,
         variance_factors=factors,
     )

@@ -49,10 +49,10 @@ def errors_of(
         first = simulations.free_runs(fit.unknowns.values(before.point))
         last = first if same else simulations.free_runs(fit.unknowns.values(after.point))
     else:
-        first, last = ([one.sizes for one in lin.residuals] for lin in (before, after))
+        first, last = ([residuals.sizes for residuals in lin.residuals] for lin in (before, after))
     for k, recording in enumerate(simulations.recordings):
         sizes = [lin.residuals[k].sizes for lin in (before, after)]
-        samples = recording.measured[recording.told].sum(axis=0)
+        samples = recording.measured[recording.reported].sum(axis=0)
         for c, channel in enumerate(channels(simulations.system, recording.signals)):
             if recording.silent[c]:
                 continue

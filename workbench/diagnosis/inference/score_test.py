@@ -20,7 +20,7 @@ from workbench.diagnosis.inference.quadratic import (
 )
 
 _LARGEST = 1e4  # times what matters, up to which a size is sought
-_TOLD = 1e-3  # share of what a candidate explains alone, from which on it is told from others
+_DETERMINED = 1e-3  # share of what a candidate explains alone, from which on it is told from others
 _UNSEEN = 1e-12  # share of all information on an unknown, which stops that do not show it have
 Candidate = tuple[Effect, Mapping[str, float]]
 
@@ -205,8 +205,8 @@ class ScoreTest:
         left = beside(whole, self._known)[known:, known:]
         scale = 1.0 / np.sqrt(np.maximum(np.diag(total.N)[known:], 1e-100))
         values, vectors = np.linalg.eigh(left[:-1, :-1] * np.outer(scale, scale))
-        told = values > _TOLD
-        falls = (vectors.T @ (scale * left[:-1, -1]))[told] ** 2 / values[told]
+        determined = values > _DETERMINED
+        falls = (vectors.T @ (scale * left[:-1, -1]))[determined] ** 2 / values[determined]
         return float(falls.sum()), falls.size
 
     def explained(self, sizes: Mapping[Key, float]) -> float:
@@ -301,4 +301,4 @@ def predictive_deviance(stops: Sequence[Quadratic], prior: Quadratic) -> Vector:
         return form.at(minimum(form)) + float(np.linalg.slogdet(information)[1])
 
     whole = evidence(total)
-    return np.array([whole - evidence(rest) for rest in _without_each(total, stops)])
+    return np.array([whole - evidence(others) for others in _without_each(total, stops)])

@@ -244,12 +244,12 @@ def _confusability(trial: ScoreTest, catalogue: Sequence[Effect]) -> tuple[tuple
         at = [joint.shared.index(key) for key in keys if key in joint.shared]
         if at:
             own[effect.name] = at
-    rest = beside(total, levels)
-    roots = {name: _inverse_root(rest[np.ix_(at, at)]) for name, at in own.items()}
+    information = beside(total, levels)
+    roots = {name: _inverse_root(information[np.ix_(at, at)]) for name, at in own.items()}
     cosines = np.eye(len(own))
     for i, (a, at_a) in enumerate(own.items()):
         for j, (b, at_b) in enumerate(own.items()):
-            coupling = roots[a] @ rest[np.ix_(at_a, at_b)] @ roots[b]
+            coupling = roots[a] @ information[np.ix_(at_a, at_b)] @ roots[b]
             cosines[i, j] = np.linalg.norm(coupling, 2)
     return tuple(own), np.clip(cosines, 0.0, 1.0)
 

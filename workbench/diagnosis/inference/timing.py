@@ -138,5 +138,5 @@ def _together(fit: Fit, clocks: Sequence[Effect], fitted: FittedModel, least: fl
             # Between samples, time is a matter of form: within the least that matters.
             sigma = float(np.hypot(1.0 / np.sqrt(information), least / BAND))
             return LateSignals(signals, skew, sigma, dict.fromkeys(signals, skew))
-    each = dict(zip(names[1:], map(float, skews), strict=True))
-    return LateSignals(tuple(each), 0.0, 0.0, each)
+    by_signal = dict(zip(names[1:], map(float, skews), strict=True))
+    return LateSignals(tuple(by_signal), 0.0, 0.0, by_signal)

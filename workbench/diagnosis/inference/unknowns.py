@@ -45,29 +45,29 @@ class Presence:
     def at(self, effect: Effect, k: int) -> bool:
         """Whether recording k can have an effect: where the conditions say, if those of any do."""
         where = effect.where
-        return where is None or not self.told(where) or self.share(where, k) > 0.0
+        return where is None or not self.is_stated(where) or self.share(where, k) > 0.0
 
-    def share(self, said: Where | Unless, k: int) -> float:
+    def share(self, rule: Where | Unless, k: int) -> float:
         """Share of what a condition of recording k says that is one state."""
-        states = self._cases[k].conditions.get(said.condition)
+        states = self._cases[k].conditions.get(rule.condition)
         if states is None:
             raise InputError(
                 where=f"conditions of {self._cases[k].name}",
-                found=f"no '{said.condition}', which an effect of the library asks for",
+                found=f"no '{rule.condition}', which an effect of the library asks for",
                 expected="a condition that recordings have",
                 remedy="correct the annotation of the effect",
             )
         entries = states if isinstance(states, tuple) else (states,)
-        return entries.count(said.state) / len(entries)
+        return entries.count(rule.state) / len(entries)
 
-    def told(self, said: Where | Unless) -> bool:
+    def is_stated(self, rule: Where | Unless) -> bool:
         """Whether the conditions of any recording say so."""
-        return any(self.share(said, k) > 0.0 for k in range(len(self._cases)))
+        return any(self.share(rule, k) > 0.0 for k in range(len(self._cases)))
 
     def unseen(self, effect: Effect) -> str:
         """Why these recordings cannot show an effect; empty if they can."""
         unless, falling = effect.unless, effect.falling
-        if unless is not None and self.told(unless):
+        if unless is not None and self.is_stated(unless):
             return unless.because
         if falling is not None and not any(
             recording.falls(falling.signal) for recording in self._recordings
@@ -224,7 +224,7 @@ class Unknowns:
             )
         for effect in self.effects.values():
             where = effect.where
-            if where is not None and where.share and self.presence.told(where):
+            if where is not None and where.share and self.presence.is_stated(where):
                 values |= dict.fromkeys(
                     variables(effect, where.share), self.presence.share(where, k)
                 )
@@ -303,7 +303,7 @@ def choice_of(system: System, level: str, conditions: Mapping[str, Value]) -> st
     by = system.comparison.levels[level].by
     if not by:
         return ALL
-    said = conditions[by]
-    entries = said if isinstance(said, tuple) else (said,)
+    states = conditions[by]
+    entries = states if isinstance(states, tuple) else (states,)
     usual = system.condition(by).choices[0]
     return str(next((entry for entry in entries if entry != usual), usual))

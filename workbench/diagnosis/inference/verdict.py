@@ -658,9 +658,9 @@ def _strongest_first(fit: Fit, chosen: Selection, catalogue: Sequence[Effect]) -
     alone |= {fit.active[-1]: fit for fit in fits if fit is not None}
     left = dict(zip(alone, misfits(list(alone.values())), strict=True))
     ordered = list[Effect]()
-    while rest := [effect for effect in causes if effect not in ordered]:
-        least = min(left.get(effect, np.inf) for effect in rest)
-        equals = [other for other in rest if left.get(other, np.inf) <= least + fit.decides.tied]
+    while waiting := [effect for effect in causes if effect not in ordered]:
+        least = min(left.get(effect, np.inf) for effect in waiting)
+        equals = [other for other in waiting if left.get(other, np.inf) <= least + fit.decides.tied]
         ordered.append(min(equals, key=catalogue.index))
     return ordered
 

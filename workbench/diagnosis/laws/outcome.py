@@ -110,12 +110,12 @@ class Proposal:
         part = ", a part of what is missing" * (self.outcome.system.comparison.left == 1.0)
         errors = f"{self._error_before(gain):.1f} to {gain.after:.1f}"
         return (
-            f"{MARK.capitalize()}{part}: {'; and '.join(map(self.said, self.laws))}{beside}. In "
+            f"{MARK.capitalize()}{part}: {'; and '.join(map(self.text_of, self.laws))}{beside}. In "
             f"cross-validation the error falls from {errors} times the noise. As a "
             f"free function it is {where}."
         )
 
-    def said(self, cause: Cause) -> str:
+    def text_of(self, cause: Cause) -> str:
         """A law in a sentence, with those that are as good."""
         alike = [
             f"{form.law.short}, {form.form.text}"

@@ -117,10 +117,10 @@ class LawInfluence:
             return f"{clock}{own}, with a period of {self.span:.4g} {self.unit}"
         if self.kind == "since":
             return f"the time since {self.factors[0].name} ({self.factors[0].text}) began"
-        what = " x ".join(f"{factor.name} ({factor.text})" for factor in self.factors)
+        product = " x ".join(f"{factor.name} ({factor.text})" for factor in self.factors)
         before = {"size": "the size of ", "rate": "the rate of ", "work": "heat, the work of "}
         lost = f", lost with a time constant of {self.span:g} s" if self.cools else ""
-        return before.get(self.kind, "") + what + lost
+        return before.get(self.kind, "") + product + lost
 
     @property
     def short(self) -> str:
@@ -229,10 +229,10 @@ class Law:
     @property
     def text(self) -> str:
         """What it is, for people."""
-        what = f"something that {self.carrier.text}, {self.place.text}"
+        action = f"something that {self.carrier.text}, {self.place.text}"
         if self.influence is None:
-            return f"{what}, whatever else happens"
-        return f"{what}, and depends on {self.influence.text}"
+            return f"{action}, whatever else happens"
+        return f"{action}, and depends on {self.influence.text}"
 
 
 def places(library: Library, base: str, slots: Sequence[Slot]) -> Iterator[Place]:
@@ -333,17 +333,17 @@ def _varies(recordings: Sequence[Vector]) -> bool:
 def _carriers(place: Place, recordings: Sequence[Mapping[str, Vector]]) -> Iterator[Carrier]:
     output = place.output
     values = [place.at(recording, output.name) for recording in recordings]
-    what = f"{output.name} ({output.text})"
+    target = f"{output.name} ({output.text})"
     if any(np.any(value) for value in values):
-        yield Carrier(place.nominal, "1", f"multiplies {what}")
+        yield Carrier(place.nominal, "1", f"multiplies {target}")
     if _varies(values) or not any(np.any(value) for value in values):
-        yield Carrier("1.0", output.unit, f"adds to {what}")
+        yield Carrier("1.0", output.unit, f"adds to {target}")
     for variable in place.inputs:
         passes = place.slot.chained and variable.name == place.nominal
         own = [place.at(watched, variable.name) for watched in recordings]
         if output.unit and variable.unit == output.unit and not passes and _varies(own):
             yield Carrier(
-                variable.name, "1", f"adds a share of {variable.name} ({variable.text}) to {what}"
+                variable.name, "1", f"adds a share of {variable.name} ({variable.text}) to {target}"
             )
 
 

@@ -148,9 +148,9 @@ class Scan:
     ) -> list[LawScore]:
         lin = self._base.linearised
         scores: list[LawScore] = []
-        each = max(1, _AT_ONCE // COEFFICIENTS)
-        for first in range(0, len(every), each):
-            part = every[first : first + each]
+        batch = max(1, _AT_ONCE // COEFFICIENTS)
+        for first in range(0, len(every), batch):
+            part = every[first : first + batch]
             bases = [self._basis(law) for law in part]
             columns = [
                 Variation(

@@ -131,6 +131,6 @@ class FreePredictor:
 
         What moves a recording in time reads between samples.
         """
-        end = int(np.flatnonzero(samples.told)[-1]) + 2
+        end = int(np.flatnonzero(samples.reported)[-1]) + 2
         u = np.where(self._whole, np.round(samples.u[:end]), samples.u[:end])
         return Drive(samples.time[:end], u, samples.model_time)

@@ -288,7 +288,8 @@ class Predictor:
         errors = np.zeros_like(samples.y)
         self._model.u[:] = 0.0
         x0 = fmu.get_states()
-        end = int(np.flatnonzero(samples.told)[-1]) + 2  # one more, for rates at the last one told
+        # One more, for rates at the last one.
+        end = int(np.flatnonzero(samples.reported)[-1]) + 2
         work = self._steps()
         varied = [column.variables for column in columns]
         along = tangent(fmu, self._model, varied, samples.time.size, work.stiff, absent)

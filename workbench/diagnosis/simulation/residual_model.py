@@ -174,8 +174,8 @@ class ResidualModel:
         own = self._simulator(self.simulated._replace(recordings=tuple(forms)))
         weighed = []
         for at, k in enumerate([*self._at, *lesser]):
-            said = self.system.set_by(self.cases[k].conditions)
-            weighed.append((own.weighed(at, {**self.given, **said}), own.begin(at)))
+            parameters = self.system.set_by(self.cases[k].conditions)
+            weighed.append((own.weighed(at, {**self.given, **parameters}), own.begin(at)))
         return weighed
 
     def _choose(self) -> None:

@@ -139,7 +139,7 @@ class Simulator:
     def errors(self, points: Sequence[Mapping[str, float]]) -> list[Matrix]:
         """Prediction errors of the samples that count, of each recording at its point, (m, c)."""
         pairs = enumerate(zip(self._recordings, points, strict=True))
-        return [self._simulated(k, values)[0][own.told] for k, (own, values) in pairs]
+        return [self._simulated(k, values)[0][own.reported] for k, (own, values) in pairs]
 
     def along(self, number: int, values: Mapping[str, float], watched: Sequence[str]) -> Matrix:
         """Variables of the FMU at each sample of one recording, (n, w)."""

@@ -142,7 +142,7 @@ def _row(planting: Planting, study: PowerStudy, workers: int) -> LeftOutRow:
                 proposal = propose(before, problem, engine)
                 if proposal.laws:
                     laws = [form.law for form in proposal.forms.values()]
-                    row.laws = [proposal.said(law) for law in proposal.laws]
+                    row.laws = [proposal.text_of(law) for law in proposal.laws]
                     row.slots = list(dict.fromkeys(law.place.slot.name for law in laws))
                     if proposal.outcome and (gain := proposal.outcome.diagnosis.gain):
                         row.before, row.after = gain.before, gain.after
