@@ -156,8 +156,8 @@ def _inspect_cache() -> Inspection:
     for path, size in _cached(folder):
         part = parts.get(path.relative_to(folder).parts[0], "compiled loops")
         sizes[part] = sizes.get(part, 0) + size
-    each = ", ".join(f"{part} {size / 1e6:.0f} MB" for part, size in sorted(sizes.items()))
-    total = f"{sum(sizes.values()) / 1e6:.0f} MB" + (f" ({each})" if each else "")
+    listed = ", ".join(f"{part} {size / 1e6:.0f} MB" for part, size in sorted(sizes.items()))
+    total = f"{sum(sizes.values()) / 1e6:.0f} MB" + (f" ({listed})" if listed else "")
     return Inspection("cache", "ok", f"{folder}: {total}; 'workbench doctor --clean' deletes it")
 
 

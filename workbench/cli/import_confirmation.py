@@ -94,7 +94,7 @@ def _complete(
 
 
 def _format(files: Sequence[RecordedFile], proposed: ProposedRecordings, system: System) -> str:
-    lines = [f"{file.path}: {file.kind}" for file in files]
+    lines = [f"{file.path}: {file.format}" for file in files]
     if len(proposed.held) > 1:
         names = listed([f"'{recording.name}'" for recording in proposed.held])
         lines.append(f"  {len(proposed.held)} recordings, with the same channels: {names}")

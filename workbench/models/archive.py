@@ -64,8 +64,8 @@ def _check(path: Path, entries: list[zipfile.ZipInfo]) -> None:
         shown = repr(name if len(name) <= 80 else f"{name[:80]}...")
         if _FORBIDDEN.search(entry.orig_filename):
             raise _refusal(path, f"the name {shown}", "names inside the FMU's folder, with '/'")
-        kind = stat.S_IFMT(entry.external_attr >> 16)
-        if kind not in (0, stat.S_IFREG, stat.S_IFDIR):
+        file_type = stat.S_IFMT(entry.external_attr >> 16)
+        if file_type not in (0, stat.S_IFREG, stat.S_IFDIR):
             raise _refusal(path, f"{shown}, which is a link or a device", "files and folders")
         if entry.header_offset < 0:
             raise _refusal(path, f"{shown}, which begins before it", "files inside the archive")

@@ -321,7 +321,7 @@ def excite(fmu: FMU) -> Excitation:
     inputs = continuous_variables(fmu, fmu.inputs)
     fmu.start({})
     states = origin = fmu.get_states()
-    rest, reach = fmu.get(inputs).copy(), 0.0
+    start, reach = fmu.get(inputs).copy(), 0.0
     for share in (0.1, 0.01, 0.001, -0.1, -0.01, -0.001):
         if share < 0.0 < reach:  # below is for a model that bears nothing above, as a full tank
             break
@@ -336,8 +336,8 @@ def excite(fmu: FMU) -> Excitation:
         if np.all(np.abs(rates) < 100.0 * nominal):  # farther out, it flies off within 10 ms
             break
     fmu.set_states(states)
-    levels = np.array([_level(fmu, inputs, rest, j, nominal) for j in range(rest.size)])
-    excitation = Excitation(states, nominal, reach, inputs, rest + levels, rest + levels / 3)
+    levels = np.array([_level(fmu, inputs, start, j, nominal) for j in range(start.size)])
+    excitation = Excitation(states, nominal, reach, inputs, start + levels, start + levels / 3)
     fmu.set(inputs, excitation.first)
     return excitation
 
@@ -438,7 +438,7 @@ def run(simulation: CoSimulation, excitation: Excitation, begin: float) -> tuple
 
 
 def same_bits(
-    question: CheckResult, fmu: FMU, first: Matrix, second: Matrix, what: str
+    question: CheckResult, fmu: FMU, first: Matrix, second: Matrix, rerun: str
 ) -> CheckResult:
     """Judge two runs, (samples, k) of all real variables, that must be one and the same."""
     if first.tobytes() == second.tobytes():
@@ -448,7 +448,7 @@ def same_bits(
         question,
         passed=False,
         value=float(np.nanmax(np.abs(first - second))),
-        reason=f"{what}, '{real_variables(fmu).names[column]}' is {second[row, column]:.9g} "
+        reason=f"{rerun}, '{real_variables(fmu).names[column]}' is {second[row, column]:.9g} "
         f"instead of {first[row, column]:.9g} at sample {row}",
     )
 
@@ -774,8 +774,8 @@ def _serialise(path: Path, instantiations: int) -> Iterator[CheckResult]:
         fmu.restore(saved)
         fmu.release(saved)
         second, _ = walk(fmu, excitation, t)
-        what = "run again in a new instance from serialised bytes"
-        yield same_bits(SERIALISATION, fmu, first, second, what)
+        rerun = "run again in a new instance from serialised bytes"
+        yield same_bits(SERIALISATION, fmu, first, second, rerun)
 
 
 def _differentiate(path: Path, instantiations: int) -> Iterator[CheckResult]:

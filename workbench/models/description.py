@@ -323,9 +323,9 @@ def _description(
         path=path,
         sha256=hashlib.sha256(path.read_bytes()).hexdigest(),
         version=description.fmiVersion[:3],
-        name=_said(description.modelName),
-        text=_said(description.description),
-        tool=_said(description.generationTool),
+        name=_one_line(description.modelName),
+        text=_one_line(description.description),
+        tool=_one_line(description.generationTool),
         token=description.guid,
         interfaces={
             name: _interface(tag, description.fmiVersion[:3])
@@ -442,13 +442,13 @@ def _relative(root: ElementTree.Element) -> set[str]:
     names: set[str] = set()
     for place in ("TypeDefinitions", "ModelVariables"):  # FMI 2.0 has attributes in an element more
         for tag in root.findall(f"{place}/*"):
-            said = [
+            stated = [
                 e.get("relativeQuantity") for e in (tag, *tag) if "relativeQuantity" in e.attrib
             ]
             declared = next(
                 (e.get("declaredType") for e in (tag, *tag) if e.get("declaredType")), ""
             )
-            if said[0] in ("true", "1") if said else declared in types:
+            if stated[0] in ("true", "1") if stated else declared in types:
                 names.add(tag.get("name", ""))
         types, names = names, set()
     return types
@@ -527,7 +527,7 @@ def _variable(variable: "fmpy.model_description.ModelVariable") -> Variable:
         nominal=limit("nominal"),
         minimum=minimum,
         maximum=maximum,
-        text=_said(variable.description),
+        text=_one_line(variable.description),
         array=bool(variable.dimensions),
         initial=variable.initial,
         items=_items(variable),
@@ -576,12 +576,12 @@ def _elements(variable: "fmpy.model_description.ModelVariable") -> tuple[Variabl
     )
 
 
-def _said(text: str | None) -> str:
+def _one_line(text: str | None) -> str:
     """A text for people, as one line that they can read."""
     return one_line(" ".join((text or "").split()))
 
 
-def _number(text: str | float | None, what: str, *, endless: bool = False) -> float | None:
+def _number(text: str | float | None, name: str, *, endless: bool = False) -> float | None:
     """A number of the description, if there is one; endless ones only where they have a meaning."""
     if text is None:
         return None
@@ -592,5 +592,5 @@ def _number(text: str | float | None, what: str, *, endless: bool = False) -> fl
     if isinstance(text, str) and ("_" in text or not text.isascii()):  # which Python reads
         number = math.nan
     if math.isnan(number) or (math.isinf(number) and not endless):
-        raise _WrongError(f"{what} = '{str(text)[:40]}'")
+        raise _WrongError(f"{name} = '{str(text)[:40]}'")
     return number

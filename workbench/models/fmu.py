@@ -236,10 +236,10 @@ class FMUInstance:
             )
         except Exception as error:  # FMPy raises bare Exception where a library cannot be loaded
             os.chdir(here)  # it looks for the library in its own folder, and stays there
-            said = str(error).replace(f"{self._scratch.path}{os.sep}", "")
+            message = str(error).replace(f"{self._scratch.path}{os.sep}", "")
             raise InputError(
                 where=str(self.description.path),
-                found=f"a binary that cannot be loaded ({said})",
+                found=f"a binary that cannot be loaded ({message})",
                 expected="one that this machine can load, with the functions of FMI",
                 remedy="export the model again for this machine",
             ) from None
@@ -1073,8 +1073,8 @@ class FMU(FMUInstance):
         )
         rounding = 64.0 * np.finfo(float).eps * np.abs(at) / steps
         size = np.maximum(np.abs(stated), np.abs(mean))
-        told = bend <= _BENDS * size + rounding
-        return bool((told & (np.abs(stated - mean) > _WRONG * size + rounding)).any())
+        smooth = bend <= _BENDS * size + rounding
+        return bool((smooth & (np.abs(stated - mean) > _WRONG * size + rounding)).any())
 
     def complete_step(self) -> bool:
         """Say that a step of integration is over; returns whether a step event is due.
@@ -1106,8 +1106,8 @@ class FMU(FMUInstance):
         """Typical sizes of the states at the present point, (n,)."""
         sizes = np.ones(len(self.states))
         self._states("nominals", sizes)
-        said = np.isfinite(sizes) & (sizes != 0.0) & (sizes != 1.0)  # which FMI has for unknown
-        return np.where(said, np.abs(sizes), self.sizes(self.states))
+        stated = np.isfinite(sizes) & (sizes != 0.0) & (sizes != 1.0)  # which FMI has for unknown
+        return np.where(stated, np.abs(sizes), self.sizes(self.states))
 
     def sizes(self, names: Sequence[str]) -> Vector:
         """Typical sizes of variables, (k,): their nominal values.
@@ -1124,8 +1124,8 @@ class FMU(FMUInstance):
     def _size(self, variable: Variable) -> float:
         if variable.nominal:
             return abs(variable.nominal)
-        said = self.scales.get(variable.name) or abs(self.defaults.get(variable.name, 0.0))
-        return said if said and not 1.0 / ALIKE <= said <= ALIKE else 1.0
+        scale = self.scales.get(variable.name) or abs(self.defaults.get(variable.name, 0.0))
+        return scale if scale and not 1.0 / ALIKE <= scale <= ALIKE else 1.0
 
     def event_indicators(self) -> Vector:
         """Values whose change of sign is a state event, (z,)."""

@@ -389,8 +389,8 @@ class HybridSimulation:
             "smooth, or let the model come to rest"
         )
 
-    def _error(self, what: str, more: str = "") -> FMUError:
-        return FMUError(f"{self._fmu.called}: it {what} at {self._t:.9g} s of its time{more}")
+    def _error(self, fault: str, more: str = "") -> FMUError:
+        return FMUError(f"{self._fmu.called}: it {fault} at {self._t:.9g} s of its time{more}")
 
 
 class CoSimulationRun:

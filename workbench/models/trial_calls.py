@@ -163,11 +163,11 @@ class _Calls:
             common = (identifier, token, text(task["resources"]), false, false)
             if task["exchange"]:
                 name = "fmi3InstantiateModelExchange"
-                rest: list[Any] = [None, self._kept[1]]
+                settings: list[Any] = [None, self._kept[1]]
             else:
                 name = "fmi3InstantiateCoSimulation"
-                rest = [false, false, None, _SIZE(0), None, self._kept[1], None]
-            made = self._raw(name, _POINTER, *common, *rest)
+                settings = [false, false, None, _SIZE(0), None, self._kept[1], None]
+            made = self._raw(name, _POINTER, *common, *settings)
         if not made:
             raise self._refusal(f"{name}, which did not instantiate it,", 3)
         self.component = made
@@ -466,9 +466,9 @@ def _work(task: dict[str, Any], report: int) -> None:
     """Try the FMU, and end this process."""
     own = os.getpid()
 
-    def tell(what: str, **rest: str) -> None:
+    def tell(call: str, **results: str) -> None:
         if os.getpid() == own:  # not another that the FMU made of this process
-            write_record(report, task["secret"], {"call": what, **rest})
+            write_record(report, task["secret"], {"call": call, **results})
 
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # what an FMU prints is nobody's concern
     os.dup2(1, 2)
@@ -484,14 +484,14 @@ def _work(task: dict[str, Any], report: int) -> None:
         tell("not loaded", error=str(error))
         os._exit(0)
     one, little = 1.0, 1e-30
-    found = {
+    results = {
         "contradicted": "yes" * contradicted,
         "remembers": "yes" * remembers,
         "rounds": "yes" * (one - little == one == one + little),
     }
     if resource is not None:
         os.kill(own, signal.SIGCONT)  # stops a process that is traced, and no other
-    tell("end", refused=refused, partly=partly, **found)
+    tell("end", refused=refused, partly=partly, **results)
     os._exit(0)
 
 

@@ -137,9 +137,9 @@ def feedback_space(
     values : (n,) where the search begins.
     """
     order, effect = orders.ravel(), effects.ravel()
-    ones = np.ones(order.size)
+    limits = np.ones(order.size)
     space = SearchSpace(
-        slowest**order / effect, fastest**order / effect, -ones, ones, np.zeros(order.size)
+        slowest**order / effect, fastest**order / effect, -limits, limits, np.zeros(order.size)
     )
     return space.starting_at(values)
 

@@ -118,14 +118,14 @@ def rolling_ratio(fmu: FMU, system: System) -> float:
     assert rolling is not None
     zero = fmu.variables([rolling.zero])
     fmu.start({rolling.follower: 0.0, rolling.leader: 0.0})
-    rest = fmu.get_states()
+    states = fmu.get_states()
     readings = []
     for name in (rolling.leader, rolling.follower):
-        moving = rest.copy()
+        moving = states.copy()
         moving[_state_index(fmu, name)] = 1.0
         fmu.set_states(moving)
         readings.append(float(fmu.get(zero)[0]))
-    fmu.set_states(rest)
+    fmu.set_states(states)
     ratio = -readings[0] / readings[1] if readings[1] else math.nan
     if not math.isfinite(ratio):
         raise InputError(

@@ -439,10 +439,10 @@ def observability_answer(system: System, summary: Mapping[str, Any]) -> Answer:
     first, test = next(iter(summary["linear"].items()))
     seen = "can" if test["observable"] else "cannot"
     window = f"{summary['window_s']:g} s of samples"
-    said = f"{window} can tell {'; '.join(words)}. " if words else ""
+    reach = f"{window} can tell {'; '.join(words)}. " if words else ""
     states = f"All states of {first} {seen} be observed in the linear test."
     if not test["observable"]:
         states = f"Not all states of {first} can be observed: {', '.join(test['unobservable'])}."
     texts = dict.fromkeys(text for values in cases.values() for text in values["warnings"])
     doubts = "".join(f"{text.partition(':')[0]}. " for text in texts)
-    return Answer(f"{doubts}{said[:1].upper()}{said[1:]}{states}", headline, details)
+    return Answer(f"{doubts}{reach[:1].upper()}{reach[1:]}{states}", headline, details)

@@ -112,7 +112,7 @@ class DesignPointError(InputError):
     """A design point where what is estimated moves no output in its own way, or a model fails."""
 
     @classmethod
-    def at(cls, fmu: FMU, system: System, what: str) -> "DesignPointError":
+    def at(cls, fmu: FMU, system: System, text: str) -> "DesignPointError":
         """Say what is wrong where the FMU is, on its way to rest at the inputs of a point."""
         names = [*fmu.states, *(signal.name for signal in system.inputs)]
         values = fmu.get_typed(fmu.typed(names))
@@ -121,7 +121,7 @@ class DesignPointError(InputError):
         more = ", ..." * (len(names) > _SHOWN)
         return cls(
             where=fmu.place,
-            found=f"{what.removeprefix(f'{fmu.called}: ')}, at the design point, where states come "
+            found=f"{text.removeprefix(f'{fmu.called}: ')}, at the design point, where states come "
             f"to rest at given inputs: {place}{more}",
             expected="a model that can be evaluated and linearised there",
             remedy="give inputs at which the model works, such as those of a recording, in "

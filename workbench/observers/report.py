@@ -190,7 +190,7 @@ def simulation_answer(system: System, summary: Mapping[str, Any]) -> Answer:
         for case, values in summary["cases"].items()
         for name, score in values["estimators"].items()
     }
-    trust = "".join(f" {line}" for line in _said(system, summary))
+    trust = "".join(f" {line}" for line in _trust_lines(system, summary))
     return Answer(_ranked(system, summary, ranking) + trust, headline, details)
 
 
@@ -275,7 +275,7 @@ def write_page(
         headline=_ranked(system, summary, ranking),
         parts=parts,
         warnings=[incomplete] * (missing > 0)
-        + [Markup.escape(line) for line in _said(system, summary) + warning_lines(warnings)],
+        + [Markup.escape(line) for line in _trust_lines(system, summary) + warning_lines(warnings)],
         run=_run(system, summary),
     )
     page.write(summary, path)
@@ -364,7 +364,7 @@ def _cases(
     )
 
 
-def _said(system: System, summary: Mapping[str, Any]) -> list[str]:
+def _trust_lines(system: System, summary: Mapping[str, Any]) -> list[str]:
     """What contradicts the ranking of estimators, or their bands."""
     tested = {
         name: {

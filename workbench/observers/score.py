@@ -62,16 +62,16 @@ def _differing(fmu: FMU, readings: Mapping[str, str]) -> list[str]:
     if not readings:
         return []
     fmu.start({})
-    rng, rest = np.random.default_rng(0), fmu.get_states().copy()
+    rng, x = np.random.default_rng(0), fmu.get_states().copy()
     outputs, read = fmu.variables(list(readings)), fmu.variables(list(readings.values()))
     away = np.zeros(len(readings), bool)
     for _ in range(_POINTS):
-        fmu.set_states(rest + np.maximum(np.abs(rest), 1.0) * rng.uniform(-1.0, 1.0, rest.size))
+        fmu.set_states(x + np.maximum(np.abs(x), 1.0) * rng.uniform(-1.0, 1.0, x.size))
         try:
-            shown, said = fmu.get(outputs).copy(), fmu.get(read).copy()
+            shown, reading = fmu.get(outputs).copy(), fmu.get(read).copy()
         except FMUError:  # no state of this machine
             continue
-        away |= np.abs(said - shown) > _ROUNDED * np.abs(shown)
+        away |= np.abs(reading - shown) > _ROUNDED * np.abs(shown)
     fmu.start({})
     return [name for name, other in zip(readings, away, strict=True) if other]
 

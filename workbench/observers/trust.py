@@ -159,8 +159,8 @@ def _tests(case: Case, run: Run, system: System, window: slice) -> list[Contradi
     if not nis.size:
         return []
     fed = [name for name in (*case.outputs, *case.aids) if name in run.columns]
-    kind = estimators_of(system).get(run.estimator)
-    if kind is not None and kind.offline:  # residuals of samples that it has seen before
+    estimator = estimators_of(system).get(run.estimator)
+    if estimator is not None and estimator.offline:  # residuals of samples that it has seen before
         fed = []
     residuals = {name: (case[name] - run.signal(name))[window] for name in fed}
     deviations = {name: run.deviation(name)[window] for name in fed}
@@ -266,8 +266,8 @@ def sampling_doubt(fmu: FMU, system: System, case: Case) -> str:
     A Kalman filter is run with some steps in place of each, between which nothing is measured. If
     its innovations then exceed what it says by less than half, steps are the reason.
     """
-    kind = ExtendedKalmanFilter
-    estimator = kind(fmu, system, kind.default_gains(fmu, system))
+    gains = ExtendedKalmanFilter.default_gains(fmu, system)
+    estimator = ExtendedKalmanFilter(fmu, system, gains)
     case = case.part(_liveliest(case, system))
     run, size = replay(case, estimator), len(system.columns)
     fine = estimator.run(*_finer(case, system))

@@ -47,12 +47,12 @@ def read_conditions(table: Table, system: System) -> dict[str, Value]:
         f"'{condition.name}' holds the sign" for condition in system.conditions if condition.sign
     ]
     remedy = "; ".join(["give the magnitude", *signs])
-    said = [
+    stated = [
         condition
         for condition in system.conditions
         if condition.name in table or not condition.sets
     ]
-    return {condition.name: _condition(table, condition, remedy) for condition in said}
+    return {condition.name: _condition(table, condition, remedy) for condition in stated}
 
 
 def _condition(table: Table, condition: Condition, remedy: str) -> Value:

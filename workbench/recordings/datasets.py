@@ -67,7 +67,7 @@ class FolderLayout:
     # are noted
     pattern: str = ""
     # reads a single recording from its own folder, where it has one with a case.toml; or None
-    one: Callable[[Path], PublishedRecording] | None = None
+    read_one: Callable[[Path], PublishedRecording] | None = None
 
     def hashes_in(self, source: Path) -> dict[str, str]:
         """SHA-256 of the files of the layout that are in a folder, by their path there."""
@@ -170,7 +170,7 @@ def read_recorded(folder: Path, system: System) -> Case:
     document = read_table(folder / _CASE, "repair the folder, or remove it", 'title = "..."')
     known: PublishedSet | None = load(find_plugin(system.plugin).published)
     layouts = known.layouts if known else ()
-    readers = [layout.one for layout in layouts if layout.one is not None]
+    readers = [layout.read_one for layout in layouts if layout.read_one is not None]
     if set(document.content) <= set(KEYS) or not readers:
         return read_case(folder, system)
     recording = readers[0](folder)

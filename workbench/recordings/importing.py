@@ -278,7 +278,7 @@ def describe(imported: Import, system: System) -> dict[str, Any]:
             {
                 "file": str(file.path),
                 "sha256": file.sha256,
-                "format": file.kind,
+                "format": file.format,
                 "notes": list(file.notes),
                 "doubts": list(file.doubts),
             }

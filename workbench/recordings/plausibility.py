@@ -489,9 +489,9 @@ def _conditions(
         at_start = condition.agrees.place == FIRST
         values = system.evaluate(condition.agrees.formula, signals)
         sample = 0 if at_start else int(np.argsort(values)[-min(_FEW, values.size)])
-        said = float(conditions[condition.name])
-        tolerance, difference = condition.agrees.tolerance, abs(shown - said)
-        share = difference / max(abs(shown), abs(said)) if difference > tolerance.slack else 0.0
+        stated = float(conditions[condition.name])
+        tolerance, difference = condition.agrees.tolerance, abs(shown - stated)
+        share = difference / max(abs(shown), abs(stated)) if difference > tolerance.slack else 0.0
         if not share > tolerance.likely:
             continue
         names = [name for name in signals if name in condition.agrees.formula.names]
@@ -499,7 +499,7 @@ def _conditions(
         yield _Finding(
             share > condition.agrees.tolerance.possible,
             f"{origin.conditions} {condition.name}",
-            f"{_condition_text(condition, said)} where the record has "
+            f"{_condition_text(condition, stated)} where the record has "
             f"{condition.agrees.formula.text} = "
             f"{_condition_text(condition, shown)} "
             f"({where}{', at the start' if at_start else ', its largest'})",

@@ -307,11 +307,11 @@ class DaskPool(Generic[State]):
         digest = hashlib.sha256(self._given).hexdigest()
         if equal:
             ready = self._client.run(_prepare, self._given, workers=equal, on_error="return")
-            for address, got in ready.items():
-                if got == digest:
+            for address, answer in ready.items():
+                if answer == digest:
                     self._ready[address] = present[address]
                 else:
-                    self._refuse(address, present[address], f"what it was sent ended in {got!r}")
+                    self._refuse(address, present[address], f"what it was sent ended in {answer!r}")
 
     def _refuse(self, address: str, process: str, reason: str) -> None:
         self._refused[process] = f"a worker at {address} that may not work: {reason}"

@@ -365,8 +365,8 @@ def _remove(folder: Path, lock: int | None, owner: int) -> None:
 def read_bytes(path: Path, remedy: str) -> bytes:
     """Read a file that ends."""
     try:
-        kind = path.stat().st_mode
-        if not stat.S_ISREG(kind) and not stat.S_ISDIR(kind):  # a pipe or a device may never end
+        mode = path.stat().st_mode
+        if not stat.S_ISREG(mode) and not stat.S_ISDIR(mode):  # a pipe or a device may never end
             raise OSError(0, "no regular file")
         return path.read_bytes()
     except OSError as error:

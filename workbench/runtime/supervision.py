@@ -377,14 +377,14 @@ def _set_results_apart() -> None:
     """
     if sys.stdout is None or sys.stderr is None:
         return
-    shown, told = os.dup(1), os.dup(2)
+    shown, messages = os.dup(1), os.dup(2)
     os.dup2(2, 1)
     buffering = 1 if os.isatty(shown) else -1
     sys.stdout = open(  # noqa: SIM115  # for as long as the process runs
         shown, "w", buffering, encoding=sys.stdout.encoding, errors=sys.stdout.errors
     )
     sys.stderr = open(  # noqa: SIM115
-        told, "w", 1, encoding=sys.stderr.encoding, errors=sys.stderr.errors
+        messages, "w", 1, encoding=sys.stderr.encoding, errors=sys.stderr.errors
     )
 
 
@@ -489,10 +489,10 @@ def _describe_end(status: int) -> str:
     )
 
 
-def _control(what: int, value: int) -> None:
+def _control(option: int, value: int) -> None:
     """Set a property of this process; without effect where the system is not Linux."""
     if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(what, value, 0, 0, 0)
+        ctypes.CDLL(None).prctl(option, value, 0, 0, 0)
 
 
 _CREATE_RULESET, _ADD_RULE, _RESTRICT_SELF = 444, 445, 446  # the same on every processor

@@ -785,8 +785,8 @@ class Condition:
         """Smallest quantity, or what it must be above [unit]."""
         return self.above if self.exclusive else self.smallest
 
-    def means(self, said: object) -> Mapping[str, float]:
+    def means(self, value: object) -> Mapping[str, float]:
         """Parameters of the model that it sets where it is this, SI; none where nobody knows."""
-        if self.sets and isinstance(said, float):
-            return {self.sets: said}
-        return self.parameters.get(str(said), {})
+        if self.sets and isinstance(value, float):
+            return {self.sets: value}
+        return self.parameters.get(str(value), {})

@@ -40,7 +40,7 @@ class Table:
     def __contains__(self, key: str) -> bool:
         return key in self.content
 
-    def take(self, key: str, kind: type[_T]) -> _T:
+    def take(self, key: str, type_: type[_T]) -> _T:
         """An entry that must be there, of this very type and no empty text."""
         if key not in self.content:
             raise unknown_name(
@@ -48,12 +48,12 @@ class Table:
                 self.content,
                 where=self.where,
                 found=f"no '{key}'",
-                expected=f"{_KINDS[kind]} '{key}'",
+                expected=f"{_KINDS[type_]} '{key}'",
                 remedy=f"add '{key}'",
             )
         value = self.content[key]
-        if type(value) is not kind or value == "":  # `type`, because true is an int
-            raise self.wrong(key, _KINDS[kind])
+        if type(value) is not type_ or value == "":  # `type`, because true is an int
+            raise self.wrong(key, _KINDS[type_])
         has_zero = isinstance(value, str) and "\0" in value
         if has_zero:  # no name of a file, or of anything else
             raise self.wrong(key, "a text without zero characters")

@@ -69,8 +69,8 @@ class Search:
 def identity(job: Job, space: SearchSpace, cases: Sequence[int], plan: Plan) -> str:
     """Hash of everything that a search depends on, but for its length."""
     digest = hashlib.sha256(job.fmu)
-    what = [job.estimator, repr(job.system), job.follows, list(cases), plan.population, plan.seed]
-    digest.update(json.dumps(what).encode())
+    inputs = [job.estimator, repr(job.system), job.follows, list(cases), plan.population, plan.seed]
+    digest.update(json.dumps(inputs).encode())
     for recording in job.recordings:
         conditions = sorted(recording.conditions.items())
         digest.update(f"{recording.name} {conditions}".encode())

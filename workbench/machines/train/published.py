@@ -135,5 +135,7 @@ PUBLISHED = PublishedSet(
     licence="that of the train's owner",
     recordings="Each stop begins with 20 to 30 s of coasting and ends after standstill. A folder "
     "holds stops of one train.",
-    layouts=(FolderLayout("one folder for each stop", {}, _read, pattern="*/*", one=_recording),),
+    layouts=(
+        FolderLayout("one folder for each stop", {}, _read, pattern="*/*", read_one=_recording),
+    ),
 )

@@ -386,12 +386,12 @@ def _repeated(constraining: Modifier, given: Modifier, of: str) -> None:
         own = given.inner.get(name, _NOTHING)
         new = modification.redeclared
         if (modification.value and not own.value) or (new and not own.redeclared):
-            what = f"redeclare {new.type} {name}" if new else f"{name}={modification.value}"
+            clause = f"redeclare {new.type} {name}" if new else f"{name}={modification.value}"
             _refuse(
                 modification.where,
-                f"a modifier ({what}) after 'constrainedby', and not for {of}",
+                f"a modifier ({clause}) after 'constrainedby', and not for {of}",
                 "the same modifier where a component is declared, and none of a class",
-                f"write ({what}) at each declaration, too; of a class, at each of its components",
+                f"write ({clause}) at each declaration, too; of a class, at each of its components",
             )
         _repeated(modification, own, of)
 

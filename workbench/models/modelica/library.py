@@ -119,12 +119,12 @@ class Library:
 
     def resolve(self, name: str, scope: str) -> str:
         """Dotted name of what `name` means in a class; `name` itself if it is of no class here."""
-        head, *rest = name.removeprefix(".").split(".")
+        head, *members = name.removeprefix(".").split(".")
         scopes = [""] if name.startswith(".") else _outward(scope)
         full_name = next((visible for at in scopes if (visible := self._visible(head, at))), "")
         if full_name not in self.classes:
-            return ".".join([full_name or head, *rest])
-        for part in rest:
+            return ".".join([full_name or head, *members])
+        for part in members:
             if not (inside := self.inside(part, full_name)):
                 hidden = f"; to mean the library {head}, import it" if head != full_name else ""
                 raise InputError(
@@ -233,13 +233,13 @@ class Library:
     def unit(self, component: Component) -> str:
         """Unit of a component; where it has none, the name of the type that could have one."""
         modifier, name, scope = component.modifier, component.type, component.owner
-        kind = ""
+        candidate = ""
         while "unit" not in modifier.inner:
             name = self.resolve(name, scope)
             if name not in self.classes or not self.bases(name):
-                return kind or name
+                return candidate or name
             self.ancestors(name)  # refuses a type that is its own
-            kind, scope, base = name, name, self.classes[name].extends[0]
+            candidate, scope, base = name, name, self.classes[name].extends[0]
             modifier, name = base.modifier, base.name
         return modifier.inner["unit"].value.strip('"')
 

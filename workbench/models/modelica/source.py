@@ -246,7 +246,7 @@ class Reader(Cursor):
 
     def __init__(self, file: Path, text: str) -> None:
         super().__init__(file, text)
-        self._found: list[Class] = []
+        self._classes: list[Class] = []
         self._owner = ""  # class that is being read
 
     def file(self, enclosing: str) -> list[Class]:
@@ -267,7 +267,7 @@ class Reader(Cursor):
         self.expect(";")
         if self.token.kind != "end":
             raise self.refusal("one class in a file, and others within it")
-        return self._found
+        return self._classes
 
     # --- classes ---
 
@@ -278,7 +278,7 @@ class Reader(Cursor):
         kind = self.one_of(KINDS)
         if kind == "operator" and self.token.text in ("function", "record"):
             kind = self.advance().text
-        where, place = self.where, len(self._found)
+        where, place = self.where, len(self._classes)
         if self.sees("extends"):
             raise InputError(
                 where=where,
@@ -319,7 +319,7 @@ class Reader(Cursor):
             experiment=annotation.experiment,
             where=where,
         )
-        self._found.insert(place, made)
+        self._classes.insert(place, made)
 
     def _alias(self) -> list[Extends]:
         """What stands after `type X =`."""

@@ -70,8 +70,8 @@ def changes(system: System) -> Matrix:
         if condition.parameters and not condition.count:
             k = len(condition.parameters)
             # Nothing to change to: a lone choice lasts.
-            each = 1.0 / (condition.lasts * (k - 1)) if k > 1 else 0.0
-            own = each * (np.ones((k, k)) - k * np.eye(k))
+            rate = 1.0 / (condition.lasts * (k - 1)) if k > 1 else 0.0
+            own = rate * (np.ones((k, k)) - k * np.eye(k))
             rates = np.kron(rates, np.eye(k)) + np.kron(np.eye(len(rates)), own)
     return rates
 

@@ -27,8 +27,8 @@ _ROUNDS = tuple(
     sorted(
         {float(2**bits) * part for bits in (16, 24, 32) for part in (1.0, 1e-3, 1e-6)}
         | {
-            float(rest) * part
-            for rest in (60, 3600, 43200, 86400, 604800)
+            float(seconds) * part
+            for seconds in (60, 3600, 43200, 86400, 604800)
             for part in (1.0, 1e3, 1e6)
         }
         | {12.0, 24.0, 1440.0}
@@ -130,8 +130,8 @@ def _read_clock(
                 clock = _named_clock(channel_of_time, named, system, where)
             return _going_on(clock, group, where)
     if group.time is not None:
-        time, said = group.time, "the file says it"
-        own_clock = Clock("", time.values, said, start=time.start, zoned=time.zoned)
+        time, reason = group.time, "the file says it"
+        own_clock = Clock("", time.values, reason, start=time.start, zoned=time.zoned)
         beside = [c for channel in group.channels if (c := _candidate(channel, group, system))]
         going = [clock for clock in beside if clock.certain and _goes_on(clock.times, group)]
         own_clock = _going_on(own_clock, group, where)
@@ -165,8 +165,8 @@ def _read_clock(
     if back:  # segments, between which a stated rate knows no gap
         return _going_on(back[0], group, where)
     if math.isfinite(group.step):
-        said = f"every {group.step:g} s, as the file says"
-        return Clock("", count * group.step, said, certain=False, counted=True)
+        reason = f"every {group.step:g} s, as the file says"
+        return Clock("", count * group.step, reason, certain=False, counted=True)
     if clocks:
         first = next((c for c in clocks if _goes_on(c.times, group)), clocks[0])
         return _going_on(first, group, where)
@@ -555,7 +555,7 @@ def _rows_of_one_time(times: Vector, group: Group) -> int:
     for channel in group.channels:
         values = channel.values[rows]
         moves = np.diff(values)
-        within, between = (moves[kind & np.isfinite(moves)] for kind in (again, ~again))
+        within, between = (moves[mask & np.isfinite(moves)] for mask in (again, ~again))
         if not within.size or not between.size or _is_clock(channel, moves, steps):
             continue
         jumps |= again & np.isfinite(moves) & (moves != 0.0)
@@ -592,13 +592,13 @@ def _going_on(clock: Clock, group: Group, where: str) -> Clock:
     """The clock, if it goes on from sample to sample; samples without a time are told."""
     lost = np.flatnonzero(~np.isfinite(clock.times) & _holds_values(group, clock))
     if lost.size:
-        said = f"{lost.size} samples without a time are left out, the first is sample {lost[0] + 1}"
-        clock = replace(clock, corrections=(*clock.corrections, said))
+        note = f"{lost.size} samples without a time are left out, the first is sample {lost[0] + 1}"
+        clock = replace(clock, corrections=(*clock.corrections, note))
     if _increases(clock.times):
         return clock
     if again := _rows_of_one_time(clock.times, group):
-        said = f"{again} rows have the time of the row before; of one time, the last value is kept"
-        return replace(clock, reason=f"{clock.reason}; {said}")
+        note = f"{again} rows have the time of the row before; of one time, the last value is kept"
+        return replace(clock, reason=f"{clock.reason}; {note}")
     held = clock.times[np.isfinite(clock.times)]
     late = int(np.argmin(np.diff(held) > 0)) if held.size > 1 else -1
     fault = f"{held[late + 1]:.9g} s after {held[late]:.9g} s" if late >= 0 else "no times"

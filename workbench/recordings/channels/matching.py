@@ -101,7 +101,7 @@ def missing_of(
     if declared is not None:
         return declared, f"; {channel.unread} are no samples" if channel.unread else "", ""
     known, others = markers(channel.values)
-    said = "".join(f"; {value:g}, {count} times, is no sample" for value, count in known.items())
+    reason = "".join(f"; {value:g}, {count} times, is no sample" for value, count in known.items())
     doubt = ""
     if channel.unread:
         doubt = (
@@ -117,7 +117,7 @@ def missing_of(
             f"'{channel.name}' is {counted}, far outside of all others, and taken for no sample; "
             f"--column '{column} missing {listed}' confirms it, 'missing none' keeps all"
         )
-    return (*known, *others), said, doubt
+    return (*known, *others), reason, doubt
 
 
 def _impossible_value(name: str, unit: str, values: Vector, signal: Signal) -> str:
@@ -195,12 +195,12 @@ def meaning_doubt(
     if conversion(si, "Pa") is not None:
         base, zero = pressure_zero(unit)
         zero = zero or _zero_in(channel)
-        said = next(filter(None, map(_zero_in, names)), "")
-        if zero and zero != said:
+        stated = next(filter(None, map(_zero_in, names)), "")
+        if zero and zero != stated:
             means = "above that of the air" if zero == "gauge" else "above a vacuum"
             return (
                 f"'{channel}' [{unit}] is a pressure {means}, and {names[0]} is "
-                f"{said or 'not said to be one'}; add or take off the pressure of the air where "
+                f"{stated or 'not said to be one'}; add or take off the pressure of the air where "
                 f"they differ, --column '{column} [{base}]' takes the values as they are"
             )
     if match := _GALLON.search(unit):
@@ -244,9 +244,9 @@ def _rounds(values: Vector) -> int:
 def unit_doubt(signal: str, channel: str, unit: str) -> str:
     """That nobody has said a unit, and how to; brackets of a name may hold one."""
     match = _IN_BRACKETS.search(channel)
-    found = f"no unit that is known in the file, {match[0]} may be one" if match else ""
-    found = found or "no unit in the file"
-    return f"{found}, --column '{signal}={channel} [{unit}]' confirms [{unit}]"
+    problem = f"no unit that is known in the file, {match[0]} may be one" if match else ""
+    problem = problem or "no unit in the file"
+    return f"{problem}, --column '{signal}={channel} [{unit}]' confirms [{unit}]"
 
 
 def unit_reason(reason: str, unit: str, concluded: bool) -> str:
@@ -277,7 +277,7 @@ def _candidate(
 ) -> tuple[Assignment | None, str]:
     """A channel as a signal, or None and why it cannot be."""
     channel, column = place.channel, f"{signal.name}={place.label}"
-    missing, said, marked = missing_of(channel, None, column)
+    missing, gaps, marked = missing_of(channel, None, column)
     samples = samples_of(channel, missing)
     unit = stated = channel.unit or unit_in_name(channel.name, signal, system)
     if not stated:
@@ -326,7 +326,7 @@ def _candidate(
         factor=scale.factor,
         zero=scale.zero,
         formula=formula,
-        reason=unit_reason(reason, unit, concluded) + said,
+        reason=unit_reason(reason, unit, concluded) + gaps,
         certain=likeness == EXACT
         and channel.name == signal.name
         and bool(channel.unit)

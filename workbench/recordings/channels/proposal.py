@@ -216,7 +216,7 @@ def _as_named(
     """The channel that a user names for a signal."""
     place = _find(channel, signal.name, places, where)
     column = f"{signal.name}={place.label}"
-    missing, said, marked = missing_of(place.channel, channel.missing, column)
+    missing, gaps, marked = missing_of(place.channel, channel.missing, column)
     samples = samples_of(place.channel, missing)
     unit = stated = channel.unit or place.channel.unit
     if not stated:
@@ -245,7 +245,7 @@ def _as_named(
         factor=turn * scale.factor,
         zero=turn * scale.zero,
         formula=formula,
-        reason=unit_reason("named", unit, concluded) + said,
+        reason=unit_reason("named", unit, concluded) + gaps,
         certain=not (concluded or any(doubts)),
         concluded=concluded or bool(channel.unit),
         doubt="; ".join(filter(None, (doubt, *doubts))),

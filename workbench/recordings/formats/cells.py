@@ -274,7 +274,7 @@ def find_table(rows: Sequence[Sequence[str]], lines: Sequence[int], where: str) 
     own_names, own_units = (tuple((row + [""] * width)[:width]) for row in (names, units))
     # Recorders of portable kind name channels CH1 above samples, and say further up what they are.
     listed = {row[0].strip(): row[1].strip() for row in rows[:first] if len(row) > 2}
-    about = tuple(said if (said := listed.get(name, "")) not in names else "" for name in names)
+    about = tuple(text if (text := listed.get(name, "")) not in names else "" for name in names)
     return Cells(body, [lines[i] for i in kept], head, own_names, own_units, about)
 
 
@@ -648,8 +648,8 @@ def _by_clock(table: Cells) -> list[tuple[str, Cells]]:
 
 def _is_clock(name: str, unit: str, cells: Sequence[str]) -> bool:
     """Whether a column may be one of times: it says so, and holds times or numbers."""
-    said = _TIME_NAME.match(name) is not None or (unit and conversion(unit, "s") is not None)
-    return bool(said) and _mostly(cells, lambda cell: is_number(cell) or is_stamp(cell))
+    named = _TIME_NAME.match(name) is not None or (unit and conversion(unit, "s") is not None)
+    return bool(named) and _mostly(cells, lambda cell: is_number(cell) or is_stamp(cell))
 
 
 def _length(cells: Sequence[str]) -> int:
@@ -720,10 +720,10 @@ def read_group(
                 f"'{labels[i][0]}': {len(bad)} cells that are no numbers are gaps, the first "
                 f"{columns[i][bad[0]]!r} in line {table.lines[bad[0]]}"
             )
-        said = about.get(labels[i][0], "")
+        remark = about.get(labels[i][0], "")
         like = [k for k in bad if is_like_number(cells[k])]
         unread = f"{len(like)} cells such as {columns[i][like[0]]!r}" if like else ""
-        channel = FileChannel(*labels[i], values, said, censored=tuple(beyond), unread=unread)
+        channel = FileChannel(*labels[i], values, remark, censored=tuple(beyond), unread=unread)
         channels.append(channel)
     step, doubt = stated_step(table.head)
     within = (name,) if name else ()
@@ -778,8 +778,8 @@ def _leave_out_bad(
 
 def _is_good(state: str, word: str) -> bool:
     """Whether a state, in a column of some name, says that a sample is good."""
-    said = state in _GOOD or (state == "1" and word.casefold() in _VALID)
-    return said or (state.isdecimal() and int(state) >= _OPC_GOOD)
+    stated = state in _GOOD or (state == "1" and word.casefold() in _VALID)
+    return stated or (state.isdecimal() and int(state) >= _OPC_GOOD)
 
 
 def _newest_first(columns: Sequence[Sequence[str]]) -> str:

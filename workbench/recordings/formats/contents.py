@@ -64,7 +64,7 @@ class RecordedFile:
     """A file as it was read."""
 
     path: Path
-    kind: str  # format, and what was found of it, in words
+    format: str  # format, and what was found of it, in words
     groups: tuple[Group, ...]
     notes: tuple[str, ...]  # what was left out or understood, in words
     sha256: str  # of the file
@@ -74,7 +74,7 @@ class RecordedFile:
 class Contents(NamedTuple):
     """What the reader of a format finds in a file; see `RecordedFile`."""
 
-    kind: str
+    format: str
     groups: list[Group]
     notes: list[str]
     doubts: tuple[str, ...] = ()

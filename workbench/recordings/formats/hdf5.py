@@ -26,13 +26,13 @@ _COUNTED = re.compile(r"datetime64\[(ns|us|ms|s)\]")
 
 def read_frame(group: h5py.Group) -> dict[str, Any] | None:
     """Columns of a group by name, the index first; None where pandas did not write it."""
-    kind = _text(group.attrs.get("pandas_type", b""))
-    if kind == "frame_table" and isinstance(group.get("table"), h5py.Dataset):
+    layout = _text(group.attrs.get("pandas_type", b""))
+    if layout == "frame_table" and isinstance(group.get("table"), h5py.Dataset):
         return _table(group["table"])
-    if kind == "series" and "values" in group and "index" in group:
+    if layout == "series" and "values" in group and "index" in group:
         name = _text(group.attrs.get("name", b"")) or group.name.rpartition("/")[2]
         return {**_index(group["index"]), name: group["values"][()]}
-    if kind != "frame" or "axis1" not in group:
+    if layout != "frame" or "axis1" not in group:
         return None
     columns = _index(group["axis1"])
     for number in range(int(group.attrs.get("nblocks", 0))):
@@ -64,9 +64,9 @@ def _index(item: h5py.Dataset) -> dict[str, Any]:
     return _of_index(name, _text(item.attrs.get("kind", b"")), item[()])
 
 
-def _of_index(name: str, kind: str, values: Any) -> dict[str, Any]:
+def _of_index(name: str, dtype: str, values: Any) -> dict[str, Any]:
     """An index by its name, as a time where it counts from 1970."""
-    if counted := _COUNTED.match(kind):
+    if counted := _COUNTED.match(dtype):
         return {f"time [{counted[1]}]": values}
     return {name if name not in ("", "N.") else "index": values}
 
@@ -170,8 +170,8 @@ def scaled(value: Any, attributes: Mapping[str, Any]) -> Any:
     numbers = {
         key: float(np.ravel(x)[0]) for key, x in stated.items() if np.asarray(x).dtype.kind in "fiu"
     }
-    if said := next((f"{k} = {x:g}" for k, x in numbers.items() if _UNSAID.get(k, x) != x), ""):
-        return Opaque(f"stated with {said}, and nobody says whether that is applied")
+    if scaling := next((f"{k} = {x:g}" for k, x in numbers.items() if _UNSAID.get(k, x) != x), ""):
+        return Opaque(f"stated with {scaling}, and nobody says whether that is applied")
     if not numbers.keys() & {*_SCALING, *_NONE}:
         return value
     kept = np.where(

@@ -41,13 +41,13 @@ def read(path: Path, raw: bytes) -> Contents:
     groups: list[Group] = []
     notes: list[str] = []
     tables: list[tuple[str, list[list[Any]], Mapping[str, Any]]] = []
-    rest = _arrays(_split_tables("", document, {}, tables))
+    arrays = _arrays(_split_tables("", document, {}, tables))
     for name, rows, units in tables:
         where = f"{path}, '{name}'" if name else str(path)
         group, _, own = read_group(_table(rows, units, where), name, where)
         groups += [group] * bool(group.channels)
         notes += own
-    nested, left = read_groups(rest if isinstance(rest, Mapping) else {"data": rest})
+    nested, left = read_groups(arrays if isinstance(arrays, Mapping) else {"data": arrays})
     return Contents("JSON", [*groups, *nested], [*notes, *left])
 
 
@@ -158,8 +158,8 @@ def _pairs(signal: Mapping[str, Any]) -> list[list[Any]]:
 def _name_of_metric(labels: Mapping[str, Any]) -> str:
     """The name of a metric with its labels, as Prometheus writes it."""
     name = str(labels.get("__name__", ""))
-    rest = ",".join(f'{key}="{value}"' for key, value in labels.items() if key != "__name__")
-    return f"{name}{{{rest}}}" if rest else name
+    tags = ",".join(f'{key}="{value}"' for key, value in labels.items() if key != "__name__")
+    return f"{name}{{{tags}}}" if tags else name
 
 
 def _records(value: Mapping[str, Any]) -> list[dict[str, Any]]:

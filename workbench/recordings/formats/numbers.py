@@ -78,11 +78,11 @@ def markers(values: Vector) -> tuple[dict[float, int], dict[float, int]]:
         left = left[~np.isin(left, list(known))]
     while left.size > _FEWEST:
         for extreme in (float(left.max()), float(left.min())):
-            rest = left[left != extreme]
-            if not _is_varied(rest):
+            within = left[left != extreme]
+            if not _is_varied(within):
                 continue
-            distance, at = _distance(extreme, rest), left == extreme
-            count = left.size - rest.size
+            distance, at = _distance(extreme, within), left == extreme
+            count = left.size - within.size
             # Far outside of all others, or out and back at once, as no machine moves.
             rare = count <= max(1.0, _RARE * left.size)
             alone = distance > _FARTHER or not (at[1:-1] & at[2:] & at[:-2]).any()
@@ -93,7 +93,7 @@ def markers(values: Vector) -> tuple[dict[float, int], dict[float, int]]:
                 or (rare and distance > _FARTHER)
             ):
                 others[extreme] = count
-                left = rest
+                left = within
                 break
         else:
             break

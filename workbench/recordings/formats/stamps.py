@@ -299,7 +299,7 @@ def _by_date(
     matches = [pattern.fullmatch(text) for text in texts]
     known = np.array([match is not None for match in matches])
     clocks = np.array([_clock(match) if match else 0 for match in matches])
-    parts, said = _counted_frames(matches, clocks)
+    parts, notes = _counted_frames(matches, clocks)
     zones = {str(match["zone"]) for match in matches if match and match.groupdict().get("zone")}
     letters = {own.upper() for own in zones if own.isalpha()}
     local = len(zones) == 1 and bool(letters & _AMBIGUOUS or letters - _AHEAD.keys())
@@ -315,7 +315,7 @@ def _by_date(
         whole, leap = _with_leap_second(matches, days + clocks, parts)
         zoned = bool(zones) and not local
         channel = _channel(name, texts, known, (whole, parts, shift), zone, zoned=zoned)
-        readings[reading] = replace(channel, corrections=(*said, *leap, *channel.corrections))
+        readings[reading] = replace(channel, corrections=(*notes, *leap, *channel.corrections))
     return _choose_reading(name, texts, readings, matches)
 
 
@@ -663,8 +663,8 @@ def _counted_frames(
             break
     else:
         rate = 0
-    said = [f"behind the last colon are frames, {rate} in a second"] if rate else []
-    return frames / rate if rate else parts, said
+    notes = [f"behind the last colon are frames, {rate} in a second"] if rate else []
+    return frames / rate if rate else parts, notes
 
 
 def _with_leap_second(

@@ -60,8 +60,8 @@ def read_excel_97(path: Path, raw: bytes) -> Contents:
         if cell.ctype == xlrd.XL_CELL_DATE and cell.value >= 1.0:
             return xlrd.xldate_as_datetime(cell.value, book.datemode)
         if cell.ctype == xlrd.XL_CELL_DATE:  # the part of a day, to a millisecond as Excel shows it
-            seconds, rest = divmod(round(cell.value * 86_400_000) % 86_400_000, 1000)
-            return time(seconds // 3600, seconds // 60 % 60, seconds % 60, rest * 1000)
+            seconds, milliseconds = divmod(round(cell.value * 86_400_000) % 86_400_000, 1000)
+            return time(seconds // 3600, seconds // 60 % 60, seconds % 60, milliseconds * 1000)
         if cell.ctype == xlrd.XL_CELL_NUMBER:
             return _as_shown(cell.value, formats[book.xf_list[cell.xf_index].format_key].format_str)
         if cell.ctype == xlrd.XL_CELL_TEXT:

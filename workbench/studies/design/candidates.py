@@ -146,7 +146,7 @@ def draw_experiment(experiments: Experiments, rng: np.random.Generator) -> Exper
         name: values[rng.integers(len(values))] for name, values in experiments.settings.items()
     }
     choices = [_profiles(varied) for varied in experiments.varied]
-    return Experiment(settings, tuple(each[rng.integers(len(each))] for each in choices))
+    return Experiment(settings, tuple(options[rng.integers(len(options))] for options in choices))
 
 
 def _profiles(varied_input: VariedInput) -> list[Profile]:

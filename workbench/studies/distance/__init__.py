@@ -63,7 +63,7 @@ class Effort:
         return max(1, self.samples // 4)
 
     @property
-    def each(self) -> int:
+    def per_decade(self) -> int:
         """Samples of a decade of a run of subset simulation, a multiple of ten."""
         return max(1, self.samples // 20) * 10
 
@@ -184,7 +184,7 @@ class _Prediction:
         if not effort.decades:
             return None, False
         calls = [
-            (question, effort.decades, effort.each, 1000 * effort.seed + number)
+            (question, effort.decades, effort.per_decade, 1000 * effort.seed + number)
             for number in range(_RUNS)
         ]
         runs, interrupted = self._run("runs of subset simulation", Forecaster.descent, calls)

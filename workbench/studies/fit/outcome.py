@@ -58,9 +58,9 @@ class Direction:
         moves = ", ".join(f"{name} {change:+.2g} %" for name, change in self.parts.items())
         if len(names) == 2 and abs(abs(min(self.parts.values(), key=abs)) - 1.0) < _SAME:
             first, second = self.parts.values()
-            what = "product" if first * second < 0.0 else "ratio"
+            form = "product" if first * second < 0.0 else "ratio"
             sign = "*" if first * second < 0.0 else "/"
-            return f"{' and '.join(names)}: only their {what} {names[0]}{sign}{names[1]} is "
+            return f"{' and '.join(names)}: only their {form} {names[0]}{sign}{names[1]} is "
             "identifiable"
         return f"{', '.join(names)}: they compensate each other ({moves})"
 

@@ -87,7 +87,7 @@ class MonitoringResult:
             ]
         )
         lines += self.sentences
-        lines += [f"{name}: {what}" for name, what in self.warned.items()]
+        lines += [f"{name}: {warning}" for name, warning in self.warned.items()]
         lines += [f"not used: {name}: {why}" for name, why in self.refused.items()]
         lines += [f"there twice: {name} is {other}" for name, other in self.again.items()]
         return "\n".join(lines)

@@ -67,7 +67,7 @@ def write_monitoring_page(result: MonitoringResult, summary: Mapping[str, Any], 
         parts.append(Part("work", "Work of friction", [_work(summary["work"])]))
     parts.append(Part("definitions", "Definitions", [Definitions(_TERMS)]))
     warnings = ["Interrupted: the same command goes on from here."] * result.interrupted
-    warnings += [f"{name}: {what}" for name, what in result.warned.items()]
+    warnings += [f"{name}: {warning}" for name, warning in result.warned.items()]
     warnings += [f"Not used: {name}: {why}" for name, why in result.refused.items()]
     warnings += [f"There twice: {name} is {other}." for name, other in result.again.items()]
     title = f"One machine over its recordings, {result.names[0]} to {result.names[-1]}"

@@ -139,10 +139,10 @@ def _limit(
         if other != name
     }
     like = min(differences, key=lambda other: differences[other], default="")
-    told = None
+    discriminated = None
     if like and differences[like] > _ALIKE:
-        told = multiple * sigma / float(np.sqrt(differences[like]))
-    return EffectLimit(name, plantable.unit, sigma, multiple * sigma, like, told)
+        discriminated = multiple * sigma / float(np.sqrt(differences[like]))
+    return EffectLimit(name, plantable.unit, sigma, multiple * sigma, like, discriminated)
 
 
 ORACLE = "an oracle's standard deviation"

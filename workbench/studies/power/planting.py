@@ -190,9 +190,9 @@ def plan(
     unknown = [plantable for plantable in repertoire.plantables if not plantable.effect]
     kinds: list[list[Group]] = [
         [(Planting("clean", _seed(seed, "clean", n), 0.0, {}, ()),) for n in range(clean)],
-        _each(repertoire, known, largest_first, repeats, seed),
+        _singles(repertoire, known, largest_first, repeats, seed),
         [(_pair(repertoire, _seed(seed, "pair", n), largest_first[0]),) for n in range(pairs)],
-        _each(repertoire, unknown, largest_first, repeats, seed),
+        _singles(repertoire, unknown, largest_first, repeats, seed),
     ]
     # All kinds advance alike, so that a run that is cut short has something of each.
     ranked = [((i + 0.5) / len(sets), group) for sets in kinds for i, group in enumerate(sets)]
@@ -219,7 +219,7 @@ def draw_sets(groups: Sequence[Group], count: int, seed: int) -> list[Planting]:
     return [planting for _, planting in sorted(ranked, key=lambda entry: entry[0])[:count]]
 
 
-def _each(
+def _singles(
     repertoire: Repertoire,
     plantables: Sequence[Plantable],
     sizes: Sequence[float],

@@ -211,10 +211,10 @@ def _correct(
     inverse = np.linalg.inv(H @ P @ H.T + R)
     K = P @ H.T @ inverse
     innovation = y - H @ z
-    rest = np.eye(z.size) - K @ H
+    uncorrected = np.eye(z.size) - K @ H
     return (
         z + K @ innovation,
-        rest @ P @ rest.T + K @ R @ K.T,
+        uncorrected @ P @ uncorrected.T + K @ R @ K.T,
         float(innovation @ inverse @ innovation),
     )
 

@@ -37,12 +37,12 @@ def blocks(fmu: FMU, system: System, layout: Layout) -> Blocks:
 
     What an output that is no state depends on stays in one block.
     """
-    n, said = len(fmu.states), fmu.description.dependencies
+    n, dependencies = len(fmu.states), fmu.description.dependencies
     names = [*fmu.states, *system.corrections]
     number = {name: i for i, name in enumerate(names)}
 
     def knowns(name: str) -> list[int]:
-        return [number[state] for state in said.get(name, names) if state in number]
+        return [number[state] for state in dependencies.get(name, names) if state in number]
 
     rates = [knowns(name) for name in fmu.description.rates]
     fed = {j: knowns(output.name) for j, output in enumerate(system.outputs) if layout.seen[j] < 0}
@@ -92,7 +92,7 @@ def divide(
     links : pairs of nodes.
     """
 
-    def kind(block: Sequence[int]) -> tuple[int, int]:
+    def shape(block: Sequence[int]) -> tuple[int, int]:
         return sum(k < states for k in block), len(block)
 
     adjacent = np.zeros((size + others, size + others), bool)
@@ -107,12 +107,12 @@ def divide(
         nodes = np.flatnonzero(left)
         components = _components(adjacent[np.ix_(nodes, nodes)], nodes, size)
         # Few unlike ones are shared: what stands between blocks is known of like ones.
-        most = Counter(map(kind, components)).most_common(1)[0][0]
-        alike = [block for block in components if kind(block) == most]
-        rest = shared + [k for block in components if kind(block) != most for k in block]
-        operations = sum((len(block) + len(rest)) ** 3 for block in alike)
+        most = Counter(map(shape, components)).most_common(1)[0][0]
+        alike = [block for block in components if shape(block) == most]
+        border = shared + [k for block in components if shape(block) != most for k in block]
+        operations = sum((len(block) + len(border)) ** 3 for block in alike)
         if operations < fewest:
-            fewest, best = operations, (alike, sorted(rest))
+            fewest, best = operations, (alike, sorted(border))
     return best
 
 
