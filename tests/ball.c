@@ -29,6 +29,11 @@ OK(fmi2EnterContinuousTimeMode, fmi2Component c) OK(fmi2SetTime, fmi2Component c
 fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *e) {
     double *r = ((Ball *)c)->r;
     memset(e, 0, sizeof *e);
+#ifdef RESTS /* where it is slower than this; until then it is thrown back from where it was found */
+    if (r[H] <= 0.0 && r[V] < 0.0) r[V] *= -r[E], e->valuesOfContinuousStatesChanged = SAYS;
+    if (r[H] <= 0.0 && r[V] < RESTS) r[V] = 0.0, r[DG] = -r[G];
+    return fmi2OK;
+#endif
     if (r[H] <= 0.0 && r[V] < 0.0) r[H] = 0.0, r[V] *= -r[E], e->valuesOfContinuousStatesChanged = SAYS;
     return fmi2OK;
 }

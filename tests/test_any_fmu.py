@@ -572,6 +572,18 @@ def test_states_that_change_at_an_event_without_a_word_are_read(tmp_path, compil
     assert simulated[:, 0] == pytest.approx(fall(time, 9.81)[0], abs=1e-6)
 
 
+def test_a_ball_that_jumps_ever_lower_comes_to_rest_on_the_ground(tmp_path, compiled):
+    """It jumps up and is back between two looks at it: it fell through the ground, 172 m deep.
+
+    Jumps are 20 cm/s and less from the 14th on, and over within 40 ms, the time between samples.
+    """
+    time = 0.04 * np.arange(250.0)
+    with FMU(bouncing(tmp_path, compiled("ball.c", "-DRESTS=1e-3"))) as fmu:
+        simulated = Simulation(fmu, [], ["h"], []).run(Drive(time, np.zeros((250, 0))), {})
+    exact = np.maximum(thrown(time, 0.8)[0], 0.0)  # which ends with its 60th jump
+    assert simulated[:, 0] == pytest.approx(exact, abs=1e-6)
+
+
 def test_what_derivatives_leave_in_an_fmu_is_not_read(tmp_path, compiled):
     """Dymola leaves its directions in variables: a spring constant had a slope of 1e4 times."""
     path = bouncing(tmp_path, compiled("ball.c"), ' providesDirectionalDerivative="true"')

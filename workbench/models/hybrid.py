@@ -75,6 +75,7 @@ class HybridSimulation:
         self._step: float | None = None
         self._unknown = ""  # of a rate on the way of the step, see `FMU.unknown_rate`
         self._events, self._piled = 0, self._t  # in this interval, and when so many were over
+        self._event_at = self._t  # of the last one [s]
         self.passed = 0  # events but for jumps of inputs, since `start_from`, one it was beyond too
         self._kept: _Kept | None = None
 
@@ -344,8 +345,10 @@ class HybridSimulation:
             now = np.sign(self._fmu.event_indicators())
             return bool(((now != signs) & ((now != 0.0) | (not strictly))).any())
 
-        low = begin
-        for high in map(float, np.linspace(begin, end, _LOOKS + 1)[1:]):
+        low, looks = begin, [float(t) for t in np.linspace(begin, end, _LOOKS + 1)[1:]]
+        if begin == self._event_at and not changed(looks[0], strictly=True):
+            looks = [*self._early_looks(begin, looks[0], x_at), *looks]
+        for high in looks:
             strictly = changed(high, strictly=True)
             if strictly or (high == end and changed(high, strictly=False)):
                 break
@@ -357,9 +360,21 @@ class HybridSimulation:
             low, high = (low, middle) if changed(middle, strictly=strictly) else (middle, high)
         return high
 
+    def _early_looks(self, begin: float, look: float, x_at) -> list[float]:  # type: ignore[no-untyped-def]
+        """Times between an event and the first look after it [s], from the event on.
+
+        An indicator that the event left at zero may be back there before the first look, as that
+        of a ball is which just jumps. It is beyond zero from the event on, so that looks at halves
+        of halves find it. The shortest is where states bend by the tolerance over the whole jump.
+        """
+        x, middle, after = x_at(begin), x_at(0.5 * (begin + look)), x_at(look)
+        bend = np.abs(after - 2.0 * middle + x) / (TOLERANCE * (self._nominal + np.abs(x)))
+        halves = int(np.ceil(0.5 * np.log2(max(float(bend.max(initial=0.0)) / 2.0, 1.0))))
+        return [begin + (look - begin) * 0.5**k for k in range(halves, 0, -1)]
+
     def _handle_event(self, u: Vector | None = None) -> None:
         """Go through Event Mode at the present point, where inputs may jump to u."""
-        self._events += 1
+        self._events, self._event_at = self._events + 1, self._t
         self.passed += u is None
         if self._events % _PILED == 0:
             left, took = self._end - self._t, self._t - self._piled
