@@ -16,6 +16,9 @@ NAME = "MinimalObserver"
 REFUSALS = {"void": "", "fmi2Component": "NULL", "fmi2Status": "fmi2Error"}
 
 
+XML = "modelDescription.xml"
+
+
 def rewritten(original: Path, path: Path, change: Callable[[Path], None]) -> Path:
     """Copy of an FMU, changed in its unpacked folder."""
     folder = path.with_suffix("")

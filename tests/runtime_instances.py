@@ -30,11 +30,12 @@ def compile_model(model: str, version: int, library: Path, visibility: str = "hi
     """Compile runtime and model into a shared library; warnings are errors."""
     library.parent.mkdir(parents=True, exist_ok=True)
     sources = [RUNTIME / f"{name}.c" for name in ("instance", "integrator", f"fmi{version}")]
+    sources += [MODELS / "defaults.c", MODELS / model / "model.c"]
     subprocess.run(
         [
             *(COMPILER, "-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-O2", "-shared"),
             *("-fPIC", f"-fvisibility={visibility}", f"-I{RUNTIME}", f"-I{MODELS / model}"),
-            *("-isystem", HEADERS, *sources, MODELS / model / "model.c", "-o", library, "-lm"),
+            *("-isystem", HEADERS, *sources, "-o", library, "-lm"),
         ],
         check=True,
     )

@@ -53,6 +53,7 @@ from workbench.recordings.case import Case, read_case, read_cases
 from workbench.recordings.csv import read_columns
 from workbench.system.registry import open_model
 
+from .edits import edit
 from .page_rules import check_page
 from .recordings import record
 from .schemas import check
@@ -559,7 +560,7 @@ def test_command_refuses_a_truth_in_other_units(root, tmp_path, monkeypatch, cap
     folder = tmp_path / "case"
     shutil.copytree(root / "cases" / WITHOUT_SLIDE, folder)
     truth = folder / "truth.csv"
-    truth.write_text(truth.read_text().replace("pads [Pa]", "pads [bar]", 1))
+    edit(truth, ("pads [Pa]", "pads [bar]"), count=1)
     assert main(["accuracy", str(folder), "--out", str(tmp_path / "out")]) == 2
     assert "column 'pads': found unit [bar]; expected [Pa]" in capsys.readouterr().err
 

@@ -40,7 +40,8 @@ from workbench.studies.distance.simulation import DrivingInputs, StopSimulation
 from workbench.system.registry import load_system, open_model
 
 from .built import machine_file
-from .hostile_fmus import rewritten
+from .edits import edit, edits
+from .hostile_fmus import XML, rewritten
 from .processes import COMPILER, needs_compiler
 from .systems import TRAIN
 
@@ -92,7 +93,7 @@ def build(tmp_path, compiled) -> Build:
             offered = 'modelIdentifier="Room" canGetAndSetFMUstate="true"/>'
             description = description.replace('modelIdentifier="Room"/>', offered)
         with zipfile.ZipFile(tmp_path / "Room.fmu", "w") as archive:
-            archive.writestr("modelDescription.xml", description)
+            archive.writestr(XML, description)
             archive.write(library, f"{BINARY}/Room{fmpy.sharedLibraryExtension}")
         (tmp_path / "system.toml").write_text(
             machine_file("room_fmu/system.toml", correction=correction)
@@ -260,11 +261,7 @@ def test_a_relay_that_chatters_is_told_with_what_switches_it(build):
 def test_an_fmu_of_neither_interface_is_refused_by_a_comparison(build, tmp_path):
     """As of scheduled execution alone; it was a traceback."""
 
-    def change(folder: Path) -> None:
-        text = (folder / "modelDescription.xml").read_text()
-        text = text.replace('<ModelExchange modelIdentifier="Room"/>', "")
-        (folder / "modelDescription.xml").write_text(text)
-
+    change = edits(XML, ('<ModelExchange modelIdentifier="Room"/>', ""))
     comparison = compare_with_fmpy(rewritten(build("RELAYS"), tmp_path / "None.fmu", change))
     assert (comparison.verdict, comparison.difference) == (REFUSED, None)
     assert "neither Model Exchange nor Co-Simulation" in comparison.reason
@@ -398,7 +395,7 @@ def test_another_unit_is_asked_about_where_the_model_says_no_start(what, recorde
     unsaid = VARIABLES.replace(' initial="exact"><Real start="291"/>', "><Real/>")
     file = build(what, variables=unsaid).parent / "system.toml"
     line = 'outputs.T = { unit = "K", noise = "0.05 K", scale = "'
-    file.write_text(file.read_text().replace(f"{line}10 K", f"{line}100000 K"))
+    edit(file, (f"{line}10 K", f"{line}100000 K"))
     system, time = load_system(file), 10.0 * np.arange(60.0)
     noise = 0.05 * np.random.default_rng(1).standard_normal((2, time.size))
     columns = {"time [s]": time, "Ta [K]": 280.0 + noise[0]}
@@ -417,7 +414,7 @@ def test_a_boolean_input_that_starts_as_a_word_is_0_and_1(build):
     )
     file = build("RELAYS", variables=command).parent / "system.toml"
     line = 'inputs.flag = { unit = "1", noise = 0.0, scale = 1.0, held = true }'
-    file.write_text(file.read_text().replace("outputs.T", f"{line}\noutputs.T"))
+    edit(file, ("outputs.T", f"{line}\noutputs.T"))
     system, time = load_system(file), 10.0 * np.arange(30.0)
     noise = 1e-4 * np.random.default_rng(1).standard_normal((2, time.size))
     columns = {"time [s]": time, "Ta [K]": 280.0 + noise[0], "flag [1]": 1.0 * (time == 30.0)}
@@ -603,12 +600,12 @@ def test_derivatives_are_compared_where_a_fit_may_move_parameters(moved, build):
     path = build("TIMETABLE", flags=["-DSTALE"])
     with zipfile.ZipFile(path) as archive:
         library = archive.read(f"{BINARY}/Room{fmpy.sharedLibraryExtension}")
-        text = archive.read("modelDescription.xml").decode()
+        text = archive.read(XML).decode()
     offered = 'modelIdentifier="Room" providesDirectionalDerivative="true"/>'
     with zipfile.ZipFile(path, "w") as archive:
         comment = f"<!-- {moved} --></fmiModelDescription>"  # what is found is remembered by bytes
         text = text.replace("</fmiModelDescription>", comment)
-        archive.writestr("modelDescription.xml", text.replace('modelIdentifier="Room"/>', offered))
+        archive.writestr(XML, text.replace('modelIdentifier="Room"/>', offered))
         archive.writestr(f"{BINARY}/Room{fmpy.sharedLibraryExtension}", library)
     system, time = load_system(path.parent), 20.0 * np.arange(60.0)
     noise = 0.05 * np.random.default_rng(1).standard_normal((2, time.size))
@@ -846,7 +843,7 @@ def bouncing(folder: Path, library: Path, able: str = "") -> Path:
         "<ModelExchange", f"<ModelExchange{able}"
     )
     with zipfile.ZipFile(folder / "Ball.fmu", "w") as archive:
-        archive.writestr("modelDescription.xml", said)
+        archive.writestr(XML, said)
         archive.write(library, f"{BINARY}/Ball{fmpy.sharedLibraryExtension}")
     (folder / "system.toml").write_text(machine_file("ball/system.toml"))
     return folder / "Ball.fmu"
@@ -940,7 +937,7 @@ def test_a_tuning_tells_events_that_it_does_not_go_through_and_what_the_fmu_warn
     pd.DataFrame(columns).to_csv(folder / "day" / "measured.csv", index=False)
     (folder / "day" / "case.toml").write_text('title = "day"\nmeasurement.file = "measured.csv"\n')
     file, line = folder / "system.toml", 'G = { unit = "W/K", noise = "1 W/K", scale = "50 W/K" }'
-    file.write_text(file.read_text().replace("[est", f"reference_signals.{line}\n[est"))
+    edit(file, ("[est", f"reference_signals.{line}\n[est"))
     options = ["--system", folder, "--cases", folder / "day", "--workers", "1", "--quiet"]
     out = ["--out", tmp_path / "tuned", "--budget", "2"]
     assert main(["tune", "disturbance_observer", *map(str, [*options, *out])]) == status
@@ -1101,7 +1098,7 @@ def test_a_model_with_clocks_is_refused(causality, kind, found, tmp_path):
     clock += f'intervalVariability="{kind}"/></ModelVariables>'
     text = machine_file("arrays_fmu/modelDescription.xml").replace("</ModelVariables>", clock)
     with zipfile.ZipFile(tmp_path / "Clocked.fmu", "w") as archive:
-        archive.writestr("modelDescription.xml", text)
+        archive.writestr(XML, text)
     with pytest.raises(InputError, match=f"found {found}"):
         FMU(tmp_path / "Clocked.fmu")
 
@@ -1151,7 +1148,7 @@ def test_a_system_file_gives_variables_names_of_its_own(build):
 )
 def test_a_name_that_the_fmu_has_not_or_that_is_taken_is_refused(line, match, build):
     file = renamed_system(build("RELAYS"))
-    file.write_text(file.read_text().replace("variable = 'T'", line))
+    edit(file, ("variable = 'T'", line))
     with pytest.raises(InputError, match=match):
         load_system(file)
 
@@ -1160,7 +1157,7 @@ def test_a_variable_with_a_name_of_its_own_is_not_called_as_the_fmu_calls_it_too
     """The FMU was said to have no such variable."""
     file = renamed_system(build("RELAYS"))
     again = 'outputs.T = { unit = "K", noise = "0.05 K", scale = "10 K" }\noutputs.inside = {'
-    file.write_text(file.read_text().replace("outputs.inside = {", again))
+    edit(file, ("outputs.inside = {", again))
     with pytest.raises(InputError, match=r"'T', a variable .* called 'inside' there as well"):
         open_model(load_system(file)).__enter__()
 
@@ -1192,7 +1189,7 @@ def test_names_of_a_system_file_may_come_from_the_command_line(build, capsys):
 def test_observability_says_where_the_fmu_leaves_its_table(flag, said, build, capsys):
     path = build("RELAYS", flags=[flag])
     file = recorded(path.parent) / "measured.csv"
-    file.write_text(file.read_text().replace(",291.", ",293."))  # K: half are above its table
+    edit(file, (",291.", ",293."))  # K: half are above its table
     given = ["--system", path.parent / "system.toml", "--out", path.parent / "out"]
     status = main(["observability", *map(str, [file.parent, *given])])
     told = capsys.readouterr()
@@ -1251,7 +1248,7 @@ def test_a_new_system_file_quotes_names_with_other_letters(build, tmp_path):
 def test_a_new_system_asks_what_a_channel_leaves_open(header, asked, build, tmp_path, capsys):
     pressure = VARIABLES.replace('<Real start="291"/>', '<Real start="291" unit="Pa"/>')
     path, log = build("RELAYS", variables=pressure), recorded(tmp_path) / "measured.csv"
-    log.write_text(log.read_text().replace("T [K]", header))
+    edit(log, ("T [K]", header))
     options = ["new", path.parent / "new", "--fmu", path, "--recordings", log, "--yes", "--quiet"]
     assert main([*map(str, options)]) == 0
     text = (path.parent / "new" / "system.toml").read_text()
@@ -1293,12 +1290,12 @@ def test_units_are_what_the_model_says_of_them(attributes, units, size, build, t
     described = template.replace("<TypeDefinitions>", UNITS.format(units) + RISE)
 
     def change(folder: Path) -> None:
-        (folder / "modelDescription.xml").write_text(described)
+        (folder / XML).write_text(described)
 
     path = rewritten(build("RELAYS"), tmp_path / "Other.fmu", change)
     log = recorded(tmp_path) / "measured.csv"
     header = f"T [{attributes[6:-1]}]" if units else "T [degC]"
-    log.write_text(log.read_text().replace("T [K]", header))
+    edit(log, ("T [K]", header))
     options = ["new", tmp_path / "new", "--fmu", path, "--recordings", log, "--yes", "--quiet"]
     assert main([*map(str, options)]) == (2 if isinstance(size, str) else 0)
     if isinstance(size, str):
@@ -1331,13 +1328,8 @@ def test_a_unit_whose_definition_contradicts_its_name_is_refused_or_taken_as_it_
     wrong = '<Unit name="L/min"><BaseUnit m="3" s="-1" factor="6e-4"/></Unit>'
     unit = 'start="291" unit="L/min"'
     path = build("RELAYS", variables=VARIABLES.replace('start="291"', unit))
-
-    def change(folder: Path) -> None:
-        file = folder / "modelDescription.xml"
-        defined = f"<UnitDefinitions>{wrong}</UnitDefinitions><ModelVariables>"
-        file.write_text(file.read_text().replace("<ModelVariables>", defined))
-
-    rewritten(path, path, change)
+    defined = f"<UnitDefinitions>{wrong}</UnitDefinitions><ModelVariables>"
+    rewritten(path, path, edits(XML, ("<ModelVariables>", defined)))
     system = path.with_name("system.toml")
 
     def declare(unit: str, noise: str, scale: str) -> None:
@@ -1353,13 +1345,8 @@ def test_a_unit_whose_definition_contradicts_its_name_is_refused_or_taken_as_it_
 
 def test_an_fmu_of_one_instance_in_a_process_has_no_variant(build, tmp_path):
     """A second one has the values of the first in FMUs that keep them in globals."""
-
-    def change(folder: Path) -> None:
-        text = (folder / "modelDescription.xml").read_text()
-        once = 'modelIdentifier="Room" canBeInstantiatedOnlyOncePerProcess="true"/>'
-        text = text.replace('modelIdentifier="Room"/>', once)
-        (folder / "modelDescription.xml").write_text(text)
-
+    once = 'modelIdentifier="Room" canBeInstantiatedOnlyOncePerProcess="true"/>'
+    change = edits(XML, ('modelIdentifier="Room"/>', once))
     path = rewritten(build("RELAYS"), tmp_path / "Once.fmu", change)
     with FMU(path) as fmu, pytest.raises(InputError, match="two instances are needed here"):
         fmu.variant({"G": 40.0})
@@ -1372,6 +1359,7 @@ def test_what_needs_modelica_asks_for_the_class(build):
 
 
 ALONE = 'CoSimulation modelIdentifier="Alone"'
+ANY_STEP = (ALONE, f'{ALONE} canHandleVariableCommunicationStepSize="true"')
 COASTING = """
 <ScalarVariable name="x" valueReference="0" causality="output" initial="exact"><Real start="1"/></ScalarVariable>
 <ScalarVariable name="u" valueReference="1" causality="input"><Real start="0"/></ScalarVariable>
@@ -1393,7 +1381,7 @@ def build_integrator(tmp_path: Path, library: Path) -> Path:
     structure = description[description.index("<Outputs>") : description.index("</ModelStruct")]
     description = description.replace(structure, "<Outputs><Unknown index='1'/></Outputs>")
     with zipfile.ZipFile(tmp_path / "Alone.fmu", "w") as archive:
-        archive.writestr("modelDescription.xml", description)
+        archive.writestr(XML, description)
         archive.write(library, f"{BINARY}/Alone{fmpy.sharedLibraryExtension}")
     (tmp_path / "system.toml").write_text(
         'title = "Alone"\nsample_time = "1 s"\nmodels.observer = { fmu = "Alone.fmu" }\n'
@@ -1450,12 +1438,8 @@ def test_whole_simulations_of_co_simulation_alone_have_derivatives(integrator):
 def test_co_simulation_that_takes_slopes_of_inputs_follows_straight_lines(able, tmp_path, compiled):
     """der(x) = u - x, u = t, from x = 1: x = t - 1 + 2 exp(-t). Means of 1 s are off by 0.08."""
     folder = build_integrator(tmp_path, compiled("co_simulation.c", "-DLAGS"))
-    said = f'modelIdentifier="Alone" canInterpolateInputs="{str(able).lower()}"'
-
-    def change(folder: Path) -> None:
-        file = folder / "modelDescription.xml"
-        file.write_text(file.read_text().replace('modelIdentifier="Alone"', said))
-
+    stated = f'modelIdentifier="Alone" canInterpolateInputs="{str(able).lower()}"'
+    change = edits(XML, ('modelIdentifier="Alone"', stated))
     time = np.arange(5.0)
     with CoSimulation(rewritten(folder / "Alone.fmu", tmp_path / "Lines.fmu", change)) as fmu:
         simulated = Simulation(fmu, ["u"], ["x"], [0.0]).run(Drive(time, time[:, None]), {})[:, 0]
@@ -1469,15 +1453,8 @@ def test_a_co_simulation_that_does_not_reach_its_samples_by_its_own_time_is_refu
     """Its solver makes steps of 0.4 s; FMI 2.0 has no other word for how far a step came."""
     shown = '<ScalarVariable name="time" valueReference="3" causality="independent"><Real/>'
     folder = build_integrator(tmp_path, compiled("co_simulation.c", "-DSOLVES=0.4"))
-
-    def change(folder: Path) -> None:
-        file = folder / "modelDescription.xml"
-        text = file.read_text().replace(
-            "</ModelVariables>", f"{shown}</ScalarVariable></ModelVariables>"
-        )
-        able = 'modelIdentifier="Alone" canHandleVariableCommunicationStepSize="true"'
-        file.write_text(text.replace('modelIdentifier="Alone"', able))
-
+    end = "</ModelVariables>"
+    change = edits(XML, (end, f"{shown}</ScalarVariable>{end}"), ANY_STEP)
     with CoSimulation(rewritten(folder / "Alone.fmu", tmp_path / "Solver.fmu", change)) as fmu:
         simulation, u = Simulation(fmu, ["u"], ["x"], [True]), np.ones((4, 1))
         reached = simulation.run(Drive(0.8 * np.arange(4.0), u), {})[:, 0]
@@ -1500,12 +1477,7 @@ def test_a_co_simulation_that_asks_to_end_says_so(tmp_path, compiled):
 def test_co_simulation_with_steps_of_one_size_goes_in_those_or_is_refused(tmp_path, compiled):
     """Four steps of 0.25 s fit into a sample; after samples of 1 s, one of 0.5 s does not."""
     folder = build_integrator(tmp_path, compiled("co_simulation.c", "-DONLY=0.25"))
-
-    def change(folder: Path) -> None:
-        file = folder / "modelDescription.xml"
-        stated = 'startTime="0.0" stepSize="0.25"'
-        file.write_text(file.read_text().replace('startTime="0.0"', stated))
-
+    change = edits(XML, ('startTime="0.0"', 'startTime="0.0" stepSize="0.25"'))
     path = rewritten(folder / "Alone.fmu", tmp_path / "Stepping.fmu", change)
     with CoSimulation(path) as fmu:
         simulation = Simulation(fmu, ["u"], ["x"], [True])
@@ -1530,13 +1502,7 @@ def test_co_simulation_with_steps_of_a_size_that_nothing_says_goes_in_those(tmp_
 
 def test_a_step_that_a_co_simulation_discards_says_how_far_it_came(tmp_path, compiled):
     folder = build_integrator(tmp_path, compiled("co_simulation.c", "-DLONGEST=0.25"))
-
-    def change(folder: Path) -> None:
-        file = folder / "modelDescription.xml"
-        able = 'modelIdentifier="Alone" canHandleVariableCommunicationStepSize="true"'
-        file.write_text(file.read_text().replace('modelIdentifier="Alone"', able))
-
-    path = rewritten(folder / "Alone.fmu", tmp_path / "Short.fmu", change)
+    path = rewritten(folder / "Alone.fmu", tmp_path / "Short.fmu", edits(XML, ANY_STEP))
     said = r"step of 1 s from 0 s of its time, of which it made 0\.25 s\. Record at steps"
     with CoSimulation(path) as fmu, pytest.raises(FMUError, match=said):
         Simulation(fmu, ["u"], ["x"], [True]).run(Drive(np.arange(4.0), np.ones((4, 1))), {})
@@ -1575,7 +1541,7 @@ def arrays(tmp_path) -> Callable[..., Path]:
         description = machine_file("arrays_fmu/modelDescription.xml")
         with zipfile.ZipFile(tmp_path / "Arrays.fmu", "w") as archive:
             described = description.replace("ModelExchange", interface)
-            archive.writestr("modelDescription.xml", described)
+            archive.writestr(XML, described)
             archive.write(library, f"binaries/{fmpy.platform_tuple}/{library.name}")
         (tmp_path / "system.toml").write_text(
             'title = "Arrays"\nsample_time = "0.05 s"\nmodels.observer = { fmu = "Arrays.fmu" }\n'

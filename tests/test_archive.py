@@ -18,11 +18,11 @@ from workbench.errors import FMUError, InputError
 from workbench.models.archive import unpack
 from workbench.models.fmu import FMU
 
-from .hostile_fmus import rewritten
+from .edits import edits
+from .hostile_fmus import XML, rewritten
 from .processes import ROOT
 
 OWN = ROOT / "fmus" / "fmi2" / "MinimalObserver.fmu"
-XML = "modelDescription.xml"
 LIBRARY = "binaries/linux64/MinimalObserver.so"
 
 
@@ -230,12 +230,7 @@ def foreign_inside(folder: Path) -> None:
 
 
 def edited(old: str, new: str) -> Callable[[Path], None]:
-    def change(folder: Path) -> None:
-        text = (folder / XML).read_text()
-        assert old in text
-        (folder / XML).write_text(text.replace(old, new, 1))
-
-    return change
+    return edits(XML, (old, new), count=1)
 
 
 DAMAGES: dict[str, tuple[Callable[[Path], None], str]] = {

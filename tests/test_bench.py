@@ -48,6 +48,7 @@ from workbench.observers.estimators.open_loop import OpenLoop
 from workbench.recordings.case import Case
 from workbench.system.registry import open_model
 
+from .edits import edits
 from .hostile_fmus import rewritten
 from .processes import python
 
@@ -65,13 +66,7 @@ def timed(path: Path, at: Matrix) -> CallTimes:
 
 def change_source(fmu: Path, changed: Path, name: str, right: str, wrong: str) -> Path:
     """Copy an FMU with other text in one of its sources."""
-
-    def change(folder: Path) -> None:
-        text = (folder / "sources" / name).read_text()
-        assert right in text
-        (folder / "sources" / name).write_text(text.replace(right, wrong))
-
-    return rewritten(fmu, changed, change)
+    return rewritten(fmu, changed, edits(f"sources/{name}", (right, wrong)))
 
 
 def test_calls_of_the_minimal_model_take_nanoseconds(minimal_path, at):

@@ -33,6 +33,7 @@ from .case_folders import (
     with_line,
     write,
 )
+from .edits import replaced
 
 STANDARD = Path(__file__).parents[1] / "cases"
 
@@ -399,8 +400,7 @@ def test_a_file_without_a_usable_recording_is_refused(tmp_path, csv, match):
     ],
 )
 def test_a_wrong_entry_of_the_conditions_is_refused(tmp_path, old, new, match):
-    assert old in TOML
-    folder = write(tmp_path, toml=TOML.replace(old, new, 1))
+    folder = write(tmp_path, toml=replaced(TOML, (old, new)))
     assert_refused(match, lambda: read(folder))
 
 

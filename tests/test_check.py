@@ -8,6 +8,8 @@ import pytest
 from workbench.__main__ import main
 from workbench.system.template import write_system
 
+from .edits import edit
+
 TRUE_CLAIM = """
   package Tests
     model WallSeepsInProportionToLevel
@@ -29,10 +31,7 @@ def library(tmp_path):
     package = tmp_path / "tank" / "package.mo"
 
     def change(old: str, new: str) -> Path:
-        text = package.read_text()
-        assert old in text
-        package.write_text(text.replace(old, new, 1))
-        return tmp_path / "tank"
+        return edit(package, (old, new), count=1).parent
 
     return change
 

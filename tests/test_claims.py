@@ -10,6 +10,8 @@ import pytest
 from workbench.models.modelica import read_library
 from workbench.studies.library_check import claim_models, failures_of_claim
 
+from .edits import edit
+
 LIBRARIES = sorted(
     path.parents[1]
     for path in (Path(__file__).parent.parent / "modelica").glob("*/Tests/package.mo")
@@ -61,6 +63,6 @@ def test_a_wrong_claim_fails_with_its_text(tmp_path):
     copy = tmp_path / "WheelsetRig"
     shutil.copytree(RIG, copy)
     claim = copy / "Tests" / "PolachSlopeIsKalkerStiffness.mo"
-    claim.write_text(claim.read_text().replace("kS=1.0", "kS=0.9"))
+    edit(claim, ("kS=1.0", "kS=0.9"))
     failures = failures_of_claim(copy / "package.mo", f"WheelsetRig.Tests.{claim.stem}")
     assert any("Polach's slope at zero slip differs from K" in failure for failure in failures)

@@ -55,6 +55,7 @@ from workbench.recordings.case import Case, make_case, read_cases
 from workbench.system.registry import load_system
 from workbench.system.template import write_system
 
+from .edits import edit
 from .systems import WHEELSET as SYSTEM
 
 ROOT = Path(__file__).parent.parent
@@ -656,7 +657,7 @@ def test_what_a_varied_effect_adds_up_counts_though_its_size_is_zero(tmp_path):
     """Reference: central differences, of an effect that acts by its own state alone."""
     write_system(tmp_path)
     modelica = tmp_path / "package.mo"
-    modelica.write_text(modelica.read_text().replace("\n  model Observer", RISING, 1))
+    edit(modelica, ("\n  model Observer", RISING), count=1)
     system = load_system(tmp_path)
     cases = read_cases([tmp_path / "recordings"], system)[:1]
     library = read_library(system.library)

@@ -21,6 +21,7 @@ from workbench.models.modelica import Library, packages, read_library
 from workbench.runtime import resources
 
 from .built import machine_file
+from .edits import edit, replaced
 
 ROOT = Path(__file__).parent.parent
 WHEELSET = read_library(ROOT / "modelica" / "WheelsetRig" / "package.mo")
@@ -29,12 +30,8 @@ EFFECTS = read_effects(WHEELSET, "MinimalObserver")
 
 def tank(folder: Path, *changes: tuple[str, str]) -> Library:
     """A library of one file, with changes."""
-    text = machine_file("tank_that_runs_out/package.mo")
-    for old, new in changes:
-        assert old in text
-        text = text.replace(old, new, 1)
     file = folder / "Tank.mo"
-    file.write_text(text)
+    file.write_text(replaced(machine_file("tank_that_runs_out/package.mo"), *changes))
     return read_library(file)
 
 
@@ -323,13 +320,9 @@ def test_places_that_cannot_be_counted_or_told_apart_are_refused(old, new, messa
 
 
 def stage(folder: Path, *changes: tuple[str, str]) -> Path:
-    text = machine_file("stage/package.mo")
-    for old, new in changes:
-        assert old in text
-        text = text.replace(old, new, 1)
     file = folder / "Stage" / "package.mo"
     file.parent.mkdir()
-    file.write_text(text)
+    file.write_text(replaced(machine_file("stage/package.mo"), *changes))
     return file
 
 
@@ -369,7 +362,7 @@ def test_a_change_of_a_used_library_is_another_fmu(tmp_path):
     file, own = stage(tmp_path), own_effects(tmp_path)
     before = fmu_cache.key(file), compiler.source_hash(file)
     law = own.parent / "Friction" / "Dry.mo"
-    law.write_text(law.read_text().replace("tanh(v/v0)", "sin(v/v0)"))
+    edit(law, ("tanh(v/v0)", "sin(v/v0)"))
     after = fmu_cache.key(file), compiler.source_hash(file)
     assert before[0] != after[0]
     assert before[1] != after[1]
@@ -398,7 +391,7 @@ def test_an_extended_model_has_the_common_laws(beside, tmp_path):
     file = stage(tmp_path)
     if beside:
         law = own_effects(tmp_path).parent / "Friction" / "Viscous.mo"
-        law.write_text(law.read_text().replace("f = damping*v", "f = 2.0*damping*v"))
+        edit(law, ("f = damping*v", "f = 2.0*damping*v"))
     library = read_library(file)
     text = ExtendedModel(library, "Base", "Extended", read_effects(library, "Base"), "").source()
     build(library, "Extended", text, tmp_path / "Extended.fmu", every_platform=False)

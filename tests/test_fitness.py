@@ -19,6 +19,7 @@ from workbench.observers.gains import usual_gains
 from workbench.observers.replay import replay
 from workbench.runtime.supervision import Limits
 
+from .edits import replaced
 from .hostile_fmus import compile_library, rewritten
 from .processes import needs_compiler
 
@@ -115,10 +116,9 @@ def faulty(original: Path, path: Path, old: str, new: str) -> Path:
 
     def change(folder: Path) -> None:
         source = folder / "sources" / "instance.c"
-        text = source.read_text()
         # The adjoint begins as the directional derivative does, but comes after it.
-        assert old in text
-        source.write_text("#include <unistd.h>\n" + text.replace(old, new, 1))
+        text = replaced(source.read_text(), (old, new))
+        source.write_text(f"#include <unistd.h>\n{text}")
         compile_library(folder, NAME)
 
     return rewritten(original, path, change)

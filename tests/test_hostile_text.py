@@ -20,6 +20,7 @@ from workbench.recordings.datasets import _hashes_before
 from workbench.recordings.importing import imported
 
 from .case_folders import LINES, TOML, write
+from .edits import edit, replaced
 from .systems import WHEELSET
 
 DEEP = 5000
@@ -52,13 +53,8 @@ def text(content: str | bytes) -> Callable[[Path], None]:
     return replace
 
 
-def said(old: str, new: str) -> Callable[[Path], None]:
-    def replace(path: Path) -> None:
-        content = path.read_text()
-        assert old in content
-        path.write_text(content.replace(old, new, 1))
-
-    return replace
+def said(old: str, new: str) -> Callable[[Path], Path]:
+    return lambda path: edit(path, (old, new), count=1)
 
 
 WHOLE = "\n".join(LINES)
@@ -163,9 +159,7 @@ def test_a_system_that_no_person_wrote_is_refused(root, tmp_path, capsys, old, n
     library = tmp_path / "modelica" / "WheelsetRig"
     library.mkdir(parents=True)
     (tmp_path / "fmus").symlink_to(root / "fmus")
-    content = (root / SYSTEM).read_text()
-    assert old in content
-    (library / "system.toml").write_text(content.replace(old, new, 1))
+    (library / "system.toml").write_text(replaced((root / SYSTEM).read_text(), (old, new)))
     case = str(root / "cases" / "01_dry_80_1.5")
     message = refused(["simulate", case, "--system", str(library)], capsys)
     assert "system.toml" in message

@@ -27,6 +27,8 @@ from workbench.system.registry import load_system
 from workbench.system.system import System
 from workbench.system.template import write_system
 
+from .edits import edit
+
 QUARTER = 900.0  # s, between samples
 
 
@@ -36,7 +38,7 @@ def tank(tmp_path_factory) -> System:
     folder = tmp_path_factory.mktemp("systems") / "tank"
     write_system(folder)
     path = folder / "system.toml"
-    path.write_text(path.read_text().replace('sample_time = "0.5 s"', 'sample_time = "900 s"'))
+    edit(path, ('sample_time = "0.5 s"', 'sample_time = "900 s"'))
     return load_system(folder)
 
 
@@ -552,7 +554,7 @@ def test_a_clock_that_was_set_is_refused_or_told(tmp_path, tank):
 def test_nothing_goes_across_a_censored_sample(tmp_path, tank):
     """Neither the inflow before it, which is held, nor a line between its neighbours."""
     path = table(tmp_path / "a.csv", [str(900 * k) for k in range(60)], "time [s]")
-    path.write_text(path.read_text().replace("\n27000;1.2;", "\n27000;<0.01;"))
+    edit(path, ("\n27000;1.2;", "\n27000;<0.01;"))
     recorded = read_recorded_file(path)
     measured = merge([recorded], propose([recorded], tank, {}), tank)
     assert measured.time.size == 59

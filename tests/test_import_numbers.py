@@ -24,6 +24,8 @@ from workbench.system.registry import load_system
 from workbench.system.system import System
 from workbench.system.template import write_system
 
+from .edits import edit
+
 # --- names above samples ---
 
 
@@ -536,7 +538,7 @@ def test_one_value_that_comes_again_and_again_is_asked_about(tmp_path, tank):
 @pytest.mark.parametrize("cell", ["950m", "9.5.0"])
 def test_cells_that_look_like_numbers_are_asked_about(tmp_path, tank, cell):
     path = write(tmp_path / "a.csv", LEVEL)
-    path.write_text(path.read_text().replace(f"{LEVEL[50]:.3f}", cell, 1))
+    edit(path, (f"{LEVEL[50]:.3f}", cell), count=1)
     (doubt,) = proposed(path, tank).doubts
     assert f"'h' has 1 cells such as '{cell}', which are no numbers" in doubt
     left_out = proposed(path, tank, "h=h missing none")
@@ -583,7 +585,7 @@ def test_steps_between_a_few_values_are_samples():
 def test_a_marker_in_a_recording_of_the_workbench_is_refused(tmp_path, tank):
     (tmp_path / "case.toml").write_text('title = "a"\n[measurement]\nfile = "measured.csv"\n')
     path = write(tmp_path / "measured.csv", np.where(np.arange(200) == 20, -9999.0, LEVEL))
-    path.write_text(path.read_text().replace(";", ","))
+    edit(path, (";", ","))
     with pytest.raises(InputError, match=r"line 22, column 'h': found -9999 in 1 samples"):
         wb.read_cases(tmp_path, tank)
 

@@ -44,6 +44,7 @@ from workbench.studies.monitoring.watch import (
     watch,
 )
 
+from .edits import edit
 from .page_rules import check_page, script
 from .schemas import check
 from .systems import TRAIN
@@ -380,7 +381,7 @@ def test_a_condition_that_the_model_needs_and_nobody_knows_is_told(history, trai
     for name in ("01", "02"):
         shutil.copytree(history / name, tmp_path / "in" / name)
     toml = tmp_path / "in" / "02" / "case.toml"
-    toml.write_text(toml.read_text().replace('"dry"', '"unknown"'))
+    edit(toml, ('"dry"', '"unknown"'))
     result = wb.monitor(train, tmp_path / "in", workers=1)
     assert result.names == ("01",)
     assert "found rail: unknown" in result.refused["02"]

@@ -25,6 +25,7 @@ from workbench.system.experiments import RELEASE
 from workbench.system.expression import Expression
 from workbench.system.registry import model_path
 
+from .edits import edit
 from .recordings import REFERENCE, record
 from .systems import WHEELSET as SYSTEM
 
@@ -164,7 +165,7 @@ def test_what_sets_a_parameter_is_said_or_is_as_in_the_model(light, unsaid):
 def test_a_load_that_is_none_is_refused(written, found, tmp_path):
     record(LIGHT, 3, CONSTANT_PADS, tmp_path / "stop")
     toml = tmp_path / "stop" / "case.toml"
-    toml.write_text(toml.read_text().replace("60 kN", written))
+    edit(toml, ("60 kN", written))
     with pytest.raises(InputError, match=found):
         read_case(tmp_path / "stop", SYSTEM)
 

@@ -20,6 +20,7 @@ from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
+from .edits import edit
 from .processes import COMPILER, needs_compiler
 from .runtime_instances import (
     DISCARD,
@@ -786,9 +787,7 @@ def test_a_life_with_right_and_wrong_calls_is_clean(fmi, model, tmp_path):
 def test_a_planted_fault_is_found(right, wrong, found, tmp_path):
     """The counterexamples: without them a clean run might mean that nothing was looked at."""
     sources = unpack_sources(2, "MinimalObserver", tmp_path)
-    code = (sources / "instance.c").read_text()
-    assert right in code
-    (sources / "instance.c").write_text(code.replace(right, wrong))
+    edit(sources / "instance.c", (right, wrong))
     run = run_life(2, sources)
     assert run.returncode != 0
     assert found in run.stderr

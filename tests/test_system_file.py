@@ -24,6 +24,7 @@ from workbench.system.reference import reference, schema, tables
 from workbench.system.registry import load_system, model_path, open_model
 from workbench.system.tables import Table
 
+from .edits import replaced
 from .schemas import validator
 
 ROOT = Path(__file__).parent.parent
@@ -32,12 +33,9 @@ OWN = ROOT / "modelica" / "WheelsetRig" / "system.toml"
 
 def changed(folder: Path, *changes: tuple[str, str]) -> Path:
     """The wheelset's file with other lines, in a folder without a library."""
-    text = OWN.read_text()
-    for old, new in (("../../fmus", f"{ROOT}/fmus"), *changes):
-        assert old in text
-        text = text.replace(old, new, -1 if old == "../../fmus" else 1)
+    text = OWN.read_text().replace("../../fmus", f"{ROOT}/fmus")
     path = folder / "system.toml"
-    path.write_text(text)
+    path.write_text(replaced(text, *changes))
     return path
 
 

@@ -18,6 +18,8 @@ from workbench.recordings.case import Case, read_cases
 from workbench.recordings.datasets import write_cases
 from workbench.system.system import OBSERVER, System
 
+from .edits import edit
+
 RECORDINGS = Path(__file__).parent.parent.parent / "shared" / "recordings" / "train"
 TIME = np.arange(0.0, 20.0, 0.02)
 CASE = """
@@ -117,7 +119,7 @@ def test_a_folder_without_stops_is_refused(tmp_path):
 def test_an_axle_that_turns_unlike_the_others_is_refused(tmp_path, train):
     """Its speed is in rad/s, and said to be in rpm."""
     recorded = stop(tmp_path) / "01" / "measured.csv"
-    recorded.write_text(recorded.read_text().replace("omega3 [rad/s]", "omega3 [rpm]"))
+    edit(recorded, ("omega3 [rad/s]", "omega3 [rpm]"))
     write_cases("train", tmp_path / "set", tmp_path / "cases")
     with pytest.raises(InputError, match="all axles of a train roll along"):
         read_cases([tmp_path / "cases"], train)

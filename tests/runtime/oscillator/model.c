@@ -24,11 +24,6 @@ int model_algebraics(double t, const double *x, const double *u, const double *p
     return 0;
 }
 
-int model_assertions(double t, const double *x, const double *u, const double *p, double *holds) {
-    (void)t, (void)x, (void)u, (void)p, (void)holds;
-    return 0;
-}
-
 int model_jacobian_xu(double t, const double *x, const double *u, const double *p,
                       double *nonzeros) {
     (void)t, (void)u;
@@ -48,10 +43,4 @@ int model_jacobian_p(double t, const double *x, const double *u, const double *p
     nonzeros[2] = 0.5 * x[0] * x[0];
     nonzeros[3] = nonzeros[4] = -x[1];
     return 0;
-}
-
-int model_linearisation(double t, const double *x, const double *u, const double *p,
-                        double *values) {
-    return model_derivatives(t, x, u, p, values) || model_algebraics(t, x, u, p, values + NX) ||
-           model_jacobian_xu(t, x, u, p, values + NX + NW);
 }

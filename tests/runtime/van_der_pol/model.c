@@ -18,16 +18,6 @@ int model_derivatives(double t, const double *x, const double *u, const double *
     return 0;
 }
 
-int model_algebraics(double t, const double *x, const double *u, const double *p, double *w) {
-    (void)t, (void)x, (void)u, (void)p, (void)w;
-    return 0;
-}
-
-int model_assertions(double t, const double *x, const double *u, const double *p, double *holds) {
-    (void)t, (void)x, (void)u, (void)p, (void)holds;
-    return 0;
-}
-
 int model_jacobian_xu(double t, const double *x, const double *u, const double *p,
                       double *nonzeros) {
     (void)t, (void)u;
@@ -42,10 +32,4 @@ int model_jacobian_p(double t, const double *x, const double *u, const double *p
     (void)t, (void)u;
     nonzeros[0] = -((1.0 - x[0] * x[0]) * x[1] - x[0]) / (p[0] * p[0]);
     return 0;
-}
-
-int model_linearisation(double t, const double *x, const double *u, const double *p,
-                        double *values) {
-    return model_derivatives(t, x, u, p, values) || model_algebraics(t, x, u, p, values + NX) ||
-           model_jacobian_xu(t, x, u, p, values + NX + NW);
 }
