@@ -166,13 +166,13 @@ def dry_case(system) -> Case:
 def published(root) -> Callable[[str], Path]:
     """Finds the folder of a published set; without it the test is skipped."""
 
-    def found(name: str) -> Path:
+    def folder_of(name: str) -> Path:
         folder = root.parent / "shared" / "recordings" / "real" / name
         if not folder.exists():
             pytest.skip("the recordings are not at hand")
         return folder
 
-    return found
+    return folder_of
 
 
 @pytest.fixture(scope="session")

@@ -139,10 +139,10 @@ def mat_73_array(path: Path, stops: Stops) -> None:
             for name, (unit, values) in columns.items():
                 codes = np.array([[ord(character)] for character in unit], dtype=np.uint16)
                 entries = {"": ("double", values.reshape(1, -1)), "_unit": ("char", codes)}
-                for ending, (kind, data) in entries.items():
+                for ending, (matlab_class, data) in entries.items():
                     field = f"{_identifier(name)}{ending}"
                     dataset = hidden.create_dataset(f"{field}{number}", data=data)
-                    dataset.attrs["MATLAB_class"] = np.bytes_(kind)
+                    dataset.attrs["MATLAB_class"] = np.bytes_(matlab_class)
                     fields.setdefault(field, []).append(dataset.ref)
         for field, references in fields.items():
             held.create_dataset(field, data=np.array([references], dtype=h5py.ref_dtype))

@@ -57,7 +57,7 @@ def model_of(vehicles: int, *, pitching: bool) -> str:
             f'within TrainRig;\nmodel Longer "Train of {vehicles} vehicles"',
             f"  extends Train(final vehicles={vehicles}{start});",
             *(f"  input Real {variable};" for variable in inputs),
-            *(f"  output Real {one};" for one in (*states, *outputs)),
+            *(f"  output Real {name};" for name in (*states, *outputs)),
             "equation",
             "  mu = ordinary;\n  acting = fill(units, n);\n  drag = zeros(n);\n  mu0 = muWR;",
             f"  {shifting};",
@@ -156,8 +156,8 @@ def report(sizes: Iterable[int], most: int) -> Iterable[str]:
                 if cls is ExtendedKalmanFilter and vehicles > most:
                     continue
                 spent = 1e6 * time_filter(system, cls)
-                each = f"{spent / axles:>6.2f} us an axle"
-                yield f"  {cls.name:<5} {spent:>8.1f} us a sample, {each}"
+                per_axle = f"{spent / axles:>6.2f} us an axle"
+                yield f"  {cls.name:<5} {spent:>8.1f} us a sample, {per_axle}"
 
 
 def main() -> None:

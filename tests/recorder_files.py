@@ -177,8 +177,8 @@ def mat_5(path: Path, columns: Columns) -> None:
 def mat_73(path: Path, columns: Columns) -> None:
     """HDF5 as MATLAB lays it out: rows for columns, texts as codes, a mark in a block before it."""
 
-    def add(group: h5py.Group, name: str, kind: str, data: np.ndarray) -> None:
-        group.create_dataset(name, data=data).attrs["MATLAB_class"] = np.bytes_(kind)
+    def add(group: h5py.Group, name: str, matlab_class: str, data: np.ndarray) -> None:
+        group.create_dataset(name, data=data).attrs["MATLAB_class"] = np.bytes_(matlab_class)
 
     with h5py.File(path, "w", userblock_size=512) as file:
         for name, (unit, values) in columns.items():

@@ -59,10 +59,10 @@ class Fmu:
     ) -> None:
         self.version = version
         self.log: list[tuple[int, str, str]] = []
-        kind = {(2, True): FMU2Slave, (2, False): FMU2Model, (3, True): FMU3Slave}.get(
+        client = {(2, True): FMU2Slave, (2, False): FMU2Model, (3, True): FMU3Slave}.get(
             (version, slave), FMU3Model
         )
-        self.fmi = kind(
+        self.fmi = client(
             guid=f"{{{model}}}" if token is None else token,
             modelIdentifier=model,
             unzipDirectory=str(folder),

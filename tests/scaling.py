@@ -42,11 +42,11 @@ def watch(fleet: Path, workers: int) -> tuple[int, float]:
         words = f"monitor {fleet} --system train --fleet --quiet --out {out} --cluster".split()
         with redirect_stdout(io.StringIO()):
             status = workbench([*words, cluster.scheduler_address])
-        said = json.loads(Path(out, "fleet.json").read_text())
-    refused = [machine["machine"] for machine in said["machines"] if machine["refusal"]]
+        summary = json.loads(Path(out, "fleet.json").read_text())
+    refused = [machine["machine"] for machine in summary["machines"] if machine["refusal"]]
     if status or refused:
         raise SystemExit(f"not watched: {', '.join(refused) or status}")
-    return said["recordings"], said["seconds"]
+    return summary["recordings"], summary["seconds"]
 
 
 def report(trains: int, days: int, counts: Iterable[int]) -> Iterable[str]:
@@ -58,8 +58,8 @@ def report(trains: int, days: int, counts: Iterable[int]) -> Iterable[str]:
             recordings, seconds = watch(Path(folder), workers)
             first = first or seconds * workers
             share = first / (seconds * workers)
-            said = f"{trains} trains of {days} days, {recordings} stops that count"
-            yield f"{said}, {workers} workers: {seconds:.0f} s, {share:.2f} of linear"
+            amount = f"{trains} trains of {days} days, {recordings} stops that count"
+            yield f"{amount}, {workers} workers: {seconds:.0f} s, {share:.2f} of linear"
 
 
 def main() -> None:

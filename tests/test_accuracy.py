@@ -62,7 +62,7 @@ from .systems import WHEELSET as SYSTEM
 ROOT = Path(__file__).parent.parent
 RECORDINGS = ROOT.parent / "shared" / "recordings"
 # Of a wheelset, which has no like parts, the block filter is the extended one.
-KINDS = {name: kind for name, kind in all_estimators(SYSTEM).items() if name != "arrow"}
+KINDS = {name: cls for name, cls in all_estimators(SYSTEM).items() if name != "arrow"}
 OBSERVERS = tuple(KINDS)[2:]  # the others are baselines
 PLANTS = ("clean", "cylinder_lag", "fade", "pole_ring", "radius", "speed_friction")
 
@@ -476,8 +476,8 @@ def test_bands_that_are_multiplied_by_what_they_need_hold_95_percent(scale):
         for name in ("a", "b", "c", "d", "e", "f"):
             wrong = FORCE + scale * sigma * rng.standard_t(4, TIME.size)
             stop = estimated(wrong, TRUTH.muDC)
-            said = np.full_like(stop.runs["one"].sigma, multiplied * sigma)
-            run = replace(stop.runs["one"], sigma=said)
+            sigmas = np.full_like(stop.runs["one"].sigma, multiplied * sigma)
+            run = replace(stop.runs["one"], sigma=sigmas)
             held_in = accuracy(replace(stop, runs={"one": run}), "one")
             stops.append(stop_of(name, False, False, held_in))
         return stops
@@ -519,8 +519,8 @@ def test_command_writes_every_stop_and_the_worst(system, root, tmp_path, monkeyp
             "rise_delay": rise_delay(stop, "ekf"),
             "muDC": friction_error(stop, "ekf"),
         }
-        found = summary["stops"][name]["estimators"]["ekf"]
-        assert {quantity: found[quantity] for quantity in expected} == pytest.approx(expected)
+        errors = summary["stops"][name]["estimators"]["ekf"]
+        assert {quantity: errors[quantity] for quantity in expected} == pytest.approx(expected)
         for quantity, value in expected.items():
             unit = summary["quantities"][quantity]["unit"]
             # Six digits are written.

@@ -58,60 +58,58 @@ def estimate(fmu: FMU, cls: type[ExtendedKalmanFilter], system: System, *stop: V
 MUDC = list(WHEELSET.columns).index("muDC")
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("cls", KINDS)
 @pytest.mark.parametrize("noise", [0.3, 1.0, 3.0])
-def test_noise_of_sensors_is_learnt(fmu, kind, noise):
+def test_noise_of_sensors_is_learnt(fmu, cls, noise):
     """After ten times the time for it, innovations are as large as the filter says."""
-    estimates = estimate(fmu, kind, WHEELSET, *stop(fmu, np.full(5000, 0.30), noise))
+    estimates = estimate(fmu, cls, WHEELSET, *stop(fmu, np.full(5000, 0.30), noise))
     nis = np.asarray(estimates.nis)[4000:]
     # Mean of 1000 samples of two outputs: chance makes 2 +- 0.06, levels know 4 % of a deviation.
     assert nis.mean() == pytest.approx(2.0, abs=0.3)
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_a_friction_that_stays_is_known_the_better_the_longer(fmu, kind):
+@pytest.mark.parametrize("cls", KINDS)
+def test_a_friction_that_stays_is_known_the_better_the_longer(fmu, cls):
     held = replace(WHEELSET, learns=np.inf)
     samples = stop(fmu, np.full(6000, 0.30))
-    learnt, assumed = (estimate(fmu, kind, system, *samples) for system in (WHEELSET, held))
+    learnt, assumed = (estimate(fmu, cls, system, *samples) for system in (WHEELSET, held))
     assert learnt.sigma[-1, MUDC] < 0.4 * assumed.sigma[-1, MUDC]
     late = np.abs(learnt.values[3000:, MUDC] - 0.30)
     assert np.mean(late < 2.0 * learnt.sigma[3000:, MUDC]) > 0.9
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_a_friction_that_moves_again_is_followed(fmu, kind):
+@pytest.mark.parametrize("cls", KINDS)
+def test_a_friction_that_moves_again_is_followed(fmu, cls):
     """Still for 15 s, then 0.1 in 5 s, as on a drying disc: the band opens, and holds it."""
     moving = np.concatenate([np.full(3000, 0.20), np.linspace(0.20, 0.30, 1000)])
-    estimates = estimate(fmu, kind, WHEELSET, *stop(fmu, moving))
+    estimates = estimate(fmu, cls, WHEELSET, *stop(fmu, moving))
     error = np.abs(estimates.values[:, MUDC] - moving)[3200:]
     assert error.max() < 0.01
     assert np.mean(error < 2.0 * estimates.sigma[3200:, MUDC]) > 0.8
 
 
-@pytest.mark.parametrize("kind", KINDS[:2])  # the window gives it less weight instead
-def test_a_single_wrong_sample_is_left_out(fmu, kind):
+@pytest.mark.parametrize("cls", KINDS[:2])  # the window gives it less weight instead
+def test_a_single_wrong_sample_is_left_out(fmu, cls):
     time, u, y = stop(fmu, np.full(3000, 0.30))
     spoilt = y.copy()
     spoilt[2000] *= 1.5
-    clean, estimates = (
-        estimate(fmu, kind, WHEELSET, time, u, readings) for readings in (y, spoilt)
-    )
+    clean, estimates = (estimate(fmu, cls, WHEELSET, time, u, readings) for readings in (y, spoilt))
     # One sample less is known: a small part of a deviation.
     moved = np.abs(estimates.values - clean.values)[1999:]
     assert (moved < 0.5 * np.maximum(clean.sigma, 1e-9)[1999:]).all()
 
 
 @pytest.mark.parametrize(
-    ("kind", "within", "limit"),
+    ("cls", "within", "limit"),
     [(KINDS[0], 0.3, 0.02), (KINDS[1], 0.3, 0.02), (KINDS[2], 0.7, 0.03)],
 )
-def test_a_jump_of_a_friction_is_followed_at_once(fmu, kind, within, limit):
+def test_a_jump_of_a_friction_is_followed_at_once(fmu, cls, within, limit):
     """Pads lose half their friction between two samples; held levels take a second to follow.
 
     The window first takes some of its samples for outliers, and is ready for more jumps after one.
     """
     jumping = np.concatenate([np.full(3000, 0.40), np.full(400, 0.20)])
-    estimates = estimate(fmu, kind, WHEELSET, *stop(fmu, jumping, 0.3))
+    estimates = estimate(fmu, cls, WHEELSET, *stop(fmu, jumping, 0.3))
     error = np.abs(estimates.values[:, MUDC] - jumping)
     assert error[3000 + round(within / STEP) :].max() < limit
 
@@ -141,8 +139,8 @@ def test_one_sample_speaks_for_three_standard_deviations_at_most():
     levels = kalman.levels(2, 1)
     kalman.reset(levels)
     noise, explained = 4.0, 5.0  # variances; an innovation scatters by 3
-    told = []
+    scatters = []
     for innovation in (3.0, 9.0, 90.0):
         kalman.note(levels, 0, innovation, explained, noise)
-        told.append(levels.scatter[0])
-    assert told == pytest.approx([1.0, (81.0 - 5.0) / 4.0, (81.0 - 5.0) / 4.0])
+        scatters.append(levels.scatter[0])
+    assert scatters == pytest.approx([1.0, (81.0 - 5.0) / 4.0, (81.0 - 5.0) / 4.0])

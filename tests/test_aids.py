@@ -164,16 +164,16 @@ def test_what_the_crew_says_is_a_model_with_those_parameters(stop):
     cls, part = ExtendedKalmanFilter, slice(0, 150)
     wet = {"muWR": 0.275, "polach.kA": 0.3, "polach.kS": 0.1, "polach.B": 0.2}
     with open_model(TRAIN) as model:
-        told = cls(model, TRAIN, cls.default_gains(model, TRAIN))
+        own = cls(model, TRAIN, cls.default_gains(model, TRAIN))
         values = []
         for rail in ("wet", "dry"):
-            told.set_conditions({"rail": rail})
-            values.append(told.run(case.time[part], case.u[part], case.y[part]).values)
+            own.set_conditions({"rail": rail})
+            values.append(own.run(case.time[part], case.u[part], case.y[part]).values)
         variant = model.variant(wet)
         plain = cls(variant, TRAIN, cls.default_gains(variant, TRAIN))
         plain.set_conditions({"rail": "unknown"})
         expected = plain.run(case.time[part], case.u[part], case.y[part]).values
-    corrections = [list(told.system.columns).index(correction) for correction in TRAIN.corrections]
+    corrections = [list(own.system.columns).index(correction) for correction in TRAIN.corrections]
     # The friction that is estimated is a deviation from another nominal value.
     same = np.delete(np.arange(expected.shape[1]), corrections)
     assert_allclose(values[0][:, same], expected[:, same], rtol=1e-7, atol=1e-9)
@@ -296,7 +296,7 @@ def gradient_error(case: Case, made: SimulatedStop) -> Vector:
 
 def test_what_is_of_a_recording_is_not_watched_over_many():
     names = {quantity.name for quantity in watched(TRAIN)}
-    kinds = [f"{kind}[{i}]" for kind in ("muDC", "r") for i in range(1, 9)]
+    kinds = [f"{quantity}[{i}]" for quantity in ("muDC", "r") for i in range(1, 9)]
     assert names == {*kinds, "bias"}
 
 

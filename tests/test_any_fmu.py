@@ -75,17 +75,17 @@ def build(tmp_path, compiled) -> Build:
     """Builds the room in a folder with its system file; returns the FMU."""
 
     def make(
-        what: str,
+        events: str,
         start: float = 0.0,
         correction: str = "dG",
         variables: str = VARIABLES,
         flags: Sequence[str] = (),
         saves: bool = False,
     ) -> Path:
-        library = compiled("events.c", f"-DWHAT={what}", *flags)
+        library = compiled("events.c", f"-DWHAT={events}", *flags)
         description = machine_file(
             "room_fmu/modelDescription.xml",
-            count=int(what == "THERMOSTAT"),
+            count=int(events == "THERMOSTAT"),
             start=start,
             variables=variables,
         )
@@ -143,15 +143,15 @@ def test_a_calculated_start_beyond_a_switch_is_in_the_mode_of_there(begin, build
         assert fmu.get(fmu.variables(["P"]))[0] == (1500.0 if begin < 295.0 else 0.0)
 
 
-def along(what: str, times: np.ndarray, G: float = 50.0, T: float = 291.0) -> np.ndarray:
+def along(events: str, times: np.ndarray, G: float = 50.0, T: float = 291.0) -> np.ndarray:
     """Temperature of the room at 280 K outside, by the closed form from event to event."""
     values, t, power, slowness = [], 0.0, 1500.0, 1e5 / G
     for sample in times:
         while True:
             steady = 280.0 + power / G
-            if what == "TIMETABLE":
+            if events == "TIMETABLE":
                 event = 600.0 * (np.floor(t / 600.0 + 1e-9) + 1.0)
-            elif what == "FUSE" and power == 0.0:
+            elif events == "FUSE" and power == 0.0:
                 event = np.inf
             else:
                 edge = 295.0 if power else 293.0
@@ -168,22 +168,22 @@ def along(what: str, times: np.ndarray, G: float = 50.0, T: float = 291.0) -> np
     return np.array(values)
 
 
-@pytest.mark.parametrize("what", ["THERMOSTAT", "TIMETABLE"])
-def test_the_open_loop_goes_through_events(what, build):
+@pytest.mark.parametrize("events", ["THERMOSTAT", "TIMETABLE"])
+def test_the_open_loop_goes_through_events(events, build):
     """The room is between 293 K and 295 K, or heated from 0 to 600 s, from 1200 s to 1800 s.
 
     Six events of a thermostat in an hour; the tolerance of the integration is 1e-8 of 300 K.
     """
-    with FMU(build(what)) as fmu:
+    with FMU(build(events)) as fmu:
         estimated = run(fmu, "open_loop", 3600.0)
-    assert estimated == pytest.approx(along(what, 10.0 * np.arange(estimated.size)), abs=1e-4)
+    assert estimated == pytest.approx(along(events, 10.0 * np.arange(estimated.size)), abs=1e-4)
 
 
 def test_a_model_without_derivatives_at_the_design_point_is_told(build):
     """A traceback came of it."""
     system = load_system(build("RELAYS", flags=["-DLOST=0.0"]).parent)
-    said = r"a derivative of 'T' that is nan; at 0 s of its time, at the design point, .*: T = 291"
-    with open_model(system) as fmu, pytest.raises(DesignPointError, match=said):
+    text = r"a derivative of 'T' that is nan; at 0 s of its time, at the design point, .*: T = 291"
+    with open_model(system) as fmu, pytest.raises(DesignPointError, match=text):
         linearised(fmu, system)
 
 
@@ -193,8 +193,8 @@ def test_a_model_that_discards_calls_beyond_its_table_works_within_it(build):
     kinds = {name: estimators_of(system)[name] for name in ("open_loop", "parameter_estimator")}
     left_out = {}
     assert list(prepare(system, kinds, leave_out=left_out.__setitem__).gains) == ["open_loop"]
-    said = "fmi2GetDerivatives returned discard"
-    assert re.search(rf"{said}.* at the design point, .*: T = ", str(left_out.popitem()[1]))
+    message = "fmi2GetDerivatives returned discard"
+    assert re.search(rf"{message}.* at the design point, .*: T = ", str(left_out.popitem()[1]))
     time = 10.0 * np.arange(60.0)
     with open_model(system) as fmu:
         terms = rate_terms(fmu, system)
@@ -203,12 +203,12 @@ def test_a_model_that_discards_calls_beyond_its_table_works_within_it(build):
         within, beyond = np.full((60, 1), 280.0), np.full((60, 1), 200.0)
         warm = np.asarray(estimator(fmu, "open_loop").run(time, within, beyond + 91.0).values)
         assert warm[-1, 0] == pytest.approx(exact(1500.0, 590.0), abs=0.03)
-        with pytest.raises(FMUError, match=said):
+        with pytest.raises(FMUError, match=message):
             estimator(fmu, "open_loop").run(time, beyond, beyond + 91.0)
 
 
 @pytest.mark.parametrize(
-    ("attributes", "size", "said"),
+    ("attributes", "size", "stated"),
     [
         ('start="1e-9"', 1e-9, True),
         ('start="2e5"', 2e5, True),
@@ -216,7 +216,7 @@ def test_a_model_that_discards_calls_beyond_its_table_works_within_it(build):
         ('start="20"', 1.0, False),
     ],
 )
-def test_the_size_of_a_state_follows_what_the_fmu_tells(attributes, size, said, build):
+def test_the_size_of_a_state_follows_what_the_fmu_tells(attributes, size, stated, build):
     """A charge of 1e-9 C had a walk of 2e-4 C, and differences by six times of what it is."""
     folder = build("RELAYS", variables=VARIABLES.replace('start="291"', attributes)).parent
     system = load_system(folder)
@@ -227,7 +227,7 @@ def test_the_size_of_a_state_follows_what_the_fmu_tells(attributes, size, said, 
         doubt = size_doubt(fmu, system, np.full((2, 1), 291.0))
     assert ("T is up to 291, taken for 1e-09" in doubt) == (size == 1e-9)
     with open_model(system) as fmu:  # whose scale of 10 K says more than a start
-        assert (walks(fmu, system) == pytest.approx([2e-4 * size])) != said
+        assert (walks(fmu, system) == pytest.approx([2e-4 * size])) != stated
 
 
 def test_a_time_event_that_stays_due_is_told(build):
@@ -253,8 +253,8 @@ def test_a_derivative_that_is_lost_on_the_way_is_named_with_its_time(build):
 
 def test_a_relay_that_chatters_is_told_with_what_switches_it(build):
     """At 295 K it heats and cools without end: from 291 K after 2000 s ln(19 / 15) = 472.8 s."""
-    said = r"events between two samples at 472\.7.*: its event indicator 1 of 1 changes sign again"
-    with FMU(build("THERMOSTAT", flags=["-DCHATTERS"])) as fmu, pytest.raises(FMUError, match=said):
+    text = r"events between two samples at 472\.7.*: its event indicator 1 of 1 changes sign again"
+    with FMU(build("THERMOSTAT", flags=["-DCHATTERS"])) as fmu, pytest.raises(FMUError, match=text):
         run(fmu, "open_loop", 600.0)
 
 
@@ -332,11 +332,11 @@ def test_a_parameter_is_fitted_through_events(build):
 
 
 @pytest.mark.parametrize(
-    ("warns", "said"),
+    ("warns", "message"),
     [(1, "T is above its table"), (2, "no message, but the status"), (3, "T is above its table")],
 )
 def test_what_the_fmu_warns_of_stands_at_the_top_of_each_answer(
-    warns: int, said: str, build: Build
+    warns: int, message: str, build: Build
 ) -> None:
     """In compiled loops (ekf), in a loop in Python (open loop, with events), and in a fit."""
     system = load_system(build("THERMOSTAT", flags=[f"-DWARNS={warns}"]).parent)
@@ -354,11 +354,11 @@ def test_what_the_fmu_warns_of_stands_at_the_top_of_each_answer(
         if step == 2.0:  # not warm yet
             assert not any("warned" in text for text in first)
         else:
-            assert re.fullmatch(rf"the FMU Room.fmu warned \d+ times, first: {said}.*", first[0])
+            assert re.fullmatch(rf"the FMU Room.fmu warned \d+ times, first: {message}.*", first[0])
     settings = wb.FitSettings(starts=1, profiles=False)
     case = wb.case_from_frame(system, pd.DataFrame(columns | {"T [K]": 293.0 + noise[1]}))
     outcome = wb.fit(system, [case], ["T"], settings=settings, workers=1, report=lambda line: None)
-    assert re.search(rf"warned \d+ times, first: {said}", outcome.doubts[0])
+    assert re.search(rf"warned \d+ times, first: {message}", outcome.doubts[0])
     # A diagnosis runs an FMU around this one.
     around = system.source.parent / "Around.fmu"
     term = RateTerm("added", 0, CONSTANT, 1.0, "", 1.0, "", "a constant")
@@ -366,7 +366,7 @@ def test_what_the_fmu_warns_of_stands_at_the_top_of_each_answer(
     with FMU(around) as fmu:
         fmu.start({"T": 293.0})
         fmu.derivatives()
-        assert re.search(f"Around.fmu warned once: {said}", fmu.take_warning())
+        assert re.search(f"Around.fmu warned once: {message}", fmu.take_warning())
 
 
 def test_a_stop_says_what_the_fmu_warns_of(build):
@@ -375,14 +375,14 @@ def test_a_stop_says_what_the_fmu_warns_of(build):
     stopping = replace(stopping_of(TRAIN), state="T", longest=600.0)
     drive = DrivingInputs(np.zeros(1), np.zeros(1), np.zeros(1), np.full((1, 2), 280.0))
     with open_model(system) as fmu:
-        for rest, begin, warns in ((293.0, 296.0, True), (290.0, 291.5, False)):
-            simulation = StopSimulation(fmu, system, replace(stopping, rest=rest))
+        for speed, begin, warns in ((293.0, 296.0, True), (290.0, 291.5, False)):
+            simulation = StopSimulation(fmu, system, replace(stopping, rest=speed))
             stop = simulation.run(drive, {"T": begin})
             assert ("T is above its table" in stop.warned) == warns
 
 
 @pytest.mark.parametrize(
-    ("what", "recorded", "said"),
+    ("events", "recorded", "doubt"),
     [
         ("RELAYS", lambda T: 1000.0 * T, "T is about 1000 times what the model says, which runs"),
         ("THERMOSTAT", lambda T: 1000.0 * T, "T is about 1000 times what the model says"),
@@ -390,10 +390,10 @@ def test_a_stop_says_what_the_fmu_warns_of(build):
         ("RELAYS", lambda T: T + 5.0, ""),
     ],
 )
-def test_another_unit_is_asked_about_where_the_model_says_no_start(what, recorded, said, build):
+def test_another_unit_is_asked_about_where_the_model_says_no_start(events, recorded, doubt, build):
     """Of a heated room, through events or without. The scale is as wrong as the recording."""
     unsaid = VARIABLES.replace(' initial="exact"><Real start="291"/>', "><Real/>")
-    file = build(what, variables=unsaid).parent / "system.toml"
+    file = build(events, variables=unsaid).parent / "system.toml"
     line = 'outputs.T = { unit = "K", noise = "0.05 K", scale = "'
     edit(file, (f"{line}10 K", f"{line}100000 K"))
     system, time = load_system(file), 10.0 * np.arange(60.0)
@@ -403,7 +403,7 @@ def test_another_unit_is_asked_about_where_the_model_says_no_start(what, recorde
     case = wb.case_from_frame(system, pd.DataFrame(columns))
     simulation = prepare(system, {"open_loop": estimators_of(system)["open_loop"]})
     warnings = [text for text in simulation.warnings(case) if "what the model says" in text]
-    assert [text[: len(said)] for text in warnings] == [said] * bool(said)
+    assert [text[: len(doubt)] for text in warnings] == [doubt] * bool(doubt)
 
 
 def test_a_boolean_input_that_starts_as_a_word_is_0_and_1(build):
@@ -493,16 +493,16 @@ def consistency(law: Estimator, time: np.ndarray, truth: dict[str, np.ndarray], 
 
 
 @pytest.mark.parametrize("name", ["ekf", "ukf"])
-@pytest.mark.parametrize("what", ["THERMOSTAT", "TIMETABLE"])
-def test_kalman_filters_go_through_events(what, name, build):
+@pytest.mark.parametrize("events", ["THERMOSTAT", "TIMETABLE"])
+def test_kalman_filters_go_through_events(events, name, build):
     """A heat loss of 60 W/K in place of 50, by the closed form; six events in an hour.
 
     Chi-squared of 1440 innovations to five standard deviations. Walks are declared, of which the
     room has none, so that bands are somewhat wide.
     """
     time = 10.0 * np.arange(361.0)
-    truth = {"T": along(what, time, 60.0), "G": np.full(time.size, 60.0)}
-    with FMU(build(what, saves=True)) as fmu:
+    truth = {"T": along(events, time, 60.0), "G": np.full(time.size, 60.0)}
+    with FMU(build(events, saves=True)) as fmu:
         law = estimator(fmu, name)
         square, inside = consistency(law, time, truth, "T")
         assert not law.doubt
@@ -665,20 +665,20 @@ def test_a_live_filter_hears_of_an_event_that_is_told_once(build):
 
 @pytest.mark.parametrize("name", ["ekf", "ukf"])
 @pytest.mark.parametrize(
-    ("what", "flag", "said"),
+    ("events", "flag", "text"),
     [
         ("THERMOSTAT", "-DFORGETS", "keeps more than its saved state holds"),
         ("TIMETABLE", "-DCONTROLS=2000.0", "what an event sets follows from states"),
     ],
 )
-def test_filters_refuse_discrete_states_that_they_do_not_know(what, flag, said, name, build):
+def test_filters_refuse_discrete_states_that_they_do_not_know(events, flag, text, name, build):
     """A mode that a saved state has not, and a power that a sampled controller sets by states.
 
     Bands of 0.0016 about what was off by 0.02, and such that held the truth in 3 of 100 samples.
     """
     time = 10.0 * np.arange(181.0)
     y, u = along("THERMOSTAT", time, 55.0)[:, None], np.full((time.size, 1), 280.0)
-    with FMU(build(what, flags=[flag], saves=True)) as fmu, pytest.raises(FMUError, match=said):
+    with FMU(build(events, flags=[flag], saves=True)) as fmu, pytest.raises(FMUError, match=text):
         estimator(fmu, name).run(time, u, y)
 
 
@@ -686,18 +686,18 @@ CONTINUOUS_POWER = VARIABLES.replace('variability="discrete"><Real/>', "><Real/>
 
 
 @pytest.mark.parametrize(
-    ("flag", "said"),
+    ("flag", "message"),
     [
         ("-DLATE", "once a step is said to be over, without an event"),
         ("-DUNREAD", "before derivatives are read"),
     ],
 )
-def test_outputs_that_follow_other_calls_alone_are_refused(flag, said, build):
+def test_outputs_that_follow_other_calls_alone_are_refused(flag, message, build):
     """They were those of the sample before, or of a point within the step."""
     x, u = 291.0 + np.arange(3.0)[:, None], np.full((3, 1), 280.0)
     with FMU(build("TIMETABLE", variables=CONTINUOUS_POWER, flags=[flag])) as fmu:
         fmu.start({})
-        with pytest.raises(NoFunctionError, match=rf"' is .* {said}"):
+        with pytest.raises(NoFunctionError, match=rf"' is .* {message}"):
             fmu.require_function(["Ta"], ["P"], np.arange(3.0), x, u)
 
 
@@ -769,16 +769,16 @@ def test_a_switch_in_code_that_remembers_is_refused_along_a_recording(build):
     frame = {"time [s]": time, "Ta [K]": 280.0 + noise[0], "T [K]": inside}
     case = wb.case_from_frame(system, pd.DataFrame(frame))
     settings = wb.FitSettings(starts=1, profiles=False)
-    said = r"'der\(T\)' is .* the model remembers calls, and no event tells it"
-    with pytest.raises(FMUError, match=said):
+    message = r"'der\(T\)' is .* the model remembers calls, and no event tells it"
+    with pytest.raises(FMUError, match=message):
         wb.fit(system, [case], ["G"], settings=settings, workers=1, report=lambda line: None)
-    with pytest.raises(FMUError, match=said):
+    with pytest.raises(FMUError, match=message):
         wb.diagnose(system, [case, case], effects=["G"], workers=1, report=lambda line: None)
-    with pytest.raises(FMUError, match=said):
+    with pytest.raises(FMUError, match=message):
         wb.tune(system, "ekf", [case], workers=1, report=lambda line: None)
     for name in ("open_loop", "ekf"):
         run = wb.observe(system, case, name)
-        assert re.search(said, run.message)
+        assert re.search(message, run.message)
         assert np.isnan(run.estimate).all()
 
 
@@ -797,23 +797,23 @@ def test_inputs_of_whole_numbers_act_in_whole_simulations(build):
 
 
 @pytest.mark.parametrize("saves", [True, False])
-@pytest.mark.parametrize("kind", ["THERMOSTAT", "DELAY", "arrays"])
-def test_the_check_says_of_each_use_what_commands_do(kind, saves, build, arrays, capsys):
+@pytest.mark.parametrize("model", ["THERMOSTAT", "DELAY", "arrays"])
+def test_the_check_says_of_each_use_what_commands_do(model, saves, build, arrays, capsys):
     """Events, a delay, states that are arrays; whatever has no Co-Simulation has no solver."""
-    if kind == "arrays":
+    if model == "arrays":
         path, u, y = arrays(), "u[2]", "y[2]"
     else:
-        flags = ["-DDELAY=100.0"] * (kind == "DELAY")
-        what = "RELAYS" if flags else kind
-        path, u, y = build(what, saves=saves, flags=flags), "Ta", "T"
+        flags = ["-DDELAY=100.0"] * (model == "DELAY")
+        events = "RELAYS" if flags else model
+        path, u, y = build(events, saves=saves, flags=flags), "Ta", "T"
     assert main(["fmu", "check", str(path), "--instantiations", "3", "--json"]) == 1
     possible = json.loads(capsys.readouterr().out)["result"]["uses"]
     assert not possible["fit and diagnosis"]
     assert possible["tools that use its own solver"] == ["Co-Simulation"]
-    assert bool(possible["tools that roll back"]) != (saves and kind != "arrays")
+    assert bool(possible["tools that roll back"]) != (saves and model != "arrays")
     system = load_system(path.parent)
     time = system.sample_time * np.arange(200.0)
-    measured = along("THERMOSTAT", time) if kind == "THERMOSTAT" else 291.0 + 0.0 * time
+    measured = along("THERMOSTAT", time) if model == "THERMOSTAT" else 291.0 + 0.0 * time
     uses = {
         "open_loop": "open loop",
         "ekf": "ekf and ukf on recordings",
@@ -839,11 +839,11 @@ def test_the_check_bears_a_full_vessel_and_one_that_integrates_alone(flag, build
 
 def bouncing(folder: Path, library: Path, able: str = "") -> Path:
     """The FMU of a ball, with more that it is able to, and its system file beside it."""
-    said = machine_file("ball/modelDescription.xml").replace(
+    described = machine_file("ball/modelDescription.xml").replace(
         "<ModelExchange", f"<ModelExchange{able}"
     )
     with zipfile.ZipFile(folder / "Ball.fmu", "w") as archive:
-        archive.writestr(XML, said)
+        archive.writestr(XML, described)
         archive.write(library, f"{BINARY}/Ball{fmpy.sharedLibraryExtension}")
     (folder / "system.toml").write_text(machine_file("ball/system.toml"))
     return folder / "Ball.fmu"
@@ -893,7 +893,7 @@ def test_a_filter_that_does_not_know_when_a_thermostat_switches_says_so(name, bu
     result = prepare(system, choose(system, [name])).run(
         wb.case_from_frame(system, pd.DataFrame(columns))
     )
-    assert any(f"{name} does not know at which sample" in said for said in result.warnings())
+    assert any(f"{name} does not know at which sample" in warning for warning in result.warnings())
 
 
 def test_a_filter_beside_a_running_machine_goes_on_through_events(build):
@@ -918,20 +918,20 @@ def test_what_does_not_go_through_events_says_so_of_an_fmu_that_saves_its_state_
 
 
 @pytest.mark.parametrize(
-    ("what", "flags", "status", "said"),
+    ("events", "flags", "status", "message"),
     [
         ("TIMETABLE", [], 1, "it has events, which disturbance_observer does not go through"),
         ("RELAYS", ["-DWARNS=1"], 0, "day: the FMU Room.fmu warned "),
     ],
 )
 def test_a_tuning_tells_events_that_it_does_not_go_through_and_what_the_fmu_warns_of(
-    what, flags, status, said, build, tmp_path, capsys
+    events, flags, status, message, build, tmp_path, capsys
 ):
-    folder = build(what, saves=True, flags=flags).parent
+    folder = build(events, saves=True, flags=flags).parent
     (folder / "day").mkdir()
     time = 10.0 * np.arange(91.0)
     columns = {"time [s]": time, "Ta [K]": 280.0 + 0.0 * time, "T [K]": along("TIMETABLE", time)}
-    if what == "RELAYS":
+    if events == "RELAYS":
         columns["T [K]"] = exact(1500.0, time)
     columns["G [W/K]"] = 50.0 + 0.0 * time
     pd.DataFrame(columns).to_csv(folder / "day" / "measured.csv", index=False)
@@ -941,8 +941,8 @@ def test_a_tuning_tells_events_that_it_does_not_go_through_and_what_the_fmu_warn
     options = ["--system", folder, "--cases", folder / "day", "--workers", "1", "--quiet"]
     out = ["--out", tmp_path / "tuned", "--budget", "2"]
     assert main(["tune", "disturbance_observer", *map(str, [*options, *out])]) == status
-    told = capsys.readouterr()
-    assert said in told.out + told.err
+    printed = capsys.readouterr()
+    assert message in printed.out + printed.err
 
 
 def test_the_open_loop_goes_on_where_a_model_asks_for_event_mode_that_has_no_indicators(build):
@@ -955,9 +955,9 @@ def test_the_open_loop_goes_on_where_a_model_asks_for_event_mode_that_has_no_ind
     assert estimated[-1] < 293.0
 
 
-@pytest.mark.parametrize("what", ["THERMOSTAT", "FUSE"])
-def test_the_last_sample_may_not_be_beyond_an_event(what, build):
-    with FMU(build(what)) as fmu:
+@pytest.mark.parametrize("events", ["THERMOSTAT", "FUSE"])
+def test_the_last_sample_may_not_be_beyond_an_event(events, build):
+    with FMU(build(events)) as fmu:
         fmu.start({})
         fmu.set_states(np.array([296.0]))
         with pytest.raises(EventError, match=r"an event of the model.*asks for Event Mode"):
@@ -994,8 +994,8 @@ def test_parameters_are_set_by_their_type_where_references_repeat(build):
 
 def test_an_enumeration_takes_its_items_alone(build):
     """It has holes: of `off`, 0, and `boost`, 2, the value 1 is none, and was set all the same."""
-    kind = '<Enumeration declaredType="Mode" start="0"/>'
-    with FMU(build("RELAYS", variables=VARIABLES.replace('<Integer start="0"/>', kind))) as fmu:
+    mode = '<Enumeration declaredType="Mode" start="0"/>'
+    with FMU(build("RELAYS", variables=VARIABLES.replace('<Integer start="0"/>', mode))) as fmu:
         fmu.start({}, {"mode": 2.0})
         with pytest.raises(InputError, match="found the value 1; expected 0, 2, an item"):
             fmu.start({}, {"mode": 1.0})
@@ -1035,7 +1035,7 @@ def test_the_open_loop_sets_discrete_inputs_at_events_and_reads_whole_numbers(bu
 
 
 @pytest.mark.parametrize(
-    ("correction", "found"),
+    ("correction", "message"),
     [
         ("C", "'C', which is a fixed variable of causality parameter"),
         ("G", "'G', which is an estimated quantity"),
@@ -1044,9 +1044,9 @@ def test_the_open_loop_sets_discrete_inputs_at_events_and_reads_whole_numbers(bu
         ("T", "'T', which is a measured output"),
     ],
 )
-def test_a_correction_is_an_input_of_its_own(correction, found, build):
+def test_a_correction_is_an_input_of_its_own(correction, message, build):
     path = build("RELAYS", correction=correction)
-    with FMU(path) as fmu, pytest.raises(InputError, match=f"correction: found {found}"):
+    with FMU(path) as fmu, pytest.raises(InputError, match=f"correction: found {message}"):
         estimator(fmu, "ekf")
 
 
@@ -1062,10 +1062,10 @@ def test_compiled_code_gets_samples_of_the_size_that_it_needs(build):
 @pytest.mark.parametrize("reference", [2, 3])
 def test_a_correction_that_is_another_variable_by_its_reference_is_refused(reference, build):
     """That of Ta, and of G: the estimate would add what overwrote G."""
-    one = VARIABLES.replace(
+    shared = VARIABLES.replace(
         'name="dG" valueReference="4"', f'name="dG" valueReference="{reference}"'
     )
-    file = build("RELAYS", variables=one).parent / "system.toml"
+    file = build("RELAYS", variables=shared).parent / "system.toml"
     with pytest.raises(InputError, match=f"another name of '(Ta|G)'.*reference {reference}"):
         load_system(file)
 
@@ -1085,21 +1085,21 @@ def test_values_outside_of_the_ranges_of_the_model_are_refused(build):
 
 
 @pytest.mark.parametrize(
-    ("causality", "kind", "found"),
+    ("causality", "interval", "message"),
     [
         ("input", "constant", "input clocks, tick"),
         ("input", "triggered", "input clocks, tick"),
         ("local", "countdown", "a clock 'tick' that follows time and is no input"),
     ],
 )
-def test_a_model_with_clocks_is_refused(causality, kind, found, tmp_path):
+def test_a_model_with_clocks_is_refused(causality, interval, message, tmp_path):
     """Equations that wait for them would stand still; those of time FMI has as inputs alone."""
     clock = f'<Clock name="tick" valueReference="5" causality="{causality}" '
-    clock += f'intervalVariability="{kind}"/></ModelVariables>'
+    clock += f'intervalVariability="{interval}"/></ModelVariables>'
     text = machine_file("arrays_fmu/modelDescription.xml").replace("</ModelVariables>", clock)
     with zipfile.ZipFile(tmp_path / "Clocked.fmu", "w") as archive:
         archive.writestr(XML, text)
-    with pytest.raises(InputError, match=f"found {found}"):
+    with pytest.raises(InputError, match=f"found {message}"):
         FMU(tmp_path / "Clocked.fmu")
 
 
@@ -1180,21 +1180,21 @@ def test_names_of_a_system_file_may_come_from_the_command_line(build, capsys):
 
 
 @pytest.mark.parametrize(
-    ("flag", "said"),
+    ("flag", "message"),
     [
         ("-DWARNS=1", r"one: the FMU Room.fmu warned \d+ times, first: T is"),
         ("-DLOST=292.0", r"no solution, with a derivative of 'T' that is nan; at 10 s"),
     ],
 )
-def test_observability_says_where_the_fmu_leaves_its_table(flag, said, build, capsys):
+def test_observability_says_where_the_fmu_leaves_its_table(flag, message, build, capsys):
     path = build("RELAYS", flags=[flag])
     file = recorded(path.parent) / "measured.csv"
     edit(file, (",291.", ",293."))  # K: half are above its table
     given = ["--system", path.parent / "system.toml", "--out", path.parent / "out"]
     status = main(["observability", *map(str, [file.parent, *given])])
-    told = capsys.readouterr()
+    printed = capsys.readouterr()
     assert status == int("LOST" in flag)
-    assert re.search(said, told.out + told.err)
+    assert re.search(message, printed.out + printed.err)
 
 
 def test_an_estimator_that_meets_an_event_at_once_leaves_the_others(build, capsys):
@@ -1503,8 +1503,8 @@ def test_co_simulation_with_steps_of_a_size_that_nothing_says_goes_in_those(tmp_
 def test_a_step_that_a_co_simulation_discards_says_how_far_it_came(tmp_path, compiled):
     folder = build_integrator(tmp_path, compiled("co_simulation.c", "-DLONGEST=0.25"))
     path = rewritten(folder / "Alone.fmu", tmp_path / "Short.fmu", edits(XML, ANY_STEP))
-    said = r"step of 1 s from 0 s of its time, of which it made 0\.25 s\. Record at steps"
-    with CoSimulation(path) as fmu, pytest.raises(FMUError, match=said):
+    message = r"step of 1 s from 0 s of its time, of which it made 0\.25 s\. Record at steps"
+    with CoSimulation(path) as fmu, pytest.raises(FMUError, match=message):
         Simulation(fmu, ["u"], ["x"], [True]).run(Drive(np.arange(4.0), np.ones((4, 1))), {})
 
 
@@ -1594,19 +1594,19 @@ def test_the_open_loop_and_a_diagnosis_read_and_set_elements_of_arrays(arrays):
 
 
 @pytest.mark.parametrize(
-    ("interface", "flag", "said"),
+    ("interface", "flag", "message"),
     [
         ("ModelExchange", "-DINDICATORS=1", "EventIndicators says 1, and the model structure"),
         ("CoSimulation", "-DSHARE=0.5", "ends the step at 0.25 s, where it was told that steps"),
         ("CoSimulation", "-DSHARE=1.0", ""),
     ],
 )
-def test_what_an_fmu_does_otherwise_than_it_says_is_refused(interface, flag, said, arrays):
+def test_what_an_fmu_does_otherwise_than_it_says_is_refused(interface, flag, message, arrays):
     """More events than it describes, which were passed over; half of each step."""
     path = arrays(interface, flag)
     fmu_class = FMU if interface == "ModelExchange" else CoSimulation
     drive = Drive(0.5 * np.arange(3.0), np.zeros((3, 0)))
-    with pytest.raises(FMUError, match=said) if said else nullcontext():  # noqa: SIM117
+    with pytest.raises(FMUError, match=message) if message else nullcontext():  # noqa: SIM117
         with fmu_class(path) as fmu:
             values = Simulation(fmu, [], ["y[2]"], []).run(drive, {})
             np.testing.assert_allclose(values[:, 0], 2.0 * np.exp(-2.0 * drive.time))

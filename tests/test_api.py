@@ -53,8 +53,8 @@ def test_a_script_needs_no_guard_from_file_to_diagnosis(root, folder):
     run = python("-W", "error", script, cwd=folder, MPLBACKEND="agg")
     assert run.returncode == 0, run.stderr
     assert run.stdout.count("[1/2] z ") == 1
-    said = "The model lacks a wall that seeps in proportion to the level: Seepage, k 0.0004"
-    assert run.stdout.count(said) == 1
+    sentence = "The model lacks a wall that seeps in proportion to the level: Seepage, k 0.0004"
+    assert run.stdout.count(sentence) == 1
     assert "no law: the diagnosis: found the verdict 'found'" in run.stdout
 
 

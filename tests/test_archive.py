@@ -70,10 +70,10 @@ def test_a_name_that_leads_elsewhere_is_refused(name, tmp_path):
     assert not (tmp_path / "outside").exists()
 
 
-@pytest.mark.parametrize("kind", [stat.S_IFLNK, stat.S_IFIFO, stat.S_IFCHR])
-def test_a_link_or_device_is_refused(kind, tmp_path):
+@pytest.mark.parametrize("file_type", [stat.S_IFLNK, stat.S_IFIFO, stat.S_IFCHR])
+def test_a_link_or_device_is_refused(file_type, tmp_path):
     entry = zipfile.ZipInfo("resources/link")
-    entry.external_attr = (kind | 0o777) << 16
+    entry.external_attr = (file_type | 0o777) << 16
     with pytest.raises(InputError, match="'resources/link', which is a link or a device"):
         FMU(with_entry(tmp_path / "evil.fmu", entry, b"/etc/passwd"))
 

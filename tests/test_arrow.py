@@ -154,10 +154,10 @@ def test_a_model_without_blocks_has_the_extended_filter():
 
 def test_a_model_whose_structure_is_not_said_is_one_block(filling, vessels):
     """As of exporters that leave it out, which FMI allows."""
-    said = filling.description
-    filling.description = replace(said, dependencies={})
+    description = filling.description
+    filling.description = replace(description, dependencies={})
     _, estimator = made(filling, vessels)
-    filling.description = said
+    filling.description = description
     assert estimator._blocks.first.tolist() == [0, 12, 12]
 
 

@@ -65,10 +65,10 @@ def test_innovations_do_not_contradict_bands_of_a_model_and_noise_that_are_right
 def test_a_score_by_what_corrects_an_estimator_says_so(vessel):
     """V follows its sensor as closely as gains let it."""
     result = result_of(vessel, 1.0, 0)
-    said = "V corrects the estimators that it scores"
-    assert format_table(vessel, [result]).splitlines()[1].startswith(said)
-    assert said in result.summary()
-    assert said in summarise_runs(vessel, [result], {"run": {}})["answer"]["sentence"]
+    doubt = "V corrects the estimators that it scores"
+    assert format_table(vessel, [result]).splitlines()[1].startswith(doubt)
+    assert doubt in result.summary()
+    assert doubt in summarise_runs(vessel, [result], {"run": {}})["answer"]["sentence"]
     # A gauge of the outflow is fed to none.
     (meter,) = [output for output in vessel.outputs if output.name == "through"]
     objective = replace(vessel.objective, signal="gauge", weights={"gauge": 1.0})
@@ -96,11 +96,11 @@ def test_gains_that_repeat_the_noise_of_what_scores_them_score_worse(vessel):
 def test_bands_that_innovations_contradict_are_told_at_the_top_of_all_that_is_read(vessel):
     result = result_of(vessel, 3.0, 0)
     assert list(result.contradicted) == ["ekf", "mhe"]
-    said = "Bands of ekf are too narrow in filled: innovations have "
-    assert format_table(vessel, [result]).splitlines()[2].startswith(said)
-    assert said in result.summary()
+    doubt = "Bands of ekf are too narrow in filled: innovations have "
+    assert format_table(vessel, [result]).splitlines()[2].startswith(doubt)
+    assert doubt in result.summary()
     summary = summarise_runs(vessel, [result], {"run": {}})
-    assert said in summary["answer"]["sentence"]
+    assert doubt in summary["answer"]["sentence"]
     assert summary["cases"]["filled"]["contradicted"]["ekf"] == pytest.approx(
         result.surprise("ekf"), abs=5e-4
     )
@@ -131,14 +131,14 @@ def test_a_start_that_is_farther_off_than_it_is_said_to_be_is_named(vessel):
 
 
 def innovations(
-    rng: np.random.Generator, walk: float, said: float, count: int = 400
+    rng: np.random.Generator, walk: float, stated: float, count: int = 400
 ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
     """Residuals and deviations of a filter on a walk, of which it says another, in unit noise."""
     truth = np.cumsum(walk * rng.standard_normal(count))
     samples = truth + rng.standard_normal(count)
     x, P, values, deviations = 0.0, 1.0, [], []
     for sample in samples:
-        P += said**2
+        P += stated**2
         gain = P / (P + 1.0)
         x, P = x + gain * (sample - x), (1.0 - gain) * P
         values.append(sample - x)
@@ -216,9 +216,9 @@ def test_coarse_steps_are_told_of_estimators_that_have_no_others(tmp_path):
     start = result.case["s"][0] - 0.5  # where the swing begins as measured, it stays off by that
     assert result.runs["open_loop"].signal("s") - exact == pytest.approx(0.0, abs=abs(start) + 1e-4)
     assert result.step_share > 0.9
-    (said,) = [text for text in result.warnings() if "damps what swings" in text]
-    assert said.startswith("disturbance_observer: one step")
-    assert said in format_table(result.system, [result])
+    (doubt,) = [text for text in result.warnings() if "damps what swings" in text]
+    assert doubt.startswith("disturbance_observer: one step")
+    assert doubt in format_table(result.system, [result])
 
 
 def test_an_error_that_the_model_makes_is_not_put_down_to_steps(tmp_path):

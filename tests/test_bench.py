@@ -102,7 +102,7 @@ def test_the_schema_of_times_has_what_is_written_of_them():
     sections = summaries()["bench"]["properties"]
     observers, tuning = (sections[name]["properties"] for name in ("observers", "tuning"))
     beside = {"ratios", "unit", "steps_per_second"}
-    for kind, schema in (
+    for cls, schema in (
         (CallTimes, sections["calls"]["additionalProperties"]),
         (ObserverTimes, observers["steps"]["items"]),
         (ProcessTimes, observers["processes"]),
@@ -112,7 +112,7 @@ def test_the_schema_of_times_has_what_is_written_of_them():
         (TuningMemory, tuning["memory"]),
     ):
         assert set(schema["properties"]) - beside == {
-            field.name for field in dataclasses.fields(kind)
+            field.name for field in dataclasses.fields(cls)
         }
         assert schema["required"] == list(schema["properties"])
         assert not schema["additionalProperties"]
@@ -132,17 +132,17 @@ def test_a_delay_in_the_interface_shows_in_the_ratio(minimal_path, tmp_path, at)
 
 
 @pytest.mark.parametrize(
-    ("right", "wrong", "found"),
+    ("right", "wrong", "message"),
     [
         ("xdot[k] = source[k]", "xdot[k] = 1.0", "derivatives differ"),
         ("sensitivity[k] = zero", "sensitivity[k] = 1.0", "Jacobians differ"),
     ],
 )
 def test_an_interface_that_gives_other_numbers_is_refused(
-    minimal_path, tmp_path, at, right, wrong, found
+    minimal_path, tmp_path, at, right, wrong, message
 ):
     changed = change_source(minimal_path, tmp_path / "wrong.fmu", "instance.c", right, wrong)
-    with pytest.raises(InputError, match=rf"wrong\.fmu: found {found}"):
+    with pytest.raises(InputError, match=rf"wrong\.fmu: found {message}"):
         timed(changed, at)
 
 
@@ -295,8 +295,8 @@ def test_the_table_has_the_ratios_and_says_what_was_not_measured():
     memory = TuningMemory(master=290_000_000, worker=270_000_000, total=840_000_000)
     rates = WorkerRates(cases=14, candidates=60, one=15.0, two=28.5, dask=27.0)
     table = format_tuning(evaluations, rates, memory)
-    for said in ("150x", "1.90 times as many", "0.95 times as many", "840 MB in all processes"):
-        assert said in table
+    for text in ("150x", "1.90 times as many", "0.95 times as many", "840 MB in all processes"):
+        assert text in table
     assert "no package 'distributed'" in format_tuning(
         evaluations, replace(rates, dask=None), memory
     )

@@ -424,10 +424,10 @@ def test_a_table_that_is_missing_or_no_table_is_refused(tmp_path, table):
     lines = TOML.splitlines()
     begin = lines.index(f"[{table}]")
     end = next((i for i in range(begin + 1, len(lines)) if lines[i][0] == "["), len(lines))
-    rest = "\n".join(lines[:begin] + lines[end:])
-    missing = write(tmp_path / "a", toml=rest)
+    others = "\n".join(lines[:begin] + lines[end:])
+    missing = write(tmp_path / "a", toml=others)
     assert_refused(f"found no '{table}'", lambda: read(missing))
-    number = write(tmp_path / "b", toml=f"{table} = 1\n{rest}")
+    number = write(tmp_path / "b", toml=f"{table} = 1\n{others}")
     assert_refused(f"{table}: found 1; expected a table", lambda: read(number))
 
 

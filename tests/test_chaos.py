@@ -24,13 +24,13 @@ def tune(tmp_path_factory) -> Undisturbed:
 
 # `test_tune` kills.
 @pytest.mark.long
-@pytest.mark.parametrize("kind", ["interrupt", "full disk"])
+@pytest.mark.parametrize("disturbance", ["interrupt", "full disk"])
 def test_a_tuning_that_is_ended_goes_on_to_the_same_gains_and_leaves_no_process(
-    kind, tune, tmp_path
+    disturbance, tune, tmp_path
 ):
-    if kind == "full disk" and not can_starve():
+    if disturbance == "full disk" and not can_starve():
         pytest.skip("this machine lets users mount no disk of their own")
-    failures = disturb(tune, kind, Random(kind), tmp_path)
+    failures = disturb(tune, disturbance, Random(disturbance), tmp_path)
     assert [
         str(failure) for failure in failures if failure.what in ("end", "process", "results")
     ] == []

@@ -242,8 +242,8 @@ def package(tmp_path) -> Path:
 
 def stand_in(folder: Path, monkeypatch: pytest.MonkeyPatch, prints: str, *, builds: bool) -> Path:
     """Put a program 'omc' on the PATH; returns the file in which it notes its call."""
-    calls, said, built = folder / "calls", folder / "said", folder / "built"
-    said.write_text(prints)
+    calls, output, built = folder / "calls", folder / "said", folder / "built"
+    output.write_text(prints)
     with zipfile.ZipFile(built, "w") as archive:
         archive.writestr("modelDescription.xml", OFFERS)
         archive.writestr("binaries/linux64/M.so", OFFERS)
@@ -251,7 +251,7 @@ def stand_in(folder: Path, monkeypatch: pytest.MonkeyPatch, prints: str, *, buil
     program.parent.mkdir()
     leave = f"cp {built} M.fmu" if builds else ":"
     program.write_text(
-        f'#!/bin/sh\necho "$@" > {calls}\ncat build.mos >> {calls}\n{leave}\ncat {said}\n'
+        f'#!/bin/sh\necho "$@" > {calls}\ncat build.mos >> {calls}\n{leave}\ncat {output}\n'
     )
     program.chmod(0o755)
     monkeypatch.setenv("PATH", f"{program.parent}:/bin:/usr/bin")

@@ -50,11 +50,11 @@ def test_progress_goes_to_standard_error_unless_nobody_asks(tmp_path, capsys):
     case = "cases/01_dry_80_1.5"
     arguments = ["simulate", case, "--estimator", "ekf", "--workers", "1", "--out", str(tmp_path)]
     assert main(arguments) == 0
-    said, progress = capsys.readouterr()
+    printed, progress = capsys.readouterr()
     assert re.search(r"^\[  1/1\] 01_dry_80_1\.5 .* s, about 0 s left$", progress, re.MULTILINE)
-    assert "s left" not in said
+    assert "s left" not in printed
     assert main(["--quiet", *arguments]) == 0
-    assert capsys.readouterr() == (said, "")
+    assert capsys.readouterr() == (printed, "")
 
 
 @pytest.mark.parametrize("options", [[], ["--json"]])
@@ -182,7 +182,7 @@ def test_a_sound_installation_has_nothing_wrong(capsys):
     offered = {
         finding["name"]: finding for finding in document(["doctor"], capsys)["result"]["findings"]
     }
-    assert {one["state"] for one in offered.values()} <= {"ok", "missing"}
+    assert {extra["state"] for extra in offered.values()} <= {"ok", "missing"}
     assert offered["fmus/fmi2/Reference.fmu"]["state"] == "ok"
     if offered["extra [compiler]"]["state"] == "ok":
         assert offered["compiler"]["found"] == "compiled and ran a model with the state x"
@@ -207,11 +207,11 @@ def test_the_cache_is_measured_by_part_and_deleted_on_demand(tmp_path, monkeypat
         (folder / part / "deeper" / "file").write_bytes(bytes(size))
     monkeypatch.setattr(doctor, "missing_packages", lambda extra: ["casadi"] * bool(extra))
     assert main(["doctor"]) == 0
-    said = capsys.readouterr().out
-    assert f"{folder}: 5 MB (FMUs 2 MB, compiled loops 3 MB)" in said
+    printed = capsys.readouterr().out
+    assert f"{folder}: 5 MB (FMUs 2 MB, compiled loops 3 MB)" in printed
     assert main(["doctor", "--clean"]) == 0
-    said = capsys.readouterr().out
-    assert f"{folder}: 5 MB deleted" in said
+    printed = capsys.readouterr().out
+    assert f"{folder}: 5 MB deleted" in printed
     assert list(folder.iterdir()) == []
 
 
@@ -226,12 +226,12 @@ def test_a_changed_fmu_and_a_cache_out_of_reach_are_told_with_what_to_do(
     monkeypatch.setattr(doctor, "missing_packages", lambda extra: ["casadi"] * bool(extra))
     monkeypatch.setenv("XDG_CACHE_HOME", "/dev/null")
     assert main(["doctor"]) == 1
-    said = capsys.readouterr().out
+    text = capsys.readouterr().out
     assert re.search(
-        r"^wrong +fmus/fmi2/Reference.fmu +its SHA-256 is not that", said, re.MULTILINE
+        r"^wrong +fmus/fmi2/Reference.fmu +its SHA-256 is not that", text, re.MULTILINE
     )
-    assert re.search(r"^wrong +fmus/fmi3/Reference.fmu +no such file$", said, re.MULTILINE)
-    assert re.search(r"^ +to do: make fmus$", said, re.MULTILINE)
-    assert re.search(r"^missing +extra \[compiler\] +for .*; without casadi$", said, re.MULTILINE)
-    assert re.search(r"^wrong +cache +/dev/null/", said, re.MULTILINE)
-    assert "set XDG_CACHE_HOME to a folder that can be written" in said
+    assert re.search(r"^wrong +fmus/fmi3/Reference.fmu +no such file$", text, re.MULTILINE)
+    assert re.search(r"^ +to do: make fmus$", text, re.MULTILINE)
+    assert re.search(r"^missing +extra \[compiler\] +for .*; without casadi$", text, re.MULTILINE)
+    assert re.search(r"^wrong +cache +/dev/null/", text, re.MULTILINE)
+    assert "set XDG_CACHE_HOME to a folder that can be written" in text

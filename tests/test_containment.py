@@ -44,7 +44,7 @@ def places(tmp_path, monkeypatch) -> Path:
 @pytest.fixture
 def plan(monkeypatch) -> Callable[[str], None]:
     """Sets what the FMU does."""
-    return lambda what: monkeypatch.setenv("HOSTILE", what)
+    return lambda call: monkeypatch.setenv("HOSTILE", call)
 
 
 CALL = "fmi2GetDerivatives"
@@ -112,18 +112,18 @@ WRONGS = {
 
 @pytest.mark.parametrize("wrong", WRONGS)
 def test_what_a_call_does_without_an_error_and_may_not_is_told(wrong, root, tmp_path):
-    function, code, said = WRONGS[wrong]
+    function, code, message = WRONGS[wrong]
 
     def change(folder: Path) -> None:
         file = folder / "sources" / "fmi2.c"
         head = rf"(?m)^fmi2Status {function}\([^{{;]*\) \{{"
-        text, count = re.subn(head, lambda found: f"{found[0]} {code}", file.read_text())
+        text, count = re.subn(head, lambda match: f"{match[0]} {code}", file.read_text())
         assert count == 1
         file.write_text(text)
         compile_library(folder, NAME)
 
     path = rewritten(root / "fmus" / "fmi2" / f"{NAME}.fmu", tmp_path / "wrong.fmu", change)
-    with pytest.raises(FMUError, match=f"^wrong.fmu: .*{said}"):
+    with pytest.raises(FMUError, match=f"^wrong.fmu: .*{message}"):
         FMU(path).start({})
 
 
@@ -174,9 +174,9 @@ def tried(monkeypatch) -> list[str]:
     names: list[str] = []
     original = trial.run_trial
 
-    def run_trial(description: Description, *rest: Any) -> str:
+    def run_trial(description: Description, *arguments: Any) -> str:
         names.append(description.path.name)
-        return original(description, *rest)
+        return original(description, *arguments)
 
     monkeypatch.setattr(trial, "run_trial", run_trial)
     return names

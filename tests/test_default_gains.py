@@ -156,5 +156,5 @@ def test_settling_predicts_how_much_of_a_friction_step_is_left(system, models, m
 def test_methods_of_an_estimator_under_their_former_names_are_taken():
     former = {"name": "former", "reasoned": classmethod(lambda cls, fmu, system: "its own")}
     with pytest.warns(DeprecationWarning, match="reasoned is now called default_gains"):
-        kind = type("Former", (DisturbanceObserver,), former)
-    assert kind.default_gains(None, None) == "its own"
+        cls = type("Former", (DisturbanceObserver,), former)
+    assert cls.default_gains(None, None) == "its own"

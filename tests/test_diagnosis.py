@@ -163,12 +163,12 @@ def test_nothing_is_missing_in_the_model_that_a_diagnosis_extended(tmp_path):
     """As by `--model Extended.fmu`: what was found of the pads acts in every simulation."""
     cases = recorded(tmp_path / "stops", Effects(cylinder_lag=0.06), 511)
 
-    def said(system: System, out: Path) -> Outcome:
+    def outcome_of(system: System, out: Path) -> Outcome:
         return diagnose(Problem(system, cases, LIBRARY, EFFECTS), Engine(out=out))
 
-    first = said(SYSTEM, tmp_path / "first")
+    first = outcome_of(SYSTEM, tmp_path / "first")
     assert [cause.effect.name for cause in first.diagnosis.causes] == ["CylinderLag"]
-    again = said(with_model(SYSTEM, OBSERVER, first.extension.fmu), tmp_path / "again")
+    again = outcome_of(with_model(SYSTEM, OBSERVER, first.extension.fmu), tmp_path / "again")
     assert (again.diagnosis.verdict, again.extension) == ("nothing", None)
 
 

@@ -147,8 +147,8 @@ def test_a_cause_that_the_search_passed_over_is_taken_up_where_it_leaves_noise(
     """Of a controlled temperature of 20-sim, a capacity was "nearest", and all was unexplained."""
     step = search._step
 
-    def blind(fit: Any, catalogue: Any, best: Any, *rest: Any) -> Any:
-        return step(fit, catalogue, best, *rest) if best.active else None
+    def blind(fit: Any, catalogue: Any, best: Any, *arguments: Any) -> Any:
+        return step(fit, catalogue, best, *arguments) if best.active else None
 
     monkeypatch.setattr(search, "_step", blind)
     write_fmu(tmp_path, alone=True)

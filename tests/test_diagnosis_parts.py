@@ -121,7 +121,7 @@ def test_a_signal_that_a_recording_has_not_says_nothing_and_leaves_the_others(ev
     speeds = replace(case.without(["Fx"]), name="speeds")
     values = {"muWR": 0.4}
     with ResidualModel(ModelSource(everything, SYSTEM, {}), [case, speeds]) as both:
-        told, silent = both.at([{**values, delay("Fx"): 0.0}] * 2)
+        measured, silent = both.at([{**values, delay("Fx"): 0.0}] * 2)
     with ResidualModel(ModelSource(everything, SYSTEM, {}), [speeds]) as alone:
         (without,) = alone.at([values])
     assert silent.blocks.tolist() == [*without.blocks, 0]
@@ -130,7 +130,7 @@ def test_a_signal_that_a_recording_has_not_says_nothing_and_leaves_the_others(ev
     assert np.isnan(silent.sizes[:, 2]).all()
     assert np.square(silent.errors[:, 2]).sum() < 1e-9
     # What lasts in one of two recordings is as large as in that one.
-    loud = replace(told, errors=3.0 * told.errors)
+    loud = replace(measured, errors=3.0 * measured.errors)
     assert slowness([loud, silent], 20)[2] == pytest.approx(slowness([loud], 20)[2], rel=1e-9)
 
 
@@ -401,19 +401,19 @@ def test_eliminating_local_unknowns_is_least_squares_over_all():
 
 def test_two_local_unknowns_that_act_alike_leave_what_one_of_them_does():
     """Starts of two states may move all that is measured alike, by far more than tolerances do."""
-    one = recording(np.random.default_rng(5), 2, 9.0)
-    P = np.sign(one.P[:, :1]) * 2.0**40  # whose products are exact
-    one = replace(one, P=P, deviations=np.zeros(1), furthest=np.full(1, 9.0))
+    single = recording(np.random.default_rng(5), 2, 9.0)
+    P = np.sign(single.P[:, :1]) * 2.0**40  # whose products are exact
+    single = replace(single, P=P, deviations=np.zeros(1), furthest=np.full(1, 9.0))
     both = replace(
-        one,
-        P=np.hstack([one.P, one.P]),
+        single,
+        P=np.hstack([single.P, single.P]),
         deviations=np.zeros(2),
         furthest=np.full(2, 9.0),
     )
-    alone, together = one.eliminated(), both.eliminated()
+    alone, together = single.eliminated(), both.eliminated()
     assert_allclose(together.N, alone.N, rtol=1e-6, atol=1e-6)
     z = np.array([0.3, -0.2])
-    assert_allclose(both.local(z).sum(), one.local(z).sum(), rtol=1e-6)
+    assert_allclose(both.local(z).sum(), single.local(z).sum(), rtol=1e-6)
 
 
 def test_a_tolerance_at_its_bound_stays_there_while_the_rest_does_its_best():

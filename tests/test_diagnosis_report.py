@@ -241,8 +241,8 @@ def test_matrix_frames_what_was_found_and_reads_out_its_twin(page, summary):
     framed = matrix.xpath("./text[@class='found' and @y]")[0]
     assert text(framed).endswith(summary["causes"][0]["effect"])
     assert abs(float(framed.get("y")) - float(frame.split()[1].split("H")[0])) < 24.0
-    for told in (matrix.get("aria-label"), text(section(page, "confusability"))):
-        assert re.search(r"ApexOffset and FxOffset|FxOffset and ApexOffset", told)
+    for label in (matrix.get("aria-label"), text(section(page, "confusability"))):
+        assert re.search(r"ApexOffset and FxOffset|FxOffset and ApexOffset", label)
 
 
 def test_gain_is_drawn_for_every_stop_and_for_all(page, summary):
@@ -359,8 +359,8 @@ def test_a_fit_from_elsewhere_that_ended_lower_is_a_warning(system, summary, fig
     }
     changed = {**summary, "certainty": {**summary["certainty"], "starts": starts}}
     causes = section(written(system, changed, [figure], tmp_path), "causes")
-    (told,) = [element for element in causes.find_class("warning") if "lower" in text(element)]
-    assert "0.0, -40.0, no end" in text(told)
+    (warning,) = [element for element in causes.find_class("warning") if "lower" in text(element)]
+    assert "0.0, -40.0, no end" in text(warning)
 
 
 def test_a_diagnosis_that_was_not_asked_says_nothing_of_how_sure_sizes_are(

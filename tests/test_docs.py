@@ -225,9 +225,9 @@ def test_the_readme_says_of_machines_what_the_page_says():
     )
     rows = [row.split(" | ") for row in readme if row.count(" | ") == 4][1:]
     assert len(rows) == 8
-    for machine, published, *found in rows:
+    for machine, published, *results in rows:
         (there,) = (row.split(" | ") for row in page if row.startswith(machine))
-        assert there[2:] == found
+        assert there[2:] == results
         numbers, known = (re.findall(r"\d+(?:\.\d+)?", text) for text in (published, there[1]))
         assert numbers
         assert set(numbers) <= set(known)

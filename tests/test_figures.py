@@ -208,10 +208,10 @@ def test_stops_beyond_the_claim_count_apart_with_their_reasons():
 
 
 def test_what_monitoring_tells_stands_beside_what_was_planted():
-    told = {"recordings": 40, "refused": {}, "sentences": ["axle 7: -12 %"]}
+    summary = {"recordings": 40, "refused": {}, "sentences": ["axle 7: -12 %"]}
     sound = {"recordings": 6, "refused": {"07": "", "08": ""}, "sentences": []}
     cause = {"effect": "BrakeFade", "confusable_with": [], "parameters": FADE}
-    _, first, second, third = train.monitored(told, {"causes": [cause]}, sound)
+    _, first, second, third = train.monitored(summary, {"causes": [cause]}, sound)
     assert first[1:] == [train.LOSS, "40 of 40", "axle 7: -12 %"]
     assert second[3] == "BrakeFade: fade 4.28 (4.07 to 4.5) % per 100 K"
     assert third[1:] == ["nothing", "6 of 8", "no alarms"]
@@ -238,11 +238,11 @@ def test_a_law_is_right_where_the_cause_acts():
     none = {"left_out": ["A"], "verdict": "unexplained", "named": [], "laws": [], "asked": True}
     none |= {"rig": "--seed 7 --effect a=0.1", "slot_right": False, "before": None, "after": None}
     none |= {"after_with_it": None, "function_error": None}
-    found = none | {"laws": ["a law"], "slot_right": True, "before": 52.91, "after": 1.32}
-    found |= {"after_with_it": 1.0, "function_error": 0.042}
-    unknown = found | {"left_out": [], "named": ["B"], "after_with_it": None}
+    right = none | {"laws": ["a law"], "slot_right": True, "before": 52.91, "after": 1.32}
+    right |= {"after_with_it": 1.0, "function_error": 0.042}
+    unknown = right | {"left_out": [], "named": ["B"], "after_with_it": None}
     unknown |= {"function_error": None}
-    rows = [found, unknown, none, none | {"verdict": "found", "named": ["B"], "asked": False}]
+    rows = [right, unknown, none, none | {"verdict": "found", "named": ["B"], "asked": False}]
     header, first, second, third, last = tables.laws({"sets": rows, **summarise_left_out(rows)})
     assert len(header) == len(last)
     assert first == ["A", "unexplained", "a law", "yes", "52.9 → 1.32", "1", "4.2 %"]

@@ -98,8 +98,8 @@ def test_values_and_deviations_are_those_of_curve_fit_on_the_closed_form(system,
     )
 
 
-@pytest.mark.parametrize(("unit", "size", "said"), [("mK", 1e-3, False), ("GK", 1e9, True)])
-def test_a_state_that_an_output_shows_under_another_name_starts_there(unit, size, said, tmp_path):
+@pytest.mark.parametrize(("unit", "size", "bad"), [("mK", 1e-3, False), ("GK", 1e9, True)])
+def test_a_state_that_an_output_shows_under_another_name_starts_there(unit, size, bad, tmp_path):
     """In mK and without a nominal value: from the model's 0 the start would be 4000 sizes away.
 
     Walks of filters are far off by either unit, tolerances of a fit too coarse in GK.
@@ -119,7 +119,7 @@ def test_a_state_that_an_output_shows_under_another_name_starts_there(unit, size
     doubt = r"size states are: x is up to \S+ .K, taken for 1\."
     assert re.search(doubt, wb.observe(system, cases[0], "open_loop").message)
     outcome = fitted(system, cases, "C", "G")
-    assert [bool(re.search(doubt, text)) for text in outcome.doubts] == [True] * said
+    assert [bool(re.search(doubt, text)) for text in outcome.doubts] == [True] * bad
     (start,) = (value for value in outcome.values if value.name == "x")
     assert start.value == pytest.approx(4.0 / size, abs=4.0 * NOISE / size)
     assert outcome["C"].value == pytest.approx(C, abs=4.0 * (outcome["C"].deviation or 0.0))
@@ -212,11 +212,11 @@ def test_the_command_writes_what_other_tools_read(folder, tmp_path):
     values = {name: summary["values"][name]["value"] for name in ("C", "G")}
     ssv = ElementTree.parse(tmp_path / "parameters.ssv").getroot()
     name = "{http://ssp-standard.org/SSP1/SystemStructureParameterValues}"
-    told = {
+    parameters = {
         parameter.get("name"): float(parameter.find(f"{name}Real").get("value"))  # type: ignore[union-attr,arg-type]
         for parameter in ssv.iter(f"{name}Parameter")
     }
-    assert told == values
+    assert parameters == values
     fmu = tmp_path / "Block_fitted.fmu"
     starts = {v.name: v.start for v in read_description(fmu).variables}
     assert float(starts["C"] or 0.0) == values["C"]

@@ -219,8 +219,8 @@ def test_an_input_that_nothing_feeds_is_asked_about(tmp_path):
     )
     build_text(tmp_path, text.replace("inflow - c", "inflow + rain - c"))
     (tmp_path / "system.toml").write_text(SYSTEM)
-    said = "input 'rain' of the FMU: found no signal that feeds it, so that it keeps 0.0002"
-    with pytest.warns(UserWarning, match=said):
+    message = "input 'rain' of the FMU: found no signal that feeds it, so that it keeps 0.0002"
+    with pytest.warns(UserWarning, match=message):
         cases = read_cases(record(tmp_path / "recordings", seed=2), load_system(tmp_path))
     assert [len(case.doubts) for case in cases] == [1] * len(cases)
 
@@ -314,10 +314,10 @@ def test_power_of_an_fmu_alone_plants_what_its_diagnosis_may_find(recorded, tmp_
     assert powered(recorded, tmp_path, *chosen) == 0
     power = json.loads((tmp_path / "power.json").read_text())
     check("power", power)
-    told = "The figures hold only as far as its form is right"
-    assert told in power["provenance"]["machine"]
-    assert told in capsys.readouterr().out
-    assert told in (tmp_path / "index.html").read_text()
+    sentence = "The figures hold only as far as its form is right"
+    assert sentence in power["provenance"]["machine"]
+    assert sentence in capsys.readouterr().out
+    assert sentence in (tmp_path / "index.html").read_text()
     assert (power["false_alarms"]["hits"], power["failed"]) == (0, [])
     right = {name: effect["right_first"]["20"]["hits"] for name, effect in power["effects"].items()}
     assert right == dict.fromkeys(names, 1)
@@ -743,5 +743,5 @@ def test_what_is_small_beside_absolute_temperatures_is_named(
     assert len(outcome.diagnosis.causes) == 1
     assert name in (cause.effect.name, *cause.confusable_with)
     if name == cause.effect.name:
-        (found,) = cause.parameters.values()
-        assert found.low < size < found.high
+        (interval,) = cause.parameters.values()
+        assert interval.low < size < interval.high

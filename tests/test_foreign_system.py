@@ -140,9 +140,9 @@ def test_the_open_loop_model_goes_where_its_own_equations_lead(case, runs):
     levels = [np.array([1.0, 0.8])]
     values, vectors = np.linalg.eigh(A)
     for inflow in case["pump"][1:]:
-        rest = -np.linalg.solve(A, np.array([inflow, -BEFORE]) / AREA)
+        steady = -np.linalg.solve(A, np.array([inflow, -BEFORE]) / AREA)
         kept = vectors @ np.diag(np.exp(values * STEP)) @ vectors.T
-        levels.append(rest + kept @ (levels[-1] - rest))
+        levels.append(steady + kept @ (levels[-1] - steady))
     # Implicit Euler: relative error h*rate/2 of a motion that decays at up to 0.01 1/s.
     expected = 2.0 * np.array(levels)[:, 1] + 0.4
     assert_allclose(runs["open_loop"].signal("reading"), expected, rtol=0.01)

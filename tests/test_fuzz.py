@@ -100,7 +100,7 @@ def leaves(_: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("read", "outcome", "said"),
+    ("read", "outcome", "reason"),
     [
         (lambda _: None, "accepted", ""),
         (refuses, "refused", ""),
@@ -110,14 +110,14 @@ def leaves(_: Path) -> None:
         (lambda _: "NaN", "impossible", "NaN"),
     ],
 )
-def test_what_a_reader_must_not_do_is_named(read, outcome, said, tmp_path, monkeypatch):
+def test_what_a_reader_must_not_do_is_named(read, outcome, reason, tmp_path, monkeypatch):
     monkeypatch.setattr(harness, "LONGEST", 0.2)
     target = Target("toy", {"a": b"1"}, read, lambda value: value or "")
     report = fuzz(target, seed=3, numbers=range(5, 7), keep=tmp_path)
     assert report.outcomes == {"toy": {outcome: 2}}
-    assert [said in failure.said for failure in report.failures] == [True] * (2 if said else 0)
+    assert [reason in failure.said for failure in report.failures] == [True] * (2 if reason else 0)
     kept = sorted(path.name for path in tmp_path.iterdir())
-    assert kept == (["toy-3-5", "toy-3-6"] if said else [])
+    assert kept == (["toy-3-5", "toy-3-6"] if reason else [])
     for folder in tmp_path.iterdir():
         assert "seed 3, number" in (folder / "said.txt").read_text()
         assert (folder / "a").exists()

@@ -53,7 +53,7 @@ def text(content: str | bytes) -> Callable[[Path], None]:
     return replace
 
 
-def said(old: str, new: str) -> Callable[[Path], Path]:
+def with_text(old: str, new: str) -> Callable[[Path], Path]:
     return lambda path: edit(path, (old, new), count=1)
 
 
@@ -86,27 +86,27 @@ TOMLS: dict[str, tuple[Callable[[Path], None], str]] = {
         "case.toml, [model]: found unknown key 'a'",
     ),
     "a table in tables for a text": (
-        said('"dry"', "{" + "a." * DEEP + "a = 1}"),
+        with_text('"dry"', "{" + "a." * DEEP + "a = 1}"),
         "case.toml, [conditions] wheel_rail: found ",
     ),
     "zero in a name of a file": (
-        said("measured.csv", "measured\\u0000.csv"),
+        with_text("measured.csv", "measured\\u0000.csv"),
         "[measurement] file: found 'measured\\x00.csv'; expected a text without zero",
     ),
     "a whole number of 5000 digits": (
-        said("-1", f"-{'1' * DIGITS}"),
+        with_text("-1", f"-{'1' * DIGITS}"),
         "case.toml, line 7: found text that is no TOML",
     ),
     "a whole number of 5000 hexadecimal digits": (
-        said("-1", f"0x{'1' * DIGITS}"),
+        with_text("-1", f"0x{'1' * DIGITS}"),
         "[conditions] direction: found a number of thousands of digits",
     ),
     "a speed of 5000 digits": (
-        said('"80 km/h"', f'"{"8" * DIGITS} km/h"'),
+        with_text('"80 km/h"', f'"{"8" * DIGITS} km/h"'),
         "initial_speed: found '8888",
     ),
     "a title with commands for the terminal": (
-        said('"dry"', '"\\u001b[2J\\n\\n"'),
+        with_text('"dry"', '"\\u001b[2J\\n\\n"'),
         "wheel_rail: found '\\x1b[2J\\n\\n'",
     ),
     "a pipe": (pipe, "case.toml: found a file that cannot be read (no regular file)"),
@@ -127,11 +127,11 @@ def refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
 
 
 @pytest.mark.parametrize(
-    ("file", "kind"), [("measured.csv", k) for k in CSV] + [("case.toml", k) for k in TOMLS]
+    ("file", "damage"), [("measured.csv", k) for k in CSV] + [("case.toml", k) for k in TOMLS]
 )
-def test_a_case_that_no_person_wrote_is_refused(tmp_path, capsys, file, kind):
+def test_a_case_that_no_person_wrote_is_refused(tmp_path, capsys, file, damage):
     case = write(tmp_path / "a")
-    spoil, match = (CSV if file == "measured.csv" else TOMLS)[kind]
+    spoil, match = (CSV if file == "measured.csv" else TOMLS)[damage]
     spoil(case / file)
     out = str(tmp_path / "out")
     assert match in refused(["simulate", str(case), "--out", out], capsys)
@@ -180,19 +180,19 @@ def test_gains_that_no_person_wrote_are_refused(root, tmp_path, capsys, line):
     tuned = (root / "workbench/machines/wheelset/gains/disturbance_observer.toml").read_text()
     key = line.split(" = ")[0].split("\n")[-1]
     start = tuned.index("[gains]")
-    head, rest = tuned[:start], tuned[start:]
+    head, tail = tuned[:start], tuned[start:]
     if key == "design":
-        rest = rest.replace("[design]", "[unknown]")
+        tail = tail.replace("[design]", "[unknown]")
         head += line + "\n"
     elif key == "gains":
-        rest = rest.replace("[gains]", "[unknown]")
+        tail = tail.replace("[gains]", "[unknown]")
         head += line + "\n"
     elif key == "estimator":
         head = line + "\n"
     else:
-        rest = line + rest.partition("\n")[2].partition("\n")[2].join(["\n", ""])
+        tail = line + tail.partition("\n")[2].partition("\n")[2].join(["\n", ""])
     path = tmp_path / "gains.toml"
-    path.write_text(head + rest)
+    path.write_text(head + tail)
     case = str(root / "cases" / "01_dry_80_1.5")
     out = ["--out", str(tmp_path / "out")]
     assert "gains.toml" in refused(["simulate", case, "--gains", str(path), *out], capsys)
@@ -255,7 +255,7 @@ LEFT = {
 
 @pytest.mark.parametrize("name", LEFT)
 def test_what_another_run_left_and_no_run_writes_is_refused(name, tmp_path):
-    read, found = LEFT[name]
+    read, message = LEFT[name]
     large = {
         "tried": [{"conditions": {}, "inputs": {"pB": {"levels": [10**400]}}}],
         "effects": {"pads_axle": {"size": 10**400, "at": 1}},
@@ -265,5 +265,5 @@ def test_what_another_run_left_and_no_run_writes_is_refused(name, tmp_path):
     half = {**large, "answer": {"sentence": "\ud800"}}
     for content in ("[]", "{", DEEP_LIST, json.dumps(large), json.dumps(half)):
         (tmp_path / name).write_text(content)
-        with pytest.raises(InputError, match=f"{name}: found {found}"):
+        with pytest.raises(InputError, match=f"{name}: found {message}"):
             read(tmp_path, WHEELSET)

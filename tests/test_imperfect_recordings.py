@@ -124,10 +124,10 @@ def test_what_a_wrong_sensor_read_at_the_start_is_where_no_state_began(tmp_path)
         frame["T [K]"] += 60.0 * NOISE
     outcome = diagnosed(of, cases(of, frames), tmp_path / "out")
     causes = outcome.diagnosis.causes
-    found = {cause.effect.name: cause.parameters[cause.effect.size] for cause in causes}
-    assert {*found} == {"Draught", "Zero"}
-    assert found["Draught"].low <= LOSS <= found["Draught"].high
-    assert found["Zero"].low <= 60.0 * NOISE <= found["Zero"].high
+    sizes = {cause.effect.name: cause.parameters[cause.effect.size] for cause in causes}
+    assert {*sizes} == {"Draught", "Zero"}
+    assert sizes["Draught"].low <= LOSS <= sizes["Draught"].high
+    assert sizes["Zero"].low <= 60.0 * NOISE <= sizes["Zero"].high
     # And so says what another tool has to start the extended model with.
     starts = [outcome.start_values(case.name)["T"] for case in outcome.cases]
     assert starts == pytest.approx([5.0] * 3, abs=4.0 * NOISE)

@@ -249,13 +249,13 @@ def test_nothing_is_claimed_of_a_condition_that_nobody_knows(root, tmp_path, sys
     source = root / "cases" / "09_wet_160_4.2_wsp"
     text = (source / "case.toml").read_text()
     runs = {}
-    for said in ("dry", "unknown"):
-        (tmp_path / said).mkdir()
-        told = text.replace('wheel_rail = "wet"', f'wheel_rail = "{said}"')
-        (tmp_path / said / "case.toml").write_text(told)
-        (tmp_path / said / "measured.csv").write_bytes((source / "measured.csv").read_bytes())
-        (case,) = wb.read_cases(tmp_path / said, system)
-        runs[said] = wb.observe(system, case, "ekf")
+    for rail_state in ("dry", "unknown"):
+        (tmp_path / rail_state).mkdir()
+        toml = text.replace('wheel_rail = "wet"', f'wheel_rail = "{rail_state}"')
+        (tmp_path / rail_state / "case.toml").write_text(toml)
+        (tmp_path / rail_state / "measured.csv").write_bytes((source / "measured.csv").read_bytes())
+        (case,) = wb.read_cases(tmp_path / rail_state, system)
+        runs[rail_state] = wb.observe(system, case, "ekf")
     np.testing.assert_array_equal(runs["dry"].estimate, runs["unknown"].estimate)
     (rail,) = [quantity.name for quantity in system.estimated if "wheel_rail" in quantity.claimed]
     assert runs["dry"].claimed[rail].any()
@@ -316,10 +316,10 @@ def test_channels_of_a_train_are_known_by_the_names_of_a_laboratory(
 ):
     kinds = zip(("pB", "mass", "slope", "omega"), names, (1e-5, 1e-3, 1.0, 3.6 * 0.46), strict=True)
     columns = {"Zeit [s]": train_stop.time}
-    for kind, name, factor in kinds:
+    for signal, name, factor in kinds:
         for i in range(1, 9):
-            if f"{kind}{i}" in train_stop:
-                columns[name.format(i)] = factor * train_stop[f"{kind}{i}"]
+            if f"{signal}{i}" in train_stop:
+                columns[name.format(i)] = factor * train_stop[f"{signal}{i}"]
     columns |= {curve: train_stop["curve"], acceleration: train_stop["a"]}
     assert len(columns) == 1 + len(train_stop.signals)
     pd.DataFrame(columns).to_csv(tmp_path / "stop.csv", index=False)
@@ -336,11 +336,11 @@ def test_speeds_of_all_axles_in_another_unit_contradict_the_acceleration(train_s
     wrong = {f"omega{i}": 3.6 * 0.46 * train_stop[f"omega{i}"] for i in range(1, 9)}
     origin = Origin("stop.csv", 2, {}, "")
     signals = {**train_stop.signals, **wrong}
-    right, told = (
+    right, scaled = (
         doubts(train_stop.time, recorded, train_stop.conditions, TRAIN, origin)
         for recorded in (train_stop.signals, signals)
     )
-    (doubt,) = set(told) - set(right)
+    (doubt,) = set(scaled) - set(right)
     assert "what a train accelerates by turns its axles faster" in doubt
 
 
@@ -469,15 +469,15 @@ def stops(cases, system) -> dict[str, Columns]:
 @pytest.fixture
 def take(tmp_path) -> Callable[..., int]:
     """Imports a file of the folder into `out`."""
-    return lambda name, *said: main(
-        ["import", str(tmp_path / name), "--out", str(tmp_path / "out"), "--yes", *said]
+    return lambda name, *options: main(
+        ["import", str(tmp_path / name), "--out", str(tmp_path / "out"), "--yes", *options]
     )
 
 
-def assert_same(got: Case, truth: Case, rtol: float = 1e-9) -> None:
-    assert_allclose(got.time, truth.time - truth.time[0], atol=1e-6)
+def assert_same(case: Case, truth: Case, rtol: float = 1e-9) -> None:
+    assert_allclose(case.time, truth.time - truth.time[0], atol=1e-6)
     for signal in SIGNALS:
-        assert_allclose(got[signal], truth[signal], rtol=rtol, atol=1e-9)
+        assert_allclose(case[signal], truth[signal], rtol=rtol, atol=1e-9)
 
 
 def record(folder: Path) -> list[dict]:
@@ -498,8 +498,8 @@ def test_each_recording_of_a_file_is_a_case_without_a_wrong_number(
     assert [entry["recording"] for entry in recorded] == list(called)
     for entry, truth in zip(recorded, cases, strict=True):
         (folder,) = entry["cases"]
-        (got,) = wb.read_cases(tmp_path / "out" / folder, system)
-        assert_same(got, truth)
+        (case,) = wb.read_cases(tmp_path / "out" / folder, system)
+        assert_same(case, truth)
         assert set(entry["channels"]) == set(SIGNALS)
         assert entry["channels"]["omegaR"]["converted"]["recorded_as"] == "rR * omegaR"
         assert entry["dropped"] == ["Temperatur [degC]"]
@@ -528,9 +528,9 @@ def test_one_question_asks_for_all_recordings_and_what_it_says_is_kept(
     assert "2 recordings, with the same channels: 'Stop 1', 'Stop 2'" in shown
     assert shown.count("  pB         Kanal 7 [bar]") == 1 + 1
     for name in ("a_Stop_1", "b_Stop_1"):
-        (got,) = wb.read_cases(tmp_path / "out" / name, system)
-        assert_same(got, cases[0])
-    assert got.conditions["wheel_rail"] == "unknown"  # it was said of the first file
+        (case,) = wb.read_cases(tmp_path / "out" / name, system)
+        assert_same(case, cases[0])
+    assert case.conditions["wheel_rail"] == "unknown"  # it was said of the first file
 
 
 @pytest.mark.filterwarnings("ignore:.*a sample every 0.04 s")
@@ -541,8 +541,8 @@ def test_sheets_may_differ_in_order_rate_and_stated_units(tmp_path, take, cases,
     workbook(tmp_path / "a.xlsx", {"Stop 1": stops["Stop 1"], "Stop 2": other})
     assert take("a.xlsx") == 0
     for name, truth in (("a_Stop_1", cases[0]), ("a_Stop_2", cases[1].part(slice(None, None, 2)))):
-        (got,) = wb.read_cases(tmp_path / "out" / name, system)
-        assert_same(got, truth)
+        (case,) = wb.read_cases(tmp_path / "out" / name, system)
+        assert_same(case, truth)
     assert [entry["channels"]["pB"]["unit"] for entry in record(tmp_path)] == ["bar", "kPa"]
 
 
@@ -599,8 +599,8 @@ def test_names_of_sheets_become_names_that_differ(tmp_path, take, stops, system,
     assert take("a.tdms") == 0
     assert take("a.tdms") == 0  # and again: in the same folders
     for name, truth in zip(("a_80_km_h_wet", "a_80_km_h_wet_tdms"), cases, strict=True):
-        (got,) = wb.read_cases(tmp_path / "out" / name, system)
-        assert_same(got, truth)
+        (case,) = wb.read_cases(tmp_path / "out" / name, system)
+        assert_same(case, truth)
     assert len(record(tmp_path)) == 2
     assert "a.tdms, '80 km/h wet'" in (tmp_path / "out" / "a_80_km_h_wet" / "case.toml").read_text()
 
@@ -664,12 +664,12 @@ def test_channels_of_one_sheet_may_be_named(tmp_path, take, stops, system, cases
     at_once(tmp_path / "a.xlsx", stops)
     channels = {"pB": "Bremsdruck", "tauR": "Antriebsmoment", "omegaW": "v_Rad", "Fx": "Längskraft"}
     channels["omegaR"] = "v_Rolle"
-    said = [part for key, name in channels.items() for part in ("--column", f"{key}=two/{name}")]
-    assert take("a.xlsx", *said) == 0
+    options = [part for key, name in channels.items() for part in ("--column", f"{key}=two/{name}")]
+    assert take("a.xlsx", *options) == 0
     (entry,) = record(tmp_path)
     assert not entry.get("recording")
-    (got,) = wb.read_cases(tmp_path / "out" / "a", system)
-    assert_same(got, cases[1])
+    (case,) = wb.read_cases(tmp_path / "out" / "a", system)
+    assert_same(case, cases[1])
 
 
 def test_signals_of_two_sheets_that_may_be_two_recordings_are_told(tmp_path, take, stops, capsys):
@@ -677,8 +677,10 @@ def test_signals_of_two_sheets_that_may_be_two_recordings_are_told(tmp_path, tak
     second = {name: column for name, column in stops["Stop 2"].items() if name != "v_Rad"}
     workbook(tmp_path / "a.xlsx", {"Stop 1": stops["Stop 1"], "Stop 2": second})
     channels = {"pB": "Bremsdruck", "tauR": "Antriebsmoment", "omegaR": "v_Rolle"}
-    said = [part for key, name in channels.items() for part in ("--column", f"{key}=Stop 2/{name}")]
-    take("a.xlsx", *said)
+    named = [
+        part for key, name in channels.items() for part in ("--column", f"{key}=Stop 2/{name}")
+    ]
+    take("a.xlsx", *named)
     error = capsys.readouterr().err
     assert "omegaW is taken from 'Stop 1', which holds 'Bremsdruck' as 'Stop 2' does" in error
 
@@ -726,8 +728,8 @@ def test_channels_of_two_loggers_on_two_sheets_are_one_recording(
     }
     workbook(tmp_path / "a.xlsx", {"hydraulics": pressure, "drive": others})
     assert take("a.xlsx") == 0
-    (got,) = wb.read_cases(tmp_path / "out" / "a", system)
-    assert_same(got, cases[0])
+    (case,) = wb.read_cases(tmp_path / "out" / "a", system)
+    assert_same(case, cases[0])
     (entry,) = record(tmp_path)
     assert not entry.get("recording")
 
@@ -736,8 +738,8 @@ def test_a_sheet_whose_names_are_less_alike_is_left_out(tmp_path, take, stops, s
     other = {f"{name} gefiltert": column for name, column in stops["Stop 2"].items()}
     workbook(tmp_path / "a.xlsx", {"raw": stops["Stop 1"], "filtered": other})
     assert take("a.xlsx") == 0
-    (got,) = wb.read_cases(tmp_path / "out" / "a", system)
-    assert_same(got, cases[0])
+    (case,) = wb.read_cases(tmp_path / "out" / "a", system)
+    assert_same(case, cases[0])
     assert "Bremsdruck gefiltert [bar]" in record(tmp_path)[0]["dropped"]
 
 

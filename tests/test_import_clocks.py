@@ -116,8 +116,8 @@ def test_one_gap_that_a_clock_may_have_made_is_told(tmp_path, tank, zone, begin,
     path = table(
         tmp_path / "a.csv", local(begin.replace(tzinfo=ZoneInfo(zone)), 160, "%Y-%m-%d %H:%M")
     )
-    (told,) = clock(path, tank).corrections
-    assert missing in told
+    (correction,) = clock(path, tank).corrections
+    assert missing in correction
     known = clock(path, tank, f"Time [{zone}]")
     assert_allclose(known.times, QUARTER * np.arange(160))
     assert not known.corrections
@@ -143,12 +143,12 @@ def test_an_hour_without_samples_on_another_day_stays_a_gap(tmp_path, tank):
 
 
 @pytest.mark.parametrize(
-    ("header", "said"), [("Time", "Time [DMY Europe/Berlin]"), ("Time [Europe/Berlin]", "")]
+    ("header", "zone"), [("Time", "Time [DMY Europe/Berlin]"), ("Time [Europe/Berlin]", "")]
 )
-def test_a_zone_that_is_said_tells_the_hours_of_a_changing_clock(tmp_path, tank, header, said):
+def test_a_zone_that_is_said_tells_the_hours_of_a_changing_clock(tmp_path, tank, header, zone):
     begin = datetime(2024, 10, 26, 22, tzinfo=BERLIN)
     path = table(tmp_path / "a.csv", local(begin, 100, "%d.%m.%Y %H:%M"), header)
-    read_clock = clock(path, tank, said)
+    read_clock = clock(path, tank, zone)
     assert_allclose(read_clock.times, QUARTER * np.arange(100))
     assert iso(read_clock.start) == "2024-10-26T20:00:00.000000"
     assert read_clock.zoned
@@ -220,9 +220,9 @@ def test_two_figures_are_minutes_and_seconds_if_that_is_nearer_to_usual_steps(tm
     read_clock = clock(path, tank)
     assert_allclose(read_clock.times, 5.0 * np.arange(1000))
     assert not read_clock.certain
-    said = clock(path, tank, "Time [min:s]")
-    assert_allclose(said.times, read_clock.times)
-    assert (said.certain, said.stated) == (True, "min:s")
+    stated = clock(path, tank, "Time [min:s]")
+    assert_allclose(stated.times, read_clock.times)
+    assert (stated.certain, stated.stated) == (True, "min:s")
 
 
 def test_hours_to_12_go_on_from_12_to_1(tmp_path, tank):
@@ -276,8 +276,8 @@ def test_samples_without_a_time_are_told(tmp_path, tank, lost, first):
     stamps = local(datetime(2024, 3, 5, 10, tzinfo=UTC), 60, "%d.%m.%Y %H:%M")
     stamps[first : first + 20] = [lost] * 20
     read = clock(table(tmp_path / "a.csv", stamps), tank)
-    said = f"20 samples without a time are left out, the first is sample {first + 1}"
-    assert read.corrections[-1] == said
+    note = f"20 samples without a time are left out, the first is sample {first + 1}"
+    assert read.corrections[-1] == note
 
 
 def test_rows_that_were_mixed_are_to_be_sorted(tmp_path, tank):
@@ -311,9 +311,9 @@ def test_dates_that_go_on_in_two_ways_are_asked_for(tmp_path, tank):
     path = table(tmp_path / "a.csv", [f"{k:02d}/01/2024" for k in range(1, 13)])
     with pytest.raises(InputError, match=r"in two ways, .*DMY.*MDY.*--column 'time=Time \[YMD\]'"):
         clock(path, tank)
-    said = clock(path, tank, "Time [DMY]")
-    assert_allclose(said.times, 86400.0 * np.arange(12))
-    assert said.stated == "DMY"
+    stated = clock(path, tank, "Time [DMY]")
+    assert_allclose(stated.times, 86400.0 * np.arange(12))
+    assert stated.stated == "DMY"
     # And how they are written is kept for further files.
     proposal = propose([read_recorded_file(path)], tank, {"time": NamedChannel("Time", "MDY")})
     assert proposal.named["time"] == NamedChannel("Time", "MDY")
@@ -383,10 +383,10 @@ def test_counts_are_seconds_from_their_first(tmp_path, tank, name, values, start
 
 
 def test_days_that_may_count_from_1904_are_told(tmp_path, tank):
-    (told,) = clock(
+    (correction,) = clock(
         table(tmp_path / "a.csv", every(lambda k: f"{43890 + k / 96:.9f}")), tank
     ).corrections
-    assert "2020-02-29; a workbook that counts from 1904 means 2024-03-01" in told
+    assert "2020-02-29; a workbook that counts from 1904 means 2024-03-01" in correction
 
 
 def test_clocks_that_contradict_each_other_are_refused_with_both(tmp_path, tank):
@@ -409,8 +409,8 @@ def test_a_stated_rate_that_times_contradict_is_told(tmp_path, tank):
         clock(path, tank)
     assert_allclose(clock(path, tank, "Time [ms]").times[1], 0.9)
     path.write_text(f"Sample rate: 10 Hz\n{plain}")
-    told = clock(path, tank).corrections[0]
-    assert "every 900 s, and the file states a sample every 0.1 s" in told
+    correction = clock(path, tank).corrections[0]
+    assert "every 900 s, and the file states a sample every 0.1 s" in correction
 
 
 def test_stamps_coarser_than_samples_tell_the_rate(tmp_path, tank):
@@ -632,15 +632,15 @@ def test_a_recording_begins_as_its_preamble_says_where_its_times_begin_at_zero(t
 
 
 @pytest.mark.parametrize(
-    ("order", "said"),
+    ("order", "message"),
     [
         (range(299, -1, -1), r"the newest sample stands first.*sort the rows"),
         ([*range(150), *range(150)], r"times begin anew.*part the file before sample 151"),
     ],
 )
-def test_times_that_go_back_say_what_to_do(tmp_path, tank, order, said):
+def test_times_that_go_back_say_what_to_do(tmp_path, tank, order, message):
     """A stated rate would take both for one recording that goes on."""
-    with pytest.raises(InputError, match=said):
+    with pytest.raises(InputError, match=message):
         clock(table(tmp_path / "a.csv", [f"{900 * k}" for k in order], "t [s]"), tank)
 
 

@@ -167,8 +167,8 @@ def test_rows_may_end_before_empty_cells_where_that_is_a_habit(tmp_path, every):
     assert_allclose(group.channels[0].values, times)
     gaps = np.isnan(group.channels[2].values)
     assert_allclose(times[gaps], short if habit else [])
-    said = recorded.doubts[0] if habit else recorded.notes[0]
-    assert said.startswith("line 61 was left out" if habit else "2 lines that are no samples were")
+    note = recorded.doubts[0] if habit else recorded.notes[0]
+    assert note.startswith("line 61 was left out" if habit else "2 lines that are no samples were")
 
 
 def test_channels_may_be_rows(tmp_path):
@@ -366,7 +366,7 @@ def test_a_stream_of_arrow_is_read_and_its_missing_end_is_told(tmp_path):
     held = pa.table({"time [s]": np.arange(60.0), "h [mm]": 900.0 + np.arange(60.0)})
     with pa.ipc.new_stream(tmp_path / "a.arrows", held.schema) as stream:
         stream.write_table(held)
-    for left, said in ((0, ()), (8, ("the stream of Arrow has no end: batches may be missing",))):
+    for left, doubts in ((0, ()), (8, ("the stream of Arrow has no end: batches may be missing",))):
         raw = (tmp_path / "a.arrows").read_bytes()
         (tmp_path / "b.arrows").write_bytes(raw[: len(raw) - left])
         recorded = read_recorded_file(tmp_path / "b.arrows")
@@ -375,7 +375,7 @@ def test_a_stream_of_arrow_is_read_and_its_missing_end_is_told(tmp_path):
             ("h", "mm"),
         ]
         assert_allclose(recorded.groups[0].channels[1].values, 900.0 + np.arange(60.0))
-        assert recorded.doubts == said
+        assert recorded.doubts == doubts
 
 
 @pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-16-be", "utf-32", "latin-1"])
@@ -520,9 +520,9 @@ def open_document(rows: Sequence[Sequence[float | str]], percent: int = -1) -> d
         f'<table:table table:name="Rig">{lines}</table:table>'
         "</office:spreadsheet></office:body></office:document-content>"
     )
-    kind = "application/vnd.oasis.opendocument.spreadsheet"
+    mimetype = "application/vnd.oasis.opendocument.spreadsheet"
     manifest = f'<manifest:manifest xmlns:manifest="{urn}:manifest:1.0"/>'
-    parts = {"mimetype": kind, "META-INF/manifest.xml": manifest, "content.xml": content}
+    parts = {"mimetype": mimetype, "META-INF/manifest.xml": manifest, "content.xml": content}
     return {name: part.encode() for name, part in parts.items()}
 
 

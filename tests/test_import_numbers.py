@@ -81,8 +81,8 @@ MINUTE = np.arange(0.0, 60.0, 0.5)  # s
 
 
 def test_times_beside_data_are_in_the_unit_that_stands_there(tmp_path, tank):
-    said = {"unit": "mm", "data": MINUTE, "time": 1e3 * MINUTE, "time_unit": "ms"}
-    savemat(tmp_path / "a.mat", {"h": said})
+    content = {"unit": "mm", "data": MINUTE, "time": 1e3 * MINUTE, "time_unit": "ms"}
+    savemat(tmp_path / "a.mat", {"h": content})
     assert_allclose(clock(tmp_path / "a.mat", tank).times, MINUTE, rtol=1e-12)
 
 
@@ -90,8 +90,8 @@ def test_times_beside_data_that_state_no_unit_are_asked_about(tmp_path, tank):
     savemat(tmp_path / "a.mat", {"h": {"unit": "mm", "data": MINUTE, "time": 1e3 * MINUTE}})
     read_clock = clock(tmp_path / "a.mat", tank)
     assert (read_clock.unit, read_clock.certain) == ("ms", False)
-    said = clock(tmp_path / "a.mat", tank, time=NamedChannel("time", "ms"))
-    assert_allclose(said.times, MINUTE, rtol=1e-12)
+    stated = clock(tmp_path / "a.mat", tank, time=NamedChannel("time", "ms"))
+    assert_allclose(stated.times, MINUTE, rtol=1e-12)
 
 
 @pytest.mark.parametrize(("unit", "step"), [("ms", 500.0), ("s", 0.5), ("", 0.5)])
@@ -159,8 +159,8 @@ def test_a_channel_of_times_that_contradicts_the_file_is_told(tmp_path, tank):
         InputError, match=r"times of the file in \[s\] over .* and 'Time'.* 2 times"
     ):
         clock(tmp_path / "a.tdms", tank)
-    said = clock(tmp_path / "a.tdms", tank, time=NamedChannel("Time"))
-    assert_allclose(said.times, MINUTE)
+    named = clock(tmp_path / "a.tdms", tank, time=NamedChannel("Time"))
+    assert_allclose(named.times, MINUTE)
 
 
 @pytest.mark.parametrize(
@@ -226,16 +226,16 @@ def test_a_rate_in_doubt_is_refused_until_it_is_said(tmp_path, tank, head, match
     path = table(tmp_path / "a.csv", [*head, "Nr;h [mm]", *(f"{i};{i}" for i in range(60))])
     with pytest.raises(InputError, match=f"{match}.*--sample-rate '200 Hz'"):
         clock(path, tank)
-    (said,) = propose([read_recorded_file(path)], tank, {}, step=0.5).clocks.values()
-    assert_allclose(said.times, MINUTE[:60])
+    (stated,) = propose([read_recorded_file(path)], tank, {}, step=0.5).clocks.values()
+    assert_allclose(stated.times, MINUTE[:60])
 
 
-@pytest.mark.parametrize("said", [None, 0.5])
-def test_one_rate_is_not_that_of_vectors_of_two_lengths(tmp_path, tank, said):
+@pytest.mark.parametrize("step", [None, 0.5])
+def test_one_rate_is_not_that_of_vectors_of_two_lengths(tmp_path, tank, step):
     savemat(tmp_path / "a.mat", {"fs": 2.0, "h_mm": MINUTE, "inflow": MINUTE[::4], "gains": [1, 2]})
     columns = {"inflow": NamedChannel("inflow", "l/s")}
     with pytest.raises(InputError, match="one rate for channels of 30 and 120 samples"):
-        propose([read_recorded_file(tmp_path / "a.mat")], tank, columns, said)
+        propose([read_recorded_file(tmp_path / "a.mat")], tank, columns, step)
     assert_allclose(clock(tmp_path / "a.mat", tank).times, MINUTE)
 
 
@@ -252,8 +252,8 @@ def test_times_that_may_be_seconds_or_minutes_are_asked_for(tmp_path, tank, name
     path = table(tmp_path / "a.csv", ["Zeit;h [mm]", *rows])
     with pytest.raises(InputError, match=r"without a unit.*--column 'time=\w+ \[UNIT\]'"):
         clock(path, tank, **named)
-    said = clock(path, tank, time=NamedChannel("Zeit", "min"))
-    assert_allclose(said.times, 2.0 * np.arange(60), atol=1e-4)
+    stated = clock(path, tank, time=NamedChannel("Zeit", "min"))
+    assert_allclose(stated.times, 2.0 * np.arange(60), atol=1e-4)
 
 
 @pytest.mark.parametrize(
@@ -277,10 +277,10 @@ def test_what_is_no_day_of_a_month_is_no_time(tmp_path, tank, day):
 # --- names, units ---
 
 
-@pytest.mark.parametrize("said", [{}, {"inflow": NamedChannel("inflow")}], ids=["found", "named"])
-def test_a_unit_that_nobody_says_is_to_be_confirmed(tmp_path, tank, said):
+@pytest.mark.parametrize("named", [{}, {"inflow": NamedChannel("inflow")}], ids=["found", "named"])
+def test_a_unit_that_nobody_says_is_to_be_confirmed(tmp_path, tank, named):
     path = table(tmp_path / "a.csv", ["t [s];inflow;h [m]", *(f"{i};5;1" for i in range(60))])
-    proposal = propose([read_recorded_file(path)], tank, said)
+    proposal = propose([read_recorded_file(path)], tank, named)
     assert not proposal.certain
     (doubt,) = proposal.doubts
     assert doubt.endswith("--column 'inflow=inflow [l/s]' confirms [l/s]")
@@ -342,14 +342,14 @@ def test_a_channel_that_judges_is_named_and_not_dropped_in_silence(tmp_path, sys
     """A recording may be without the creep force, but its channel is seen."""
     names = "t [s];Bremsdruck [bar];Antriebsmoment [kNm];v_Rad [m/s];v_Rolle [m/s]"
     rows = [f"{0.01 * i:.2f};1.5;1.5;20.5;20.5;1.5" for i in range(60)]
-    told = {}
+    unmatched = {}
     for force in ("F_long [kN]", "Längskraft [kq]", "Temperatur [degC]"):
         path = table(tmp_path / "a.csv", [f"{names};{force}", *rows])
         proposal = propose([read_recorded_file(path)], system, {})
         assert not proposal.problems
         assert "Fx" not in proposal.assigned
-        told[force] = proposal.unmatched
-    assert told == {
+        unmatched[force] = proposal.unmatched
+    assert unmatched == {
         "F_long [kN]": (
             "Fx: it may be 'F_long'; nothing but its unit speaks for it, "
             "--column 'Fx=F_long' confirms it",
@@ -418,8 +418,8 @@ def test_a_gallon_is_asked_about(tmp_path, tank):
     inflow = propose([read_recorded_file(path)], tank, {}).assigned["inflow"]
     assert inflow.factor == pytest.approx(6.30901964e-5)
     assert "[gal/min]' confirms it, [igal/min] takes the other" in inflow.doubt
-    said = {"inflow": NamedChannel("inflow", "igal/min")}
-    inflow = propose([read_recorded_file(path)], tank, said).assigned["inflow"]
+    named = {"inflow": NamedChannel("inflow", "igal/min")}
+    inflow = propose([read_recorded_file(path)], tank, named).assigned["inflow"]
     assert inflow.factor == pytest.approx(4.54609e-3 / 60)
 
 

@@ -52,9 +52,9 @@ def test_a_mass_and_an_efficiency_that_act_as_their_quotient_are_guesses(tmp_pat
     assert result.inseparable["m", "e"] > 0.999
     assert not result.runs["ekf"].claimed["m"].any()
     assert not result.runs["ekf"].claimed["e"].any()
-    said = "m and e are indistinguishable in this recording"
-    assert said in format_table(result.system, [result]).splitlines()[2]
-    assert result.to_dict()["doubts"][-1].startswith(said)
+    doubt = "m and e are indistinguishable in this recording"
+    assert doubt in format_table(result.system, [result]).splitlines()[2]
+    assert result.to_dict()["doubts"][-1].startswith(doubt)
 
 
 def test_a_mass_and_a_resistance_are_told_apart_as_the_power_changes(tmp_path):
@@ -77,11 +77,11 @@ def test_observability_names_what_cannot_be_told_apart(tmp_path, capsys):
     ran(tmp_path / "pair", "m", "e")
     options = ["--system", str(tmp_path / "pair"), "--out", str(tmp_path / "out"), "--workers", "1"]
     assert main(["observability", str(tmp_path / "pair" / "run.csv"), *options]) == 0
-    said = "m and e are indistinguishable in this recording"
-    assert said in capsys.readouterr().out.splitlines()[0]
+    sentence = "m and e are indistinguishable in this recording"
+    assert sentence in capsys.readouterr().out.splitlines()[0]
     summary = json.loads((tmp_path / "out" / "observability.json").read_text())
-    assert summary["answer"]["sentence"].startswith(said)
-    assert said in (tmp_path / "out" / "index.html").read_text()
+    assert summary["answer"]["sentence"].startswith(sentence)
+    assert sentence in (tmp_path / "out" / "index.html").read_text()
 
 
 def test_estimates_that_no_recording_tells_end_with_a_status(tmp_path, capsys):

@@ -59,8 +59,8 @@ def weighted(part: Part) -> float:
 @compiled
 def everything(whole: Whole, k: int) -> float:
     sign = -1.0 if whole.negative else 1.0
-    found = weighted(whole.part) + whole.matrix[1, 0] * whole.count + weighted(whole.parts[k])
-    return sign * found
+    total = weighted(whole.part) + whole.matrix[1, 0] * whole.count + weighted(whole.parts[k])
+    return sign * total
 
 
 @compiled

@@ -63,7 +63,7 @@ class Clocks:
         return SimpleNamespace(shared=shared, total=lambda: total)
 
 
-def said(skews: Mapping[str, float], monkeypatch: pytest.MonkeyPatch) -> LateSignals | None:
+def inferred(skews: Mapping[str, float], monkeypatch: pytest.MonkeyPatch) -> LateSignals | None:
     """What is late, where nothing else was found and much is wrong without clocks."""
     fit = Clocks(skews)
 
@@ -85,24 +85,24 @@ def said(skews: Mapping[str, float], monkeypatch: pytest.MonkeyPatch) -> LateSig
 
 def test_one_late_signal_is_named_with_its_time(monkeypatch):
     """Six microseconds are a hundredth of a sample, however sure they are."""
-    printed = said({"u": -6e-6, "w": 8e-3}, monkeypatch)
+    printed = inferred({"u": -6e-6, "w": 8e-3}, monkeypatch)
     assert printed.signals == ("w",)
     assert printed.skew == pytest.approx(8e-3)
 
 
 def test_what_all_others_are_early_against_is_late(monkeypatch):
-    printed = said({"u": -8e-3, "w": -8e-3}, monkeypatch)
+    printed = inferred({"u": -8e-3, "w": -8e-3}, monkeypatch)
     assert (printed.signals, printed.skew) == (("i",), pytest.approx(8e-3))
 
 
 def test_signals_that_are_late_by_different_times_are_listed(monkeypatch):
-    printed = said({"u": 3e-3, "v": -2e-3, "w": 8e-3, "x": 5e-3}, monkeypatch)
+    printed = inferred({"u": 3e-3, "v": -2e-3, "w": 8e-3, "x": 5e-3}, monkeypatch)
     assert printed.skews == {"u": 3e-3, "v": -2e-3, "w": 8e-3, "x": 5e-3}
     assert printed.signals == ("u", "v", "w", "x")
 
 
 def test_clocks_that_are_right_are_no_cause(monkeypatch):
-    assert said({"u": -6e-6, "w": 9e-5}, monkeypatch) is None
+    assert inferred({"u": -6e-6, "w": 9e-5}, monkeypatch) is None
 
 
 # --- a motor, written from its equations and simulated by SciPy ---

@@ -36,7 +36,7 @@ from .heater import NOISE, cases, diagnosed
 from .heater import system as heated_block
 
 G, SPREAD = 0.3, 0.015  # of both of the block's own conductances together [W/K]
-HALVES = "".join(f"{one} = {{ spread = {SPREAD / 2**0.5 / (0.5 * G)} }}\n" for one in ("Ga", "Gb"))
+HALVES = "".join(f"{key} = {{ spread = {SPREAD / 2**0.5 / (0.5 * G)} }}\n" for key in ("Ga", "Gb"))
 
 
 def block(folder: Path, more: str) -> System:
@@ -73,7 +73,7 @@ def recorded(conductance: float, seed: int, share: float = 1.0) -> pd.DataFrame:
     return heated(share * rng.uniform(10.0, 90.0, 12), lambda T: conductance * T, 0.0, rng)
 
 
-def found(frames: Sequence[pd.DataFrame], folder: Path) -> list[str]:
+def causes_of(frames: Sequence[pd.DataFrame], folder: Path) -> list[str]:
     of = block(folder / "block", f"[diagnosis.levels]\n{HALVES}")
     return [
         cause.effect.name for cause in diagnosed(of, cases(of, frames), folder).diagnosis.causes
@@ -82,17 +82,19 @@ def found(frames: Sequence[pd.DataFrame], folder: Path) -> list[str]:
 
 def test_what_no_block_of_its_kind_has_is_a_cause(tmp_path):
     """Of 3.5 deviations, where 3.3 are asked for. Held-out recordings say nothing of it."""
-    assert found([recorded(G + 3.5 * SPREAD, seed) for seed in range(3)], tmp_path) == ["Draught"]
+    assert causes_of([recorded(G + 3.5 * SPREAD, seed) for seed in range(3)], tmp_path) == [
+        "Draught"
+    ]
 
 
 def test_what_one_block_in_twenty_has_is_none(tmp_path):
-    assert found([recorded(G + 2.0 * SPREAD, seed) for seed in range(3)], tmp_path) == []
+    assert causes_of([recorded(G + 2.0 * SPREAD, seed) for seed in range(3)], tmp_path) == []
 
 
 def test_what_a_single_recording_tells_is_none(tmp_path):
     """The others are of a block that is hardly heated."""
     frames = [recorded(G + 3.5 * SPREAD, seed, 1.0 if seed == 0 else 1e-3) for seed in range(3)]
-    assert found(frames, tmp_path) == []
+    assert causes_of(frames, tmp_path) == []
 
 
 def test_what_wanders_is_uncertain_by_as_much_as_it_moves_means(tmp_path):
@@ -170,8 +172,8 @@ def test_a_free_run_is_free_whatever_noise_an_input_declares(tmp_path):
         outcome = diagnosed(of, cases(of, frames[:1]), folder, cases(of, frames)[1:])
         free.append([error.free_run[0] for error in outcome.errors])
         corrected.append([error.rms[0] for error in outcome.errors])
-        said = {error.corrected for error in outcome.errors}
-        assert said == ({""} if name == "exact" else {"measured outputs"})
+        correcting = {error.corrected for error in outcome.errors}
+        assert correcting == ({""} if name == "exact" else {"measured outputs"})
         assert ("free run" in outcome.summary()) is (name == "noisy")
     assert corrected[0] == free[0]
     assert free[1] == pytest.approx(free[0], rel=0.05)  # the first value read is fitted again
@@ -227,8 +229,8 @@ def test_a_level_further_from_its_sheet_than_is_likely_is_said(tmp_path):
     (level,) = outcome.diagnosis.shifted
     assert (level.name, level.hides) == ("K", ())
     assert level.value == pytest.approx(2.0, rel=0.02)
-    said = "25% above its data sheet of 1.6 W/K, declared as ±0.05 of it. Check the data sheet: "
-    assert f"{said}no effect explains it as this nuisance parameter does." in level.text
+    warning = "25% above its data sheet of 1.6 W/K, declared as ±0.05 of it. Check the data sheet: "
+    assert f"{warning}no effect explains it as this nuisance parameter does." in level.text
     assert level.text in outcome.warnings
 
 
@@ -384,7 +386,7 @@ def test_what_is_declared_too_narrow_is_told_with_what_to_write(
 ):
     """Masses that move already, or springs that differ; by the advice, nothing is missing."""
     library, file = machine("car")
-    told = file.replace("20 mm/s", "0.2 mm/s") + "[diagnosis.tolerances]\nk = 0.0005\n"
+    text = file.replace("20 mm/s", "0.2 mm/s") + "[diagnosis.tolerances]\nk = 0.0005\n"
     shares = zip(UNEVEN, (1.0, -1.0, 0.6, -0.8), strict=True)
     frames = [
         driven(size, [2, k], lambda x, k=2e4 + share * stiffness: k * x, rise=share * rise)
@@ -393,10 +395,10 @@ def test_what_is_declared_too_narrow_is_told_with_what_to_write(
     outcomes = []
     for name in ("narrow", "wide"):
         (tmp_path / name).mkdir()
-        of = declare(tmp_path / name, library, told)
+        of = declare(tmp_path / name, library, text)
         outcomes.append(diagnosed(of, cases(of, frames), tmp_path / name))
         if name == "narrow":
-            said = re.search(f"write ({advice})", outcomes[0].warnings[0])
-            assert said is not None
-            told = told.replace(declared, said[1].partition(" in ")[0])
+            match = re.search(f"write ({advice})", outcomes[0].warnings[0])
+            assert match is not None
+            text = text.replace(declared, match[1].partition(" in ")[0])
     assert [outcome.diagnosis.verdict for outcome in outcomes] == ["unexplained", "nothing"]

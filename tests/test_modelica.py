@@ -147,7 +147,7 @@ def test_what_a_class_inherits_has_the_values_it_gives(wheelset):
         for name in ("WaterFilm", "SingleDiscWaterFilm")
     )
     assert list(whole) == list(single)
-    assert [one["wet"].modifier.value for one in (whole, single)] == ["1.0", "1.0/3.0"]
+    assert [parts["wet"].modifier.value for parts in (whole, single)] == ["1.0", "1.0/3.0"]
     assert wheelset.unit(single["wet"]) == "1"
     assert wheelset.unit(single["E0"]) == "J"  # by its type, whose unit is a modifier
 

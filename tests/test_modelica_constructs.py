@@ -216,8 +216,8 @@ def page(text: str) -> str:
     """Text of the page with its lists written anew."""
     for name, constructs in (("constructs", CONSTRUCTS), ("library", LIBRARY)):
         begin, end = f"<!-- {name} -->\n", f"<!-- end of {name} -->"
-        before, _, rest = text.partition(begin)
-        text = before + begin + listing(constructs) + end + rest.partition(end)[2]
+        before, _, below = text.partition(begin)
+        text = before + begin + listing(constructs) + end + below.partition(end)[2]
     return text
 
 

@@ -78,10 +78,10 @@ def test_surprises_of_a_sound_quantity_are_standard_normal_and_independent():
             distances.append(surprise)
     surprises = np.reshape(distances, (300, 12))
     assert np.isnan(surprises[:, :2]).all()
-    told = surprises[:, 2:]
+    scored = surprises[:, 2:]
     # Of right ones, one seed in a thousand fails.
-    assert kstest(told.ravel(), "norm").pvalue > 1e-3
-    assert_allclose(np.corrcoef(told.T) - np.eye(10), 0.0, atol=4.0 / np.sqrt(300))
+    assert kstest(scored.ravel(), "norm").pvalue > 1e-3
+    assert_allclose(np.corrcoef(scored.T) - np.eye(10), 0.0, atol=4.0 / np.sqrt(300))
 
 
 # --- quantities of one machine, by numbers alone ---
@@ -419,9 +419,9 @@ def test_a_machine_that_has_not_changed_says_so(usual, tmp_path):
 def test_the_command_writes_what_it_says(history, usual, tmp_path, capsys):
     words = ["monitor", str(history), "--system", "train", "--workers", "2"]
     assert main([*words, "--out", str(tmp_path / "out")]) == 0
-    said = capsys.readouterr()
-    assert usual.sentences[0] in said.out
-    assert "[16/16]" in said.err
+    printed = capsys.readouterr()
+    assert usual.sentences[0] in printed.out
+    assert "[16/16]" in printed.err
     alarms = pd.read_csv(tmp_path / "out" / "alarms.csv")
     assert set(alarms["quantity"]) == {"muDC[3] against the others"}
     assert len(pd.read_csv(tmp_path / "out" / "estimates.csv")) == 16 * 19
@@ -517,9 +517,9 @@ def fleet(once) -> Path:
 def watched(where: str, out: Path, *more: str) -> dict[str, dict[str, object]]:
     words = ["monitor", where, "--system", "train", "--fleet", "--out", str(out), *more]
     assert main([*words, "--quiet"]) == 0
-    said = json.loads((out / "fleet.json").read_text())
-    check("fleet", said)
-    return {machine["machine"]: machine for machine in said["machines"]}
+    summary = json.loads((out / "fleet.json").read_text())
+    check("fleet", summary)
+    return {machine["machine"]: machine for machine in summary["machines"]}
 
 
 @pytest.fixture(scope="module")
@@ -572,7 +572,7 @@ def test_a_cluster_finds_the_same(fleet, local, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("where", "more", "found"),
+    ("where", "more", "message"),
     [
         ("nowhere", ["--fleet"], "what cannot be read"),
         ("no-such://x/y", ["--fleet"], "what cannot be read"),
@@ -580,6 +580,6 @@ def test_a_cluster_finds_the_same(fleet, local, tmp_path):
         (".", ["--cluster", "tcp://127.0.0.1:1"], "add --fleet"),
     ],
 )
-def test_what_makes_no_sense_is_refused(where, more, found, tmp_path, capsys):
+def test_what_makes_no_sense_is_refused(where, more, message, tmp_path, capsys):
     assert main(["monitor", where, "--system", "train", "--out", str(tmp_path / "out"), *more]) == 2
-    assert found in capsys.readouterr().err
+    assert message in capsys.readouterr().err

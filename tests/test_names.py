@@ -63,9 +63,9 @@ def start_of_stop(dry_case) -> Case:
     return dry_case.part(slice(1000))
 
 
-@pytest.mark.parametrize("kind", [OpenLoop, DisturbanceObserver, ExtendedKalmanFilter])
+@pytest.mark.parametrize("cls", [OpenLoop, DisturbanceObserver, ExtendedKalmanFilter])
 def test_a_model_with_other_names_gives_the_same_estimate_bit_for_bit(
-    root, renamed_path, start_of_stop, system, kind
+    root, renamed_path, start_of_stop, system, cls
 ):
     estimates = []
     with (
@@ -73,7 +73,7 @@ def test_a_model_with_other_names_gives_the_same_estimate_bit_for_bit(
         FMU(renamed_path, NAMES) as theirs,
     ):
         for fmu in (ours, theirs):
-            run = replay(start_of_stop, kind(fmu, system, kind.default_gains(fmu, system)))
+            run = replay(start_of_stop, cls(fmu, system, cls.default_gains(fmu, system)))
             assert run.ending is Ending.OK
             estimates.append(run.estimate)
     assert_array_equal(*estimates)

@@ -236,8 +236,8 @@ def test_a_folder_with_a_system_is_left_as_it_is(folder):
 
 def ran(command: str, folder: Path, out: Path, *options: str) -> dict[str, object]:
     """Run a command on the new system; returns its summary."""
-    name, *rest = command.split()
-    assert main([name, *rest, "--system", str(folder), "--out", str(out), *options]) == 0
+    name, *arguments = command.split()
+    assert main([name, *arguments, "--system", str(folder), "--out", str(out), *options]) == 0
     summary: dict[str, object] = json.loads((out / "summary.json").read_text())
     return summary
 

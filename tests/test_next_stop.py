@@ -159,12 +159,12 @@ def test_precision_of_one_unknown_is_its_standard_deviation():
 # --- experiments ---
 
 
-@pytest.mark.parametrize("kind", [STEP, STAIRCASE, SINE])
-def test_a_demand_stays_in_its_range_and_begins_when_it_says(kind):
-    varied = VariedInput("u", (2.0, 5.0), (kind,), 3.0, 4.0, ())
+@pytest.mark.parametrize("shape", [STEP, STAIRCASE, SINE])
+def test_a_demand_stays_in_its_range_and_begins_when_it_says(shape):
+    varied = VariedInput("u", (2.0, 5.0), (shape,), 3.0, 4.0, ())
     time = np.arange(0.0, 60.0, 0.1)
-    levels = {STEP: (5.0,), STAIRCASE: (2.0, 3.5, 5.0), SINE: (2.0, 5.0)}[kind]
-    demand = Profile(varied, kind, levels, 4.0).demand(time)
+    levels = {STEP: (5.0,), STAIRCASE: (2.0, 3.5, 5.0), SINE: (2.0, 5.0)}[shape]
+    demand = Profile(varied, shape, levels, 4.0).demand(time)
     assert not demand[time < 3.0].any()
     begun = demand[time >= 3.0]
     # Sampled each 0.1 s, a sine of 4 s misses its ends by up to 0.05 rad: 0.1 % of its amplitude.
@@ -224,7 +224,7 @@ def test_of_a_large_grid_a_fraction_is_tried_with_every_value(counts, parts):
         assert min(often) > 0
         assert np.ptp(often) <= 2
     # What is left out differs from something that is tried in one setting.
-    near = [other_setting for each in fraction for other_setting in other_settings(asked, each)]
+    near = [other for setting in fraction for other in other_settings(asked, setting)]
     assert len(other_settings(asked, grid[0])) == sum(counts) - len(counts)
     assert all(experiment in near for experiment in grid if experiment not in fraction)
 
@@ -414,8 +414,8 @@ def test_tolerances_of_recordings_so_far_are_where_they_do_best(undecided):
 
 
 def test_rivals_are_read_as_they_were_written(undecided):
-    said = json.loads(json.dumps(undecided.rivals.to_dict()))
-    assert read_rivals(said).to_dict() == undecided.rivals.to_dict()
+    written = json.loads(json.dumps(undecided.rivals.to_dict()))
+    assert read_rivals(written).to_dict() == undecided.rivals.to_dict()
 
 
 IMPOSSIBLE = {
@@ -455,13 +455,13 @@ def test_the_command_writes_what_it_prints(block, mild, undecided, tmp_path, cap
     out = tmp_path / "next"
     options = ["--system", str(block.source), "--out", str(out), "--workers", "1"]
     assert main(["next", str(tmp_path), *options]) == 0
-    said = json.loads((out / "next.json").read_text())
-    check("next", said)
-    page = check_page(out / "index.html", said)
-    assert len(page.get_element_by_id("tried-table").xpath("tbody/tr")) == len(said["tried"])
-    assert said["sentence"] in capsys.readouterr().out
-    assert said["rivals"] == ["Draught", "Radiation"]
-    assert len(pd.read_csv(out / "experiments.csv")) == len(said["tried"])
+    summary = json.loads((out / "next.json").read_text())
+    check("next", summary)
+    page = check_page(out / "index.html", summary)
+    assert len(page.get_element_by_id("tried-table").xpath("tbody/tr")) == len(summary["tried"])
+    assert summary["sentence"] in capsys.readouterr().out
+    assert summary["rivals"] == ["Draught", "Radiation"]
+    assert len(pd.read_csv(out / "experiments.csv")) == len(summary["tried"])
     assert (out / "responses.png").stat().st_size > 0
 
 
@@ -469,7 +469,7 @@ def test_the_command_writes_what_it_prints(block, mild, undecided, tmp_path, cap
 
 
 @pytest.mark.parametrize(
-    ("summary", "said"),
+    ("summary", "message"),
     [
         ("nonsense", "no summary of a diagnosis"),
         (
@@ -479,10 +479,10 @@ def test_the_command_writes_what_it_prints(block, mild, undecided, tmp_path, cap
         ({"verdict": "nothing", "provenance": {"system": "wheelset"}}, "diagnose more recordings"),
     ],
 )
-def test_what_is_no_undecided_diagnosis_is_refused(summary, said, tmp_path, capsys):
+def test_what_is_no_undecided_diagnosis_is_refused(summary, message, tmp_path, capsys):
     (tmp_path / "summary.json").write_text(json.dumps(summary))
     assert main(["next", str(tmp_path)]) == 2
-    assert said in capsys.readouterr().err
+    assert message in capsys.readouterr().err
 
 
 def test_a_system_that_does_not_say_what_may_be_varied_is_refused(block, undecided):
@@ -492,7 +492,7 @@ def test_a_system_that_does_not_say_what_may_be_varied_is_refused(block, undecid
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "said"),
+    ("old", "new", "message"),
     [
         ('range = ["25 W", "35 W"]', 'range = ["35 W", "25 W"]', r"\[low, high\]"),
         ('every = "60 s"', 'every = "0 s"', "a time above 0"),
@@ -505,10 +505,10 @@ def test_a_system_that_does_not_say_what_may_be_varied_is_refused(block, undecid
         ("[next.start]", SETTING.format("share", "'2 m'", "s"), "a unit of another dimension"),
     ],
 )
-def test_a_mistake_in_what_may_be_varied_is_refused(block, old, new, said, tmp_path):
+def test_a_mistake_in_what_may_be_varied_is_refused(block, old, new, message, tmp_path):
     for name in ("package.mo", "system.toml"):
         (tmp_path / name).write_text((block.source.parent / name).read_text().replace(old, new))
-    with pytest.raises(InputError, match=said):
+    with pytest.raises(InputError, match=message):
         load_system(tmp_path)
 
 

@@ -332,8 +332,8 @@ def test_command_tells_when_frictions_are_known(start_of_a_stop, tmp_path, capsy
     check("observability", summary)
     page = check_page(out / "index.html", summary)
     (row,) = page.get_element_by_id("case-table").xpath("tbody/tr")
-    told = summary["cases"]["dry"]["models"]["MinimalObserver"]["useful"]
-    assert f"{100 * told['dmuDC']:.0f}" in [cell.text_content() for cell in row]
+    useful = summary["cases"]["dry"]["models"]["MinimalObserver"]["useful"]
+    assert f"{100 * useful['dmuDC']:.0f}" in [cell.text_content() for cell in row]
     assert page.get_element_by_id("linear-FullObserver").xpath("tbody/tr")
     assert summary["linear"]["MinimalObserver"]["observable"]
     stop = summary["cases"]["dry"]["models"]

@@ -113,7 +113,7 @@ def stop(fmu) -> Stop:
 
 ESTIMATORS = list(estimators_of(WHEELSET))
 OBSERVERS = ESTIMATORS[2:]  # the others are baselines
-ONLINE = [name for name, kind in estimators_of(WHEELSET).items() if not kind.offline]
+ONLINE = [name for name, cls in estimators_of(WHEELSET).items() if not cls.offline]
 COLUMNS = list(WHEELSET.columns)
 
 

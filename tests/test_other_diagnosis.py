@@ -216,10 +216,10 @@ def test_beside_a_cause_beyond_its_bound_no_other_stands_for_it(bounded):
     assert outcome.diagnosis.verdict == "unexplained"
     (nearest,) = outcome.diagnosis.nearest
     assert set(nearest.effects) == {"BearingFriction", "Grease"}
-    said = re.search(
+    match = re.search(
         r"tau_c of BearingFriction is at its bound; ([0-9.]+) N.m, beyond", nearest.text
     )
-    assert float(said[1]) == pytest.approx(FRICTION, rel=0.05)
+    assert float(match[1]) == pytest.approx(FRICTION, rel=0.05)
     assert "widen the bounds" in outcome.summary()
 
 
@@ -305,8 +305,8 @@ def test_the_extended_model_rubs_and_lacks_nothing(fan, diagnosed, tmp_path):
 
 def test_a_diagnosis_is_text_table_numbers_and_figure(diagnosed):
     outcome, _ = diagnosed(rubbing)
-    said = "The model lacks a bearing that rubs: BearingFriction (or BrushDrop), tau_c 0.0"
-    assert outcome.summary().startswith(said)
+    sentence = "The model lacks a bearing that rubs: BearingFriction (or BrushDrop), tau_c 0.0"
+    assert outcome.summary().startswith(sentence)
     table = outcome.to_frame()
     assert list(table["effect"]) == ["BearingFriction"]
     assert (table["low"] < table["value"]).all()
@@ -336,5 +336,5 @@ def test_page_and_files_speak_of_the_fan(load, diagnosed):
         assert word not in text.replace("turn the wheel with Ctrl", ""), word
     columns = list(pd.read_csv(out / "00_steps.csv"))
     assert columns[:3] == ["time [s]", "before.w [rad/s]", "after.w [rad/s]"]
-    said: Mapping[str, object] = json.loads((out / "summary.json").read_text())
-    assert said["verdict"] == outcome.diagnosis.verdict
+    summary: Mapping[str, object] = json.loads((out / "summary.json").read_text())
+    assert summary["verdict"] == outcome.diagnosis.verdict

@@ -197,8 +197,8 @@ def kalman_gains(process: Process) -> tuple[Gains, float]:
 def around(gains: Gains, free: Sequence[str]) -> SearchSpace:
     """Gains of either sign up to 100, for those that are free; the others stay."""
     values = gains.values
-    ones = np.ones(values.size)
-    both = SearchSpace(0.01 * ones, 100.0 * ones, -ones, ones, ones)
+    limits = np.ones(values.size)
+    both = SearchSpace(0.01 * limits, 100.0 * limits, -limits, limits, limits)
     start = both.coordinates(values)
     fixed = ~np.isin(gains.names, free)
     s = 2.0 * start - 1.0

@@ -318,8 +318,8 @@ def test_what_goes_out_and_back_at_once_is_told_with_its_line(name, stop, tmp_pa
     system = WHEELSET
     toml, table = stop
     assert read_case(write(tmp_path / "whole", toml, table), system).doubts == ()
-    told = read_case(write(tmp_path / "changed", toml, change(table)), system).doubts
-    assert any(re.search(message, doubt) for doubt in told), told
+    doubts = read_case(write(tmp_path / "changed", toml, change(table)), system).doubts
+    assert any(re.search(message, doubt) for doubt in doubts), doubts
 
 
 def test_a_machine_that_turns_within_a_sample_raises_no_doubt(tmp_path):

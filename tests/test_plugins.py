@@ -70,7 +70,7 @@ def installed(minimal_path, once) -> Path:
     return once("plugin", install)
 
 
-def said(*command: str, beside: Path) -> str:
+def output_of(*command: str, beside: Path) -> str:
     """What Python prints, with a folder of distributions beside those that are installed."""
     run = python(*command, PYTHONPATH=str(beside))
     assert run.returncode == 0, run.stderr
@@ -78,11 +78,13 @@ def said(*command: str, beside: Path) -> str:
 
 
 def test_its_system_is_listed_and_its_command_runs(installed):
-    systems = json.loads(said("-m", "workbench", "systems", "--json", beside=installed))["result"]
+    systems = json.loads(output_of("-m", "workbench", "systems", "--json", beside=installed))[
+        "result"
+    ]
     assert systems["systems"]["spinning"]["title"] == "A roller that spins down"
-    assert "say how long a roller spins" in said("-m", "workbench", "--help", beside=installed)
+    assert "say how long a roller spins" in output_of("-m", "workbench", "--help", beside=installed)
     command = ("-m", "workbench", "spin", "--system", "spinning", "--json")
-    assert json.loads(said(*command, beside=installed))["result"] == {
+    assert json.loads(output_of(*command, beside=installed))["result"] == {
         "system": "spinning",
         "spins": 7.0,
     }
@@ -97,7 +99,7 @@ def test_its_estimator_is_one_of_its_system_and_of_no_other(installed):
             "print(['coasting' in names for names in known])",
         ]
     )
-    assert said("-c", listing, beside=installed) == "[True, False]\n"
+    assert output_of("-c", listing, beside=installed) == "[True, False]\n"
 
 
 def test_one_that_is_broken_costs_a_warning_and_no_command(installed, tmp_path):
@@ -105,7 +107,7 @@ def test_one_that_is_broken_costs_a_warning_and_no_command(installed, tmp_path):
     broken.mkdir()
     (broken / "METADATA").write_text("Metadata-Version: 2.1\nName: broken\nVersion: 1.0\n")
     (broken / "entry_points.txt").write_text("[workbench.machines]\nbroken = nowhere.at_all:X\n")
-    printed = said("-m", "workbench", "systems", beside=tmp_path)
+    printed = output_of("-m", "workbench", "systems", beside=tmp_path)
     assert "wheelset" in printed
     assert "plugin 'nowhere.at_all:X': found ModuleNotFoundError" in printed
 

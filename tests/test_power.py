@@ -77,7 +77,7 @@ PROVENANCE = {
 }
 
 
-def said(
+def set_verdict(
     gains: dict[str, float], *causes: NamedCause, kind: Kind = "single", other: str = ""
 ) -> SetVerdict:
     """A verdict on a set: causes, or other words, or nothing."""
@@ -89,7 +89,7 @@ def said(
 def in_part(gains: dict[str, float], *parts: tuple[str, ...]) -> SetVerdict:
     """A verdict that two effects, or what no catalogue has, are partly explained by causes."""
     kind: Kind = "outside" if len(gains) == 1 else "pair"
-    return dataclasses.replace(said(gains, kind=kind, other="partly explained"), parts=parts)
+    return dataclasses.replace(set_verdict(gains, kind=kind, other="partly explained"), parts=parts)
 
 
 def named(effect: str, *twins: str, **intervals: tuple[float, float, float]) -> NamedCause:
@@ -207,47 +207,51 @@ def test_share_of_no_trials_is_unknown():
 
 def test_right_name_is_the_first_one_or_in_its_group():
     planted = {"fx_gain": 0.008}
-    assert named_right(said(planted, named("FxGain")))
-    assert named_right(said(planted, named("DriveTorqueGain", "FxGain")))
-    assert not named_right(said(planted, named("BrakeFade"), named("FxGain")))
-    assert not named_right(said(planted))
-    assert not named_right(said({"friction_step": 0.04}, named("WaterFilm"), kind="outside"))
+    assert named_right(set_verdict(planted, named("FxGain")))
+    assert named_right(set_verdict(planted, named("DriveTorqueGain", "FxGain")))
+    assert not named_right(set_verdict(planted, named("BrakeFade"), named("FxGain")))
+    assert not named_right(set_verdict(planted))
+    assert not named_right(set_verdict({"friction_step": 0.04}, named("WaterFilm"), kind="outside"))
 
 
 def test_pair_is_found_if_each_effect_has_a_cause_of_its_own():
     planted = {"fx_gain": 0.008, "torque_gain": 0.008}
     both = named("FxGain", "DriveTorqueGain")
-    assert named_all(said(planted, named("DriveTorqueGain"), named("BrakeFade"), named("FxGain")))
-    assert not named_all(said(planted, both))
-    assert not named_all(said(planted, both, named("BrakeFade")))
+    assert named_all(
+        set_verdict(planted, named("DriveTorqueGain"), named("BrakeFade"), named("FxGain"))
+    )
+    assert not named_all(set_verdict(planted, both))
+    assert not named_all(set_verdict(planted, both, named("BrakeFade")))
 
 
 def test_intervals_are_judged_by_the_law_of_the_rig():
     near, far = (2.1, 1.9, 2.3), (1.0, 0.9, 1.1)
     bedding = named("BeddingIn", loss=(-0.04, -0.05, -0.03), tau=far)
-    assert intervals_cover(said({"bedding_in": -0.04}, bedding), REPERTOIRE) == [True, False]
+    assert intervals_cover(set_verdict({"bedding_in": -0.04}, bedding), REPERTOIRE) == [True, False]
     # The phase of an amplitude is free in each stop, so that its sign means nothing.
     ring = named("PoleRingEccentricity", amplitude=near)
-    assert intervals_cover(said({"pole_ring": -2.0}, ring), REPERTOIRE) == [True]
+    assert intervals_cover(set_verdict({"pole_ring": -2.0}, ring), REPERTOIRE) == [True]
     # A twin has a size of its own, which is no claim on what was planted.
     twin = named("DriveTorqueGain", "FxGain", gain=near)
-    assert intervals_cover(said({"fx_gain": 1.0}, twin), REPERTOIRE) == []
+    assert intervals_cover(set_verdict({"fx_gain": 1.0}, twin), REPERTOIRE) == []
 
 
 def test_summary_counts_what_was_said(tmp_path):
     results = [
-        said({}, kind="clean"),
-        said({}, kind="clean", other="unexplained"),
-        said({"fx_gain": 0.008}, named("DriveTorqueGain", "FxGain")),
-        said({"fade": 1e-4}, named("BrakeFade", fade=(1e-4, 9e-5, 1.1e-4)), named("FxGain")),
-        said({"fade": 1e-4}, named("WaterFilm")),
-        said({"wheel_inertia": 0.8}),
-        dataclasses.replace(said({"wheel_load": 0.08}), clearness=3.9),
-        dataclasses.replace(said({"wheel_load": 0.08}), clearness=4.1),
-        said({"fx_gain": 0.008, "fade": 1e-4}, named("BrakeFade"), named("FxGain"), kind="pair"),
-        said({"friction_step": 0.04}, named("WaterFilm"), kind="outside"),
-        said({"friction_step": 0.04}, kind="outside", other="unexplained"),
-        said({"drive_beat": 0.02}, kind="outside", other="failed"),
+        set_verdict({}, kind="clean"),
+        set_verdict({}, kind="clean", other="unexplained"),
+        set_verdict({"fx_gain": 0.008}, named("DriveTorqueGain", "FxGain")),
+        set_verdict({"fade": 1e-4}, named("BrakeFade", fade=(1e-4, 9e-5, 1.1e-4)), named("FxGain")),
+        set_verdict({"fade": 1e-4}, named("WaterFilm")),
+        set_verdict({"wheel_inertia": 0.8}),
+        dataclasses.replace(set_verdict({"wheel_load": 0.08}), clearness=3.9),
+        dataclasses.replace(set_verdict({"wheel_load": 0.08}), clearness=4.1),
+        set_verdict(
+            {"fx_gain": 0.008, "fade": 1e-4}, named("BrakeFade"), named("FxGain"), kind="pair"
+        ),
+        set_verdict({"friction_step": 0.04}, named("WaterFilm"), kind="outside"),
+        set_verdict({"friction_step": 0.04}, kind="outside", other="unexplained"),
+        set_verdict({"drive_beat": 0.02}, kind="outside", other="failed"),
         in_part({"friction_step": 0.04}, ("WaterFilm", "FxGain")),
         in_part({"fx_gain": 0.008, "fade": 1e-4}, ("DriveTorqueGain", "FxGain"), ("WaterFilm",)),
     ]
@@ -275,7 +279,7 @@ def test_summary_counts_what_was_said(tmp_path):
         "4": {"found": 1, "unexplained": 1, "partly explained": 1}
     }
     assert summary["confusion"]["BrakeFade"] == {"BrakeFade": 1, "WaterFilm": 1}
-    assert [one["said"] for one in summary["wrong"]] == [["WaterFilm"], ["WaterFilm"]]
+    assert [row["said"] for row in summary["wrong"]] == [["WaterFilm"], ["WaterFilm"]]
     assert [row["said"] for row in summary["partly_wrong"]] == [["WaterFilm"]]
     assert len(summary["failed"]) == 1
     write_power(summary, REPERTOIRE.effects, PROVENANCE, tmp_path)
@@ -298,7 +302,7 @@ def test_summary_counts_what_was_said(tmp_path):
     assert float(shown) * 1e-4 == pytest.approx(summary["effects"]["BrakeFade"]["size"])
 
 
-@pytest.mark.parametrize("results", [[], [said({}, kind="clean")]])
+@pytest.mark.parametrize("results", [[], [set_verdict({}, kind="clean")]])
 def test_run_that_ended_early_is_reported(results, tmp_path):
     summary = summarise(results, REPERTOIRE)
     write_power(summary, REPERTOIRE.effects, PROVENANCE, tmp_path)
@@ -311,7 +315,7 @@ def test_run_that_ended_early_is_reported(results, tmp_path):
 def test_line_that_a_kill_cut_off_is_forgotten(tmp_path):
     path = tmp_path / "sets.jsonl"
     first, second = (
-        said({"fx_gain": 0.1}, named("FxGain", "ApexOffset", gain=(0.1, 0.0, 0.2))),
+        set_verdict({"fx_gain": 0.1}, named("FxGain", "ApexOffset", gain=(0.1, 0.0, 0.2))),
         in_part({"friction_step": 0.04}, ("WaterFilm", "FxGain")),
     )
     journal = Journal(path, IDENTITY, resume=False)
@@ -326,7 +330,7 @@ def test_line_that_a_kill_cut_off_is_forgotten(tmp_path):
 
 def test_a_damaged_verdict_is_left_out_and_the_file_before_is_kept(tmp_path):
     path = tmp_path / "sets.jsonl"
-    results = [said({"fx_gain": 0.1 * k}) for k in range(1, 4)]
+    results = [set_verdict({"fx_gain": 0.1 * k}) for k in range(1, 4)]
     journal = Journal(path, IDENTITY, resume=False)
     for result in results:
         journal.append(result)
@@ -344,7 +348,7 @@ def test_a_damaged_verdict_is_left_out_and_the_file_before_is_kept(tmp_path):
 
 def test_verdicts_of_another_run_are_refused(tmp_path):
     path = tmp_path / "sets.jsonl"
-    Journal(path, IDENTITY, resume=False).append(said({}))
+    Journal(path, IDENTITY, resume=False).append(set_verdict({}))
     with pytest.raises(InputError, match=r"another run \(other: seed\)"):
         Journal(path, {"seed": 2}, resume=True)
     assert len(Journal(path, IDENTITY, resume=True).results) == 1
@@ -537,7 +541,7 @@ def test_what_was_followed_is_counted():
         row | {"group": ["A"], "proposed": None, "drawn": []},  # named alone by the stops before
     ]
     summary = summarise_following(rows)
-    counted = {name: (one["hits"], one["of"]) for name, one in summary.items()}
+    counted = {name: (share["hits"], share["of"]) for name, share in summary.items()}
     assert counted == {
         **{"proposed": (2, 4), "drawn": (1, 2), "foreseen": (1, 2), "never": (1, 2)},
         **{"sensed": (1, 1), "answered": (3, 4)},
@@ -581,7 +585,7 @@ def test_torque_and_force_part_where_the_drive_imitates_nothing(tmp_path):
     assert (row["proposed"]["foreseen"], row["proposed"]["named"]) == (True, ["FxGain"])
     assert len(row["drawn"]) == 2
     # What imitates the whole train tells nothing, whatever else is drawn.
-    assert not any(one["parts"] for one in row["drawn"] if "7840" in one["experiment"])
+    assert not any(drawn["parts"] for drawn in row["drawn"] if "7840" in drawn["experiment"])
 
 
 @pytest.mark.long

@@ -196,17 +196,17 @@ def house(published_cases) -> dict[str, Case]:
 
 @pytest.fixture(scope="module")
 def outcome(house, once) -> Outcome:
-    system, fitted, rest = load_system("heated_house"), [house["four_days"]], [house["rest"]]
-    return once("diagnosis of a house", lambda out: diagnosed(system, fitted, out, held_out=rest))
+    system, fitted, later = load_system("heated_house"), [house["four_days"]], [house["rest"]]
+    return once("diagnosis of a house", lambda out: diagnosed(system, fitted, out, held_out=later))
 
 
 def test_what_follows_the_fitted_hours_is_held_out(tmp_path):
     rows = [f'{k / 12:.12f},1.5,0.2,5.1,21.0,"2009"' for k in range(1300)]
     (tmp_path / "inputPRBS1.csv").write_text("\n".join(['"t","Ta","Ps","Ph","yTi"', *rows]))
-    fitted, rest = heated_house.PUBLISHED.layouts[0].read(tmp_path)
-    assert (fitted.held_out, rest.held_out) == (False, True)
-    assert fitted.columns["time [s]"][-1] + 300.0 == rest.counts_from == 96 * 3600.0
-    assert rest.columns["time [s]"].size == 1300
+    fitted, later = heated_house.PUBLISHED.layouts[0].read(tmp_path)
+    assert (fitted.held_out, later.held_out) == (False, True)
+    assert fitted.columns["time [s]"][-1] + 300.0 == later.counts_from == 96 * 3600.0
+    assert later.columns["time [s]"].size == 1300
     first = {"time [s]": 0.0, "Ta [K]": 274.65, "sun [W/m2]": 200.0}
     first |= {"heating [W]": 5100.0, "T [K]": 294.15}
     assert {n: values[0] for n, values in fitted.columns.items()} == pytest.approx(first)
@@ -220,17 +220,17 @@ def test_walls_that_store_heat_are_named(outcome):
 
 def test_held_out_hours_are_foreseen_as_by_the_published_structure(house, outcome):
     """Fitted to the same hours; its published parameters were fitted to the held-out ones, too."""
-    rest = house["rest"]
+    later = house["rest"]
     fit = least_squares(
-        lambda logarithms: free_run(np.exp(logarithms), rest)[SETTLED:FITTED],
+        lambda logarithms: free_run(np.exp(logarithms), later)[SETTLED:FITTED],
         np.log(PARAMETERS),
         max_nfev=25,
     )
     assert_allclose(rms(fit.fun), 0.317, atol=0.002)  # as the protocol has it
     nominal, extended = next(error.rms for error in outcome.errors if error.held_out)
     assert extended < 0.6 * nominal
-    assert extended < 1.1 * rms(free_run(np.exp(fit.x), rest)[FITTED:])
-    assert extended < 1.15 * rms(free_run(np.array(PARAMETERS), rest)[FITTED:])
+    assert extended < 1.1 * rms(free_run(np.exp(fit.x), later)[FITTED:])
+    assert extended < 1.15 * rms(free_run(np.array(PARAMETERS), later)[FITTED:])
 
 
 def test_with_all_hours_fitted_it_errs_less_than_the_published_model(house, tmp_path):
@@ -272,8 +272,8 @@ def their_files(folder: Path, time: np.ndarray) -> None:
     for number, name in enumerate(CHAMBERS):
         lines = []
         for t, p in zip(time, chamber(number, time), strict=True):
-            thousands, rest = divmod(round(1e3 * t), 1000)
-            mark = f"{thousands}.{rest:03d}.000" if thousands else f"{rest}.000"
+            thousands, below = divmod(round(1e3 * t), 1000)
+            mark = f"{thousands}.{below:03d}.000" if thousands else f"{below}.000"
             lines.append(f"{mark};{p / 2:.3f};{p}\r\n")
         (data / f"{name}.csv").write_text("".join(lines))
 

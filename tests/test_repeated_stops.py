@@ -92,12 +92,12 @@ def losses(omega: np.ndarray, c0: float, c1: float, c2: float) -> np.ndarray:
 
 def test_the_rig_coasts_down_by_its_losses_alone(coasting):
     """By those of the data sheet; what rolls slips a little, too."""
-    said = {
+    content = {
         "conditions": {**{n: s.value for n, s in coasting.settings.items()}, "discs": ["dry"] * 3},
         "settings": {"imitated": 0.0},
         "inputs": {"pB": {"profile": RELEASE, "levels": [2.7e5], "every": 5.0}},
     }
-    stop = stop_of(json.loads(json.dumps(said)), SYSTEM)
+    stop = stop_of(json.loads(json.dumps(content)), SYSTEM)
     assert not stop.protected
     made = simulate(stop, 3, CONSTANT_PADS, REFERENCE)
     assert made.standstill == made.time[-1] + 1e-3 == pytest.approx(90.0)
@@ -138,7 +138,7 @@ def light(tmp_path_factory) -> Case:
 @pytest.fixture(scope="module")
 def unsaid(light) -> Case:
     """As if nobody had said how heavy the axle was."""
-    kept = {name: said for name, said in light.conditions.items() if name != "wheel_load"}
+    kept = {name: value for name, value in light.conditions.items() if name != "wheel_load"}
     return replace(light, conditions=kept)
 
 
@@ -159,14 +159,14 @@ def test_what_sets_a_parameter_is_said_or_is_as_in_the_model(light, unsaid):
 
 
 @pytest.mark.parametrize(
-    ("written", "found"),
+    ("written", "message"),
     [("-1 kN", "found '-1 kN'; expected above 0 N"), ("60 kg", r"found \[kg\]")],
 )
-def test_a_load_that_is_none_is_refused(written, found, tmp_path):
+def test_a_load_that_is_none_is_refused(written, message, tmp_path):
     record(LIGHT, 3, CONSTANT_PADS, tmp_path / "stop")
     toml = tmp_path / "stop" / "case.toml"
     edit(toml, ("60 kN", written))
-    with pytest.raises(InputError, match=found):
+    with pytest.raises(InputError, match=message):
         read_case(tmp_path / "stop", SYSTEM)
 
 
@@ -182,8 +182,8 @@ def test_estimators_run_with_the_load_that_was_said(light, unsaid):
     runs = [open_loop(case, "observer") for case in (light, unsaid)]
     # Where the contact carries little: the model's friction is that of a slippery rail.
     begins = np.argmax(runs[0].signal("Fx") > 500.0)
-    said, usual = (run.signal("slip")[begins] for run in runs)
-    assert said / usual == pytest.approx(SOFTER, rel=0.02)
+    stated, usual = (run.signal("slip")[begins] for run in runs)
+    assert stated / usual == pytest.approx(SOFTER, rel=0.02)
     # Of both wheels, 60 kN each.
     assert runs[0].signal("adhesion") == pytest.approx(np.abs(runs[0].signal("Fx")) / 120e3)
 

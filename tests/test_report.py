@@ -130,8 +130,8 @@ def test_the_answer_says_how_sure_it_is(page, summary):
     errors = [summary["cases"][name]["estimators"][best]["Fx_nrmse"] for name in CASES]
     middle = np.exp(np.mean(np.log(errors)))
     factor = np.exp(4.3027 * np.std(np.log(errors), ddof=1) / np.sqrt(len(errors)))
-    told = summary["answer"]["headline"][f"usual error of Fx, {best}"]
-    ends = [told[key] for key in ("value", "low", "high")]
+    measure = summary["answer"]["headline"][f"usual error of Fx, {best}"]
+    ends = [measure[key] for key in ("value", "low", "high")]
     assert_allclose(ends, 100 * np.array([middle, middle / factor, middle * factor]), rtol=1e-4)
     value, low, high = (f"{end:.2f}" for end in ends)
     shown = f"{value} % (95 %: {low} to {high}) in a usual one"
@@ -168,10 +168,10 @@ def test_a_recording_without_the_cells_shows_the_smoother_as_reference(
         article = page.get_element_by_id(name.replace(" ", "_"))
         legend = [entry.text_content() for entry in article.xpath(".//ul[@class='legend']/li")]
         bands = article.xpath(".//g[starts-with(text, 'Creep force')]//path[@data-style='raw']")
-        told = "reference, as no sensor reads it: smoother, knows the whole recording" in legend
-        assert told == (name == UNJUDGED)
-        assert ("band style-raw" in [band.get("class") for band in bands]) == told
-        assert case["reference"] == ("smoother" if told else None)
+        shown = "reference, as no sensor reads it: smoother, knows the whole recording" in legend
+        assert shown == (name == UNJUDGED)
+        assert ("band style-raw" in [band.get("class") for band in bands]) == shown
+        assert case["reference"] == ("smoother" if shown else None)
     # What the cells said, which it did not see: in means over 50 ms, whose noise is 80 N / 10^0.5.
     table = pd.read_csv(results / f"{UNJUDGED}.csv")
     cells = pd.read_csv(root / "cases" / CASES[0] / "measured.csv")["Fx [N]"][: len(table)]

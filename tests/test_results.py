@@ -56,10 +56,10 @@ def test_a_folder_says_command_date_version_system_answer_and_files(results, roo
     assert entry["run"]["data"] == {CASE: hashlib.sha256(measured).hexdigest()}
     assert entry["files"] == {"csv": 1, "npz": 1, "html": 1, "json": 1}
     assert main(["results", str(results.parent)]) == 0
-    said = capsys.readouterr().out
-    assert f"{100 * error:.4g} %" in said
-    assert entry["run"]["date"][:10] in said
-    assert summary["answer"]["sentence"] in said
+    printed = capsys.readouterr().out
+    assert f"{100 * error:.4g} %" in printed
+    assert entry["run"]["date"][:10] in printed
+    assert summary["answer"]["sentence"] in printed
 
 
 def test_estimates_come_back_to_six_digits(tmp_path):
@@ -157,13 +157,13 @@ def test_what_else_differs_is_said(results, root, tmp_path, capsys):
     assert main(["simulate", str(case), "--estimator", "ukf", "--out", str(out)]) == 0
     capsys.readouterr()
     assert main(["results", str(results), str(out)]) == 0
-    said = capsys.readouterr().out
-    assert f"recordings with other content: {CASE}" in said
-    assert "settings: ekf." in said
-    (settings,) = [line for line in said.splitlines() if "settings: " in line]
+    printed = capsys.readouterr().out
+    assert f"recordings with other content: {CASE}" in printed
+    assert "settings: ekf." in printed
+    (settings,) = [line for line in printed.splitlines() if "settings: " in line]
     assert re.search(r" and \d+ more$", settings)  # a dozen of them tell enough
     assert "meanings" not in settings
-    assert f"gone     {NAME}" in said
+    assert f"gone     {NAME}" in printed
 
 
 def test_runs_of_two_commands_are_not_compared(results, tmp_path):

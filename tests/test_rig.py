@@ -406,13 +406,13 @@ def test_interrupt_keeps_finished_cases(tmp_path):
     with running(*command) as process:
         first = process.stderr.readline()
         os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to all processes of the group
-        rest, errors = process.communicate(timeout=LONGEST)
+        printed, errors = process.communicate(timeout=LONGEST)
     assert first.startswith("[  1/14]")
     assert process.returncode == 130
     assert "Traceback" not in errors
     kept = read_cases([tmp_path], SYSTEM)
     assert 1 <= len(kept) < 14
-    assert f"{len(kept)} of 14 cases" in rest
+    assert f"{len(kept)} of 14 cases" in printed
     assert not list(tmp_path.rglob("*.part"))
 
 

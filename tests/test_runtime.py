@@ -777,17 +777,17 @@ def test_a_life_with_right_and_wrong_calls_is_clean(fmi, model, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("right", "wrong", "found"),
+    ("right", "wrong", "report"),
     [
         ("sizeof *i + length + 1", "sizeof *i + length", "heap-buffer-overflow"),
         ("i->importer.release(*saved)", "(void)i", "detected memory leaks"),
         ("i->work[NX + column.row[n]]", "i->work[NX + NW + column.row[n]]", "out of bounds"),
     ],
 )
-def test_a_planted_fault_is_found(right, wrong, found, tmp_path):
+def test_a_planted_fault_is_found(right, wrong, report, tmp_path):
     """The counterexamples: without them a clean run might mean that nothing was looked at."""
     sources = unpack_sources(2, "MinimalObserver", tmp_path)
     edit(sources / "instance.c", (right, wrong))
     run = run_life(2, sources)
     assert run.returncode != 0
-    assert found in run.stderr
+    assert report in run.stderr

@@ -66,10 +66,10 @@ def test_a_file_or_a_part_that_one_lacks_is_told(kept, capsys):
     (kept[0] / "tank" / "files/out/old.csv").touch()
     (kept[1] / "tank" / "files/out/more.csv").touch()
     (kept[1] / "train").mkdir()
-    said = difference(kept, capsys)
-    assert "old.csv: gone" in said
-    assert "more.csv: new" in said
-    assert "train: not kept before" in said
+    printed = difference(kept, capsys)
+    assert "old.csv: gone" in printed
+    assert "more.csv: new" in printed
+    assert "train: not kept before" in printed
     assert "train" not in difference(kept, capsys, "--only", "tank")
 
 
@@ -109,10 +109,10 @@ def test_refusals_are_kept_by_the_name_of_the_test_and_compared(tmp_path, capsys
     assert texts["a"]["test_refused[1]"]["refusals"] == [
         "<tmp>/x.csv: found 1; expected 3. To do: go on."
     ]
-    said = difference((tmp_path / "a.json", tmp_path / "b.json"), capsys)
-    assert said.startswith("refusals changed: 1\n  test_refused[2]\n")
-    assert "mend it" in said
-    assert "leave it" in said
+    printed = difference((tmp_path / "a.json", tmp_path / "b.json"), capsys)
+    assert printed.startswith("refusals changed: 1\n  test_refused[2]\n")
+    assert "mend it" in printed
+    assert "leave it" in printed
     # A test that is gone takes its refusals with it.
     (tmp_path / "b.json").write_text(json.dumps({"test_refused[2]": texts["a"]["test_refused[2]"]}))
     assert "lost, with their test: 1\n  test_refused[1]" in difference(

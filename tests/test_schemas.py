@@ -45,13 +45,13 @@ def test_a_wrong_system_file_is_refused(name):
 
 
 OF_A_STOP: dict[str, Callable[[dict[str, Any]], object]] = {
-    "an unknown key": lambda one: one.update(sped="vTrain"),
-    "no speed is asked": lambda one: one["asked"].pop("speed"),
-    "a pressure at some time": lambda one: one["asked"]["pressure"].update(at="then"),
-    "an input along nothing": lambda one: one["inputs"]["pB1"].update(along="1 m"),
-    "neither spread nor share": lambda one: one["differs"][0].pop("spread"),
-    "a limit on no side": lambda one: one["outside"][0].pop("above"),
-    "three constants": lambda one: one["rating"]["constants"].update({"9 km/h": [1.0, 2.0, 3.0]}),
+    "an unknown key": lambda stop: stop.update(sped="vTrain"),
+    "no speed is asked": lambda stop: stop["asked"].pop("speed"),
+    "a pressure at some time": lambda stop: stop["asked"]["pressure"].update(at="then"),
+    "an input along nothing": lambda stop: stop["inputs"]["pB1"].update(along="1 m"),
+    "neither spread nor share": lambda stop: stop["differs"][0].pop("spread"),
+    "a limit on no side": lambda stop: stop["outside"][0].pop("above"),
+    "three constants": lambda stop: stop["rating"]["constants"].update({"9 km/h": [1.0, 2.0, 3.0]}),
 }
 
 

@@ -213,8 +213,8 @@ def test_the_pore_is_named_and_not_the_wall(bottle, tmp_path):
 
 
 def test_a_single_recording_will_do(bottle, tmp_path):
-    one = bottle / "recordings" / "01_leak"
-    (cause,) = built.diagnosed(load_system(bottle), one, tmp_path).diagnosis.causes
+    recording = bottle / "recordings" / "01_leak"
+    (cause,) = built.diagnosed(load_system(bottle), recording, tmp_path).diagnosis.causes
     assert cause.effect.name == "Pore"
     assert cause.parameters["k"].value == pytest.approx(LEAK, rel=2e-3)
 

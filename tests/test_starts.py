@@ -87,7 +87,7 @@ def recorded_room(step: float = 10.0, **factors: float) -> pd.DataFrame:
 
 
 @pytest.mark.parametrize(
-    ("factors", "said"),
+    ("factors", "message"),
     [
         ({"T0": 273.15}, "273.15 K below that of the model"),
         ({"T": 1e3}, "1000 times that of the model"),
@@ -98,11 +98,11 @@ def recorded_room(step: float = 10.0, **factors: float) -> pd.DataFrame:
         ({"T": -1.0}, "what the model allows, from 200 K"),
     ],
 )
-def test_another_unit_of_a_column_is_asked_about(tmp_path, factors, said):
+def test_another_unit_of_a_column_is_asked_about(tmp_path, factors, message):
     system = declare(tmp_path / "room", ROOM, ROOM_FILE)
-    with pytest.warns(UserWarning, match=re.escape(said)):
+    with pytest.warns(UserWarning, match=re.escape(message)):
         case = case_from_frame(system, recorded_room(**factors))
-    assert all("check the unit of the column" in doubt for doubt in case.doubts if said in doubt)
+    assert all("check the unit of the column" in doubt for doubt in case.doubts if message in doubt)
 
 
 def test_nothing_is_asked_of_a_recording_in_its_units(tmp_path):
@@ -137,14 +137,14 @@ def test_times_in_another_unit_are_asked_about_by_the_models_time_constants(tmp_
 
 
 @pytest.mark.parametrize(
-    ("nominal", "more", "said"),
+    ("nominal", "more", "count"),
     [
         ("", "", True),
         (", nominal=3.0", "", False),
         ("", '[states.v]\nspread = "3 m/s"\n', False),
     ],
 )
-def test_what_filters_assume_of_a_hidden_start_is_said(tmp_path, nominal, more, said):
+def test_what_filters_assume_of_a_hidden_start_is_said(tmp_path, nominal, more, count):
     package, text = machine("swing", step=0.05)
     package = package.replace(", nominal=3.0", nominal)
     system = declare(tmp_path / "swing", package, f"{text}\n{more}")
@@ -154,7 +154,7 @@ def test_what_filters_assume_of_a_hidden_start_is_said(tmp_path, nominal, more, 
     case = case_from_frame(system, pd.DataFrame(columns), name="swing")
     warnings = prepare(system, choose(system, ["ekf"])).warnings(case)
     assumed = [text for text in warnings if "filters assume v by 1 m/s" in text]
-    assert len(assumed) == said
+    assert len(assumed) == count
     assert not prepare(system, choose(system, ["open_loop"])).warnings(case)
 
 

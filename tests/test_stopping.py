@@ -144,8 +144,8 @@ def test_a_stop_is_that_of_the_models_own_integrator(train, stopping, forecaster
 
 
 def test_more_asked_of_a_stop_makes_it_longer_and_more_force_shorter(train, stopping, forecaster):
-    def distance(**said: object) -> float:
-        return forecaster.stop(asked_stop(said, train, stopping), {}).distance
+    def distance(**asked: object) -> float:
+        return forecaster.stop(asked_stop(asked, train, stopping), {}).distance
 
     usual = distance()
     assert distance(speed="130 km/h") > usual > distance(pressure="4.2 bar")
@@ -162,8 +162,8 @@ def test_a_stop_that_does_not_end_is_told(train, stopping, forecaster):
 
 def test_corrected_stops_are_those_under_nominal_conditions(train, stopping, forecaster):
     """Made too fast, downhill and light; pads and air are not corrected for speed."""
-    said = {"speed": "123 km/h", "gradient": -0.006, "mass1": "45 t", "mass2": "46 t"}
-    stop, response = asked_stop(said, train, stopping), stopping.response
+    asked = {"speed": "123 km/h", "gradient": -0.006, "mass1": "45 t", "mass2": "46 t"}
+    stop, response = asked_stop(asked, train, stopping), stopping.response
     rate = equivalent_rate(stop.asked["speed"], response, forecaster.stop(stop, {}).distance)
     made = StopConditions(mass=91e3, rotating=8.0 * 110.0 / 0.46**2, resistance=-0.006)
     fixed = stopping_distance(120.0 / 3.6, response, nominal_rate(rate, made, 96e3))
@@ -254,12 +254,12 @@ def least(forecaster: Forecaster, asked: Question, points: Matrix, count: int) -
     plane = np.column_stack([np.ones(len(points)), points[:, :-1]])
     fitted = slice(1500)
     weights = np.linalg.lstsq(plane[fitted], simulated(fitted) + left[fitted])[0]
-    told, margin = plane @ weights - left, 8e-3
-    near = told < np.partition(told, count)[count] + 2.0 * margin
+    linear, margin = plane @ weights - left, 8e-3
+    near = linear < np.partition(linear, count)[count] + 2.0 * margin
     values = simulated(near)
     # To be among the least, what was not simulated would miss the plane by 1.5 margins at least,
     # three times what any of the others does.
-    assert np.abs(values - told[near]).max() < margin / 2.0
+    assert np.abs(values - linear[near]).max() < margin / 2.0
     return np.sort(values)[:count]
 
 
@@ -319,7 +319,7 @@ def test_a_recording_without_a_stop_is_refused(train, stopping):
 
 
 @pytest.mark.parametrize(
-    ("said", "message"),
+    ("asked", "message"),
     [
         ({"speeds": "120 km/h"}, r"unknown key 'speeds' \(closest: 'speed'\)"),
         ({"speed": "120 t"}, "a unit of another dimension"),
@@ -327,9 +327,9 @@ def test_a_recording_without_a_stop_is_refused(train, stopping):
         ({"mass1": 48.0}, "a text with a unit"),
     ],
 )
-def test_what_no_stop_can_be_asked_for_is_refused(said, message, train, stopping):
+def test_what_no_stop_can_be_asked_for_is_refused(asked, message, train, stopping):
     with pytest.raises(InputError, match=message):
-        asked_stop(said, train, stopping)
+        asked_stop(asked, train, stopping)
 
 
 def test_a_system_that_does_not_say_how_it_stops_is_refused(system, dry_case):
@@ -381,19 +381,19 @@ def test_bands_hold_stops_that_were_not_used(result):
 
 
 def test_results_say_what_was_asked_and_what_data_do_not_carry(result):
-    said = json.loads((result / "distance.json").read_text())
-    check("distance", said)
-    assert_allclose(said["asked"]["speed"], 140.0 / 3.6)
-    assert said["conditions"] == {"rail": "dry"}
-    low, middle, high = (said["distance"][share] for share in ("0.025", "0.5", "0.975"))
+    summary = json.loads((result / "distance.json").read_text())
+    check("distance", summary)
+    assert_allclose(summary["asked"]["speed"], 140.0 / 3.6)
+    assert summary["conditions"] == {"rail": "dry"}
+    low, middle, high = (summary["distance"][share] for share in ("0.025", "0.5", "0.975"))
     assert low < middle < high
-    assert_allclose(said["response"], 0.7)  # the sheet's tE
-    assert "5 stops show what happens once in 6" in said["warnings"][0]
-    (level,) = said["safety"]
+    assert_allclose(summary["response"], 0.7)  # the sheet's tE
+    assert "5 stops show what happens once in 6" in summary["warnings"][0]
+    (level,) = summary["safety"]
     assert level["low"] < level["ratio"] < level["high"] < 1.0
     # Of 2100 the 210th; both intervals are of 95 %.
-    (plain,) = said["plain"]["levels"]
-    assert said["plain"]["samples"] == 2100
+    (plain,) = summary["plain"]["levels"]
+    assert summary["plain"]["samples"] == 2100
     assert plain["low"] < level["high"]
     assert level["low"] < plain["high"]
     assert {path.name for path in result.iterdir()} == {
@@ -403,19 +403,19 @@ def test_results_say_what_was_asked_and_what_data_do_not_carry(result):
 
 
 def test_the_page_shows_the_distance_and_each_stop_beside_what_the_others_say(result):
-    said = json.loads((result / "distance.json").read_text())
-    page = check_page(result / "index.html", said)
+    summary = json.loads((result / "distance.json").read_text())
+    page = check_page(result / "index.html", summary)
     assert page.xpath("//svg[@data-axis='distance' and @data-unit='m']")
     (dots,) = page.xpath("//section[@aria-labelledby='shown']//svg[@class='dots']")
-    of, held = said["held"]["of"], said["held"]["stops"]
+    of, held = summary["held"]["of"], summary["held"]["stops"]
     assert f"{held} of {of} past stops" in dots.get("aria-label")
-    assert len(dots.xpath(".//circle")) == len(said["stops"])
+    assert len(dots.xpath(".//circle")) == len(summary["stops"])
     # What the model does not claim is set apart.
-    assert len(dots.xpath(".//circle[@class='style-7']")) == len(said["stops"]) - of
+    assert len(dots.xpath(".//circle[@class='style-7']")) == len(summary["stops"]) - of
     for table, rows in (("stop-table", "stops"), ("quantile-table", "distance")):
-        assert len(page.get_element_by_id(table).xpath("tbody/tr")) == len(said[rows])
+        assert len(page.get_element_by_id(table).xpath("tbody/tr")) == len(summary[rows])
     (ratio,) = page.get_element_by_id("safety-table").xpath("tbody/tr/td[1]/@data-value")
-    assert float(ratio) == said["safety"][0]["ratio"]
+    assert float(ratio) == summary["safety"][0]["ratio"]
 
 
 @pytest.mark.long
@@ -522,9 +522,9 @@ def test_a_probability_scatters_as_it_says():
     """Coefficient of variation at 1e-6, over 25 tails whose quantiles have known probability."""
     quantiles = [tail(summed, 10, 100 * k).quantile(6) for k in range(25)]
     scatter = np.std(np.log(norm.cdf([quantile.value for quantile in quantiles])), ddof=1)
-    said = np.sqrt(np.mean(np.square([quantile.variation for quantile in quantiles])))
+    stated = np.sqrt(np.mean(np.square([quantile.variation for quantile in quantiles])))
     # 25 give a deviation to 14 %, eight runs theirs to 27 %, 25 times: two and a half of both.
-    assert 0.6 < scatter / said < 1.4
+    assert 0.6 < scatter / stated < 1.4
 
 
 def test_what_is_added_with_a_heavy_tail_is_not_missed():

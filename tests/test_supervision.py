@@ -393,9 +393,9 @@ def test_a_command_goes_on_without_a_process_of_its_pool_and_leaves_nothing(vict
         os.kill(killed, signal.SIGSTOP)
         time.sleep(5.0)  # in which it is asked for something, and does not answer
         os.kill(killed, signal.SIGKILL)
-        _, said = process.communicate(timeout=LONGEST)
-    assert process.returncode == 0, said
-    assert "Traceback" not in said
+        _, printed = process.communicate(timeout=LONGEST)
+    assert process.returncode == 0, printed
+    assert "Traceback" not in printed
     assert left(home) == []
     assert comes_true(lambda: not living(process.pid))
 
@@ -483,8 +483,8 @@ def test_an_isolated_model_changes_no_mode_owner_time_attribute_limit_or_socket(
     run = workbench(home, *command, "--out", "out", "--fmu", hostile_path, **plan)
     assert run.returncode == 0, run.stderr
     deeds = ("chmod", "chown", "utimes", "setxattr", "setflags", "prlimit", "socket")
-    said = {line for line in run.stderr.splitlines() if line.endswith((" refused", " DEED"))}
-    assert said == {f"{deed} refused" for deed in deeds}
+    printed = {line for line in run.stderr.splitlines() if line.endswith((" refused", " DEED"))}
+    assert printed == {f"{deed} refused" for deed in deeds}
     assert place.stat().st_mode & 0o777 == 0o600
     assert ("run as root" in run.stderr) == (os.geteuid() == 0)
     assert "no change of modes, owners, times or attributes of files" in run.stderr

@@ -145,7 +145,7 @@ def test_sheet_errors_are_those_that_the_rig_knows_and_the_library_may_name():
     assert len({group[0].seed for group in groups}) == len(groups) == 3 * len(SHEET_ERRORS)
 
 
-def said(effect: str, *causes: tuple[str, ...]) -> SetVerdict:
+def set_verdict(effect: str, *causes: tuple[str, ...]) -> SetVerdict:
     planting = Planting("sheet", 1, 1.0, {"roller_inertia": 0.015}, (effect,))
     named = tuple(NamedCause(first, {}, tuple(twins)) for first, *twins in causes)
     return SetVerdict(planting, "found" if named else "nothing", named, None, None, 1.0)
@@ -153,13 +153,13 @@ def said(effect: str, *causes: tuple[str, ...]) -> SetVerdict:
 
 def test_only_the_error_itself_or_its_stated_twin_may_be_named():
     twins = ("DriveTorqueGain", "RollerInertia")
-    assert not named_wrong(said("RollerInertia"))
-    assert not named_wrong(said("RollerInertia", ("RollerInertia",)))
-    assert not named_wrong(said("RollerInertia", twins))
-    assert named_wrong(said("RollerInertia", ("DriveTorqueGain",)))
-    assert named_wrong(said("RollerInertia", twins, ("BrakeFade",)))
-    assert named_wrong(said("", ("BrakeFade",)))  # noise has no name
-    rows = summarise_sheet([said("RollerInertia", twins), said("", ("BrakeFade",))])
+    assert not named_wrong(set_verdict("RollerInertia"))
+    assert not named_wrong(set_verdict("RollerInertia", ("RollerInertia",)))
+    assert not named_wrong(set_verdict("RollerInertia", twins))
+    assert named_wrong(set_verdict("RollerInertia", ("DriveTorqueGain",)))
+    assert named_wrong(set_verdict("RollerInertia", twins, ("BrakeFade",)))
+    assert named_wrong(set_verdict("", ("BrakeFade",)))  # noise has no name
+    rows = summarise_sheet([set_verdict("RollerInertia", twins), set_verdict("", ("BrakeFade",))])
     table = sheet_check(rows).text
     assert "DriveTorqueGain or RollerInertia" in table
     assert "1 of 2 sets have a wrong name" in table

@@ -81,11 +81,11 @@ def test_gradients_and_curves_are_those_under_the_vehicles(tmp_path, train):
 
 
 @pytest.mark.parametrize(
-    ("said", "doubted"), [('"2.3 bar"', False), ('"2.5 bar"', True), ('"4.2 bar"', None)]
+    ("pressure", "doubted"), [('"2.3 bar"', False), ('"2.5 bar"', True), ('"4.2 bar"', None)]
 )
-def test_a_pressure_that_the_brake_never_reached_is_doubted(said, doubted, tmp_path, train):
+def test_a_pressure_that_the_brake_never_reached_is_doubted(pressure, doubted, tmp_path, train):
     """Readings rise to 2 bar in vehicles of 45 t and 50 t: that is 2.3 bar in full ones of 56 t."""
-    write_cases("train", stop(tmp_path, ('"2.7 bar"', said)), tmp_path / "cases")
+    write_cases("train", stop(tmp_path, ('"2.7 bar"', pressure)), tmp_path / "cases")
     if doubted is None:
         with pytest.raises(InputError, match="pressure_full_load: found 420000 Pa"):
             read_cases([tmp_path / "cases"], train)
@@ -133,9 +133,9 @@ def test_what_an_axle_may_have_is_sought_on_each(train):
         effect.name
         for effect in read_effects(read_library(train.library), train.model(OBSERVER).name)
     ]
-    for kind in ("WeakPads", "IsolatedUnit", "DraggingBrake", "WheelRadius", "LateSpeed"):
-        assert [name for name in names if name.startswith(kind)] == [
-            f"{kind}[{axle}]" for axle in range(1, 9)
+    for effect in ("WeakPads", "IsolatedUnit", "DraggingBrake", "WheelRadius", "LateSpeed"):
+        assert [name for name in names if name.startswith(effect)] == [
+            f"{effect}[{axle}]" for axle in range(1, 9)
         ]
     assert {"CylinderLag[4]", "PressureSensorGain[4]", "WrongMass[2]"} <= set(names)
     # Of a bogie, of a vehicle, and of the train.
@@ -212,7 +212,7 @@ def test_friction_and_radius_of_each_axle_are_estimated(train, tmp_path):
 
 
 @pytest.mark.parametrize(
-    "name", ["healthy", *(f"labelled/{one}" for one in LABELLED if "radius" not in one)]
+    "name", ["healthy", *(f"labelled/{fault}" for fault in LABELLED if "radius" not in fault)]
 )
 def test_satellites_tell_radii_and_speed_when_brakes_are_told_to_act(name, train, tmp_path):
     """But of a train with a brake that drags, which slows while it coasts as another would not."""
@@ -234,7 +234,7 @@ def test_satellites_tell_radii_and_speed_when_brakes_are_told_to_act(name, train
 
 def test_a_wet_rail_is_told_from_a_dry_one_by_the_slip_of_axles_that_brake(train, tmp_path):
     """`imm` weighs both, whatever the crew says; slides are on patches, which are neither."""
-    said = []
+    probabilities = []
     for name in ("healthy", "labelled/pads_axle", "labelled/cylinder_lag_bogie"):
         cases, truth = cases_of(name, train, tmp_path / name)
         for case in cases:
@@ -242,9 +242,9 @@ def test_a_wet_rail_is_told_from_a_dry_one_by_the_slip_of_axles_that_brake(train
             if truth_of_case["patch"] is None:
                 probability = wb.observe(train, case, "imm").probability
                 at = int(np.searchsorted(case.time, truth_of_case["standstill"] - 5.0))
-                said.append(probability[f"rail_{case.conditions['rail']}"][at])
-    assert len(said) == 14
-    assert min(said) > 0.95
+                probabilities.append(probability[f"rail_{case.conditions['rail']}"][at])
+    assert len(probabilities) == 14
+    assert min(probabilities) > 0.95
 
 
 def test_masses_of_a_sound_train_stay_as_weighed_where_no_axle_slides(train, tmp_path):

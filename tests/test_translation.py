@@ -261,7 +261,7 @@ def calls_itself(a, m, x):
 
 
 @pytest.mark.parametrize(
-    ("law", "line", "found"),
+    ("law", "line", "message"),
     [
         (goes_over_an_array, 1, "a loop that is not over a range: for value in a"),
         (assigns_a_piece, 1, r"a part of an array that is assigned to: a\[1:\]"),
@@ -274,10 +274,10 @@ def calls_itself(a, m, x):
     ],
     ids=lambda item: getattr(item, "__name__", None),
 )
-def test_what_has_no_translation_is_refused_with_file_and_line(law, line, found):
+def test_what_has_no_translation_is_refused_with_file_and_line(law, line, message):
     # A decorator is the first line, the second has the name.
     first = law.py_func.__code__.co_firstlineno
-    where = rf"test_translation\.py, line {first + 1 + line}: found {found}"
+    where = rf"test_translation\.py, line {first + 1 + line}: found {message}"
     with pytest.raises(InputError, match=where):
         Program({}).add(law, [VECTOR, MATRIX, Number(DOUBLE)])
 
@@ -312,7 +312,7 @@ def test_named_tuples_become_structs_of_the_same_contents():
 
 
 @pytest.mark.parametrize(
-    ("value", "found"),
+    ("value", "message"),
     [
         ("text", "str, which has no fixed size"),
         (np.zeros((3, 4))[:, 1], "an array that is not contiguous"),
@@ -323,6 +323,6 @@ def test_named_tuples_become_structs_of_the_same_contents():
     ],
     ids=["text", "column", "single", "tuple", "far", "large"],
 )
-def test_what_has_no_fixed_size_is_refused(value, found):
-    with pytest.raises(InputError, match=rf"here, memory\.grid: found {found}"):
+def test_what_has_no_fixed_size_is_refused(value, message):
+    with pytest.raises(InputError, match=rf"here, memory\.grid: found {message}"):
         Data("here").type_of(_Outer((_Inner(np.zeros(1), 0.0),), value, True), "memory")

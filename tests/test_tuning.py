@@ -205,10 +205,10 @@ def test_gains_are_as_good_as_the_last_candidates_that_lose_one_percent_at_most(
     members[:, 0] = 0.55, 0.65, 0.95
     last = Population(members, ended.z * np.array([1.0, 1.009, 1.011]), ended.last.z_k[:3])
     tuned = TuningResult(problem, plan, replace(ended, last=last), ended.z_k, interrupted=False)
-    told = summarise_tuning(tuned)
-    assert (told["work"]["as_good"], told["work"]["last"]) == (2, 3)
-    assert_allclose(told["gains"]["L11"]["as_good"], space.gains(members)[:2, 0])
-    low, high = told["gains"]["L21"]["as_good"]
+    summary = summarise_tuning(tuned)
+    assert (summary["work"]["as_good"], summary["work"]["last"]) == (2, 3)
+    assert_allclose(summary["gains"]["L11"]["as_good"], space.gains(members)[:2, 0])
+    low, high = summary["gains"]["L21"]["as_good"]
     assert low == high == ended.best[job.gains.names.index("L21")]
 
 
@@ -335,9 +335,9 @@ def test_a_run_that_is_killed_resumes_to_the_result_of_one_that_is_not(
 def test_results_keep_their_contract(root, system, folder, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(root)
     assert main(command(folder, tmp_path, "--folds", "2", "--budget", "2", "--live")) == 0
-    printed, told = capsys.readouterr()
-    assert "evaluations/s" in told
-    assert "of work saved" in told
+    printed, progress = capsys.readouterr()
+    assert "evaluations/s" in progress
+    assert "of work saved" in progress
     assert "not seen: 03_dry_120_3.6" in printed
     summary = json.loads((tmp_path / "summary.json").read_text())
     assert set(summary["gains"]) == {f"L{i}{j}" for i in (1, 2) for j in (1, 2, 3, 4)}

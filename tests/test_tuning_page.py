@@ -202,10 +202,10 @@ def test_every_gain_is_shown_with_its_numbers_and_unit(page, summary):
     assert table.at["L43", "what it does"] == "rate of dmuDC by ∫ omegaW"
 
 
-TUNABLE = [name for name, kind in estimators_of(WHEELSET).items() if kind.tunable]
+TUNABLE = [name for name, cls in estimators_of(WHEELSET).items() if cls.tunable]
 
 
-def told(system: System, estimator: str) -> tuple[Gains, dict[str, tuple[str, str]]]:
+def gains_and_meanings(system: System, estimator: str) -> tuple[Gains, dict[str, tuple[str, str]]]:
     """Reasoned gains of an estimator, and what it tells of them."""
     cls = estimators_of(system)[estimator]
     with open_model(system, cls.role) as fmu:
@@ -215,14 +215,14 @@ def told(system: System, estimator: str) -> tuple[Gains, dict[str, tuple[str, st
 
 @pytest.mark.parametrize("estimator", TUNABLE)
 def test_every_gain_that_can_be_tuned_has_a_meaning_and_a_unit(system, estimator):
-    gains, meanings = told(system, estimator)
+    gains, meanings = gains_and_meanings(system, estimator)
     assert set(meanings) == set(gains.names)
     assert all(meaning and unit for meaning, unit in meanings.values())
 
 
 def test_levels_of_noise_are_shown_in_the_units_of_what_they_disturb(system, changed, tmp_path):
     gain, effect = changed["gains"]["L11"], changed["sensitivity"]["L11"]
-    _, meanings = told(system, "ekf")
+    _, meanings = gains_and_meanings(system, "ekf")
     changed |= {"estimator": "ekf", "label": estimators_of(system)["ekf"].label}
     changed["gains"] = {
         name: gain | {"meaning": meaning, "unit": unit}
@@ -308,20 +308,20 @@ def test_folds_that_were_not_done_are_told(changed, tmp_path):
 
 
 def test_work_and_provenance_are_told(page, summary, results):
-    told = {text(entry): text(entry.getnext()) for entry in page.xpath("//dl[@class='grid']/dt")}
+    shown = {text(entry): text(entry.getnext()) for entry in page.xpath("//dl[@class='grid']/dt")}
     work, provenance = summary["work"], summary["provenance"]
-    assert told["Generations"] == str(work["generations"])
-    assert told["As good"].startswith(f"{work['as_good']} of the last {work['last']} candidates")
+    assert shown["Generations"] == str(work["generations"])
+    assert shown["As good"].startswith(f"{work['as_good']} of the last {work['last']} candidates")
     # Two for each of the gains that are searched, of which the best is as good as itself.
     assert 1 <= work["as_good"] <= work["last"] == 2 * len(summary["gains"])
-    assert told["Candidates"].startswith(f"{work['candidates']}, ")
-    assert told["Work saved"].startswith(f"{100 * work['saved']:.2f} %")
-    assert told["Time"] == f"{work['seconds']:.1f} s"
-    assert told["Crashed or blocked workers"] == str(work["crashed"])
-    assert told["SHA-256 of the FMU"] == provenance["fmu"]["sha256"]
-    assert told["Random seed"] == str(provenance["seed"])
+    assert shown["Candidates"].startswith(f"{work['candidates']}, ")
+    assert shown["Work saved"].startswith(f"{100 * work['saved']:.2f} %")
+    assert shown["Time"] == f"{work['seconds']:.1f} s"
+    assert shown["Crashed or blocked workers"] == str(work["crashed"])
+    assert shown["SHA-256 of the FMU"] == provenance["fmu"]["sha256"]
+    assert shown["Random seed"] == str(provenance["seed"])
     for package, version in provenance["packages"].items():
-        assert f"{package} {version}" in told["Versions"]
+        assert f"{package} {version}" in shown["Versions"]
     (use,) = page.xpath("//pre[@class='source']")
     assert text(use) == f"workbench simulate --gains {results / 'gains.toml'}"
 

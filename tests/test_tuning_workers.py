@@ -400,9 +400,9 @@ def test_interruption_keeps_the_best_so_far_and_resuming_changes_nothing(
     part = run(pool, problem, path, SMALL, report=interrupt)
     assert part.interrupted
     assert len(part.history) == 3
-    rest = run(pool, problem, path, SMALL, resume=True)
-    assert_array_equal(rest.best, alone.best)
-    assert [g.z for g in rest.history] == [g.z for g in alone.history]
+    resumed = run(pool, problem, path, SMALL, resume=True)
+    assert_array_equal(resumed.best, alone.best)
+    assert [g.z for g in resumed.history] == [g.z for g in alone.history]
 
 
 def test_another_search_does_not_go_on_from_a_checkpoint(problem, pool, tmp_path):

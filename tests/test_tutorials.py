@@ -47,8 +47,8 @@ def held_out(outcome: wb.Outcome, measure: str = "rms") -> tuple[float, float]:
     """Error of all samples that were not fitted, before and after."""
     errors = [error for error in outcome.errors if error.held_out]
     power = 2.0 if measure == "rms" else 1.0
-    each = np.array([getattr(entry, measure) for entry in errors]) ** power
-    before, after = np.average(each, axis=0, weights=[entry.samples for entry in errors]) ** (
+    values = np.array([getattr(entry, measure) for entry in errors]) ** power
+    before, after = np.average(values, axis=0, weights=[entry.samples for entry in errors]) ** (
         1.0 / power
     )
     return float(before), float(after)

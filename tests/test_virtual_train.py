@@ -97,7 +97,7 @@ def test_the_rig_refuses_what_it_cannot_do(names, model, message):
 # --- sets that were recorded ---
 
 
-def told(folder: Path, effects: object) -> Path:
+def truth_file(folder: Path, effects: object) -> Path:
     (folder / "set").mkdir()
     (folder / "set" / "truth.json").write_text(json.dumps({"effects": effects}))
     return folder
@@ -118,7 +118,7 @@ def test_the_rig_plants_what_it_is_told(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("told", "message"),
+    ("options", "message"),
     [
         ("--effect pds[3]=0.1", "unknown effect 'pds[3]' (closest: 'pads[3]')"),
         ("--effect pads[3]=0.1 --effect pads[3]=0.2", "a second size for 'pads[3]'"),
@@ -126,15 +126,17 @@ def test_the_rig_plants_what_it_is_told(tmp_path):
         ("--pads constant", "an option of the roller rig"),
     ],
 )
-def test_a_planted_set_that_is_asked_for_wrongly_is_refused(told, message, tmp_path, capsys):
+def test_a_planted_set_that_is_asked_for_wrongly_is_refused(options, message, tmp_path, capsys):
     out = tmp_path / "made"
-    assert main(["rig", "--system", "train", "--out", str(out), *told.split()]) == 2
+    assert main(["rig", "--system", "train", "--out", str(out), *options.split()]) == 2
     assert message in capsys.readouterr().err
     assert not out.exists()
 
 
 def test_what_a_truth_says_is_what_is_asked_for(tmp_path):
-    sets = read_recorded_sets(SYSTEM, [told(tmp_path, {"radius_axle": {"at": 2, "size": -2.5}})])
+    sets = read_recorded_sets(
+        SYSTEM, [truth_file(tmp_path, {"radius_axle": {"at": 2, "size": -2.5}})]
+    )
     assert sets.groups == [
         (Planting("single", 0, 4.0, {"radius[2]": -2.5e-3}, ("WheelRadius[2]",)),)
     ]
@@ -145,7 +147,7 @@ def test_what_a_truth_says_is_what_is_asked_for(tmp_path):
 )
 def test_a_truth_that_is_not_understood_is_refused(effects, tmp_path):
     with pytest.raises(InputError, match="a truth that is not understood"):
-        read_recorded_sets(SYSTEM, [told(tmp_path, effects)])
+        read_recorded_sets(SYSTEM, [truth_file(tmp_path, effects)])
 
 
 def test_folders_without_a_truth_are_refused(tmp_path):
@@ -248,7 +250,7 @@ def named(planted: dict[str, float], seed: int, everything: Path, folder: Path) 
 
 
 @pytest.mark.parametrize(
-    ("name", "size", "right", "told", "within"),
+    ("name", "size", "right", "parameter", "within"),
     # A film is gone in a twentieth of the stop, which shows it; a gradient has the look of bias and
     # resistances, by half of what is planted.
     [
@@ -257,11 +259,11 @@ def named(planted: dict[str, float], seed: int, everything: Path, folder: Path) 
     ],
 )
 def test_water_and_a_wrong_track_file_are_named(
-    name, size, right, told, within, everything, tmp_path
+    name, size, right, parameter, within, everything, tmp_path
 ):
     cause = named({name: size}, 81, everything, tmp_path)
     assert cause.effect.name == right
-    assert_allclose(cause.parameters[told].value, size, rtol=within)
+    assert_allclose(cause.parameters[parameter].value, size, rtol=within)
 
 
 FAULTS = {  # by the seed of the stops: what is planted, how much, and what it is called

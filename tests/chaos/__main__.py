@@ -39,8 +39,8 @@ def main() -> int:
                 print(
                     f"{usual.command.name}, {disturbance}, number {number}: {failure}", flush=True
                 )
-    print("\n".join(f"{what} {count}" for what, count in sorted(counts.items())))
-    return 1 if any("fails" in what for what in counts) or not counts else 0
+    print("\n".join(f"{event} {count}" for event, count in sorted(counts.items())))
+    return 1 if any("fails" in event for event in counts) or not counts else 0
 
 
 if __name__ == "__main__":

@@ -74,9 +74,9 @@ def undisturbed(command: Command, folder: Path) -> Undisturbed:
         If it fails.
     """
     begin = time.monotonic()
-    status, said = _run(command, folder, again=False)
+    status, output = _run(command, folder, again=False)
     if status != 0:
-        raise RuntimeError(f"{command.name}: {said}")
+        raise RuntimeError(f"{command.name}: {output}")
     return Undisturbed(command, command.results(folder / "out"), time.monotonic() - begin)
 
 
@@ -109,9 +109,9 @@ def disturb(usual: Undisturbed, disturbance: str, random: Random, folder: Path) 
 
 
 def _resumed(usual: Undisturbed, folder: Path) -> list[Failure]:
-    status, said = _run(usual.command, folder, again=True)
+    status, output = _run(usual.command, folder, again=True)
     if status != 0:
-        return [Failure("results", f"none, status {status}: {said[-300:]}")]
+        return [Failure("results", f"none, status {status}: {output[-300:]}")]
     return _left(folder) + _changed(usual, folder / "out")
 
 
@@ -165,13 +165,13 @@ def can_starve() -> bool:
 
 def _started(command: Command, folder: Path, *, again: bool) -> subprocess.Popen[bytes]:
     (folder / "tmp").mkdir(parents=True, exist_ok=True)
-    with (folder / "said").open("wb") as said:
+    with (folder / "said").open("wb") as output:
         return subprocess.Popen(
             command.arguments(folder / "out", again=again),
             cwd=ROOT,
             env=_environment(folder),
             stdout=subprocess.DEVNULL,
-            stderr=said,
+            stderr=output,
             start_new_session=True,
         )
 
@@ -195,8 +195,8 @@ def _send(process: subprocess.Popen[bytes], disturbance: str) -> None:
 
 
 def _traceback(folder: Path) -> list[Failure]:
-    said = (folder / "said").read_text()
-    return [Failure("words", said[-300:])] if "Traceback" in said else []
+    output = (folder / "said").read_text()
+    return [Failure("words", output[-300:])] if "Traceback" in output else []
 
 
 def _left(folder: Path) -> list[Failure]:

@@ -46,12 +46,12 @@ def main() -> int:
 
 def _tell(report: Report, name: str, seconds: float) -> None:
     counts = report.outcomes[name]
-    told = ", ".join(f"{outcome} {count}" for outcome, count in counts.most_common())
-    print(f"{name}: {counts.total()} in {seconds:.0f} s: {told}", flush=True)
+    listed = ", ".join(f"{outcome} {count}" for outcome, count in counts.most_common())
+    print(f"{name}: {counts.total()} in {seconds:.0f} s: {listed}", flush=True)
     seen: set[str] = set()
     for failure in report.failures:
-        if (kind := failure.said.split(":")[0][:60]) not in seen:
-            seen.add(kind)
+        if (reason := failure.said.split(":")[0][:60]) not in seen:
+            seen.add(reason)
             print(f"  {failure}", flush=True)
 
 

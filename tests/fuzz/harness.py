@@ -100,10 +100,10 @@ def fuzz(target: Target, seed: int, numbers: range, keep: Path | None = None) ->
             folder = Path(scratch) / "mutant"
             mutant, mutation = target.change(target.original, generator(target.name, seed, number))
             write(mutant, folder)
-            outcome, said = _outcome(target, folder, Path(scratch))
+            outcome, reason = _outcome(target, folder, Path(scratch))
             report.outcomes[target.name][outcome] += 1
-            if said:
-                failure = Failure(target.name, seed, number, mutation, said)
+            if reason:
+                failure = Failure(target.name, seed, number, mutation, reason)
                 report.failures.append(failure)
                 if keep is not None:
                     kept = keep / f"{target.name}-{seed}-{number}"
@@ -126,23 +126,23 @@ def _outcome(target: Target, folder: Path, scratch: Path) -> tuple[str, str]:
         with _limited(), _watched(scratch, outside), warnings.catch_warnings(action="error"):
             value = target.read(folder)
     except (InputError, FMUError):
-        outcome, said = "refused", ""
+        outcome, reason = "refused", ""
     except Hang:
-        outcome, said = "hang", f"more than {LONGEST:g} s of processor time"
+        outcome, reason = "hang", f"more than {LONGEST:g} s of processor time"
     except Exception as error:
-        kind = type(error).__name__
-        outcome, said = kind, f"{kind}: {error}"[:300]
+        name = type(error).__name__
+        outcome, reason = name, f"{name}: {error}"[:300]
     else:
-        said = target.impossible(value)
-        outcome = "impossible" if said else "accepted"
+        reason = target.impossible(value)
+        outcome = "impossible" if reason else "accepted"
     left = sorted(path.name for path in (scratch / "tmp").iterdir())
     shutil.rmtree(scratch / "tmp")
     (scratch / "tmp").mkdir()
     if outside:
         return "writes outside", ", ".join(outside)
-    if left and not said:
+    if left and not reason:
         return "leaves files", ", ".join(left)
-    return outcome, said
+    return outcome, reason
 
 
 @contextmanager
@@ -163,7 +163,7 @@ def _limited() -> Iterator[None]:
 
     limits = {signal.ITIMER_PROF: LONGEST, signal.ITIMER_REAL: LONGEST_WAIT}
     kinds = (signal.SIGPROF, signal.SIGALRM)
-    before = [signal.signal(kind, stop) for kind in kinds]
+    before = [signal.signal(number, stop) for number in kinds]
     try:
         for timer, seconds in limits.items():
             signal.setitimer(timer, seconds)
@@ -171,8 +171,8 @@ def _limited() -> Iterator[None]:
     finally:
         for timer in limits:
             signal.setitimer(timer, 0.0)
-        for kind, handler in zip(kinds, before, strict=True):
-            signal.signal(kind, handler)
+        for number, handler in zip(kinds, before, strict=True):
+            signal.signal(number, handler)
 
 
 class _Watch:

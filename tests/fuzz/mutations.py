@@ -85,12 +85,12 @@ def lines(content: bytes, random: Random) -> bytes:
     """Leave out, repeat, swap or join lines."""
     parts = content.split(b"\n")
     at, other = random.randrange(len(parts)), random.randrange(len(parts))
-    kind = random.randrange(4)
-    if kind == 0:
+    change = random.randrange(4)
+    if change == 0:
         del parts[at]
-    elif kind == 1:
+    elif change == 1:
         parts.insert(other, parts[at])
-    elif kind == 2:
+    elif change == 2:
         parts[at], parts[other] = parts[other], parts[at]
     else:
         parts[at : at + 2] = [b"".join(parts[at : at + 2])]
@@ -126,9 +126,9 @@ def mutate(content: bytes, random: Random, kinds: tuple[Mutation, ...] = TEXT) -
     """A mutant and the names of what happened to it: one thing most often, at times more."""
     names = []
     for _ in range(random.choice((1, 1, 1, 2, 4))):
-        kind = random.choice(kinds)
-        content = kind(content, random)
-        names.append(kind.__name__)
+        mutation = random.choice(kinds)
+        content = mutation(content, random)
+        names.append(mutation.__name__)
     return content, "+".join(names)
 
 

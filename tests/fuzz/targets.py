@@ -179,10 +179,10 @@ def _checkpoint(path: Path) -> Target:
     )
     save(Checkpoint(IDENTITY, population, False, history), path)
 
-    def impossible(found: Checkpoint | None) -> str:
-        same = found is not None and all(
+    def impossible(checkpoint: Checkpoint | None) -> str:
+        same = checkpoint is not None and all(
             np.array_equal(values, getattr(population, name))
-            for name, values in vars(found.population).items()
+            for name, values in vars(checkpoint.population).items()
         )
         return "" if same else "other candidates than were saved"
 
@@ -202,11 +202,11 @@ def _journal(path: Path) -> Target:
         journal.append(SetVerdict(planting, "nothing", (), None, None, 1.5))
     written = journal.results
 
-    def impossible(found: Journal) -> str:
+    def impossible(journal: Journal) -> str:
         # Lines that are damaged are left out, but nothing else is read, and nothing twice.
-        plantings = [result.planting for result in found.results]
+        plantings = [result.planting for result in journal.results]
         once = all(plantings.count(planting) == 1 for planting in plantings)
-        known = all(result in written for result in found.results)
+        known = all(result in written for result in journal.results)
         return "" if once and known else "other verdicts than were written"
 
     return Target(
@@ -237,8 +237,8 @@ def _state(path: Path) -> Target:
             for result in results
             if result.estimate is not None
         )
-        told = all(result.estimate is not None or result.refusal for result in results)
-        return "" if same and told else "another estimate than was kept, or none without a reason"
+        known = all(result.estimate is not None or result.refusal for result in results)
+        return "" if same and known else "another estimate than was kept, or none without a reason"
 
     return Target("monitor state", {"state.sqlite": path.read_bytes()}, read, impossible)
 
@@ -258,10 +258,10 @@ def _summary() -> Target:
     rivals = Rivals((rival,), ("Fade", "Lag"), {"mu": 0.5}, ("omegaW",), np.array([1.5]))
     content = {"verdict": "found", "provenance": {"system": "wheelset"}, "rivals": rivals.to_dict()}
 
-    def impossible(found: tuple[str, Rivals]) -> str:
+    def impossible(summary: tuple[str, Rivals]) -> str:
         whole = [
             array
-            for model in found[1].models
+            for model in summary[1].models
             for part in (model.prior, *model.recordings)
             for array in vars(part).values()
             if isinstance(array, np.ndarray)
@@ -309,17 +309,17 @@ def _changed_fmu(_: Files, random: Random, *, entries: Files) -> tuple[Files, st
 
 def _archive(entries: Files, text: str, random: Random) -> tuple[bytes, str]:
     """A mutant of a text in it, of what entries are named and hold, or of the archive itself."""
-    changed, kind = dict(entries), random.choice(("text", "names", "bytes"))
-    if kind == "text":
+    changed, change = dict(entries), random.choice(("text", "names", "bytes"))
+    if change == "text":
         changed[text], mutation = mutate(entries[text], random)
         return zipped(changed), f"{text}: {mutation}"
-    if kind == "names":
+    if change == "names":
         old, new = random.choice(list(entries)), random.choice(_NAMES)
         content = changed.pop(old) if random.random() < 0.5 else b"x" * random.choice((0, 9, 10**6))
         changed[new or old.upper()] = content
-        return zipped(changed), f"{kind}: {old} is {new}"
+        return zipped(changed), f"{change}: {old} is {new}"
     packed, mutation = mutate(zipped(entries), random, BYTES)
-    return packed, f"{kind}: {mutation}"
+    return packed, f"{change}: {mutation}"
 
 
 def _read_fmu(folder: Path) -> Description:

@@ -46,7 +46,7 @@ def main(arguments: list[str] | None = None) -> int:
         return 0
     differences = compare(options.before, options.after, options.only)
     if options.no_pages:
-        differences = [each for each in differences if each.group != "pages"]
+        differences = [difference for difference in differences if difference.group != "pages"]
     print(listed(differences) or "the same")
     return 1 if differences else 0
 
