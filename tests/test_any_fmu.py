@@ -369,6 +369,24 @@ def test_what_the_fmu_warns_of_stands_at_the_top_of_each_answer(
         assert re.search(f"Around.fmu warned once: {message}", fmu.take_warning())
 
 
+def test_libraries_beside_the_binary_go_along_into_an_extended_fmu(tmp_path, build, monkeypatch):
+    """As those of the solver that OpenModelica brings: a diagnosis ended where it needed them."""
+    beside = tmp_path / "libbeside.so"
+    linked = ["-shared", "-fPIC", f"-Wl,-soname,{beside.name}", "-x", "c", "/dev/null"]
+    subprocess.run([str(COMPILER), *linked, "-o", beside], check=True)
+    monkeypatch.setenv("LIBRARY_PATH", str(tmp_path))
+    room = build("RELAYS", flags=["-Wl,--no-as-needed,-rpath,$ORIGIN", "-lbeside"])
+    with zipfile.ZipFile(room, "a") as archive:
+        archive.write(beside, f"{BINARY}/{beside.name}")
+    around = tmp_path / "Around.fmu"
+    term = RateTerm("added", 0, CONSTANT, 1.0, "", 1.0, "", "a constant")
+    write_extended(room, around, [term], {"added": 0.5}, {})
+    with FMU(room) as fmu, FMU(around) as extended:
+        fmu.start({"T": 293.0})
+        extended.start({"T": 293.0})
+        assert extended.derivatives()[0] == pytest.approx(fmu.derivatives()[0] + 0.5)
+
+
 def test_a_stop_says_what_the_fmu_warns_of(build):
     """What falls to rest from 296 K is above its table at first, from 291.5 K it is not."""
     system = load_system(build("TIMETABLE", start=600.0, flags=["-DWARNS=1"]).parent)

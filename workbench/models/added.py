@@ -9,7 +9,7 @@ import tempfile
 import zipfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from xml.etree import ElementTree
 
 import fmpy
@@ -81,12 +81,12 @@ def write_extended(
         folder, sources = Path(scratch) / _IDENTIFIER, Path(scratch) / "c"
         resources = folder / "resources" / _INNER
         with zipfile.ZipFile(inner) as archive:
-            kept = [
-                name
-                for name in archive.namelist()
-                if name in (DESCRIPTION, library) or name.startswith("resources/")
-            ]
-            archive.extractall(resources, kept)
+            # Beside its binary may be libraries that this one loads.
+            folders = ("resources/", f"{PurePosixPath(library).parent}/")
+            archive.extractall(
+                resources,
+                [n for n in archive.namelist() if n == DESCRIPTION or n.startswith(folders)],
+            )
         text = (resources / DESCRIPTION).read_text(encoding="utf-8")
         sources.mkdir()
         header = _header(description, library, terms, coefficients, parameters)
