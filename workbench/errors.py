@@ -1,6 +1,6 @@
 """Errors that a user can mend, and those of an FMU."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Collection, Iterable
 from difflib import get_close_matches
 from functools import partial
 from typing import Any
@@ -84,6 +84,40 @@ def unknown_name(
         expected=expected,
         remedy=remedy,
     )
+
+
+def require_known(
+    names: Iterable[str],
+    known: Collection[str],
+    *,
+    where: str | Callable[[str], str],
+    found: str = "",
+    expected: str = "one of {}",
+    remedy: str = "correct the name",
+) -> None:
+    """Refuse the first name that is none of those that are known.
+
+    Parameters
+    ----------
+    where : place, or what makes it of the name.
+    found : in place of the name, which stands for `{}`.
+    expected : the known names stand for `{}`.
+
+    Raises
+    ------
+    InputError
+        As of `unknown_name`.
+    """
+    for name in names:
+        if name not in known:
+            raise unknown_name(
+                name,
+                known,
+                where=where if isinstance(where, str) else where(name),
+                found=found.format(name),
+                expected=expected.format(", ".join(known)),
+                remedy=remedy,
+            )
 
 
 def closest(name: str, names: Iterable[str]) -> str:

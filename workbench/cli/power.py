@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from workbench.cli import arguments
 from workbench.cli.extras import require_compiler
 from workbench.cli.output import CommandResult, Output, read_result
-from workbench.errors import InputError, unknown_name
+from workbench.errors import InputError, require_known
 from workbench.runtime.engine import Engine
 from workbench.runtime.files import locked_folder
 from workbench.runtime.resources import own_version
@@ -224,16 +224,14 @@ def _own_model(options: argparse.Namespace, problem: Problem) -> VirtualRig:
 def _select(names: Sequence[str], rig: VirtualRig) -> tuple[Plantable, ...]:
     """Effects to plant, by the names of the library, or of the rig where the library has none."""
     known = {plantable.effect or plantable.name: plantable for plantable in rig.plantables}
-    for name in names:
-        if name not in known:
-            raise unknown_name(
-                name,
-                known,
-                where=f"--effects {name}",
-                found="no effect that the simulated rig can inject",
-                expected=f"some of {', '.join(known)}",
-                remedy="choose others, or leave --effects out for all",
-            )
+    require_known(
+        names,
+        known,
+        where="--effects {}".format,
+        found="no effect that the simulated rig can inject",
+        expected="some of {}",
+        remedy="choose others, or leave --effects out for all",
+    )
     return tuple(plantable for name, plantable in known.items() if name in names or not names)
 
 

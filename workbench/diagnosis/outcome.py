@@ -1,6 +1,6 @@
 """What a diagnosis found, as a value: a sentence, numbers, a table, a figure."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from html import escape
 from itertools import pairwise
@@ -23,7 +23,7 @@ from workbench.diagnosis.inference.score_test import CandidateScore
 from workbench.diagnosis.inference.search import Step
 from workbench.diagnosis.inference.timing import LateSignals
 from workbench.diagnosis.inference.verdict import Cause, Diagnosis, Gain
-from workbench.errors import unknown_name
+from workbench.errors import require_known
 from workbench.observers.simulation import CaseResult, case_figure
 from workbench.pages.figures import LIGHT, CaseFigure, Curve, Panel, save_figure, styled
 from workbench.pages.views import capital, named, per_shown, shown_unit
@@ -425,14 +425,7 @@ class Outcome:
         InputError
             If there is no such recording.
         """
-        if recording not in self.starts:
-            raise unknown_name(
-                recording,
-                self.starts,
-                where=f"recording '{recording}'",
-                found="no recording of this name",
-                expected=f"one of {', '.join(self.starts)}",
-            )
+        _require_recording(recording, self.starts)
         return dict(self.starts[recording])
 
     def plot(self, recording: str = "") -> "Figure":
@@ -663,15 +656,12 @@ def shown_first(figures: Sequence[CaseFigure], recording: str) -> CaseFigure:
     known = {figure.name: figure for figure in figures}
     if not recording:
         return figures[0]
-    if recording not in known:
-        raise unknown_name(
-            recording,
-            known,
-            where=f"recording '{recording}'",
-            found="no recording of this name",
-            expected=f"one of {', '.join(known)}",
-        )
+    _require_recording(recording, known)
     return known[recording]
+
+
+def _require_recording(name: str, known: Collection[str]) -> None:
+    require_known([name], known, where=f"recording '{name}'", found="no recording of this name")
 
 
 def _clearness(residuals: Residuals, span: int, explained: bool) -> float:

@@ -4,18 +4,20 @@ One file each in `estimators`; a new one is found by itself. A system's plugin m
 """
 
 import pkgutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import cache
 from importlib import import_module
 from types import ModuleType
 
-from workbench.errors import unknown_name
+from workbench.errors import require_known
 from workbench.observers.contract import Estimate, Estimator
 from workbench.observers.gains import Gains, SearchSpace
 from workbench.system.plugins import find_plugin
 from workbench.system.system import System
 
 __all__ = ["Estimate", "Estimator", "Gains", "SearchSpace", "choose", "estimators_of", "label"]
+
+_UNKNOWN = "no estimator of this name"
 
 
 def estimators_of(system: System) -> dict[str, type[Estimator]]:
@@ -26,8 +28,12 @@ def estimators_of(system: System) -> dict[str, type[Estimator]]:
         estimator.name: estimator
         for estimator in sorted(kinds, key=lambda estimator: estimator.rank)
     }
-    for name in system.bands:
-        _refuse_unknown(name, known, f"{system.source}, [bands.{name}]")
+    require_known(
+        system.bands,
+        known,
+        where=lambda name: f"{system.source}, [bands.{name}]",
+        found=_UNKNOWN,
+    )
     return known
 
 
@@ -39,8 +45,7 @@ def choose(system: System, names: Sequence[str]) -> dict[str, type[Estimator]]:
     known = estimators_of(system)
     idle = {name for name, estimator in known.items() if estimator.by_quantities}
     idle = set() if system.estimated else idle
-    for name in names:
-        _refuse_unknown(name, known, f"estimator '{name}'")
+    require_known(names, known, where="estimator '{}'".format, found=_UNKNOWN)
     return {
         name: estimator
         for name, estimator in known.items()
@@ -52,17 +57,6 @@ def label(name: str, system: System) -> str:
     """Name of an estimator for people."""
     known = estimators_of(system)
     return known[name].label if name in known else name.replace("_", " ")
-
-
-def _refuse_unknown(name: str, known: Mapping[str, type[Estimator]], where: str) -> None:
-    if name not in known:
-        raise unknown_name(
-            name,
-            known,
-            where=where,
-            found="no estimator of this name",
-            expected=f"one of {', '.join(known)}",
-        )
 
 
 @cache

@@ -7,7 +7,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, TypeVar
 
-from workbench.errors import InputError, unknown_name
+from workbench.errors import InputError, require_known, unknown_name
 from workbench.runtime.files import read_text
 from workbench.system.units import quantity
 
@@ -152,16 +152,14 @@ class Table:
     def refuse_unknown(self, keys: str | Iterable[str]) -> None:
         """Refuse what nobody reads, which is a mistake in writing."""
         known = tuple(keys.split()) if isinstance(keys, str) else tuple(keys)
-        for key in self.content:
-            if key not in known:
-                raise unknown_name(
-                    key,
-                    known,
-                    where=self.where,
-                    found=f"unknown key '{key}'",
-                    expected=f"only {', '.join(known)}",
-                    remedy="correct or remove the key",
-                )
+        require_known(
+            self.content,
+            known,
+            where=self.where,
+            found="unknown key '{}'",
+            expected="only {}",
+            remedy="correct or remove the key",
+        )
 
 
 def _bare(key: str) -> str:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from workbench.arrays import Matrix, Vector
-from workbench.errors import FMUError, InputError, unknown_name
+from workbench.errors import FMUError, InputError, require_known
 from workbench.observers import Estimator, Gains, SearchSpace, estimators_of
 from workbench.observers.gains import format_gains
 from workbench.observers.replay import replay, run_on_model
@@ -361,14 +361,7 @@ def tunable(system: System, estimator: str) -> type[Estimator]:
 def _known(
     estimator: str, known: Mapping[str, type[Estimator]], use: str, found: str
 ) -> type[Estimator]:
-    if estimator not in known:
-        raise unknown_name(
-            estimator,
-            known,
-            where=f"estimator '{estimator}'{use}",
-            found=found,
-            expected=f"one of {', '.join(known)}",
-        )
+    require_known([estimator], known, where=f"estimator '{estimator}'{use}", found=found)
     return known[estimator]
 
 

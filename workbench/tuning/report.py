@@ -145,6 +145,7 @@ def _change(value: float | None) -> Cell:
 
 def _cases(summary: Mapping[str, Any]) -> Table:
     unstable = "gains with which an estimate diverged or the model failed here first"
+    meaning = "objective of one case: the mean weighed error over its recording"
     return tabulated(
         "case-table",
         "Objective of each case. A candidate is unstable where its estimate diverged or the model "
@@ -152,17 +153,12 @@ def _cases(summary: Mapping[str, Any]) -> Table:
         _worst_first(summary),
         [
             ("case", "name", ""),
-            (Numbers(_z_k(", model-based")), "z_k_reasoned", ".4f"),
+            (Numbers(term("z_k", meaning) + ", model-based"), "z_k_reasoned", ".4f"),
             (Numbers("z_k, tuned", sorted="descending"), "z_k", ".4f"),
             (Numbers("change"), lambda c: _change(c["z_k"] / c["z_k_reasoned"] - 1), ""),
             (Numbers("unstable candidates", unstable), lambda c: number(c["unstable"], ""), ""),
         ],
     )
-
-
-def _z_k(suffix: str) -> Markup:
-    meaning = "objective of one case: the mean weighed error over its recording"
-    return term("z_k", meaning) + suffix
 
 
 def _dots(summary: Mapping[str, Any]) -> Dots:

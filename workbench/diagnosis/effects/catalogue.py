@@ -15,7 +15,7 @@ import numpy as np
 
 from workbench.arrays import Matrix
 from workbench.diagnosis.effects.slots import Slot, read_slots
-from workbench.errors import InputError, unknown_name
+from workbench.errors import InputError, require_known, unknown_name
 from workbench.models.modelica import Class, Library
 
 # --- what a class says of itself ---
@@ -30,15 +30,13 @@ class AnnotationReader:
 
     def only(self, *known: str) -> None:
         """Refuse other keys."""
-        for key in self.content:
-            if key not in known:
-                raise unknown_name(
-                    key,
-                    known,
-                    where=self.where,
-                    expected=f"some of {', '.join(known)}",
-                    remedy="correct or remove it",
-                )
+        require_known(
+            self.content,
+            known,
+            where=self.where,
+            expected="some of {}",
+            remedy="correct or remove it",
+        )
 
     def text(self, key: str, default: str | None = None) -> str:
         """A text, which may be left out if there is a default."""
@@ -233,15 +231,13 @@ def read_effects(library: Library, base: str) -> tuple[Effect, ...]:
 def choose(names: Sequence[str], effects: Sequence[Effect]) -> tuple[Effect, ...]:
     """Effects by name, in their order; all of them if none is named."""
     known = dict.fromkeys(name for effect in effects for name in (effect.class_name, effect.name))
-    for name in names:
-        if name not in known:
-            raise unknown_name(
-                name,
-                known,
-                where=f"--effects {name}",
-                found="no effect of this name",
-                expected=f"some of {', '.join(known)}",
-            )
+    require_known(
+        names,
+        known,
+        where="--effects {}".format,
+        found="no effect of this name",
+        expected="some of {}",
+    )
     return tuple(
         effect for effect in effects if not names or {effect.name, effect.class_name} & set(names)
     )
@@ -327,15 +323,13 @@ def _slots(
             remedy="let it extend the partial class of its slot, or remove its annotation",
         )
     chosen = entry.texts("slots") if "slots" in entry.content else fitting
-    for name in chosen:
-        if name not in fitting:
-            raise unknown_name(
-                name,
-                fitting,
-                where=entry.where,
-                found=f"slot '{name}'",
-                expected=f"some of {', '.join(fitting)}, which it fits by the class it extends",
-            )
+    require_known(
+        chosen,
+        fitting,
+        where=entry.where,
+        found="slot '{}'",
+        expected="some of {}, which it fits by the class it extends",
+    )
     return tuple(name for name in fitting if name in chosen)
 
 

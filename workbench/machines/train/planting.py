@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from workbench.errors import InputError, unknown_name
+from workbench.errors import InputError, require_known
 from workbench.machines.train.rig import AXLES, BOGIES, VEHICLES, AskedStop
 from workbench.machines.train.stops import (
     DRIES,
@@ -118,15 +118,7 @@ def virtual_rig(names: Sequence[str], model: Path | None) -> PlantedTrain:
         If there is no stop of a name, or a model is given: the rig has its own equations.
     """
     known = {stop.name: stop for stop in USUAL}
-    for name in names:
-        if name not in known:
-            raise unknown_name(
-                name,
-                known,
-                where=f"--case {name}",
-                found="no stop of this name",
-                expected=f"one of {', '.join(known)}",
-            )
+    require_known(names, known, where="--case {}".format, found="no stop of this name")
     if model is not None:
         raise InputError(
             where=f"--reference {model}",

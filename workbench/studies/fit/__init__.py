@@ -17,7 +17,7 @@ from scipy.optimize import Bounds, OptimizeResult, differential_evolution, least
 
 from workbench.arrays import Matrix, Vector
 from workbench.diagnosis.data.cleaning import first_value, saturated
-from workbench.errors import FMUError, InputError, unknown_name
+from workbench.errors import FMUError, InputError, require_known, unknown_name
 from workbench.models.description import MODEL_EXCHANGE, Description, read_description
 from workbench.models.fmu import FMU
 from workbench.models.simulation import Drive, Simulation
@@ -128,10 +128,7 @@ def fit(
         there are none.
     held_out : recordings on which only errors are measured.
     """
-    if settings.loss not in LOSSES:
-        raise unknown_name(
-            settings.loss, LOSSES, where="loss", expected="one of " + ", ".join(LOSSES)
-        )
+    require_known([settings.loss], LOSSES, where="loss")
     description = read_description(model_path(system, OBSERVER)).renamed(system.names)
     entries = resolve_parameters(system, description, parameters)
     with open_model(system) as fmu:

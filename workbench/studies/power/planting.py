@@ -10,7 +10,7 @@ import numpy as np
 
 from workbench.diagnosis import Diagnosis, Effect
 from workbench.diagnosis.inference.score_test import CandidateScore
-from workbench.errors import InputError, unknown_name
+from workbench.errors import InputError, require_known
 
 _ALIKE = 0.2  # of a shape, within which it is the same: readings of each set have own noise
 
@@ -58,14 +58,7 @@ def assigned(assignments: Sequence[str], known: Mapping[str, Plantable]) -> dict
     for assignment in assignments:
         name, _, text = assignment.partition("=")
         where = f"--effect {assignment}"
-        if name not in known:
-            raise unknown_name(
-                name,
-                known,
-                where=where,
-                found=f"unknown effect '{name}'",
-                expected=f"one of {', '.join(known)}",
-            )
+        require_known([name], known, where=where, found="unknown effect '{}'")
         if name in gains:
             raise InputError(
                 where=where,
