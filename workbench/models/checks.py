@@ -342,12 +342,12 @@ def excite(fmu: FMU) -> Excitation:
     return excitation
 
 
-def _level(fmu: FMU, inputs: Variables, rest: Vector, j: int, nominal: Vector) -> float:
+def _level(fmu: FMU, inputs: Variables, start: Vector, j: int, nominal: Vector) -> float:
     """Power of ten by which an input must change to move a state by a tenth in a second."""
     still = fmu.derivatives()
     level = 1.0
     for candidate in 10.0 ** np.arange(-3, 10):
-        moved = rest.copy()
+        moved = start.copy()
         moved[j] += candidate
         try:
             fmu.set(inputs, moved)
@@ -357,7 +357,7 @@ def _level(fmu: FMU, inputs: Variables, rest: Vector, j: int, nominal: Vector) -
         if np.any(change > 0.1 * nominal):
             level = float(candidate)
             break
-    fmu.set(inputs, rest)
+    fmu.set(inputs, start)
     return level
 
 

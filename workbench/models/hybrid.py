@@ -381,8 +381,8 @@ class HybridSimulation:
             if not took > 0.0:  # the next one is due by now, each time
                 raise self._error(f"has more than {_PILED} events at one time", self._cause())
             if left * _PILED > took * (_MOST_EVENTS - self._events) and self._events > _PILED:
-                found = f"has more than {_MOST_EVENTS} events between two samples"
-                raise self._error(found, self._cause())
+                fault = f"has more than {_MOST_EVENTS} events between two samples"
+                raise self._error(fault, self._cause())
             self._piled = self._t
         update = self._fmu.handle_event(self._inputs, u)
         self._x = self._fmu.get_states()  # some tools change them, and do not say so

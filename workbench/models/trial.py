@@ -114,9 +114,9 @@ def _marks(description: Description, interface: str) -> tuple[str, str, str]:
     That bore its calls; whose directional derivatives are wrong; that remembers steps.
     """
     # Co-Simulation brings a solver, which Model Exchange does not run.
-    kind = "cs" if interface == CO_SIMULATION else "model-exchange"
+    suffix = "cs" if interface == CO_SIMULATION else "model-exchange"
     mark = description.sha256
-    return f"{mark}-{kind}", f"{mark}-differences", f"{mark}-memory"
+    return f"{mark}-{suffix}", f"{mark}-differences", f"{mark}-memory"
 
 
 @cache

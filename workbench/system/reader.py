@@ -284,7 +284,7 @@ class _Item:
             return read(fitting, within, self.scope, self.name)
         if origin is tuple:
             return self._several(inside)
-        return dict(self._each(inside[1]))
+        return dict(self._entries(inside[1]))
 
     def inline(self, cls: type) -> Any:
         """A value whose keys stand among those of the table; None where none does and none must."""
@@ -295,7 +295,7 @@ class _Item:
             inner.own[entry.field] = _field(entry, self.table, inner)
         return cls(**inner.own)
 
-    def _each(self, hint: Any) -> Iterator[tuple[str, Any]]:
+    def _entries(self, hint: Any) -> Iterator[tuple[str, Any]]:
         """Entries that are alike, by name; those of the innermost table refer to `keys`."""
         within = self.table.table(self.name)
         names, keys = list(within.content), self.declared.keys
@@ -326,7 +326,7 @@ class _Item:
         kind, *others = kinds_of(inside[0])
         if is_table(kind):
             if table_name_of(kind):
-                return tuple(value for _, value in self._each(inside[0]))
+                return tuple(value for _, value in self._entries(inside[0]))
             return tuple(read(kind, part, self.scope) for part in self.table.tables(self.name))
         if kind is str and not others:
             return self._choices(self.table.texts(self.name), "some of ")

@@ -97,8 +97,8 @@ def lagged(time: Vector, values: Matrix, lag: float) -> Matrix:
     h = float(np.median(np.diff(time)))
     q = np.exp(-h / lag)
     w = lag / h * (1.0 - q)
-    rest = w * values[:1]
-    behind: Matrix = lfilter([1.0 - w, w - q], [1.0, -q], values, axis=0, zi=rest)[0]
+    steady = w * values[:1]
+    behind: Matrix = lfilter([1.0 - w, w - q], [1.0, -q], values, axis=0, zi=steady)[0]
     return behind
 
 

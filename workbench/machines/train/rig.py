@@ -311,9 +311,9 @@ def simulate(
             remedy="plant smaller effects",
         )
     end = min(last + round(_REST / STEP), len(rows) - 1)
-    rest = rows[last + 1 : end]
-    rest[:, 0] = STEP * np.arange(last + 1, end)
-    rest[:, 2], rest[:, 28:] = rows[last, 2], rows[last, 28:]
+    standstill = rows[last + 1 : end]
+    standstill[:, 0] = STEP * np.arange(last + 1, end)
+    standstill[:, 2], standstill[:, 28:] = rows[last, 2], rows[last, 28:]
     t, v, s, a = rows[:end, :4].T
     omega, force, load, pressure = np.split(rows[:end, 4:], (8, 16, 24), axis=1)
     return StopResult(

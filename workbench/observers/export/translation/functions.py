@@ -289,12 +289,12 @@ class Statements(Expressions):
         used = {n.id for statement in later for n in ast.walk(statement) if isinstance(n, ast.Name)}
         if target.id in used:
             return False
-        (start, before), *rest = self.with_statements(self.number, [first, *later])
-        if {INT} != {value.kind for value, _ in [(start, before), *rest]}:
+        (start, before), *others = self.with_statements(self.number, [first, *later])
+        if {INT} != {value.kind for value, _ in [(start, before), *others]}:
             return False
         self.lines += before
         name = self._give(target.id, start, constant=False)
-        self.decide(value.op, name, rest)
+        self.decide(value.op, name, others)
         return True
 
     def _give(self, name: str, value: Value, constant: bool) -> str:
