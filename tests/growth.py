@@ -134,7 +134,7 @@ def stop(system: System) -> tuple[Vector, Matrix, Matrix]:
 def time_filter(system: System, cls: type[ExtendedKalmanFilter]) -> float:
     """Processor time of a filter for a sample, the least of five runs [s]."""
     with open_model(system) as fmu:
-        estimator, samples = cls(fmu, system, cls.default_gains(fmu, system)), stop(system)
+        estimator, samples = cls.untuned(fmu, system), stop(system)
         estimator.run(*samples)
         spent = []
         for _ in range(_REPEATS):

@@ -502,7 +502,7 @@ def test_command_writes_every_stop_and_the_worst(system, root, tmp_path, monkeyp
     assert all(row.text in printed for row in ROWS)
 
     with open_model(system) as fmu:
-        ekf = ExtendedKalmanFilter(fmu, system, ExtendedKalmanFilter.default_gains(fmu, system))
+        ekf = ExtendedKalmanFilter.untuned(fmu, system)
         read = (read_case(root / case, system) for case in cases)
         stops = {
             case.name: observe_stop(case, read_truth(case, system), [ekf], system) for case in read

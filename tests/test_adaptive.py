@@ -52,7 +52,7 @@ def stop(fmu: FMU, muDC: Vector, noise: float = 1.0, seed: int = 5) -> tuple[np.
 
 
 def estimate(fmu: FMU, cls: type[ExtendedKalmanFilter], system: System, *stop: Vector) -> Estimate:
-    return cls(fmu, system, cls.default_gains(fmu, system)).run(*stop)
+    return cls.untuned(fmu, system).run(*stop)
 
 
 MUDC = list(WHEELSET.columns).index("muDC")
@@ -119,7 +119,7 @@ def runs(fmu, once) -> dict[str, list[tuple[slice, Run]]]:
     cases, known = read_cases([ROOT / "cases"], WHEELSET), estimators_of(WHEELSET)
 
     def run(name: str) -> list[tuple[slice, Run]]:
-        ready = known[name](fmu, WHEELSET, known[name].default_gains(fmu, WHEELSET))
+        ready = known[name].untuned(fmu, WHEELSET)
         return [(judged_window(case, WHEELSET), replay(case, ready)) for case in cases]
 
     return once("filters on the rig", lambda _: {name: run(name) for name in FILTERS})

@@ -57,7 +57,7 @@ def test_a_constant_is_the_weighted_mean_of_what_was_measured(name, still, level
     """In closed form: of n readings of variance R and k of variance r, (n/R + k/r)^-1."""
     cls = estimators_of(still)[name]
     t, u, y = samples(40)
-    estimate = cls(level, still, cls.default_gains(level, still)).run(t, u, y)
+    estimate = cls.untuned(level, still).run(t, u, y)
     weights = np.isfinite(y) / np.array([0.2, 0.05]) ** 2
     information = weights.cumsum(axis=0).sum(axis=1)
     mean = (weights * np.nan_to_num(y)).cumsum(axis=0).sum(axis=1) / information
@@ -69,9 +69,8 @@ def test_a_constant_is_the_weighted_mean_of_what_was_measured(name, still, level
 
 
 def test_innovations_are_those_of_what_was_measured(still, level):
-    cls = ExtendedKalmanFilter
     t, u, y = samples(2000)
-    nis = cls(level, still, cls.default_gains(level, still)).run(t, u, y).nis[1:]
+    nis = ExtendedKalmanFilter.untuned(level, still).run(t, u, y).nis[1:]
     fed = np.isfinite(y[1:]).sum(axis=1)
     # Each is chi-squared of so many outputs: the mean of n of them scatters by sqrt(2 k/n).
     for k in (1, 2):
@@ -102,7 +101,7 @@ def test_estimators_with_fixed_gains_do_without_aids(still, level):
         cls = estimators_of(still)[name]
         assert list(cls.fed(still).columns) == ["coarse"]
     cls = estimators_of(still)["open_loop"]
-    estimate = cls(level, still, cls.default_gains(level, still)).run(t, u, y)
+    estimate = cls.untuned(level, still).run(t, u, y)
     assert_array_equal(estimate.values[:, 0], np.full(40, y[0, 0]))
 
 
@@ -164,13 +163,13 @@ def test_what_the_crew_says_is_a_model_with_those_parameters(stop):
     cls, part = ExtendedKalmanFilter, slice(0, 150)
     wet = {"muWR": 0.275, "polach.kA": 0.3, "polach.kS": 0.1, "polach.B": 0.2}
     with open_model(TRAIN) as model:
-        own = cls(model, TRAIN, cls.default_gains(model, TRAIN))
+        own = cls.untuned(model, TRAIN)
         values = []
         for rail in ("wet", "dry"):
             own.set_conditions({"rail": rail})
             values.append(own.run(case.time[part], case.u[part], case.y[part]).values)
         variant = model.variant(wet)
-        plain = cls(variant, TRAIN, cls.default_gains(variant, TRAIN))
+        plain = cls.untuned(variant, TRAIN)
         plain.set_conditions({"rail": "unknown"})
         expected = plain.run(case.time[part], case.u[part], case.y[part]).values
     corrections = [list(own.system.columns).index(correction) for correction in TRAIN.corrections]
@@ -184,7 +183,7 @@ def test_who_finds_a_condition_is_not_told(stop):
     case, _ = stop
     cls, part = estimators_of(TRAIN)["imm"], slice(0, 20)
     with open_model(TRAIN) as model:
-        bank = cls(model, TRAIN, cls.default_gains(model, TRAIN))
+        bank = cls.untuned(model, TRAIN)
         runs = []
         conditions: list[dict[str, Value]] = [{"rail": "dry"}, {"rail": "wet"}]
         for condition in conditions:

@@ -264,8 +264,7 @@ def filled(vessel) -> Case:
 def test_a_switched_pump_is_integrated_exactly_and_nothing_is_made_of_the_switch(
     vessel, fmu, filled, name
 ):
-    cls = estimators_of(vessel)[name]
-    run = replay(filled, cls(fmu, vessel, cls.default_gains(fmu, vessel)))
+    run = replay(filled, estimators_of(vessel)[name].untuned(fmu, vessel))
     assert_allclose(run.signal("V"), filled["V"], rtol=0.0, atol=1e-12)
     assert_allclose(run.signal("leak"), 0.0, atol=1e-12)
     # What a sensor sees at a sample is the input from there on.
@@ -291,7 +290,7 @@ def counted(vessel) -> Case:
 @pytest.mark.parametrize("name", ESTIMATORS)
 def test_means_of_a_meter_are_integrated_exactly(vessel, fmu, counted, name):
     system, cls = metered(vessel, "before"), estimators_of(vessel)[name]
-    run = replay(counted, cls(fmu, system, cls.default_gains(fmu, system)))
+    run = replay(counted, cls.untuned(fmu, system))
     assert_allclose(run.signal("V"), counted["V"], rtol=0.0, atol=1e-12)
     assert_allclose(run.signal("leak"), 0.0, atol=1e-12)
 
@@ -302,7 +301,7 @@ def test_ten_litres_are_ten_where_means_are_declared_as_what_they_are(
 ):
     """By an open loop, a whole simulation, and the prediction of a diagnosis with derivatives."""
     system, cls = metered(vessel, held), estimators_of(vessel)["open_loop"]
-    run = replay(counted, cls(fmu, system, cls.default_gains(fmu, system)))
+    run = replay(counted, cls.untuned(fmu, system))
     assert run.signal("V")[-1] == pytest.approx(1e-3 * litres)
     drive = Drive(counted.time, counted.u)
     simulated = Simulation(fmu, ["q"], ["V"], system.holds).run(drive, {})
@@ -332,8 +331,7 @@ def test_an_exported_observer_takes_inputs_as_declared(
     vessel, fmu, tmp_path, name, held, recording, request
 ):
     filled, system = request.getfixturevalue(recording), metered(vessel, held)
-    cls = estimators_of(vessel)[name]
-    estimator = cls(fmu, system, cls.default_gains(fmu, system))
+    estimator = estimators_of(vessel)[name].untuned(fmu, system)
     path = tmp_path / "observer.fmu"
     build_observer(estimator, path, 2, platforms=[native()])
     names = [signal.name for signal in (*vessel.inputs, *vessel.outputs)]

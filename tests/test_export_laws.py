@@ -344,8 +344,7 @@ def test_what_does_not_become_c_is_refused_in_words(tmp_path, minimal, name, mat
     spec = importlib.util.spec_from_file_location("own", tmp_path / "own.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
-    cls = getattr(module, name)
-    estimator = cls(minimal, SYSTEM, cls.default_gains(minimal, SYSTEM))
+    estimator = getattr(module, name).untuned(minimal, SYSTEM)
     with pytest.raises(InputError, match=match):
         build_observer(estimator, tmp_path / "own.fmu", 2, platforms=[native()])
     assert not (tmp_path / "own.fmu").exists()

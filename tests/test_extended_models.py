@@ -175,7 +175,7 @@ def test_a_worn_wheel_at_standstill_has_no_creep_force(extended, dry_case, metho
     """The radius of rolling is the model's, not the parameter rW: that would leave 7 kN."""
     fmu = extended["Worn"]
     case = dry_case.with_signals({"omegaW": dry_case["omegaW"] * fmu.defaults["rW"] / WORN})
-    run = replay(case, method(fmu, SYSTEM, method.default_gains(fmu, SYSTEM)))
+    run = replay(case, method.untuned(fmu, SYSTEM))
     resting = case.time > case.time[-1] - 0.5
     # 100 N is the noise of the load cell itself (80 N) with a margin for the drive's torque.
     assert np.abs(run.signal("Fx")[resting]).max() < 100.0

@@ -97,8 +97,7 @@ def case(folder, tanks) -> Case:
 
 
 def made(fmu: FMU, tanks: System, name: str) -> Estimator:
-    cls = estimators_of(tanks)[name]
-    return cls(fmu, tanks, cls.default_gains(fmu, tanks))
+    return estimators_of(tanks)[name].untuned(fmu, tanks)
 
 
 @pytest.fixture(scope="module")

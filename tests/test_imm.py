@@ -65,7 +65,7 @@ def case(vessel) -> Case:
 def bank(fmu: FMU, system: System, lasts: float) -> InteractingMultipleModel:
     conditions = tuple(replace(condition, lasts=lasts) for condition in system.conditions)
     given = replace(system, conditions=conditions)
-    return InteractingMultipleModel(fmu, given, InteractingMultipleModel.default_gains(fmu, given))
+    return InteractingMultipleModel.untuned(fmu, given)
 
 
 def textbook(case: Case, transition: np.ndarray, accurate: bool) -> tuple[np.ndarray, ...]:
@@ -165,8 +165,7 @@ def rails(once) -> dict[str, Run]:
 
     def run(_: Path) -> dict[str, Run]:
         with open_model(WHEELSET) as opened:
-            gains = InteractingMultipleModel.default_gains(opened, WHEELSET)
-            own = InteractingMultipleModel(opened, WHEELSET, gains)
+            own = InteractingMultipleModel.untuned(opened, WHEELSET)
             return {case.name: replay(case, own) for case in read_cases([ROOT / "cases"], WHEELSET)}
 
     return once("rails", run)

@@ -156,8 +156,7 @@ def smoother(fmu: FMU, known: System, rare: float = 1e-300) -> Smoother:
 
 
 def kalman(fmu: FMU, known: System, samples: tuple[Vector, Matrix, Matrix]) -> Estimate:
-    gains = ExtendedKalmanFilter.default_gains(fmu, known)
-    return stepping_by_euler(ExtendedKalmanFilter(fmu, known, gains)).run(*samples)
+    return stepping_by_euler(ExtendedKalmanFilter.untuned(fmu, known)).run(*samples)
 
 
 def test_samples_that_come_late_count_as_if_they_had_come_in_time(linear):
@@ -184,8 +183,7 @@ def test_samples_that_come_late_count_as_if_they_had_come_in_time(linear):
 @pytest.mark.parametrize("accurate", [False, True])
 @pytest.mark.parametrize("samples", [1, 2, 7, 20, 200])
 def test_on_a_linear_model_it_is_the_kalman_filter(linear, samples, accurate):
-    gains = ExtendedKalmanFilter.default_gains(*linear)
-    expected = with_steps(ExtendedKalmanFilter(*linear, gains), recording(), accurate)
+    expected = with_steps(ExtendedKalmanFilter.untuned(*linear), recording(), accurate)
     estimate = with_steps(horizon(*linear, samples), recording(), accurate)
     # Rounding of double precision, over the 1e6 that lie between variances of levels and flows.
     scale = np.abs(expected.values).max(axis=0)

@@ -73,7 +73,7 @@ def test_a_model_with_other_names_gives_the_same_estimate_bit_for_bit(
         FMU(renamed_path, NAMES) as theirs,
     ):
         for fmu in (ours, theirs):
-            run = replay(start_of_stop, cls(fmu, system, cls.default_gains(fmu, system)))
+            run = replay(start_of_stop, cls.untuned(fmu, system))
             assert run.ending is Ending.OK
             estimates.append(run.estimate)
     assert_array_equal(*estimates)
@@ -99,7 +99,7 @@ def test_a_variable_whose_name_is_given_to_another_stays_within_reach(minimal_pa
 
 
 def open_loop(fmu: FMU, system: System) -> OpenLoop:
-    return OpenLoop(fmu, system, OpenLoop.default_gains(fmu, system))
+    return OpenLoop.untuned(fmu, system)
 
 
 @pytest.mark.parametrize(

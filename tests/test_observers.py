@@ -123,7 +123,7 @@ def made(fmu, root, system) -> Iterator[dict[str, Estimator]]:
     with FMU(root / "fmus" / "fmi2" / "FullObserver.fmu") as full:
         by_role = {"observer": fmu, "full": full}
         yield {
-            name: cls(by_role[cls.role], system, cls.default_gains(by_role[cls.role], system))
+            name: cls.untuned(by_role[cls.role], system)
             for name, cls in estimators_of(system).items()
         }
 
@@ -250,8 +250,7 @@ def test_observers_run_on_the_full_model_too(fmu, stop, root, name):
     """Whose suspension and rocker swing without being measured."""
     case = stop(drying)
     with FMU(root / "fmus" / "fmi2" / "FullObserver.fmu") as full:
-        cls = estimators_of(WHEELSET)[name]
-        estimator = cls(full, WHEELSET, cls.default_gains(full, WHEELSET))
+        estimator = estimators_of(WHEELSET)[name].untuned(full, WHEELSET)
         assert score(case, replay(case, estimator), WHEELSET).nrmse < 0.02
 
 

@@ -144,9 +144,8 @@ def unsaid(light) -> Case:
 
 def open_loop(case: Case, role: str) -> Run:
     """A model of the rig by itself."""
-    cls = estimators_of(SYSTEM)["open_loop"]
     with FMU(model_path(SYSTEM, role)) as fmu:
-        return replay(case, cls(fmu, SYSTEM, cls.default_gains(fmu, SYSTEM)))
+        return replay(case, estimators_of(SYSTEM)["open_loop"].untuned(fmu, SYSTEM))
 
 
 def test_what_sets_a_parameter_is_said_or_is_as_in_the_model(light, unsaid):

@@ -86,7 +86,7 @@ def test_a_swing_does_not_fade_without_feedback(off, spring, fmu):
     """Where what is measured is far off, too, as by the zero of a sensor from the second sample."""
     cls, case = estimators_of(spring)["open_loop"], recorded(spring, 0.0)
     case = replace(case, signals={**case.signals, "s": case["s"] + off * (case.time > 0.0)})
-    run = replay(case, cls(fmu, spring, cls.default_gains(fmu, spring)))
+    run = replay(case, cls.untuned(fmu, spring))
     # 1e-4 of the range after 20 s, what is asked of an integrator with a tolerance of 1e-8.
     places = swing()[2]
     assert_allclose(run.signal("s"), places, rtol=0.0, atol=1e-4 * np.ptp(places))
@@ -97,7 +97,7 @@ def test_an_output_is_read_at_the_inputs_of_its_sample(spring, fmu):
     straight = replace(spring, inputs=(replace(spring.inputs[0], held=False),), reported={"R": "N"})
     cls, time = estimators_of(spring)["open_loop"], H * np.arange(400)
     force = np.sin(7.0 * time)
-    estimator = cls(fmu, straight, cls.default_gains(fmu, straight))
+    estimator = cls.untuned(fmu, straight)
     values = np.asarray(estimator.run(time, force[:, None], np.full((400, 1), np.nan)).values)
     assert estimator.steps[0].accurate[0] == 1.0
     place, acts = (values[:, list(straight.columns).index(name)] for name in ("s", "R"))
@@ -107,7 +107,7 @@ def test_an_output_is_read_at_the_inputs_of_its_sample(spring, fmu):
 def test_a_step_of_a_linear_model_ends_at_the_rate_that_the_next_one_begins_with(spring, fmu):
     """Its error is the same with and without an evaluation there."""
     case, cls, errors = recorded(spring, 0.0), estimators_of(spring)["open_loop"], []
-    estimator = cls(fmu, spring, cls.default_gains(fmu, spring))
+    estimator = cls.untuned(fmu, spring)
     steps = np.diff(case.time, prepend=case.time[0])
     for evaluated in (False, True):
         estimator.start(case.u[0], case.y[0])
@@ -147,8 +147,7 @@ def test_a_whole_simulation_of_a_stiff_motion_goes_on_implicitly(relaxation):
 
 @pytest.mark.parametrize("name", ["ekf", "ukf", "mhe", "imm", "smoother"])
 def test_filters_of_an_exact_model_err_by_less_than_a_sensor(spring, fmu, name):
-    cls = estimators_of(spring)[name]
-    run = replay(recorded(spring, NOISE), cls(fmu, spring, cls.default_gains(fmu, spring)))
+    run = replay(recorded(spring, NOISE), estimators_of(spring)[name].untuned(fmu, spring))
     assert np.sqrt(np.mean((run.signal("s") - swing()[2])[200:] ** 2)) < 0.5 * NOISE
     # The mean of 1800 values with one degree of freedom, of which 3 standard deviations are 0.1; a
     # filter whose states may walk, which these do not, expects a little more than there is.
@@ -227,8 +226,7 @@ def test_reactions_of_robertson_go_as_they_should(spring):
 @pytest.mark.parametrize("name", ["ekf", "ukf"])
 def test_innovations_of_an_exact_swing_pass_chi_squared(spring, fmu, name):
     """A hundred swings whose start, states and mass scatter by as much as the filter is told."""
-    cls = estimators_of(spring)[name]
-    estimator = cls(fmu, spring, cls.default_gains(fmu, spring))
+    estimator = estimators_of(spring)[name].untuned(fmu, spring)
     walk, spread = estimator._settings.walk, estimator._settings.spread
     time, runs, places = H * np.arange(1001), 100, []
     rng = np.random.default_rng(1)
@@ -256,8 +254,7 @@ def test_a_slow_motion_keeps_the_step_of_first_order(spring, fmu):
     table = {"time [s]": time, "F [N]": 0.0 * time, "s [m]": places}
     case = case_from_frame(spring, pd.DataFrame(table))
     for name in ("open_loop", "ekf", "ukf"):
-        cls = estimators_of(spring)[name]
-        estimator = cls(fmu, spring, cls.default_gains(fmu, spring))
+        estimator = estimators_of(spring)[name].untuned(fmu, spring)
         replay(case, estimator)
         assert [step.accurate[0] for step in estimator.steps] == [0.0]
 
@@ -265,8 +262,7 @@ def test_a_slow_motion_keeps_the_step_of_first_order(spring, fmu):
 @pytest.mark.parametrize("name", ["ekf", "ukf", "mhe"])
 def test_samples_one_by_one_and_exported_filters_take_the_same_steps(spring, fmu, tmp_path, name):
     case = recorded(spring, NOISE).part(slice(0, 600))
-    cls = estimators_of(spring)[name]
-    estimator = cls(fmu, spring, cls.default_gains(fmu, spring))
+    estimator = estimators_of(spring)[name].untuned(fmu, spring)
     rows = [estimator.init(case.time[0], case.u[0], case.y[0])]
     for k in range(1, case.time.size):
         rows.append(estimator.step(case.time[k], case.u[k], case.y[k]))

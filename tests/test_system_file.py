@@ -92,11 +92,11 @@ def test_parameters_of_this_machine_act_as_the_defaults_of_its_model_would(
     part = slice(0, 2000)
     samples = (dry_case.time[part], dry_case.u[part], dry_case.y[part])
     with FMU(minimal_path, {}, {"rW": 0.42}) as theirs, open_model(mine) as ours:
-        expected = cls(theirs, usual, cls.default_gains(theirs, usual)).run(*samples)
-        estimate = cls(ours, mine, cls.default_gains(ours, mine)).run(*samples)
+        expected = cls.untuned(theirs, usual).run(*samples)
+        estimate = cls.untuned(ours, mine).run(*samples)
     assert_array_equal(estimate.values, expected.values)
     with open_model(usual) as nominal:
-        other = cls(nominal, usual, cls.default_gains(nominal, usual)).run(*samples)
+        other = cls.untuned(nominal, usual).run(*samples)
     assert np.abs(estimate.values - other.values).max() > 1.0
 
 
@@ -107,8 +107,8 @@ def test_bands_change_what_a_filter_says_it_knows_and_no_estimate(system, dry_ca
     samples = (dry_case.time[part], dry_case.u[part], dry_case.y[part])
     (cls,) = choose(plain, ["ekf"]).values()
     with open_model(system) as fmu:
-        expected = cls(fmu, plain, cls.default_gains(fmu, plain)).run(*samples)
-        estimate = cls(fmu, wider, cls.default_gains(fmu, wider)).run(*samples)
+        expected = cls.untuned(fmu, plain).run(*samples)
+        estimate = cls.untuned(fmu, wider).run(*samples)
     assert_array_equal(estimate.values, expected.values)
     assert_array_equal(estimate.nis, expected.nis)
     factors = [1.5 if name == "Fx" else 1.0 for name in system.columns]

@@ -171,9 +171,7 @@ def test_folds_are_judged_by_gains_that_have_not_seen_them(
     assert [fold.cases for fold in folds] == [(r.name,) for r in job.recordings]
     assert_array_equal([fold.reasoned for fold in folds], z_k)
     assert all(np.isfinite(fold.tuned) for fold in folds)
-    observer = DisturbanceObserver(
-        minimal, system, DisturbanceObserver.default_gains(minimal, system)
-    )
+    observer = DisturbanceObserver.untuned(minimal, system)
     for fold, case in zip(folds, stop_beginnings, strict=True):
         assert fold.error_reasoned == score(case, replay(case, observer), system).nrmse
     # Held-out force is judged by the gains that were found, not by the reasoned ones.

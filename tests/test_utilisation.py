@@ -105,8 +105,7 @@ def test_nothing_is_claimed_at_walking_pace(peak_force):
 
 def made(fmu: FMU, system: System, name: str) -> Estimator:
     """An estimator with reasoned gains."""
-    cls = choose(system, [name])[name]
-    return cls(fmu, system, cls.default_gains(fmu, system))
+    return choose(system, [name])[name].untuned(fmu, system)
 
 
 @pytest.fixture(scope="module")

@@ -183,8 +183,7 @@ def test_a_generated_train_of_two_vehicles_is_the_one_that_is_known(tmp_path):
         order = [[x.name for x in generated.inputs].index(x.name) for x in system.inputs]
         names = [x.name for x in system.estimated]
         with open_model(system) as model:
-            cls = ExtendedKalmanFilter
-            estimator = cls(model, system, cls.default_gains(model, system))
+            estimator = ExtendedKalmanFilter.untuned(model, system)
             values = estimator.run(samples[0], samples[1][:, order], samples[2]).values
         estimates.append(values[:, [list(system.columns).index(name) for name in sorted(names)]])
     # Their equations are sorted and rounded in other orders.

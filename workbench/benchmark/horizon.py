@@ -50,9 +50,7 @@ def time_horizon(case: Case, system: System) -> HorizonTimes:
     half = case.time.size // 2
     steps = np.diff(case.time, prepend=case.time[0])
     with open_model(system) as fmu:
-        estimator = MovingHorizonEstimator(
-            fmu, system, MovingHorizonEstimator.default_gains(fmu, system)
-        )
+        estimator = MovingHorizonEstimator.untuned(fmu, system)
         spent = []
         part = slice(half, half + _SAMPLES)
         for _ in range(_REPEATS):

@@ -194,7 +194,7 @@ def opened(system: System, names: Sequence[str], role: str = "") -> Iterator[lis
         ready = []
         for estimator in choose(system, names).values():
             fmu = stack.enter_context(open_model(system, role or estimator.role))
-            ready.append(estimator(fmu, system, estimator.default_gains(fmu, system)))
+            ready.append(estimator.untuned(fmu, system))
         yield ready
 
 

@@ -5,7 +5,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -161,6 +161,11 @@ class Estimator(ABC):
     def default_gains(cls, fmu: FMU, system: System) -> Gains:
         """Gains before tuning; the FMU is left at an operating point."""
         return Gains(cls.name, (), np.zeros(0), {}, "")
+
+    @classmethod
+    def untuned(cls, fmu: FMU, system: System) -> Self:
+        """The estimator with its gains before tuning."""
+        return cls(fmu, system, cls.default_gains(fmu, system))
 
     @classmethod
     def reasoned(cls, fmu: FMU, system: System) -> Gains:

@@ -304,10 +304,9 @@ def case_observability(
     with open_model(system, OBSERVER) as fmu:
         whole = information(fmu, system, case)
         try:
-            gains = DisturbanceObserver.default_gains(fmu, system)
-            run = replay(case, DisturbanceObserver(fmu, system, gains))
+            run = replay(case, DisturbanceObserver.untuned(fmu, system))
         except InputError:
-            run = replay(case, OpenLoop(fmu, system, OpenLoop.default_gains(fmu, system)))
+            run = replay(case, OpenLoop.untuned(fmu, system))
             run = replace(run, estimate=_estimate_of_outputs(case, system, run))
     if run.ending is not Ending.OK:
         raise FMUError(f"{case.name}: {run.ending.value} {run.message}".strip())

@@ -266,8 +266,7 @@ def sampling_doubt(fmu: FMU, system: System, case: Case) -> str:
     A Kalman filter is run with some steps in place of each, between which nothing is measured. If
     its innovations then exceed what it says by less than half, steps are the reason.
     """
-    gains = ExtendedKalmanFilter.default_gains(fmu, system)
-    estimator = ExtendedKalmanFilter(fmu, system, gains)
+    estimator = ExtendedKalmanFilter.untuned(fmu, system)
     case = case.part(_liveliest(case, system))
     run, size = replay(case, estimator), len(system.columns)
     fine = estimator.run(*_finer(case, system))
@@ -333,7 +332,7 @@ def step_doubt(
     """
     if run.ending is not Ending.OK or not coarse:
         return 0.0, ""
-    estimator = OpenLoop(fmu, system, OpenLoop.default_gains(fmu, system))
+    estimator = OpenLoop.untuned(fmu, system)
     estimator.set_conditions(case.conditions)
     fmu.begin_at(case.model_time)
     estimator.run(case.time, case.u, case.y)
@@ -408,7 +407,7 @@ def unit_doubt(fmu: FMU, system: System, case: Case) -> str:
         for output in system.outputs
         if starts.get(output.reading, "") is None and known[output.name].any()
     ]
-    alone = OpenLoop(fmu, system, OpenLoop.default_gains(fmu, system))
+    alone = OpenLoop.untuned(fmu, system)
     alone.set_conditions(case.conditions)
     fmu.begin_at(case.model_time)
     unmeasured = np.full_like(case.y, np.nan)
@@ -484,7 +483,7 @@ def start_doubt(fmu: FMU, system: System, case: Case) -> str:
     ]
     if not others or not fmu.states:
         return ""
-    estimator = OpenLoop(fmu, system, OpenLoop.default_gains(fmu, system))
+    estimator = OpenLoop.untuned(fmu, system)
     estimator.set_conditions(case.conditions)
     fmu.begin_at(case.model_time)
     estimator.start(case.u[0], case.y[0])

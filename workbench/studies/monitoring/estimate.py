@@ -131,8 +131,7 @@ class RecordingEstimator:
         key = tuple(sorted(parameters.items()))
         if key not in self._filters:
             model = self._model.variant(parameters)
-            gains = UnscentedKalmanFilter.default_gains(model, self._constant)
-            self._filters[key] = UnscentedKalmanFilter(model, self._constant, gains)
+            self._filters[key] = UnscentedKalmanFilter.untuned(model, self._constant)
         return self._filters[key]
 
 
