@@ -316,7 +316,7 @@ class Excitation:
 
 def excite(fmu: FMU) -> Excitation:
     """Start the FMU and bring it to an excited point; returns where."""
-    by_name = {v.name: v for v in fmu.description.variables}
+    by_name = fmu.description.by_name
     nominal = np.array([abs(by_name[name].nominal or 1.0) for name in fmu.states])
     inputs = continuous_variables(fmu, fmu.inputs)
     fmu.start({})

@@ -7,7 +7,7 @@ import re
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from pathlib import Path
 from xml.etree import ElementTree
 from xml.parsers import expat
@@ -68,6 +68,12 @@ class Variable:
     relative: bool = False  # whether it is a difference, whose unit has no zero of its own
 
     @property
+    def limits(self) -> tuple[float, float]:
+        """Minimum and maximum, in `unit`; infinite where the description has none."""
+        low = -math.inf if self.minimum is None else self.minimum
+        return low, math.inf if self.maximum is None else self.maximum
+
+    @property
     def holds_number(self) -> bool:
         """Whether its type is of numbers, of which a Boolean has two."""
         return self.type not in _NO_NUMBERS
@@ -112,6 +118,11 @@ class Description:
     start: float | None
     step: float | None
     stop: float | None
+
+    @cached_property
+    def by_name(self) -> Mapping[str, Variable]:
+        """Its variables."""
+        return {variable.name: variable for variable in self.variables}
 
     def names(self, causality: str) -> tuple[str, ...]:
         """Names of the variables of a causality, in the order of the model description."""

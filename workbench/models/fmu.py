@@ -779,7 +779,7 @@ class FMU(FMUInstance):
                     f"--map {name}=NAME",
                 )
             if name not in self._real_names:
-                variable = next(v for v in self.description.variables if v.name == name)
+                variable = self.description.by_name[name]
                 raise InputError(
                     where=f"{self.place}, variable '{variable.name}'",
                     found=f"a variable of type {variable.type}"
@@ -855,7 +855,7 @@ class FMU(FMUInstance):
 
     def moves(self, name: str) -> bool:
         """Whether a variable may go on in a straight line; one of whole numbers jumps."""
-        variable = self._described[name]
+        variable = self.description.by_name[name]
         return variable.variability == "continuous" and variable.floats
 
     # --- the extended-FMI pattern ---
@@ -1115,11 +1115,7 @@ class FMU(FMUInstance):
         Of those without, 1, as FMI says, unless the scale of a signal of this name, or the start,
         is off that by orders of magnitude: 1 would make a charge of 1e-9 C unknown to 1 C.
         """
-        return np.array([self._size(self._described[name]) for name in names])
-
-    @cached_property
-    def _described(self) -> dict[str, Variable]:
-        return {variable.name: variable for variable in self.description.variables}
+        return np.array([self._size(self.description.by_name[name]) for name in names])
 
     def _size(self, variable: Variable) -> float:
         if variable.nominal:

@@ -80,7 +80,7 @@ class Simulation:
         self.fmu = fmu
         self._inputs, self._outputs = fmu.typed(inputs), fmu.typed(outputs)
         self._holds = np.array(holds, float)
-        self._variables = {v.name: v for v in fmu.description.variables}
+        self._variables = fmu.description.by_name
         self._resets: bool | None = None  # not known before the first run
         self._set: set[str] = set()
         # By column: over the usual step, that which was best, and its disagreement.
@@ -231,13 +231,7 @@ class Simulation:
     @cached_property
     def limits(self) -> dict[str, tuple[float, float]]:
         """Least and greatest value of each variable, infinite where it has none."""
-        return {
-            name: (
-                -np.inf if variable.minimum is None else variable.minimum,
-                np.inf if variable.maximum is None else variable.maximum,
-            )
-            for name, variable in self._variables.items()
-        }
+        return {name: variable.limits for name, variable in self._variables.items()}
 
 
 class _Difference(NamedTuple):

@@ -142,7 +142,7 @@ class _Problem:
             if v.causality == "output" and v.holds_number and not v.array
         ]
         self.outputs = outputs or list(description.states)
-        variables = {v.name: v for v in description.variables}
+        variables = description.by_name
         self._places = {
             name: (variables[name].of, variables[name].element) for name in self.outputs
         }

@@ -209,7 +209,7 @@ def start_spreads(fmu: FMU, system: System) -> Vector:
     stated. Never more than that of any value between the limits that the model has. A walk says
     nothing of a start.
     """
-    variables = {variable.name: variable for variable in fmu.description.variables}
+    variables = fmu.description.by_name
     spreads = []
     for name, size in zip(fmu.states, fmu.sizes(fmu.states), strict=True):
         if not variables[name].nominal:

@@ -107,13 +107,12 @@ def check_along(
 
 def _elsewhere(fmu: FMU, parameters: Sequence[str]) -> dict[str, float]:
     """Other values of those parameters that are Real, by what the model allows."""
-    variables = {variable.name: variable for variable in fmu.description.variables}
+    variables = fmu.description.by_name
     least, most = _MOVED
     values = {}
     for k, name in enumerate(filter(fmu.is_real, parameters)):
         variable, value = variables[name], fmu.defaults.get(name, 0.0)
-        low = -np.inf if variable.minimum is None else variable.minimum
-        high = np.inf if variable.maximum is None else variable.maximum
+        low, high = variable.limits
         share = least + (most - least) * (k * _GOLDEN % 1.0)
         other = float(np.clip(value * (1.0 + share), low, high))
         values[name] = other if other != value else float(np.clip(value / (1.0 + share), low, high))
@@ -130,7 +129,7 @@ def doubts_along(
 
 def _unsized(fmu: FMU, system: System) -> list[str]:
     """States whose size nothing says: the model no nominal value, the system no scale, no walk."""
-    variables = {variable.name: variable for variable in fmu.description.variables}
+    variables = fmu.description.by_name
     known = {*system.walks, *fmu.scales}
     return [name for name in fmu.states if name not in known and not variables[name].nominal]
 

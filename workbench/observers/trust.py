@@ -453,7 +453,7 @@ def spread_doubt(fmu: FMU, system: System, case: Case) -> str:
     fmu.begin_at(case.model_time)
     fmu.start({})
     shown = shown_states(fmu, system, case.u[0], measured, measured.keys())
-    variables = {variable.name: variable for variable in fmu.description.variables}
+    variables = fmu.description.by_name
     assumed = [
         f"{name} by {rounded(spread)} {variables[name].unit or ''}".rstrip()
         for name, spread in zip(fmu.states, start_spreads(fmu, system), strict=True)

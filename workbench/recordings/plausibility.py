@@ -190,8 +190,7 @@ def _sizes(signals: Mapping[str, Vector], system: System, origin: Origin) -> Ite
         variable = variables.get(signal.name)
         finding = None
         if variable is not None and variable.holds_number:
-            low = -np.inf if variable.minimum is None else variable.minimum
-            high = np.inf if variable.maximum is None else variable.maximum
+            low, high = variable.limits
             outside = np.flatnonzero((values < low - noise) | (values > high + noise))
             begins = float(np.median(values[:_FEW]))
             known = variable.start is not None and variable.type != "Boolean"

@@ -282,10 +282,7 @@ def _candidate(
     values = way.factor * place.channel.values + way.zero
     if not np.isfinite(values).any():
         return None, f"'{place.channel.name}' holds no numbers"
-    low, high = (
-        -math.inf if variable.minimum is None else variable.minimum,
-        math.inf if variable.maximum is None else variable.maximum,
-    )
+    low, high = variable.limits
     if np.nanmax(values) < low or np.nanmin(values) > high:
         return None, f"no sample of '{place.channel.name}' is within {low:g} to {high:g}"
     size = float(np.nanmax(np.abs(values)))
@@ -493,12 +490,12 @@ def _noise(samples: Sequence[Vector], unit: str, span: float, *, may_be_exact: b
 
 def _missing(draft: Draft) -> list[str]:
     """Inputs that nothing drives, and channels that nobody takes."""
-    causality = {v.name: v for v in draft.description.variables}
+    variables = draft.description.by_name
     lines = [
         f"# QUESTION: {name} drives the model, and {why}; it stays at its start value "
-        f"{causality[name].start or 0}. Import a recording with it, and add [inputs.NAME]."
+        f"{variables[name].start or 0}. Import a recording with it, and add [inputs.NAME]."
         for name, why in draft.unmatched.items()
-        if causality[name].causality == "input"
+        if variables[name].causality == "input"
     ]
     lines += [f"# channels that are not used: {listed(draft.left)}"] * bool(draft.left)
     return ["", *lines] if lines else []
@@ -506,7 +503,7 @@ def _missing(draft: Draft) -> list[str]:
 
 def _states(draft: Draft) -> list[str]:
     """Where states begin that no recording has the name of."""
-    variables = {v.name: v for v in draft.description.variables}
+    variables = draft.description.by_name
     measured = {signal.variable.name for signal in draft.signals}
     hidden = [name for name in draft.description.states if name not in measured]
     if not hidden:

@@ -235,8 +235,7 @@ class _Model:
         """Try an effect alone, at the size that matters."""
         names = variables(effect, effect.size)
         variable = self._variables[names[0]]
-        low = -np.inf if variable.minimum is None else variable.minimum
-        high = np.inf if variable.maximum is None else variable.maximum
+        low, high = variable.limits
         size = effect.matters if effect.matters <= high else -effect.matters
         result = EffectResult(effect.name, size, variable.unit or "1")
         if not low <= size <= high:

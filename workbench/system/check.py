@@ -1,6 +1,5 @@
 """A system against its model: whatever its file names is there, and in the same unit."""
 
-import math
 from collections.abc import Collection, Iterable, Iterator
 
 from workbench.errors import InputError, closest, unknown_name
@@ -51,7 +50,7 @@ def check_model(system: System, model: Description) -> None:
     InputError
         If it lacks a variable of the system, has a parameter without a value, or another unit.
     """
-    variables = {v.name: v for v in model.variables}
+    variables = model.by_name
     for ours, unit in system.variables.items():
         theirs = system.names.get(ours, ours)
         where = f"{model.path}, variable '{theirs}'"
@@ -175,13 +174,12 @@ def _check_ranges(system: System, model: Description) -> None:
     for condition in system.conditions:
         for parameters in condition.parameters.values():
             given += [(f"[conditions.{condition.name}]", *item) for item in parameters.items()]
-    variables = {v.name: v for v in model.variables}
+    variables = model.by_name
     for where, name, value in given:
         variable = variables.get(name)
         if variable is None:
             continue
-        low = -math.inf if variable.minimum is None else variable.minimum
-        high = math.inf if variable.maximum is None else variable.maximum
+        low, high = variable.limits
         if not low <= value <= high:
             raise InputError(
                 where=f"{system.source}, {where}",
@@ -193,7 +191,7 @@ def _check_ranges(system: System, model: Description) -> None:
 
 def _check_corrections(system: System, model: Description) -> None:
     """Refuse corrections that estimators cannot set, or that are something else as well."""
-    variables = {v.name: v for v in model.variables}
+    variables = model.by_name
     taken = {signal.name: "a measured input" for signal in system.inputs}
     taken |= {
         signal.name: "a measured output" for signal in (*system.outputs, *system.intermittent)

@@ -51,8 +51,8 @@ class FreePredictor:
         inputs = [signal.name for signal in system.inputs]
         readings = [*(system.signals[name].reading for name in signals), *watched]
         self._simulation = Simulation(fmu, inputs, readings, system.holds)
-        kinds = {v.name: v for v in fmu.description.variables}
-        self._whole = np.array([not kinds[name].floats for name in inputs], bool)
+        variables = fmu.description.by_name
+        self._whole = np.array([not variables[name].floats for name in inputs], bool)
         self._scales = {name: signal.scale for name, signal in system.signals.items()}
         self._scales |= {name: spread for name, spread in system.spreads.items() if spread > 0.0}
 

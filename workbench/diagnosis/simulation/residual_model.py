@@ -11,8 +11,6 @@ from contextlib import ExitStack, nullcontext
 from dataclasses import replace
 from typing import Any, Self, TypeVar
 
-import numpy as np
-
 from workbench.arrays import Matrix
 from workbench.diagnosis.data.clocks import DELAY, greatest_skew, late_signals
 from workbench.diagnosis.data.motion import ModelSource, OpenModel, opened
@@ -117,13 +115,7 @@ class ResidualModel:
             fmu.start({})  # as of what it calculates, and of elements of arrays
             self.nominal |= zip(unsaid, fmu.get_typed(fmu.typed(unsaid)), strict=True)
         self.states, self.units = tuple(fmu.states), dict(fmu.units)
-        self.bounds = {
-            v.name: (
-                -np.inf if v.minimum is None else v.minimum,
-                np.inf if v.maximum is None else v.maximum,
-            )
-            for v in fmu.description.variables
-        }
+        self.bounds = {v.name: v.limits for v in fmu.description.variables}
         for parameter in self.system.fitted:
             low, high = self.bounds[parameter.name]
             self.bounds[parameter.name] = (

@@ -250,7 +250,7 @@ def _unknowns(
     spreads: Mapping[str, float],
 ) -> list[_Unknown]:
     """All that is fitted, in the order in which it is told: parameters before starts."""
-    variables = {v.name: v for v in description.variables}
+    variables = description.by_name
     unknowns = []
     names = [entry.name for entry in entries]
     started = dict.fromkeys(name for run in runs for name in run.starts)
@@ -258,9 +258,8 @@ def _unknowns(
     for entry in (*entries, *shown):
         variable = variables[entry.name]
         is_state = entry.name in description.states or entry.name in started
-        low, high = entry.range
-        low = max(low, -np.inf if variable.minimum is None else variable.minimum)
-        high = min(high, np.inf if variable.maximum is None else variable.maximum)
+        low = max(entry.range[0], variable.limits[0])
+        high = min(entry.range[1], variable.limits[1])
         nominal = system.given.get(entry.name, float(variable.start or 0.0))
         own = is_state if entry.by_recording is None else entry.by_recording
         numbers: Sequence[int | None] = range(len(runs)) if own else [None]

@@ -344,8 +344,8 @@ def _able(fmu: FMU, start: Mapping[str, float]) -> dict[str, float]:
 
 def _whole(fmu: FMU, inputs: Sequence[str], u: Matrix) -> Matrix:
     """Inputs (n, m) in numbers that their types hold, of which noise makes others."""
-    kinds = {v.name: v for v in fmu.description.variables}
-    whole = [j for j, name in enumerate(inputs) if not kinds[name].floats]
+    variables = fmu.description.by_name
+    whole = [j for j, name in enumerate(inputs) if not variables[name].floats]
     u[:, whole] = np.round(u[:, whole])
     return u
 
