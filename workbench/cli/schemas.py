@@ -20,7 +20,7 @@ from workbench.observers.trust import Contradiction
 from workbench.pages.answer import Measure
 from workbench.recordings.case import UNKNOWN
 from workbench.studies.distance.outcome import SafetyLevel
-from workbench.studies.distance.rare_events import PlainLevel
+from workbench.studies.distance.rare_events import PlainSampling
 from workbench.studies.fit.outcome import LOSSES, FittedValue
 from workbench.studies.power import Scale, following, left_out
 from workbench.studies.power.campaign import EffectChance, EffectLimit
@@ -466,7 +466,7 @@ def _distance() -> Schema:
         "nominal": closed({"distance deceleration": NUMBER}),
         "outside": ANY,
         "safety": or_null(listed(declared(SafetyLevel))),
-        "plain": or_null(closed({"samples": WHOLE, "levels": listed(declared(PlainLevel))})),
+        "plain": or_null(declared(PlainSampling)),
         "stops": listed({"type": "object", "required": ["stop", "held"]}),
         "held": closed({"of stops": WHOLE}),
         "warnings": TEXTS,
