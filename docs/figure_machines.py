@@ -25,7 +25,7 @@ class Machine:
     channel : whose error is told, where there are several.
     """
 
-    said: str
+    label: str
     published: str
     system: str
     source: str
@@ -60,24 +60,24 @@ class Machine:
             if error["held_out"] == bool(self.held_out) and self.channel in ("", error["channel"])
         ]
         power = 2 if self.measure == "rms" else 1
-        samples = sum(one["samples"] for one in some)
+        samples = sum(error["samples"] for error in some)
         nominal, extended = (
-            (sum(one["samples"] * one[self.measure][k] ** power for one in some) / samples)
+            (sum(error["samples"] * error[self.measure][k] ** power for error in some) / samples)
             ** (1 / power)
-            / si_factor(self.unit, some[0]["unit"], self.said)
+            / si_factor(self.unit, some[0]["unit"], self.label)
             for k in (0, 1)
         )
         return nominal, extended
 
 
-def _seal(said: str, published: str, name: str) -> Machine:
+def _seal(label: str, published: str, name: str) -> Machine:
     cases = tuple(f"{name}_{pressure}bar" for pressure in (1, 3, 5, 7))
-    return Machine(said, published, "seal_friction", "pneumatic_cylinder", "N", cases[2:3], cases)
+    return Machine(label, published, "seal_friction", "pneumatic_cylinder", "N", cases[2:3], cases)
 
 
-def _chamber(said: str, published: str, *cases: str) -> Machine:
+def _chamber(label: str, published: str, *cases: str) -> Machine:
     names = "leaking_chamber", "pneumatic_cylinder"
-    return Machine(said, published, *names, "mbar", cases[1:], cases)
+    return Machine(label, published, *names, "mbar", cases[1:], cases)
 
 
 MACHINES = {
@@ -147,5 +147,5 @@ def machines(*summaries: Summary) -> Table:
             f"{float(f'{error:.3g}'):g} {machine.unit}" for error in machine.errors(summary)
         )
         after = extended if summary["causes"] else ""
-        rows.append([machine.said, machine.published, nominal, after, verdict(summary)])
+        rows.append([machine.label, machine.published, nominal, after, verdict(summary)])
     return rows

@@ -51,8 +51,8 @@ def errors(summary: Summary) -> Table:
     cases = summary["cases"]
     names = list(next(iter(cases.values()))["estimators"])
     rows: Table = [["case", *(titled(name) for name in names)]]
-    for case, found in cases.items():
-        shares = [found["estimators"][name][key] for name in names]
+    for case, results in cases.items():
+        shares = [results["estimators"][name][key] for name in names]
         rows.append(
             [case, *("n/a" if share is None else f"{100.0 * share:.2f} %" for share in shares)]
         )
@@ -61,15 +61,15 @@ def errors(summary: Summary) -> Table:
 
 def worst(summary: Summary) -> Table:
     """The worst stop of each row, beside what is asked of it."""
-    found = summary["worst"]
-    rows: Table = [["", "goal", *(titled(name) for name in found)]]
+    estimators = summary["worst"]
+    rows: Table = [["", "goal", *(titled(name) for name in estimators)]]
     for row, goal in zip(ROWS, GOALS, strict=True):
         cells = []
-        for name in found:
-            one = found[name].get(row.text)
-            value = None if one is None else one["value"]
+        for name in estimators:
+            entry = estimators[name].get(row.text)
+            value = None if entry is None else entry["value"]
             endless = np.inf if value is None else value
-            cells.append(cell(row, None if one is None else Worst(one["stop"], endless)))
+            cells.append(cell(row, None if entry is None else Worst(entry["stop"], endless)))
         rows.append([row.text, goal, *cells])
     return rows
 
@@ -85,8 +85,8 @@ def coverage(summary: Summary) -> Table:
     for quantity in COVERED:
         known = [share.get(quantity) for share in shares.values()]
         texts = [
-            "" if one is None else f"{100.0 * np.mean(one):.1f} % ({100.0 * min(one):.0f} %)"
-            for one in known
+            "" if held is None else f"{100.0 * np.mean(held):.1f} % ({100.0 * min(held):.0f} %)"
+            for held in known
         ]
         rows.append([quantity, *texts])
     return rows
@@ -94,12 +94,12 @@ def coverage(summary: Summary) -> Table:
 
 def widths(summary: Summary) -> Table:
     """What the standard deviations of each filter must be multiplied by for bands to hold 95 %."""
-    found = summary["bands"]
-    quantities = [one for one in COVERED if any(one in known for known in found.values())]
-    rows: Table = [["", *(titled(name) for name in found)]]
+    bands = summary["bands"]
+    quantities = [name for name in COVERED if any(name in known for known in bands.values())]
+    rows: Table = [["", *(titled(name) for name in bands)]]
     for quantity in quantities:
-        known = [one.get(quantity) for one in found.values()]
-        rows.append([quantity, *("" if one is None else f"{one:.2f}" for one in known)])
+        known = [band.get(quantity) for band in bands.values()]
+        rows.append([quantity, *("" if width is None else f"{width:.2f}" for width in known)])
     return rows
 
 
@@ -138,9 +138,9 @@ def labelled(sets: Mapping[str, str], *summaries: Summary) -> Table:
     error = "error in cross-validation, times the noise"
     rows: Table = [["recordings", "verdict", "injected", "estimate, 95 % interval", error]]
     for (name, planted), summary in zip(sets.items(), summaries, strict=True):
-        found, gain = summary["causes"], summary["gain"]
+        causes, gain = summary["causes"], summary["gain"]
         change = f"{gain['before']:.3g} → {gain['after']:.2g}" if gain else ""
-        estimate = "; ".join(map(sizes, found))
+        estimate = "; ".join(map(sizes, causes))
         rows.append([f"`{name}`", verdict(summary), planted, estimate, change])
     return rows
 
@@ -159,7 +159,7 @@ def folds(*summaries: Summary) -> Table:
         header += [f"{name}: z, untuned to tuned", f"error of {summary['judged']}"]
         for fold in summary["folds"]:
             numbers = ", ".join(case.partition("_")[0] for case in fold["cases"])
-            errors = (one and 100.0 * one for one in (fold["error_reasoned"], fold["error"]))
+            errors = (error and 100.0 * error for error in (fold["error_reasoned"], fold["error"]))
             rows.setdefault(numbers, []).extend(
                 [
                     change("{:.3f}", fold["reasoned"], fold["tuned"]),
@@ -185,24 +185,24 @@ def followed(summary: Summary) -> Table:
     header = ["injected, by the least size that matters", "verdict on two stops", "the best one"]
     rows: Table = [[*header, "said of three", "drawn ones that part them"]]
     alike: dict[tuple[str, str], list[tuple[str, bool]]] = {}
-    for one in summary["sets"]:
-        made = one["proposed"]
+    for entry in summary["sets"]:
+        made = entry["proposed"]
         if made is None:
             continue
-        planted = f"{one['planted']} x {one['multiple']:g}"
+        planted = f"{entry['planted']} x {entry['multiple']:g}"
         if not made["foreseen"]:
-            sensed = one["sensed"] or {"sensor": "", "parts": False}
-            group = " or ".join(sorted(one["group"])), sensed["sensor"]
+            sensed = entry["sensed"] or {"sensor": "", "parts": False}
+            group = " or ".join(sorted(entry["group"])), sensed["sensor"]
             alike.setdefault(group, []).append((planted, sensed["parts"]))
             continue
-        said = " or ".join(made["named"]) or made["verdict"]
-        drawn = f"{sum(k['parts'] for k in one['drawn'])} of {len(one['drawn'])}"
-        rows.append([planted, " or ".join(one["group"]), made["experiment"], said, drawn])
+        verdict = " or ".join(made["named"]) or made["verdict"]
+        drawn = f"{sum(k['parts'] for k in entry['drawn'])} of {len(entry['drawn'])}"
+        rows.append([planted, " or ".join(entry["group"]), made["experiment"], verdict, drawn])
     for (group, sensor), sets in alike.items():
         planted = ", ".join(name for name, _ in sets)
         with_it = f"; with a sensor of {sensor}" * bool(sensor)
-        said = f"its own cause {sum(parts for _, parts in sets)} of {len(sets)} times"
-        rows.append([planted, group, f"none discriminates{with_it}", said if sensor else "", ""])
+        verdict = f"its own cause {sum(parts for _, parts in sets)} of {len(sets)} times"
+        rows.append([planted, group, f"none discriminates{with_it}", verdict if sensor else "", ""])
     names = ("foreseen", "never", "sensed", "answered", "drawn")
     seen, never, sensed, answered, drawn = (_of(summary[name]) for name in names)
     ends = (
@@ -220,18 +220,18 @@ def laws(summary: Summary) -> Table:
     rows: Table = [["injected", "without a law", "proposed", "where the effect acts"]]
     rows[0] = [*rows[0], "error in cross-validation, times the noise", "with the true form"]
     rows[0] = [*rows[0], "off what the cause does"]
-    for one in summary["sets"]:
-        if not one["asked"]:
+    for entry in summary["sets"]:
+        if not entry["asked"]:
             continue
-        planted = one["left_out"] or [f"{_gain(one['rig'])}, in no catalogue"]
-        right = {True: "yes", False: "no", None: ""}[one["slot_right"]] if one["laws"] else ""
-        said = "; ".join(one["named"]) or one["verdict"]
-        error = change("{:.3g}", one["before"], one["after"]) if one["laws"] else ""
-        true = one["after_with_it"]
-        proposed = "; ".join(one["laws"]) or "nothing"
-        off = "" if one["function_error"] is None else f"{100.0 * one['function_error']:.1f} %"
+        planted = entry["left_out"] or [f"{_gain(entry['rig'])}, in no catalogue"]
+        right = {True: "yes", False: "no", None: ""}[entry["slot_right"]] if entry["laws"] else ""
+        verdict = "; ".join(entry["named"]) or entry["verdict"]
+        error = change("{:.3g}", entry["before"], entry["after"]) if entry["laws"] else ""
+        true = entry["after_with_it"]
+        proposed = "; ".join(entry["laws"]) or "nothing"
+        off = "" if entry["function_error"] is None else f"{100.0 * entry['function_error']:.1f} %"
         known = "" if true is None else f"{true:.3g}"
-        rows.append([*planted, said, proposed, right, error, known, off])
+        rows.append([*planted, verdict, proposed, right, error, known, off])
     gain, near = f"{_of(summary['gain'])} gain 80 %", f"{_of(summary['function'])} within 15 %"
     return [*rows, ["all", "", "", _of(summary["right_slot"]), gain, "", near]]
 
@@ -244,7 +244,9 @@ def _gain(options: str) -> str:
 def by_case(summary: Summary, name: str) -> dict[str, float]:
     """Error of the judged signal of an estimator by case [% of the mean]."""
     key = f"{SYSTEM.objective.signal}_nrmse"
-    return {case: 100.0 * one["estimators"][name][key] for case, one in summary["cases"].items()}
+    return {
+        case: 100.0 * result["estimators"][name][key] for case, result in summary["cases"].items()
+    }
 
 
 def tuned(untuned: Summary, *summaries: Summary) -> Table:
@@ -253,7 +255,7 @@ def tuned(untuned: Summary, *summaries: Summary) -> Table:
     texts = [f"{judged}, worst stop", f"{judged}, wet discs, mean", f"{judged}, dry discs, mean"]
     columns = [["", "z", *(f"error of {text}" for text in texts), "work saved by dropping"]]
     for name, tuning, after in zip(TUNED, summaries[::2], summaries[1::2], strict=True):
-        errors = [by_case(one, name) for one in (untuned, after)]
+        errors = [by_case(run, name) for run in (untuned, after)]
         dry = [[v for case, v in error.items() if "_dry_" in case] for error in errors]
         wet = [[v for case, v in error.items() if "_dry_" not in case] for error in errors]
         worst = [max(error.values()) for error in errors]
@@ -276,8 +278,8 @@ def tuned_elsewhere(*summaries: Summary) -> Table:
     texts = ("fourteen stops of an independent simulator", "six of it, a radius 1.5 mm off")
     for text, (before, *after) in zip(texts, (summaries[:runs], summaries[runs:]), strict=True):
         ends = (
-            [max(by_case(run, name).values()) for run in (before, one)]
-            for name, one in zip(TUNED, after, strict=True)
+            [max(by_case(run, name).values()) for run in (before, own)]
+            for name, own in zip(TUNED, after, strict=True)
         )
         rows.append([text, *(change("{:.2f} %", *end) for end in ends)])
     return rows
@@ -297,12 +299,14 @@ def judged_by(*summaries: Summary) -> Table:
 def timed_models(summary: Summary) -> Table:
     """Calls into each FMU, in brackets as a ratio to plain C."""
     rows: Table = [["", "states", "derivatives", "Jacobian", "Co-Simulation steps of 5 ms"]]
-    for name, one in summary["calls"].items():
+    for name, times in summary["calls"].items():
         calls = [
-            f"{1e6 * one[f'{call}_fmi']:.3f} us ({one['ratios'][call]:.2f})"
+            f"{1e6 * times[f'{call}_fmi']:.3f} us ({times['ratios'][call]:.2f})"
             for call in ("derivatives", "jacobian")
         ]
-        rows.append([f"`{name}`", str(one["states"]), *calls, f"{one['steps_per_second']:,.0f} /s"])
+        rows.append(
+            [f"`{name}`", str(times["states"]), *calls, f"{times['steps_per_second']:,.0f} /s"]
+        )
     return rows
 
 
@@ -311,13 +315,13 @@ def timed_observers(summary: Summary) -> Table:
     rows: Table = [
         ["observer", "us per step", "times real time", "by FMPy's methods and numpy", "in plain C"]
     ]
-    for one in summary["observers"]["steps"]:
+    for times in summary["observers"]["steps"]:
         ratios = [
-            f"{one[way] / one['step']:.{2 * (way == 'c')}f} times" if one[way] else ""
+            f"{times[way] / times['step']:.{2 * (way == 'c')}f} times" if times[way] else ""
             for way in ("fmpy", "c")
         ]
-        name = f"{titled(one['observer'])} ({one['states']} states)"
-        step, pace = f"{1e6 * one['step']:.2f}", f"{one['times_real_time']:.0f}"
+        name = f"{titled(times['observer'])} ({times['states']} states)"
+        step, pace = f"{1e6 * times['step']:.2f}", f"{times['times_real_time']:.0f}"
         rows.append([name, step, pace, *ratios])
     return rows
 
@@ -339,10 +343,11 @@ def timed_horizon(summary: Summary) -> Table:
 def said_of_errors(summary: Summary) -> Table:
     """Verdict on sets of a rig that differs from its sheet."""
     rows: Table = [["wrong in the data sheet", "verdict"]]
-    for one in summary["sets"]:
+    for entry in summary["sets"]:
         wrong = ", ".join(
-            f"{name.replace('_', ' ')} {100.0 * size:+.3g} %" for name, size in one["wrong"].items()
+            f"{name.replace('_', ' ')} {100.0 * size:+.3g} %"
+            for name, size in entry["wrong"].items()
         )
-        groups = "; ".join(" or ".join(group) for group in one["causes"])
-        rows.append([wrong, groups or one["verdict"]])
+        groups = "; ".join(" or ".join(group) for group in entry["causes"])
+        rows.append([wrong, groups or entry["verdict"]])
     return rows

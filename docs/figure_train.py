@@ -33,8 +33,8 @@ def _prepared(name: str) -> str:
     return f"prepare train --from {{recordings}}/train/{folder} --out {{out}}/stops/{name}"
 
 
-def _distance(name: str, told: str, out: str) -> str:
-    return f"distance --system train {{out}}/stops/{name} {told} --out {{out}}/distance/{out}"
+def _distance(name: str, options: str, out: str) -> str:
+    return f"distance --system train {{out}}/stops/{name} {options} --out {{out}}/distance/{out}"
 
 
 _SAFETY = _distance("healthy", "--samples 1000", "healthy")
@@ -50,11 +50,11 @@ def safety(summary: Summary) -> Table:
     """The safety level by decade."""
     rows: Table = [["one stop in", "ratio (95 %)", "variation of the probability"]]
     rows[0] = [*rows[0], "plain sampling for the same"]
-    for one in summary["safety"]:
-        digits, _, decade = f"{one['plain_stops']:.1e}".partition("e")
-        variation = f"{100.0 * one['variation']:.2g} %"
+    for level in summary["safety"]:
+        digits, _, decade = f"{level['plain_stops']:.1e}".partition("e")
+        variation = f"{100.0 * level['variation']:.2g} %"
         stops = f"{digits}e{int(decade)} stops"
-        rows.append([f"1e{one['decade']}", ends(one, ".3f"), variation, stops])
+        rows.append([f"1e{level['decade']}", ends(level, ".3f"), variation, stops])
     return rows
 
 
@@ -63,9 +63,9 @@ def plain(summary: Summary) -> Table:
     drawn = f"{summary['plain']['samples']:,} plain stops (95 %)".replace(",", " ")
     rows: Table = [["one stop in", "subset simulation (95 %)", drawn]]
     counted = {level["decade"]: ends(level, ".4f") for level in summary["plain"]["levels"]}
-    for one in summary["safety"]:
-        decade = one["decade"]
-        rows.append([f"1e{decade}", ends(one, ".4f"), counted.get(decade, "too few")])
+    for level in summary["safety"]:
+        decade = level["decade"]
+        rows.append([f"1e{decade}", ends(level, ".4f"), counted.get(decade, "too few")])
     return rows
 
 
@@ -93,10 +93,10 @@ def predicted(*summaries: Summary) -> Table:
 def monitored(history: Summary, cause: Summary, healthy: Summary) -> Table:
     """What is told of two machines over their recordings."""
     rows: Table = [["recordings", "injected", "used", "reported"]]
-    for name, planted, one in (("history", LOSS, history), ("healthy", "nothing", healthy)):
-        used, refused = one["recordings"], len(one["refused"])
-        told = "; ".join(one["sentences"]) or "no alarms"
-        rows.append([f"`{name}`", planted, f"{used} of {used + refused}", told])
+    for name, planted, summary in (("history", LOSS, history), ("healthy", "nothing", healthy)):
+        used, refused = summary["recordings"], len(summary["refused"])
+        alarms = "; ".join(summary["sentences"]) or "no alarms"
+        rows.append([f"`{name}`", planted, f"{used} of {used + refused}", alarms])
     named = f"{verdict(cause)}: {'; '.join(map(sizes, cause['causes']))}"
     rows.insert(2, ["its cause, by `--diagnose`", LOSS, "the last eight", named])
     return rows
@@ -111,19 +111,19 @@ def named(summary: Summary) -> Table:
     """How often faults of the virtual train are named, all places of one kind together."""
     rows: Table = [["injected", "right, with its place or group (95 %)", "verdict on the others"]]
     effects, wrong = sorted(summary["effects"].items()), 0
-    for kind, some in groupby(effects, lambda item: item[0].partition("[")[0]):
+    for effect, some in groupby(effects, lambda item: item[0].partition("[")[0]):
         places = dict(some)
         hits, of, others = 0, 0, dict.fromkeys(("nothing", "unexplained", "failed"), 0)
-        for name, one in places.items():
-            hits += sum(share["hits"] for share in one["right_first"].values())
-            of += sum(share["of"] for share in one["right_first"].values())
+        for name, place in places.items():
+            hits += sum(share["hits"] for share in place["right_first"].values())
+            of += sum(share["of"] for share in place["right_first"].values())
             for word in others:
                 others[word] += summary["confusion"][name].get(word, 0)
-        ((multiple, _),) = one["right_first"].items()
-        (size,), unit = in_spoken_unit([one["size"] * float(multiple)], one["unit"])
+        ((multiple, _),) = place["right_first"].items()
+        (size,), unit = in_spoken_unit([place["size"] * float(multiple)], place["unit"])
         wrong += of - hits - sum(others.values())
         text = ", ".join(f"{count} {word}" for word, count in others.items() if count)
-        rows.append([f"{kind}, {size:.3g} {unit}", f"{hits} of {of}", text])
+        rows.append([f"{effect}, {size:.3g} {unit}", f"{hits} of {of}", text])
     sound = summary["false_alarms"]
     rows += [
         ["all faults", _share(summary["right_first"]), f"{wrong} a wrong name"],

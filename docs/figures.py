@@ -35,20 +35,20 @@ _OTHER_SEEDS = range(8, 15)  # as many, which no band is judged by
 _BENCH = ("bench --out {out}/bench",)
 _FOUR = ("02_dry_100_2.7", "05_dry_120_2.7_rev", "09_wet_160_4.2_wsp", "13_onedisc_100_2.7")
 _QUICK = (
-    f"tune disturbance_observer --cases {' '.join(f'cases/{one}' for one in _FOUR)} "
+    f"tune disturbance_observer --cases {' '.join(f'cases/{name}' for name in _FOUR)} "
     "--budget 12 --population 4"
 )
 
 
 def _before_and_after(cases: str, name: str) -> tuple[str, ...]:
     """Runs of both estimators that are tuned, untuned, and of each with its gains."""
-    both = " ".join(f"--estimator {one}" for one in TUNED)
+    both = " ".join(f"--estimator {estimator}" for estimator in TUNED)
     return (
         f"simulate {cases}--untuned {both} --out {{out}}/tuned/{name}/untuned",
         *(
-            f"simulate {cases}--gains {{out}}/tuned/{one}/gains.toml --estimator {one} "
-            f"--out {{out}}/tuned/{name}/{one}"
-            for one in TUNED
+            f"simulate {cases}--gains {{out}}/tuned/{estimator}/gains.toml "
+            f"--estimator {estimator} --out {{out}}/tuned/{name}/{estimator}"
+            for estimator in TUNED
         ),
     )
 
@@ -56,7 +56,7 @@ def _before_and_after(cases: str, name: str) -> tuple[str, ...]:
 def _banded(name: str, seeds: Iterable[int]) -> Figure:
     """Filters with bands against the truth of the stops of some seeds."""
     rigs = " ".join(f"{{out}}/rig{seed}" for seed in seeds)
-    chosen = " ".join(f"--estimator {one}" for one in ("ekf", "ukf", "mhe", "imm", "smoother"))
+    chosen = " ".join(f"--estimator {name}" for name in ("ekf", "ukf", "mhe", "imm", "smoother"))
     return Figure(
         (
             *(f"rig --seed {seed} --out {{out}}/rig{seed}" for seed in seeds),
@@ -274,8 +274,8 @@ def _failing(commands: Sequence[str], options: argparse.Namespace) -> dict[str, 
     failed = {}
     for command in dict.fromkeys(commands):
         words = command.format_map({"out": RESULTS.as_posix(), "recordings": options.recordings})
-        told = [sys.executable, "-m", "workbench", *shlex.split(words)]
-        if code := subprocess.run(told, cwd=ROOT, check=False).returncode:
+        program = [sys.executable, "-m", "workbench", *shlex.split(words)]
+        if code := subprocess.run(program, cwd=ROOT, check=False).returncode:
             failed[command] = f"`workbench {words}` ends with {code}"
     return failed
 

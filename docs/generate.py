@@ -153,10 +153,10 @@ def _option(parser: argparse.ArgumentParser, action: argparse.Action) -> str:
         names[-1] = f"{names[-1][:-1]}{takes}`"
     meaning = formatter._expand_help(action) if action.help else ""
     meaning, default = re.subn(r" ?\(default: (.*?)\)$", "", meaning, flags=re.DOTALL)[0], ""
-    if found := re.search(
+    if match := re.search(
         r"\(default: (.*)\)$", formatter._expand_help(action) if action.help else ""
     ):
-        default = found[1]
+        default = match[1]
     if "one per processor" in default:
         default = "one per processor"
     return f"| {', '.join(names)} | {_cell(default)} | {_cell(meaning)} |"
@@ -173,14 +173,21 @@ def python_api() -> str:
         "`import workbench as wb`. Arrays are in SI units unless said otherwise.",
     ]
     public = {name: getattr(workbench, name) for name in workbench.__all__}
-    for name, one in sorted(public.items(), key=lambda item: (inspect.isclass(item[1]), item[0])):
-        text += ["", f"## {name}", "", f"```text\n{_signature(name, one)}\n```", "", _prose(one)]
-        if inspect.isclass(one):
-            for member, value in vars(one).items():
-                function = value.fget if isinstance(value, property) else value
+    for name, value in sorted(public.items(), key=lambda item: (inspect.isclass(item[1]), item[0])):
+        text += [
+            "",
+            f"## {name}",
+            "",
+            f"```text\n{_signature(name, value)}\n```",
+            "",
+            _prose(value),
+        ]
+        if inspect.isclass(value):
+            for member, inner in vars(value).items():
+                function = inner.fget if isinstance(inner, property) else inner
                 if member.startswith("_") or not inspect.isfunction(function):
                     continue
-                heading = member if isinstance(value, property) else _signature(member, function)
+                heading = member if isinstance(inner, property) else _signature(member, function)
                 text += [
                     "",
                     f"### {name}.{member}",
@@ -192,17 +199,18 @@ def python_api() -> str:
     return "\n".join(text) + "\n"
 
 
-def _signature(name: str, one: Callable[..., Any]) -> str:
-    if inspect.isclass(one) and issubclass(one, Exception):
+def _signature(name: str, public: Callable[..., Any]) -> str:
+    if inspect.isclass(public) and issubclass(public, Exception):
         return name
-    if typing.is_typeddict(one):
-        return f"**{name}: {', '.join(typing.get_type_hints(one))}"
-    said = inspect.signature(one)
-    whole = _short(f"{name}{said}")
+    if typing.is_typeddict(public):
+        return f"**{name}: {', '.join(typing.get_type_hints(public))}"
+    signature = inspect.signature(public)
+    whole = _short(f"{name}{signature}")
     if len(whole) <= _WIDE:
         return whole
-    inside = [_short(str(part)) for part in said.parameters.values()]
-    keyword = [part.kind is inspect.Parameter.KEYWORD_ONLY for part in said.parameters.values()]
+    inside = [_short(str(part)) for part in signature.parameters.values()]
+    only = inspect.Parameter.KEYWORD_ONLY
+    keyword = [part.kind is only for part in signature.parameters.values()]
     if any(keyword):
         inside.insert(keyword.index(True), "*")
     returned = whole.rpartition(") -> ")[2] if ") -> " in whole else ""
@@ -216,9 +224,9 @@ def _short(text: str) -> str:
     return re.sub(r"\b[a-z_]+(?:\.[a-z_]+)*\.(?=[A-Z])", "", plain)
 
 
-def _prose(one: Any) -> str:
+def _prose(public: Any) -> str:
     """A docstring in numpy style as Markdown."""
-    lines = (inspect.getdoc(one) or "").splitlines()
+    lines = (inspect.getdoc(public) or "").splitlines()
     out: list[str] = []
     errors = False
     for line, below in zip(lines, [*lines[1:], ""], strict=True):
@@ -251,7 +259,7 @@ def catalogue(systems: list[System]) -> str:
     for system in systems:
         library = read_library(system.library)
         every = read_effects(library, system.models[OBSERVER].name)
-        effects = [one for one in every if one.place <= 1]  # one class in all its places
+        effects = [effect for effect in every if effect.place <= 1]  # one class in all its places
         text += ["", f"## {system.name}", "", f"{system.title}.", ""]
         text += ["| effect | what it is | size | matters from | experiment that discriminates it |"]
         text += ["| --- | --- | --- | --- | --- |"]
@@ -311,12 +319,12 @@ def decisions() -> str:
         "For a catalogue of 28 effects:",
         "",
     ]
-    for kind, value in ((Thresholds, usual), (Soundness, usual.samples)):
+    for cls, value in ((Thresholds, usual), (Soundness, usual.samples)):
         meanings = dict(
-            re.findall(r"^(\w+) : (.*?)(?=^\w+ :|\Z)", inspect.getdoc(kind) or "", re.S | re.M)
+            re.findall(r"^(\w+) : (.*?)(?=^\w+ :|\Z)", inspect.getdoc(cls) or "", re.S | re.M)
         )
         text += ["| threshold | value | meaning and reason |", "| --- | --- | --- |"]
-        for field in dataclasses.fields(kind):
+        for field in dataclasses.fields(cls):
             if not dataclasses.is_dataclass(getattr(value, field.name)):
                 number = f"{getattr(value, field.name):.4g}"
                 text.append(f"| `{field.name}` | {number} | {_cell(meanings[field.name])} |")

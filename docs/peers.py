@@ -154,13 +154,13 @@ def main() -> None:
             own = own or seconds
             starts = {key: value for key, value in values.items() if key in (*RANGES, "phi")}
             misfit = float(np.sum(((simulate(fmu, starts) - measured) / NOISE) ** 2))
-            told = [
+            options = [
                 f"{key} {values[key]:.4f}"
                 + (f" ± {values[key + ' +-']:.4f}" if key + " +-" in values else "")
                 for key in RANGES
             ]
             row = [name, f"{seconds:.2g} s", f"{seconds / own:.0f}", f"{misfit:.1f}"]
-            rows.append(f"| {' | '.join(row)} | {', '.join(told)} |")
+            rows.append(f"| {' | '.join(row)} | {', '.join(options)} |")
             print(rows[-1], flush=True)
     print("| tool | time | over the workbench | sum of squares | values |")
     print("| --- | --- | --- | --- | --- |", *rows, sep="\n")

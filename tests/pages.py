@@ -35,7 +35,7 @@ _CALL = re.compile(r'^(?:\w+="[^"]*" )*(?:python -m )?workbench (.*)$')
 class Block:
     """One fenced block; `mark` is "long", "parsed" or empty."""
 
-    kind: str
+    language: str
     code: str
     mark: str
     line: int
@@ -74,16 +74,16 @@ def run_page(page: Path, folder: Path, root: Path, *, long: bool) -> None:
     printed, before = None, ""
     for block in blocks(page):
         where = f"{page.name}, line {block.line}"
-        if block.kind == "text" and printed is not None:
+        if block.language == "text" and printed is not None:
             _compare(block.code, printed, where)
         printed = None
         if block.mark == "parsed" or (block.mark == "long" and not long):
             check_calls(block.code, where, root)
-            if block.kind == "python":
+            if block.language == "python":
                 compile(block.code, where, "exec")
-        elif block.kind == "sh":
+        elif block.language == "sh":
             printed = _run(["bash", "-e", "-c", block.code], folder, environment, where)
-        elif block.kind == "python":
+        elif block.language == "python":
             # A reader goes on in the same session: what was printed before is left out.
             session = (
                 f"import os, sys\n_out = sys.stdout\nsys.stdout = open(os.devnull, 'w')\n{before}"
@@ -91,9 +91,9 @@ def run_page(page: Path, folder: Path, root: Path, *, long: bool) -> None:
             session += f"\nsys.stdout = _out\n{block.code}"
             printed = _run([sys.executable, "-c", session], folder, environment, where)
             before += block.code
-        elif block.kind == "toml":
+        elif block.language == "toml":
             tomllib.loads(block.code)
-        elif block.kind == "modelica":
+        elif block.language == "modelica":
             _model(block.code, folder, root, where)
 
 

@@ -32,7 +32,7 @@ def test_a_tuning_that_is_ended_goes_on_to_the_same_gains_and_leaves_no_process(
         pytest.skip("this machine lets users mount no disk of their own")
     failures = disturb(tune, disturbance, Random(disturbance), tmp_path)
     assert [
-        str(failure) for failure in failures if failure.what in ("end", "process", "results")
+        str(failure) for failure in failures if failure.event in ("end", "process", "results")
     ] == []
 
 
@@ -74,7 +74,7 @@ def test_what_an_ended_command_must_not_do_is_named(
     command = Command("toy", ("toy",), (), lambda out: (out / "r").read_text())
     usual = Undisturbed(command, "False" if wrote == "again" else "1", 1.0)
     failures = disturb(usual, "interrupt", _Moment(tmp_path / "out" / "r"), tmp_path)
-    assert {failure.what for failure in failures} == what
+    assert {failure.event for failure in failures} == what
 
 
 class _Moment(Random):

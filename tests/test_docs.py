@@ -53,7 +53,7 @@ LONGEST, MEAN, SHARE = 25, 18.0, 0.1  # words a sentence, of a page, and its sha
 RUN = [
     page
     for page in PAGES
-    if any(block.kind in ("sh", "python", "modelica") for block in blocks(page))
+    if any(block.language in ("sh", "python", "modelica") for block in blocks(page))
 ]
 
 
@@ -76,7 +76,7 @@ def test_the_long_examples_of_a_page_run(page, tmp_path):
 def test_every_example_is_in_a_block_that_says_what_it_is(page):
     text = page.read_text()
     assert not re.findall(r"^    (?:python -m workbench|workbench|make|pip) .*", text, re.MULTILINE)
-    assert {block.kind for block in blocks(page)} <= {
+    assert {block.language for block in blocks(page)} <= {
         "sh",
         "python",
         "toml",
@@ -210,10 +210,10 @@ def test_answers_in_the_readme_are_those_of_pages_that_are_run():
         for page in RUN
         if page != readme
         for block in blocks(page)
-        if block.kind == "text"
+        if block.language == "text"
         for line in block.code.split("\n")
     }
-    answers = [block.code.strip() for block in blocks(readme) if block.kind == "text"]
+    answers = [block.code.strip() for block in blocks(readme) if block.language == "text"]
     assert len(answers) == 2
     assert set(answers) <= printed
 

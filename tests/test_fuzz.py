@@ -115,7 +115,9 @@ def test_what_a_reader_must_not_do_is_named(read, outcome, reason, tmp_path, mon
     target = Target("toy", {"a": b"1"}, read, lambda value: value or "")
     report = fuzz(target, seed=3, numbers=range(5, 7), keep=tmp_path)
     assert report.outcomes == {"toy": {outcome: 2}}
-    assert [reason in failure.said for failure in report.failures] == [True] * (2 if reason else 0)
+    assert [reason in failure.message for failure in report.failures] == [True] * (
+        2 if reason else 0
+    )
     kept = sorted(path.name for path in tmp_path.iterdir())
     assert kept == (["toy-3-5", "toy-3-6"] if reason else [])
     for folder in tmp_path.iterdir():
@@ -133,4 +135,4 @@ def test_what_is_written_outside_is_seen(tmp_path):
     (failure,) = report.failures
     assert report.outcomes == {"toy": {"writes outside": 1}}
     for name in ("made", "made/file", "moved"):
-        assert str(tmp_path / name) in failure.said.split(", ")
+        assert str(tmp_path / name) in failure.message.split(", ")

@@ -49,11 +49,11 @@ class Command:
 class Failure:
     """What did not hold: "end", "process", "words", "files" or "results", and how."""
 
-    what: str
-    said: str
+    event: str
+    message: str
 
     def __str__(self) -> str:
-        return f"{self.what}: {self.said}"
+        return f"{self.event}: {self.message}"
 
 
 @dataclass(frozen=True)

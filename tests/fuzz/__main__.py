@@ -50,7 +50,7 @@ def _tell(report: Report, name: str, seconds: float) -> None:
     print(f"{name}: {counts.total()} in {seconds:.0f} s: {listed}", flush=True)
     seen: set[str] = set()
     for failure in report.failures:
-        if (reason := failure.said.split(":")[0][:60]) not in seen:
+        if (reason := failure.message.split(":")[0][:60]) not in seen:
             seen.add(reason)
             print(f"  {failure}", flush=True)
 

@@ -61,12 +61,11 @@ class Failure:
     seed: int
     number: int
     mutation: str
-    said: str
+    message: str
 
     def __str__(self) -> str:
-        return (
-            f"{self.target}, seed {self.seed}, number {self.number} ({self.mutation}): {self.said}"
-        )
+        mutant = f"{self.target}, seed {self.seed}, number {self.number} ({self.mutation})"
+        return f"{mutant}: {self.message}"
 
 
 @dataclass
