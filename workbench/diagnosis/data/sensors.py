@@ -255,7 +255,7 @@ def fitting_recordings(
             yield replace(effect, shapes=((LIMIT, tuple(dict.fromkeys(map(float, limits)))),))
         elif effect.size == STEP:
             if (step := step_of(read)) >= noise:
-                yield replace(effect, size_read=step)
+                yield replace(effect, told=step)
         elif effect.size != WIDTH or np.abs(read).min() <= noise:
             yield effect
 

@@ -153,7 +153,7 @@ class Effect:
     late: tuple[str, ...] = ()
     sensor: str = ""  # measured signal whose sensor is wrong; the effect is then none of a model
     parameter: str = ""  # of the model itself, whose value is another one by the size
-    size_read: float = 0.0  # size that readings tell without a fit, which then begins there
+    told: float = 0.0  # size that readings tell without a fit, which then begins there
 
     @property
     def of_library(self) -> bool:

@@ -540,7 +540,7 @@ def fitted(
 def joined(point: Point, rival: CandidateScore) -> Point:
     """The point with one more effect."""
     name = rival.effect.name
-    sizes = {**point.sizes, (name, rival.effect.label): rival.effect.size_read or rival.size}
+    sizes = {**point.sizes, (name, rival.effect.label): rival.effect.told or rival.size}
     sizes |= {(name, parameter): value for parameter, value in rival.shape.items()}
     phases = dict(point.phases)
     if rival.effect.order_locked:
