@@ -186,6 +186,10 @@ def test_an_experiment_gives_start_stop_step_and_tolerance(tmp_path):
         ("import Modelica.Constants.pi; output Real y=pi;", "set MODELICAPATH to the folder"),
         ("output Real y=Modelica.Math.sin(time);", "set MODELICAPATH to the folder"),
         ("Mass m=2;", "correct the name, or import it"),
+        (
+            "partial model P extends Effects.Interfaces.Signal; end P; P p(u=1.0);",
+            r"the package uses it: annotation \(uses\(Effects",
+        ),
         ("output Real y; protected Real a; algorithm a:=time; y:=a+1;", "a function with this"),
         ('output Real y; algorithm y:=1; y:=y+time; assert(y>0, "");', "a function with this"),
     ],

@@ -152,11 +152,18 @@ class _Checker:
                 where,
                 f"no class '{name}'{closest(name.rpartition('.')[2], short)}",
                 f"a class that is known in {scope}",
-                f"correct the name, or {STANDARD}"
-                if full_name.startswith("Modelica.")
-                else "correct the name, or import it",
+                f"correct the name, or {self._source_of(full_name)}",
             )
         return full_name
+
+    def _source_of(self, full_name: str) -> str:
+        """What to do for a class that may be one of another library."""
+        library, _, within = full_name.partition(".")
+        if library == "Modelica":
+            return STANDARD
+        if within and library not in self.library.classes:
+            return f'say that the package uses it: annotation (uses({library}(version="...")))'
+        return "import it"
 
     def _parts(self, type_name: str, modifier: Modifier) -> Mapping[str, Component]:
         """Components of a class, as modified."""
@@ -170,7 +177,7 @@ class _Checker:
         while (cls := self.library.classes.get(type_name)) is not None:
             if not cls.extends:
                 return "enumeration" if cls.kind == "type" else ""
-            type_name = self.library.bases(type_name)[0]
+            type_name = self._type(cls.extends[0].name, type_name, cls.extends[0].where)
         return type_name
 
     # --- modifiers ---
