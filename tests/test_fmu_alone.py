@@ -687,6 +687,45 @@ outputs.Tj = { unit = "K", noise = "0.03 K", scale = "300 K" }
 """
 
 
+def mixed(folder: Path, more: str, gain: float) -> Outcome:
+    """Three recordings of 6 h of a dye, of whose flow a share `gain` too much is read."""
+    build_text(folder, machine_file("mixer/Mixer.mo"))
+    (folder / "system.toml").write_text(machine_file("mixer/system.toml") + more)
+    rng = np.random.default_rng(3)
+    for number in range(3):
+        time = np.arange(0.0, 21600.0, 60.0)
+        flow = np.repeat(rng.uniform(0.0, 1e-4, 12), 30)
+        volume = 2.0 + np.append(0.0, np.cumsum(flow[:-1] * 60.0))
+        share = 1.0 - 2.0 / volume  # all that is no dye is the water of the start
+        columns = {
+            "time [s]": time,
+            "F [m3/s]": (1.0 + gain) * flow,
+            "c [1]": share + 0.002 * rng.standard_normal(time.size),
+        }
+        write_case(folder / "recordings" / f"{number}", columns, "Dye")
+    return quietly(load_system(folder), folder / "recordings")
+
+
+def test_a_start_that_nothing_shows_says_what_it_hides(tmp_path):
+    """What mixes goes with flow over volume alone, so that half the water is twice the flow.
+
+    By terms beside its rate the water runs out within the recordings, which must end no diagnosis.
+    """
+    outcome = mixed(tmp_path, "", 0.2)
+    assert outcome.diagnosis.verdict == "nothing"
+    assert "SensorGain[F]" in outcome.diagnosis.hidden_by_starts["V"]
+    assert "[states.V] spread" in outcome.not_visible["SensorGain[F]"]
+    assert "Start[V]" not in outcome.not_visible
+
+
+def test_a_start_that_is_known_hides_nothing(tmp_path):
+    outcome = mixed(tmp_path, '[states.V]\nspread = "0.02 m3"\n', 0.2)
+    (cause,) = outcome.diagnosis.causes
+    names = {cause.effect.name, *cause.confusable_with}
+    assert names == {"SensorGain[F]", "Start[V]"}
+    assert outcome.not_visible.keys().isdisjoint(names)
+
+
 @pytest.fixture(scope="module")
 def kettle(tmp_path_factory) -> Path:
     """Folder of an FMU whose states are temperatures, with its system file."""

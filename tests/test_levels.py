@@ -229,7 +229,7 @@ def test_a_level_further_from_its_sheet_than_is_likely_is_said(tmp_path):
     (level,) = outcome.diagnosis.shifted
     assert (level.name, level.hides) == ("K", ())
     assert level.value == pytest.approx(2.0, rel=0.02)
-    warning = "25% above its data sheet of 1.6 W/K, declared as ±0.05 of it. Check the data sheet: "
+    warning = "25% above its data sheet of 1.6 W/K, declared as ±5 % of it. Check the data sheet: "
     assert f"{warning}no effect explains it as this nuisance parameter does." in level.text
     assert level.text in outcome.warnings
 

@@ -28,6 +28,7 @@ from .built import build_here, machine, write_case
 
 BALANCE, BALANCE_FILE = machine("balance")
 STIFFNESS, FRICTION, LEAK = 103.0, 0.4, 0.01
+MATTERS = 0.05  # N, of friction, as the library says
 
 
 def written(folder: Path, library: str, file: str) -> Path:
@@ -41,20 +42,24 @@ def recorded(folder: Path, name: str, columns: dict[str, np.ndarray]) -> None:
     write_case(folder / "recordings" / name, columns, name, "%.8g")
 
 
-@pytest.fixture(scope="module")
-def balance(tmp_path_factory) -> Path:
-    """Three pulls, sampled unevenly, with a pivot that rubs."""
-    folder = written(tmp_path_factory.mktemp("small") / "balance", BALANCE, BALANCE_FILE)
+def pulls(folder: Path, friction: float) -> Path:
+    """Three pulls of a balance, sampled unevenly, with a pivot that rubs by a force [N]."""
+    folder = written(folder, BALANCE, BALANCE_FILE)
     rng = np.random.default_rng(1)
     for k in range(3):
         t = np.cumsum(rng.uniform(0.009, 0.011, 3000))
         omega = 2.0 * np.pi / (4.0 + k)
         s, v = 0.05 * (1.0 - np.cos(omega * t)), 0.05 * omega * np.sin(omega * t)
-        F = STIFFNESS * s + FRICTION * np.tanh(v / 1e-3)
+        F = STIFFNESS * s + friction * np.tanh(v / 1e-3)
         noise = rng.standard_normal((3, t.size))
         columns = {"time [s]": t, "s [m]": s + 1e-5 * noise[0], "v [m/s]": v + 1e-4 * noise[1]}
         recorded(folder, f"{k:02d}_pull", {**columns, "F [N]": F + 0.01 * noise[2]})
     return folder
+
+
+@pytest.fixture(scope="module")
+def balance(tmp_path_factory) -> Path:
+    return pulls(tmp_path_factory.mktemp("small") / "balance", FRICTION)
 
 
 @pytest.fixture(scope="module")
@@ -146,6 +151,27 @@ def test_the_pivot_that_rubs_is_named(balance, tmp_path):
     with FMU(outcome.extension.fmu) as extended:
         assert extended.states == ()
     assert set(bands(best_estimate(outcome, "00_pull"))["extended_model"]) == {"c"}
+
+
+@pytest.mark.parametrize("share", [0.94, 1.06])
+def test_what_is_at_the_least_that_matters_is_named(share, tmp_path):
+    """Something is missing for sure, and no 95 % interval says that it is too small to matter."""
+    friction = share * MATTERS
+    outcome = diagnosed(pulls(tmp_path / "balance", friction), tmp_path / "out")
+    assert outcome.diagnosis.verdict == "found"
+    (cause,) = outcome.diagnosis.causes
+    assert cause.effect.name == "DryFriction"
+    assert cause.parameters["fc"].low < friction < cause.parameters["fc"].high
+
+
+def test_what_explains_everything_by_less_than_what_matters_is_said(tmp_path):
+    outcome = diagnosed(pulls(tmp_path / "balance", 0.4 * MATTERS), tmp_path / "out")
+    assert outcome.diagnosis.verdict == "unexplained"
+    assert outcome.sentence.startswith("Something is missing that DryFriction would explain, at a")
+    nearest = outcome.diagnosis.nearest[0]
+    assert nearest.effects == ("DryFriction",)
+    assert nearest.removed > 0.9
+    assert "is less than what matters, 0.05 N" in nearest.reasons[0]
 
 
 def test_states_of_an_extension_are_not_corrected(balance, tmp_path):

@@ -22,7 +22,7 @@ from workbench.diagnosis.inference.sample_errors import Errors
 from workbench.diagnosis.inference.score_test import CandidateScore
 from workbench.diagnosis.inference.search import Step
 from workbench.diagnosis.inference.timing import LateSignals
-from workbench.diagnosis.inference.verdict import Cause, Diagnosis, Gain
+from workbench.diagnosis.inference.verdict import Cause, Diagnosis, Gain, NearestCandidate
 from workbench.errors import require_known
 from workbench.observers.simulation import CaseResult, case_figure
 from workbench.pages.figures import LIGHT, CaseFigure, Curve, Panel, save_figure, styled
@@ -241,7 +241,13 @@ class Outcome:
             else "the start of the one recording has the same signature; fit several recordings"
             for effect, name in levels.items()
         }
-        return {**diagnosis.not_visible, **hidden}
+        by_starts = {
+            effect: f"the start of {state} has the same signature; say how little it may differ "
+            f"from the model's, [states.{state}] spread, or measure it, and diagnose again"
+            for state, effects in diagnosis.hidden_by_starts.items()
+            for effect in effects
+        }
+        return {**by_starts, **diagnosis.not_visible, **hidden}
 
     @property
     def next_steps(self) -> list[str]:
@@ -254,6 +260,9 @@ class Outcome:
             "at its bound" in why for nearest in self.diagnosis.nearest for why in nearest.reasons
         )
         widen = ["widen the bounds of a parameter at its bound, if physics allows it"] * bound
+        if (slight := self._slight) is not None:
+            name = slight.effects[0]
+            widen.append(f"state a smaller size that matters for {name}, if it is worth reporting")
         if not self.system.library.is_file():
             return [
                 *widen,
@@ -270,8 +279,19 @@ class Outcome:
         partial, late = self.diagnosis.partial, self.diagnosis.late
         if late is not None:
             return _late(late)
+        if (slight := self._slight) is not None:
+            names = " and ".join(slight.effects)
+            return (
+                f"Something is missing that {names} would explain, at a size less than what "
+                f"matters{self._goes}."
+            )
         part = f", though {' and '.join(partial)} would explain a part" * bool(partial)
         return f"Something is missing that no effect of the catalogue explains{part}{self._goes}."
+
+    @property
+    def _slight(self) -> NearestCandidate | None:
+        """What explains everything at a size less than what matters."""
+        return next((nearest for nearest in self.diagnosis.nearest if nearest.slight), None)
 
     @property
     def _goes(self) -> str:

@@ -5,14 +5,14 @@ beside it. That is said, and where a level stands for more of such an effect tha
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import chdtri
 
 from workbench.diagnosis.effects.catalogue import Effect, variant
 from workbench.diagnosis.inference.fit import Fit
-from workbench.diagnosis.inference.quadratic import Quadratic, beside, minimum
+from workbench.diagnosis.inference.quadratic import Joint, Quadratic, beside, minimum
 from workbench.diagnosis.inference.score_test import ScoreTest, shapes
 from workbench.diagnosis.inference.search import FittedModel
 from workbench.diagnosis.inference.unknowns import SENSOR
@@ -42,7 +42,9 @@ class ShiftedLevel:
         away = self.value - self.sheet
         way = "above" if away > 0.0 else "below"
         by = f"{abs(away / self.sheet):.0%}" if self.sheet else with_unit(abs(away), self.unit)
-        declared = "" if self.declared is None else f", declared as ±{self.declared:.2g} of it"
+        declared = (
+            "" if self.declared is None else f", declared as ±{with_unit(self.declared, '1')} of it"
+        )
         level = (
             f"{self.name} ({self.choice})" if self.choice not in ("all", "sensor") else self.name
         )
@@ -106,6 +108,58 @@ def hidden_effects(
                 if not np.isfinite(spreads).all() or abs(share) * least > max(spreads, default=0.0):
                     hidden.setdefault(name, {})[effect.name] = share
     return hidden
+
+
+def hidden_by_starts(
+    fit: Fit, trial: ScoreTest, catalogue: Sequence[Effect]
+) -> dict[str, tuple[str, ...]]:
+    """Effects that the starts of a state hide, by that state: each recording has its own.
+
+    As of `hidden_effects`; of those alone that would show by the size that matters if the start
+    were known, and do not show now.
+    """
+    joint, known = trial.joint, list(range(len(trial.joint.known)))
+    if len(joint.systems) < 2:  # what one recording has of its own stands among the levels
+        return {}
+    spreads = fit.unknowns.stated_starts
+    starts = {name: j for j, name in enumerate(fit.unknowns.local) if name in spreads}
+    left = np.diag(beside(joint.total().N, known))
+    without = {
+        name: np.diag(beside(_without_own(joint, j).total().N, known)) for name, j in starts.items()
+    }
+    hidden: dict[str, tuple[str, ...]] = {}
+    for effect in (effect for effect in catalogue if not effect.order_locked):
+        keys = [(variant(effect, shape), effect.size) for shape in shapes(effect)]
+        columns = [joint.shared.index(key) for key in keys if key in joint.shared[len(known) :]]
+        needed = (fit.decides.significant / effect.matters) ** 2
+        if not columns or left[columns].max() > needed:
+            continue
+        taken = {
+            name: float(before[columns].max())
+            for name, before in without.items()
+            if effect.model != name  # another start in all recordings
+            and before[columns].max() > needed
+            and (left[columns] < 2.0 * fit.decides.twin * before[columns]).all()
+        }
+        if taken:
+            name = max(taken, key=taken.__getitem__)
+            hidden[name] = (*hidden.get(name, ()), effect.name)
+    return hidden
+
+
+def _without_own(joint: Joint, j: int) -> Joint:
+    """Stops of which an unknown of their own, number j, is known."""
+    systems = tuple(
+        replace(
+            system,
+            P=np.delete(system.P, j, axis=1),
+            deviations=np.delete(system.deviations, j),
+            furthest=np.delete(system.furthest, j),
+            held=None if system.held is None else np.delete(system.held, j),
+        )
+        for system in joint.systems
+    )
+    return replace(joint, systems=systems)
 
 
 def shifted_levels(

@@ -23,6 +23,7 @@ from workbench.diagnosis.inference.score_test import (
 from workbench.diagnosis.inference.thresholds import Thresholds
 from workbench.errors import FMUError
 from workbench.runtime.engine import Reporter
+from workbench.system.units import BAND
 
 Result = TypeVar("Result")
 
@@ -31,6 +32,9 @@ _SIZES = tuple(10.0 ** (0.5 * k) for k in range(9))  # times what matters, where
 _SHARES = (0.125, 0.25, 0.5, 1.0)  # of a recording, over which runs are compared
 _VARIANTS, _HALVINGS = 4, 2  # of shapes, and of the size, that a fit begins with
 ROUNDS = 12  # of Gauss-Newton, most
+# Shares by which a size is unsure beside its noise: of it, since forms of laws differ in detail,
+# and of what matters, by companions that do not.
+FORM, COMPANY = 0.005, 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -463,15 +467,20 @@ def pruned(
         ratios = {}
         for effect in best.active:
             key = (effect.name, effect.label)
-            size = abs(best.point.sizes[key])
-            clear = size / max(sigma[trial.joint.known.index(key)], 1e-300)
-            material = size / effect.matters
+            size, own = abs(best.point.sizes[key]), sigma[trial.joint.known.index(key)]
+            sure, alone = _lacks(less[effect], fit.decides), len(less) == 1
+            clear = size / max(own, 1e-300) / fit.decides.significant
+            material = _material(effect, size, own, sure=sure)
+            needs = beyond(less[effect], best) / fit.decides.needed
+            # Where something is missing for sure, its immaterial twins are no other answer.
+            if sure and alone:
+                clear = max(clear, needs)
             # No sheet says what matters of a term: what errors need does, too; of a clock alone,
             # too, from the least time on.
-            late = effect.late and len(less) == 1 and size > fit.least_skew
+            late = effect.late and alone and size > fit.least_skew
             if effect.size == COEFFICIENT or late:
-                material = max(material, beyond(less[effect], best) / fit.decides.needed)
-            ratios[effect] = min(clear / fit.decides.significant, material)
+                material = max(material, needs)
+            ratios[effect] = min(clear, material)
         if len(less) > 1 or fit.restarted:
             for effect, reduced in less.items():
                 ratios[effect] = min(ratios[effect], beyond(reduced, best) / fit.decides.needed)
@@ -548,6 +557,24 @@ def joined(point: Point, rival: CandidateScore) -> Point:
     return Point(sizes, point.levels, point.deviations, phases)
 
 
+def _lacks(model: FittedModel, decides: Thresholds) -> bool:
+    """Whether something is missing beside a model: errors that last, or swing beyond the noise."""
+    lin = model.linearised
+    return float(max(lin.variance_factors.max(), lin.squares.max())) > decides.wrong
+
+
+def _material(effect: Effect, size: float, sigma: float, *, sure: bool) -> float:
+    """Size of an effect over the least that matters.
+
+    Parameters
+    ----------
+    sure : whether something is missing without it. Then the effect may be that unless its size is
+        clearly less: its 95 % interval counts.
+    """
+    reach = BAND * np.linalg.norm([sigma, FORM * size, COMPANY * effect.matters])
+    return float(abs(size) + reach * sure) / effect.matters
+
+
 def _predicting(
     scores: Sequence[CandidateScore], best: FittedModel, decides: Thresholds
 ) -> list[list[CandidateScore]]:
@@ -560,7 +587,8 @@ def _predicting(
         return []
     first: dict[str, CandidateScore] = {}
     for score in scores:
-        if abs(score.size) >= score.effect.matters and score.held_out.min() > 0.0:
+        material = _material(score.effect, score.size, score.sigma, sure=True)
+        if material >= 1.0 and score.held_out.min() > 0.0:
             first.setdefault(score.effect.name, score)
     return [[score] for score in first.values()][: decides.rivals]
 
@@ -581,6 +609,7 @@ def _rivals(
         effect explains of it: half of it is a hint, however few they are.
     """
     hinted = best.linearised.variance_factors.max() > decides.wrong
+    sure = _lacks(best, decides)
     clear = min(decides.hint, np.sqrt(0.5 * wrong)) if hinted else decides.significant
     able: dict[str, list[CandidateScore]] = {}
     for score in scores:
@@ -592,7 +621,8 @@ def _rivals(
         else:
             shown = score.gain > needed and score.held_out.sum() > odds
         significant = abs(score.size) > clear * score.sigma and shown
-        if significant and abs(score.size) >= score.effect.matters:
+        material = _material(score.effect, score.size, score.sigma, sure=sure)
+        if significant and material >= 1.0:
             able.setdefault(score.effect.name, []).append(score)
     ranked = list(able.values())[: decides.rivals]
     best_score = ranked[0][0].score if ranked else 0.0

@@ -136,8 +136,13 @@ class Unknowns:
         # What rolls along a measured state may have no sensor of its own.
         seen = [] if led else [name for name in begin if name in system.signals]
         shown = {name: ALONG * self._deviation(name) for name in seen}
-        hidden = {name: spread for name, spread in system.spreads.items() if spread > 0.0}
-        return {**shown, **hidden}
+        return {**shown, **self.stated_starts}
+
+    @property
+    def stated_starts(self) -> dict[str, float]:
+        """Standard deviation of states at the start that the system or the model states."""
+        spreads = self._simulations.system.spreads
+        return {name: spread for name, spread in spreads.items() if spread > 0.0}
 
     def _deviation(self, signal: str) -> float:
         """Standard deviation of a first reading: that of rounding if it goes in coarser steps.

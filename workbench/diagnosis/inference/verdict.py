@@ -23,11 +23,18 @@ from workbench.diagnosis.inference.discrepancy import (
 )
 from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.linearized import Point
-from workbench.diagnosis.inference.nuisance import ShiftedLevel, hidden_effects, shifted_levels
+from workbench.diagnosis.inference.nuisance import (
+    ShiftedLevel,
+    hidden_by_starts,
+    hidden_effects,
+    shifted_levels,
+)
 from workbench.diagnosis.inference.quadratic import Key
 from workbench.diagnosis.inference.score_test import CandidateScore
 from workbench.diagnosis.inference.search import (
     BEGUN,
+    COMPANY,
+    FORM,
     FittedModel,
     Step,
     beyond,
@@ -52,7 +59,6 @@ from workbench.system.units import BAND, with_interval, with_unit
 
 Verdict = Literal["nothing", "found", "partly explained", "unexplained"]
 
-_FORM, _COMPANY = 0.005, 0.1  # shares of a value, and of the size that matters
 _DRAWS = 2000  # of the bootstrap over stops
 # Share from which on a part has the right place, if not the right form: of squares, an offset in
 # place of a ramp takes 75 %, a line in place of a parabola 94 %.
@@ -164,6 +170,7 @@ class NearestCandidate:
     effects: tuple[str, ...]  # their names
     removed: float  # share of the explainable that they remove on held-out recordings
     reasons: tuple[str, ...]  # why they are no answer, in words
+    slight: bool = False  # whether they leave noise alone, at a size less than what matters
 
     @property
     def text(self) -> str:
@@ -209,6 +216,8 @@ class Diagnosis:
     not_visible: Mapping[str, str]  # why these stops cannot show an effect, by its name
     # by a nuisance parameter, effects that these data cannot tell from it
     hidden: Mapping[str, tuple[str, ...]]
+    # the same by a state, whose start each recording has of its own
+    hidden_by_starts: Mapping[str, tuple[str, ...]]
     shifted: tuple[ShiftedLevel, ...]  # nuisance parameters that are far from their sheet
 
     def outdone(self, law: str) -> "Diagnosis":
@@ -341,6 +350,7 @@ def _judged(
             if (why := presence.unseen(effect))
         },
         hidden={level: tuple(effects) for level, effects in hidden.items()},
+        hidden_by_starts=hidden_by_starts(fit, chosen.trial, catalogue),
         shifted=shifted_levels(fit, best, chosen.trial, catalogue, hidden),
     )
 
@@ -527,7 +537,7 @@ def _nearest_fits(fit: Fit, chosen: Selection) -> dict[tuple[str, ...], FittedMo
     if not best.active or chosen.steps:
         others = dict[str, CandidateScore]()
         for score in sorted(scores, key=lambda score: -score.gain):
-            if (score.effect.name,) not in fits and abs(score.size) >= score.effect.matters:
+            if (score.effect.name,) not in fits and score.size:
                 others.setdefault(score.effect.name, score)
         tried = list(others.values())[:_NEAREST]
         fits |= {
@@ -573,8 +583,14 @@ def _nearest(
         removed = validation.explained(base, model, fast=fast)[0]
         if removed > 0.0:
             reasons = objections if model is best else _reasons(fit, chosen, model, fast=fast)
-            nearest.append(NearestCandidate(names, removed, tuple(reasons)))
+            slight = _below_what_matters(model) and validation.noise_alone(model, fast=fast)
+            nearest.append(NearestCandidate(names, removed, tuple(reasons), slight))
     return tuple(sorted(nearest, key=lambda candidate: -candidate.removed)[:_NEAREST])
+
+
+def _below_what_matters(model: FittedModel) -> bool:
+    sizes = model.point.sizes
+    return all(abs(sizes[effect.name, effect.label]) < effect.matters for effect in model.active)
 
 
 def _reasons(fit: Fit, chosen: Selection, fitted: FittedModel, *, fast: bool) -> list[str]:
@@ -585,6 +601,10 @@ def _reasons(fit: Fit, chosen: Selection, fitted: FittedModel, *, fast: bool) ->
         for _, parameter in fitted.point.sizes
         if binding_bound(fit, fitted, effect, parameter)
     ]
+    if _below_what_matters(fitted):
+        least = with_unit(effect.matters, fit.unknowns.unit(effect, effect.size))
+        size = _size_text(fit, fitted, effect)
+        reasons.append(f"its size, {size}, is less than what matters, {least}")
     worse = validation.worsened(chosen.base, fitted, fast=fast)
     reasons += [f"{' and '.join(worse)} would be predicted worse"] * bool(worse)
     left = np.sqrt(validation.squares(fitted, fast=fast))
@@ -746,14 +766,14 @@ def _cause(fit: Fit, chosen: Selection, effect: Effect, *, noise_alone: bool, wh
     """A cause with intervals, which what is left widens, or the form that noise may hide."""
     best, trial, unknowns = chosen.best, chosen.trial, fit.unknowns
     sigma = np.hypot(np.sqrt(np.diag(trial.covariance())), trial.moved())
-    fast, form_share = effect.order_locked, _FORM
+    fast, form_share = effect.order_locked, FORM
     if noise_alone:
         more = hidden_by_noise(fit, best, effect)
     else:
         left, explained = chosen.validation.where_acting(
             chosen.less[effect], best, fast=fast, whole=whole
         )
-        form_share = max(_FORM, share_by_form(left, explained))
+        form_share = max(FORM, share_by_form(left, explained))
         more = correlated_deviations(fit, best)
     parameters = {}
     for key, value in best.point.sizes.items():
@@ -761,10 +781,9 @@ def _cause(fit: Fit, chosen: Selection, effect: Effect, *, noise_alone: bool, wh
             continue
         parameter = effect.size if key[1] == effect.label else key[1]
         low, high = unknowns.bounds(effect, parameter)
-        # Beside the noise: forms of laws that differ in detail, and immaterial companions.
         of_size = key[1] == effect.label
-        share = form_share if of_size else _FORM
-        form = np.hypot(share * value, _COMPANY * effect.matters * of_size)
+        share = form_share if of_size else FORM
+        form = np.hypot(share * value, COMPANY * effect.matters * of_size)
         noise = np.hypot(sigma[trial.joint.known.index(key)], more.get(key, 0.0))
         reach = float(BAND * np.hypot(noise, form))
         limit = binding_bound(fit, best, effect, key[1])

@@ -36,12 +36,14 @@ from workbench.diagnosis.inference.thresholds import Thresholds
 from workbench.diagnosis.simulation.free import FreeDerivatives, FreePredictor
 from workbench.diagnosis.simulation.prediction import Predictor, Variation
 from workbench.errors import FMUError
-from workbench.models.fmu import FMU
+from workbench.models.fmu import FMU, EventError
 from workbench.system.registry import open_file
 from workbench.system.system import System
 
 _DELAY_STEP = 1e-3  # of the difference, over the delay's spread; errors are linear in the delay
 _DIFFERENCE = 1e-4  # step over a typical size: far above rounding, far below what bends
+_SMALLER = 8  # times that it is made ten times smaller: then it is near rounding
+_FURTHEST = 1e100  # SI, of an error: beyond, its square in units of the noise is no number
 _FINEST = 32  # steps of a sample time
 _CUT = 1e-12  # share, by which no reading differs
 _STRAIGHTENED = 2  # runs, of which each leads the next
@@ -315,12 +317,58 @@ class Simulator:
                 continue
             timed = name not in self._typical or (sensor is not None and sensor.parameter == LAG)
             step = sample if timed else _DIFFERENCE * self._typical[name]
+            if sensor is None and name not in self._clocks:
+                step, moved = self._stepped(number, known, name, at, step, simulated)
+                columns.append((read(moved, {**known, name: at + step}) - now) / step)
+                continue
             later = {**known, name: at + step}
             before = read(simulated, values, values, later) if name in self._clocks else now
             if sensor is not None and sensor.parameter in (LOSS, RECTIFIED) and not at:
                 before = errors({**known, name: _CUT})  # nothing leads either run
             columns.append((errors(later, values, later) - before) / step)
         return np.column_stack(columns)
+
+    def _stepped(
+        self,
+        number: int,
+        values: Mapping[str, float],
+        name: str,
+        at: float,
+        step: float,
+        simulated: Matrix,
+    ) -> tuple[float, Matrix]:
+        """A step of a variable that is small, and errors of samples there, (n, c).
+
+        It is made smaller until it moves no signal by more than its scale, either way: a leak that
+        is none to a lake empties a bottle, and what the model then says is no derivative.
+
+        Parameters
+        ----------
+        at, step : where the variable is, and the step to begin with, SI.
+        simulated : errors of samples there, (n, c).
+
+        Raises
+        ------
+        EventError
+            If an FMU alone passes an event.
+        FMUError
+            If the model cannot be evaluated beside this value, or its signals jump.
+        """
+        scales = [self._system.signals[n].scale for n in self._recordings[number].signals]
+        for smaller in 10.0 ** -np.arange(_SMALLER):
+            for small in (smaller * step, -smaller * step):
+                try:
+                    moved = self._simulated(number, {**values, name: at + small})[0]
+                except EventError:  # then whole simulations are compared
+                    raise
+                except FMUError:
+                    continue
+                if np.all(np.abs(moved - simulated).max(axis=0) <= scales):
+                    return small, moved
+        raise FMUError(
+            f"{self._fmu.called}: no derivative by {name} along {self._recordings[number].name}: "
+            f"however little it changes, the model cannot be evaluated, or its signals jump"
+        )
 
     def weighed(self, number: int, values: Mapping[str, float]) -> Samples:
         """A recording whose errors are weighed by how sharply they depend on what is not known.
@@ -403,6 +451,8 @@ class Simulator:
         errors = self._predictor.errors(in_time, self._known(number, values)) + (
             recording.y - in_time.y
         )
+        if not np.abs(errors).max(initial=0.0) < _FURTHEST:
+            raise FMUError(f"{self._fmu.called}: signals of {recording.name} leave all bounds")
         return errors, (recording.rest - self._fmu.get(self._rest)) / recording.rest_noise
 
     def _in_time(self, number: int, values: Mapping[str, float]) -> Samples:
