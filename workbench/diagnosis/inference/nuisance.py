@@ -119,7 +119,7 @@ def hidden_by_starts(
     were known, and do not show now.
     """
     joint, known = trial.joint, list(range(len(trial.joint.known)))
-    if len(joint.systems) < 2:  # what one recording has of its own stands among the levels
+    if fit.unknowns.count < 2:  # what one recording has of its own stands among the levels
         return {}
     spreads = fit.unknowns.stated_starts
     starts = {name: j for j, name in enumerate(fit.unknowns.local) if name in spreads}

@@ -105,6 +105,15 @@ class Interval:
         return "" if self.plain else self.unit
 
     @property
+    def holds_zero(self) -> bool:
+        """Whether it may be nothing at all.
+
+        >>> Interval(2.03, 0.0, 9.83, "1/s").holds_zero, Interval(0.4, 0.2, 0.6, "N").holds_zero
+        (True, False)
+        """
+        return self.low <= 0.0 <= self.high
+
+    @property
     def open(self) -> bool:
         """Whether there may be values beyond the limit."""
         return not (np.isfinite(self.low) and np.isfinite(self.high))
@@ -302,8 +311,9 @@ def _judged(
             for effect in _strongest_first(fit, chosen, catalogue)
         ]
         # Beside others, a part that bends as far as its effect allows stands for another law.
-        if verdict == "partly explained" and len(causes) > 1 and (bent := _at_bounds(causes)):
-            objections += bent
+        bent = _at_bounds(causes) if len(causes) > 1 else []
+        if verdict == "partly explained" and (doubtful := [*bent, *_at_zero(causes)]):
+            objections += doubtful
             verdict, causes, gain = "unexplained", [], None
     if causes:
         twins = [fits.values() for fits in chosen.twins.values()]
@@ -471,6 +481,15 @@ def _at_bounds(causes: Sequence[Cause]) -> list[str]:
         for cause in causes
         for name, interval in cause.parameters.items()
         if interval.limit and interval.open
+    ]
+
+
+def _at_zero(causes: Sequence[Cause]) -> list[str]:
+    """Causes that may be none, by the intervals of their sizes, in words."""
+    return [
+        f"the size of {cause.effect.name} may be zero"
+        for cause in causes
+        if cause.parameters[cause.effect.label].holds_zero
     ]
 
 
