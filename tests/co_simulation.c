@@ -1,6 +1,7 @@
 /* FMI 2.0 Co-Simulation without Model Exchange: der(x) = u, each step exact. */
 #include <math.h>
 #include <stdlib.h>
+#include <time.h>
 #include "fmi2FunctionTypes.h"
 enum { X, U, SLOPE, TIME, BEFORE, LOOSE, SIZE };
 const char *fmi2GetTypesPlatform(void) { return fmi2TypesPlatform; }
@@ -8,10 +9,20 @@ const char *fmi2GetVersion(void) { return "2.0"; }
 fmi2Component fmi2Instantiate(fmi2String a, fmi2Type b, fmi2String c, fmi2String d, const fmi2CallbackFunctions *e, fmi2Boolean f, fmi2Boolean g) {
     double *r = calloc(SIZE, sizeof *r);
     r[X] = r[BEFORE] = 1.0, r[LOOSE] = 0.01;
+#ifdef ONCE /* no reset, and no second instance until the library is loaded anew */
+    static int instances;
+    if (instances++) return NULL;
+#endif
     return r;
 }
 void fmi2FreeInstance(fmi2Component c) { free(c); }
+#ifdef ONCE
+fmi2Status fmi2Reset(fmi2Component c) { return fmi2Error; }
+#elif defined STAYS /* where it is */
+fmi2Status fmi2Reset(fmi2Component c) { return fmi2OK; }
+#else
 fmi2Status fmi2Reset(fmi2Component c) { ((double *)c)[X] = ((double *)c)[BEFORE] = 1.0, ((double *)c)[U] = ((double *)c)[TIME] = 0.0; return fmi2OK; }
+#endif
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean a, fmi2Real b, fmi2Real t, fmi2Boolean d, fmi2Real e) { if (a) ((double *)c)[LOOSE] = b; return fmi2OK; }
 fmi2Status fmi2EnterInitializationMode(fmi2Component c) { return fmi2OK; }
 fmi2Status fmi2ExitInitializationMode(fmi2Component c) { return fmi2OK; }
@@ -61,6 +72,12 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean n) {
 #endif
     if (ONLY && (h < 0.99 * ONLY || h > 1.01 * ONLY)) return fmi2Error;
     ((double *)c)[X] += h * ((double *)c)[U];
+#ifdef RANDOM /* variable that is moved by what is drawn */
+    static unsigned drawn;
+    struct timespec now;
+    if (!drawn) timespec_get(&now, TIME_UTC), drawn = (unsigned)now.tv_nsec;
+    ((double *)c)[RANDOM] += 1e-3 * (drawn = drawn * 1103515245u + 12345u) / 4294967296.0;
+#endif
     return fmi2OK;
 }
 #endif

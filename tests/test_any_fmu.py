@@ -28,7 +28,7 @@ from workbench.models.native import OK, instance, linearise, place, read
 from workbench.models.simulation import Drive, Simulation
 from workbench.observers import choose, estimators_of
 from workbench.observers.contract import Estimator
-from workbench.observers.fmpy_comparison import REFUSED, RIGHT, compare_with_fmpy
+from workbench.observers.fmpy_comparison import NO_REFERENCE, REFUSED, RIGHT, compare_with_fmpy
 from workbench.observers.gains import usual_gains
 from workbench.observers.operating import DesignPointError, linearised, start_spreads, walks
 from workbench.observers.replay import replay
@@ -1378,6 +1378,7 @@ def test_what_needs_modelica_asks_for_the_class(build):
 
 ALONE = 'CoSimulation modelIdentifier="Alone"'
 ANY_STEP = (ALONE, f'{ALONE} canHandleVariableCommunicationStepSize="true"')
+ONES = np.ones((4, 1))
 COASTING = """
 <ScalarVariable name="x" valueReference="0" causality="output" initial="exact"><Real start="1"/></ScalarVariable>
 <ScalarVariable name="u" valueReference="1" causality="input"><Real start="0"/></ScalarVariable>
@@ -1418,6 +1419,60 @@ def test_the_open_loop_runs_on_co_simulation_alone(integrator):
         estimate = loop(fmu, system, usual_gains(loop, fmu, system)).run(time, u, u + np.nan)
     np.testing.assert_allclose(np.asarray(estimate.values)[:, 0], [1, 2, 3, 4, 4, 4, 4])
     assert compare_with_fmpy(integrator / "Alone.fmu").verdict == RIGHT
+
+
+def test_a_co_simulation_that_refuses_a_reset_has_its_library_loaded_anew(tmp_path, compiled):
+    """AMESim's does, and keeps what its fluids are beyond an instance: no fit ran."""
+    folder = build_integrator(tmp_path, compiled("co_simulation.c", "-DONCE"))
+    with CoSimulation(folder / "Alone.fmu") as fmu:
+        simulation, drive = Simulation(fmu, ["u"], ["x"], [True]), Drive(np.arange(4.0), ONES)
+        for begin in (1.0, 2.0):
+            simulated = simulation.run(drive, {"x": begin})[:, 0]
+            np.testing.assert_allclose(simulated, begin + np.arange(4.0))
+
+
+def test_a_co_simulation_that_a_reset_leaves_where_it_is_starts_anew(tmp_path, compiled):
+    """Three recordings with one FMU, as 'simulate' runs them: a second one began at the end."""
+    folder = build_integrator(tmp_path, compiled("co_simulation.c", "-DSTAYS"))
+    system, u = load_system(folder), ONES
+    with open_model(system) as fmu:
+        loop = estimators_of(system)["open_loop"]
+        along = loop(fmu, system, usual_gains(loop, fmu, system))
+        for _ in range(3):
+            estimate = along.run(np.arange(4.0), u, u + np.nan)
+            np.testing.assert_allclose(np.asarray(estimate.values)[:, 0], [1, 2, 3, 4])
+
+
+def test_a_co_simulation_that_draws_random_numbers_is_refused(tmp_path, compiled):
+    """20-sim draws noise of its sensors: the open loop was another one at each call."""
+    folder = build_integrator(tmp_path, compiled("co_simulation.c", "-DRANDOM=X"))
+    system, u = load_system(folder), ONES
+    with open_model(system) as fmu:
+        loop = estimators_of(system)["open_loop"]
+        with pytest.raises(FMUError, match=r"gives other results .* without random numbers"):
+            loop(fmu, system, usual_gains(loop, fmu, system)).run(np.arange(4.0), u, u + np.nan)
+    comparison = compare_with_fmpy(folder / "Alone.fmu")
+    assert (comparison.verdict, comparison.reason[-3:]) == (NO_REFERENCE, "`x`")
+
+
+def test_the_comparison_leaves_out_and_names_what_each_run_has_otherwise(tmp_path, compiled):
+    """As the time of the processor, which Dymola exports: that was OFF."""
+    folder = build_integrator(tmp_path, compiled("co_simulation.c", "-DRANDOM=LOOSE"))
+    end = "</ModelVariables>"
+    drawn = '<ScalarVariable name="drawn" valueReference="5" causality="output"><Real/>'
+    change = edits(XML, (end, f"{drawn}</ScalarVariable>{end}"))
+    comparison = compare_with_fmpy(rewritten(folder / "Alone.fmu", tmp_path / "Draws.fmu", change))
+    assert (comparison.verdict, comparison.signal) == (RIGHT, "x")
+    assert "but for `drawn`" in comparison.reason
+
+
+def test_the_comparison_takes_local_variables_where_nothing_else_is_shown(integrator):
+    """Those of AMESim are all local; it was said to show nothing that can be measured."""
+    unsaid = ('causality="output" ', 'causality="local" variability="continuous" ')
+    change = edits(XML, unsaid, ("<Outputs><Unknown index='1'/></Outputs>", ""))
+    path = rewritten(integrator / "Alone.fmu", integrator / "Local.fmu", change)
+    comparison = compare_with_fmpy(path)
+    assert (comparison.verdict, comparison.signal) == (RIGHT, "x")
 
 
 def test_a_co_simulation_is_told_its_tolerance_and_that_no_step_is_undone(tmp_path, compiled):

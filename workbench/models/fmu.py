@@ -96,7 +96,8 @@ _STATUSES: Mapping[int | str, str] = {
 }
 # Places in `FMU.notes`.
 WARNED, REFUSED_BY, STATUS, STATE = range(4)
-_WARNING, _DISCARD, _LOGGED = 1, 2, 3  # status of FMI; messages that an error shows
+_WARNING, _DISCARD, _FATAL = 1, 2, 4  # status of FMI
+_LOGGED = 3  # messages that an error shows
 # Of a step, relative to the state and to its nominal value: far below what a sensor resolves.
 # Integration here keeps it, and an FMU is asked to in its own: without, Dymola's is off by 6e-5.
 TOLERANCE = 1e-8
@@ -340,13 +341,12 @@ class FMUInstance:
         FMUError
             If the FMU refuses a call, or asks to end.
         """
-        instance = self._instance
         # Those built here keep 1e-6 by themselves, with which the recordings of the rig were made.
         tolerance = None if self.is_own else TOLERANCE
         try:
             if self._used:
-                instance.reset()
-            self._used = True
+                self._reset()
+            self._used, instance = True, self._instance
             if self.version == "2.0":
                 instance.setupExperiment(tolerance=tolerance, startTime=time)
             prepare()
@@ -360,6 +360,18 @@ class FMUInstance:
             return self._update_discrete_states().time
         except FMICallException as error:
             raise self.refusal(error.function, error.status) from None
+
+    def _reset(self) -> None:
+        """Reset the instance; of a Co-Simulation that refuses it, take a new one.
+
+        A Model Exchange may be held by compiled loops.
+        """
+        try:
+            self._instance.reset()
+        except FMICallException as error:
+            if self.interface != CO_SIMULATION or error.status == _FATAL:
+                raise
+            self.renew(reload=True)  # some keep values that outlast an instance
 
     def pass_event(self, prepare: Callable[[], None]) -> EventUpdate:
         """Enter Event Mode, set what changes there, and go on in continuous time.

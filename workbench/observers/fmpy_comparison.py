@@ -59,7 +59,8 @@ def compare_with_fmpy(path: Path) -> FMUComparison:
 
     Real inputs jump at a third and at two thirds; all other inputs keep their start values. A
     Co-Simulation is compared with that of FMPy, at the same communication points.
-    Outputs that are scalar numbers are compared, and states where there are none.
+    Outputs that are scalar numbers are compared; where there are none states, or local variables.
+    Outputs that FMPy gives otherwise when it repeats a run are left out, and named.
     """
     fmi = ""
     try:
@@ -70,15 +71,20 @@ def compare_with_fmpy(path: Path) -> FMUComparison:
             pass
     except (InputError, FMUError) as error:
         return FMUComparison(path.name, fmi, REFUSED, reason=_sentence(error, path))
+    other = ""
     try:
         try:
             reference = problem.by_fmpy(1)
         except Exception:  # bare; of CVode that takes no more than 500 steps between two samples
             reference = problem.by_fmpy(_FINER)
+        reference, other = problem.repeatable(reference)
     except Exception as error:
         reference, doubt = None, re.sub(r"/\S+/", "", str(error))  # folders it was built in
     else:
         doubt = "it ends before the experiment does"
+    if not problem.outputs:
+        reason = f"FMPy: the same run gives other results when it is repeated, of {other}"
+        return FMUComparison(path.name, fmi, NO_REFERENCE, reason=reason)
     noise = None if reference is None else _sizes(reference) * LIMIT
     try:
         estimates = problem.by_workbench(noise)
@@ -94,6 +100,8 @@ def compare_with_fmpy(path: Path) -> FMUComparison:
     row, column = np.unravel_index((errors if verdict == RIGHT else beyond).argmax(), errors.shape)
     place = problem.outputs[column], float(problem.time[row])
     own = f"{unsure[column]:.0e} is FMPy's own, at {_TIGHT[1]:g}" if unsure.any() else ""
+    if other:
+        own = f"but for {other}, which FMPy gives otherwise at each run"
     return FMUComparison(path.name, fmi, verdict, float(errors[row, column]), *place, own)
 
 
@@ -141,7 +149,13 @@ class _Problem:
             for v in description.variables
             if v.causality == "output" and v.holds_number and not v.array
         ]
-        self.outputs = outputs or list(description.states)
+        # Those of AMESim are local all.
+        shown = [
+            v.name
+            for v in description.variables
+            if v.causality == "local" and v.real and not v.array and v.variability == "continuous"
+        ]
+        self.outputs = outputs or list(description.states) or shown
         variables = description.by_name
         self._places = {
             name: (variables[name].of, variables[name].element) for name in self.outputs
@@ -167,6 +181,24 @@ class _Problem:
         if self._alone:
             share[:] = 0.5
         return float(variable.start or 0.0) + size * (0.3 * (share > 1 / 3) - 0.5 * (share > 2 / 3))
+
+    def repeatable(self, reference: Matrix) -> tuple[Matrix, str]:
+        """Leave out outputs of a Co-Simulation that FMPy gives otherwise when it repeats a run.
+
+        Returns
+        -------
+        The others of the reference, (n, l), and the names of those that are left out.
+        """
+        if not self._alone:
+            return reference, ""
+        again = self.by_fmpy(1)
+        if again.shape != reference.shape:  # an end of its own
+            return reference, ""
+        same = ((reference == again) | np.isnan(reference)).all(axis=0)
+        others = [name for name, kept in zip(self.outputs, same, strict=True) if not kept]
+        self.outputs = [name for name in self.outputs if name not in others]
+        self._places = {name: self._places[name] for name in self.outputs}
+        return reference[:, same], ", ".join(f"`{name}`" for name in others)
 
     def by_tight_fmpy(self) -> tuple[Matrix, Matrix] | None:
         """The same at two tighter tolerances; None where CVode cannot keep them, or has no say."""
