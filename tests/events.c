@@ -55,6 +55,10 @@ const char *fmi2GetTypesPlatform(void) { return fmi2TypesPlatform; }
 const char *fmi2GetVersion(void) { return "2.0"; }
 fmi2Component fmi2Instantiate(fmi2String a, fmi2Type b, fmi2String c, fmi2String d, const fmi2CallbackFunctions *e, fmi2Boolean f, fmi2Boolean g) {
     Room *m = calloc(1, sizeof *m);
+#ifdef SINGLE /* instance that it bears */
+    static int made;
+    if (made++) abort();
+#endif
     m->callbacks = e;
     reset(m);
     return m;

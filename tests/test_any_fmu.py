@@ -369,6 +369,13 @@ def test_what_the_fmu_warns_of_stands_at_the_top_of_each_answer(
         assert re.search(f"Around.fmu warned once: {message}", fmu.take_warning())
 
 
+def test_an_fmu_that_bears_one_instance_alone_is_refused_with_that_word(build):
+    """FMUs of Dymola 2016 crash in a second one; the first is as any, and FMPy runs it."""
+    said = r"crashed with SIGABRT in fmi2Instantiate of a second instance, the first freed, after"
+    with pytest.raises(FMUError, match=said):
+        FMU(build("RELAYS", flags=["-DSINGLE"]))
+
+
 def test_libraries_beside_the_binary_go_along_into_an_extended_fmu(tmp_path, build, monkeypatch):
     """As those of the solver that OpenModelica brings: a diagnosis ended where it needed them."""
     beside = tmp_path / "libbeside.so"
@@ -376,6 +383,9 @@ def test_libraries_beside_the_binary_go_along_into_an_extended_fmu(tmp_path, bui
     subprocess.run([str(COMPILER), *linked, "-o", beside], check=True)
     monkeypatch.setenv("LIBRARY_PATH", str(tmp_path))
     room = build("RELAYS", flags=["-Wl,--no-as-needed,-rpath,$ORIGIN", "-lbeside"])
+    lacking = r"needs libbeside\.so, which this machine does not have.* install that library"
+    with pytest.raises(InputError, match=lacking):
+        FMU(room)
     with zipfile.ZipFile(room, "a") as archive:
         archive.write(beside, f"{BINARY}/{beside.name}")
     around = tmp_path / "Around.fmu"

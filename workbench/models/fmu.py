@@ -42,6 +42,7 @@ from workbench.models.trial import (
     derivatives_hold,
     remembers_steps,
     require_trial,
+    unloadable,
 )
 from workbench.runtime.files import TemporaryFolder, own_umask
 
@@ -238,12 +239,7 @@ class FMUInstance:
         except Exception as error:  # FMPy raises bare Exception where a library cannot be loaded
             os.chdir(here)  # it looks for the library in its own folder, and stays there
             message = str(error).replace(f"{self._scratch.path}{os.sep}", "")
-            raise InputError(
-                where=str(self.description.path),
-                found=f"a binary that cannot be loaded ({message})",
-                expected="one that this machine can load, with the functions of FMI",
-                remedy="export the model again for this machine",
-            ) from None
+            raise unloadable(self.description.path, message) from None
         dll = self._instance.dll
         self._require(dll)
         # A fresh pointer per function: FMPy's own carry argument types that cost conversions.

@@ -79,6 +79,23 @@ def require_trial(description: Description, interface: str, folder: Path) -> Non
     limit_memory(limits.memory)
 
 
+def unloadable(path: Path, error: str) -> InputError:
+    """The refusal of a library for what the system says of it."""
+    if missing := re.search(r"(\S+): cannot open shared object file", error):
+        return InputError(
+            where=str(path),
+            found=f"a binary that needs {missing[1]}, which this machine does not have",
+            expected="the libraries that the exporting tool linked it with",
+            remedy="install that library, or export the model again for this machine",
+        )
+    return InputError(
+        where=str(path),
+        found=f"a binary that cannot be loaded ({error[:400]})",
+        expected="one that this machine can load, with the functions of FMI",
+        remedy="export the model again for this machine; see 'workbench fmu info'",
+    )
+
+
 def built_here(description: Description) -> bool:
     """Whether an FMU came with the workbench, or was compiled by it."""
     return description.sha256 in _packaged() or fmu_cache.is_known(description.sha256)
@@ -172,12 +189,7 @@ def run_trial(description: Description, interface: str, folder: Path, limits: Li
         )
     if last["call"] == "not loaded":
         error = last["error"].replace(f"{folder.resolve()}{os.sep}", "")
-        raise InputError(
-            where=str(description.path),
-            found=f"a binary that cannot be loaded ({error[:400]})",
-            expected="one that this machine can load, with the functions of FMI",
-            remedy="export the model again for this machine; see 'workbench fmu info'",
-        )
+        raise unloadable(description.path, error)
     if end.get("traced"):
         raise ContainedError(
             f"{where}: had its process traced as a debugger does, which stops at each signal. "

@@ -102,6 +102,7 @@ class _Calls:
         os.chdir(os.path.dirname(task["library"]))
         self._library = ctypes.CDLL(task["library"])
         self.component: int | None = None
+        self._made = False  # an instance, before
         self.refused: list[str] = []  # of what not everybody needs
         self._log: list[str] = []
         libc = ctypes.CDLL(None) if os.name == "posix" else ctypes.cdll.msvcrt
@@ -145,7 +146,8 @@ class _Calls:
     def _raw(self, name: str, result: Any, *arguments: Any) -> Any:
         function = getattr(self._library, name)
         function.restype = result
-        self._tell(name)
+        again = " of a second instance, the first freed," if "Instantiate" in name else ""
+        self._tell(name + again * self._made)
         limit_processor(self._task["processor"])
         return function(*(_POINTER(a) if isinstance(a, int) else a for a in arguments))
 
@@ -170,7 +172,7 @@ class _Calls:
             made = self._raw(name, _POINTER, *common, *settings)
         if not made:
             raise self._refusal(f"{name}, which did not instantiate it,", 3)
-        self.component = made
+        self.component, self._made = made, True
 
     @contextmanager
     def optional(self) -> Iterator[None]:
