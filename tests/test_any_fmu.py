@@ -1441,9 +1441,13 @@ def test_a_co_simulation_that_refuses_a_reset_has_its_library_loaded_anew(tmp_pa
             np.testing.assert_allclose(simulated, begin + np.arange(4.0))
 
 
-def test_a_co_simulation_that_a_reset_leaves_where_it_is_starts_anew(tmp_path, compiled):
-    """Three recordings with one FMU, as 'simulate' runs them: a second one began at the end."""
-    folder = build_integrator(tmp_path, compiled("co_simulation.c", "-DSTAYS"))
+@pytest.mark.parametrize("flag", ["-DSTAYS=1", "-DSTAYS=2"])
+def test_a_co_simulation_that_a_reset_leaves_where_it_is_starts_anew(flag, tmp_path, compiled):
+    """Three recordings with one FMU, as 'simulate' runs them: a second one began at the end.
+
+    20-sim keeps the steps of a robot in its library: another instance goes on there.
+    """
+    folder = build_integrator(tmp_path, compiled("co_simulation.c", flag))
     system, u = load_system(folder), ONES
     with open_model(system) as fmu:
         loop = estimators_of(system)["open_loop"]
@@ -1451,6 +1455,11 @@ def test_a_co_simulation_that_a_reset_leaves_where_it_is_starts_anew(tmp_path, c
         for _ in range(3):
             estimate = along.run(np.arange(4.0), u, u + np.nan)
             np.testing.assert_allclose(np.asarray(estimate.values)[:, 0], [1, 2, 3, 4])
+    with CoSimulation(folder / "Alone.fmu") as fmu:
+        simulation = Simulation(fmu, ["u"], ["x"], [True])
+        for _ in range(3):
+            simulated = simulation.run(Drive(np.arange(4.0), u), {})[:, 0]
+            np.testing.assert_allclose(simulated, [1, 2, 3, 4])
 
 
 def test_a_co_simulation_that_draws_random_numbers_is_refused(tmp_path, compiled):

@@ -132,7 +132,8 @@ class Simulation:
                     remedy="set the parameter that it follows from",
                 )
         if self._resets is False:
-            fmu.renew(reload=False)
+            # Some Co-Simulations keep values in their library, which outlast an instance.
+            fmu.renew(reload=isinstance(fmu, CoSimulation))
         fmu.begin_at(drive.model_time)
         # What a run has set stays set in an FMU whose reset forgets to take it back.
         before = {name: fmu.defaults[name] for name in self._set if name in fmu.defaults}

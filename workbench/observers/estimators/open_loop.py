@@ -156,7 +156,7 @@ class OpenLoop(Estimator):
         """A run that is the same when it is repeated; a model that draws random numbers is refused.
 
         It looks as one that remembers steps; of a Co-Simulation nothing tells. One that a reset
-        does not take back to its start has a new instance.
+        does not take back to its start has its library loaded anew: some keep values in it.
         """
         fmu = self.fmu
         alone = isinstance(fmu, CoSimulation) and not fmu.is_own
@@ -164,9 +164,9 @@ class OpenLoop(Estimator):
         if not (alone or fmu.remembers_steps) or _same(estimate, run()):
             return estimate
         if alone:
-            fmu.renew(reload=False)
+            fmu.renew(reload=True)
             estimate = run()
-            fmu.renew(reload=False)
+            fmu.renew(reload=True)
             if _same(estimate, run()):
                 return estimate
         raise FMUError(
