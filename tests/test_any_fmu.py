@@ -34,6 +34,7 @@ from workbench.observers.operating import DesignPointError, linearised, start_sp
 from workbench.observers.replay import replay
 from workbench.observers.simulation import prepare
 from workbench.observers.trajectory import check_along, size_doubt
+from workbench.observers.trust import sampling_doubt
 from workbench.recordings.case import make_case, read_case
 from workbench.studies.distance.forecast import stopping_of
 from workbench.studies.distance.simulation import DrivingInputs, StopSimulation
@@ -607,6 +608,24 @@ def test_a_ball_that_jumps_ever_lower_comes_to_rest_on_the_ground(tmp_path, comp
         simulated = Simulation(fmu, [], ["h"], []).run(Drive(time, np.zeros((250, 0))), {})
     exact = np.maximum(thrown(time, 0.8)[0], 0.0)  # which ends with its 60th jump
     assert simulated[:, 0] == pytest.approx(exact, abs=1e-6)
+
+
+def test_samples_too_far_apart_are_said_so_without_a_time_constant_where_there_is_none(
+    tmp_path, compiled
+):
+    """A ball falls for 4 s from 100 m: of height and speed none follows from itself.
+
+    The fastest time constant was said to be 4.5e+307 s.
+    """
+    path, time = bouncing(tmp_path, compiled("ball.c")), 0.2 * np.arange(21.0)
+    text = machine_file("ball/system.toml").replace('spread = "0.5 m/s"', 'spread = "1 mm/s"')
+    (tmp_path / "system.toml").write_text(text.replace('spread = "1 m/s2"', 'spread = "1 mm/s2"'))
+    system, rng = load_system(tmp_path), np.random.default_rng(1)
+    h = 100.0 - 0.5 * 9.81 * time**2 + 0.01 * rng.standard_normal(time.size)
+    case = make_case("fallen", (time, {"h": h}), {}, system)
+    with FMU(path) as fmu:
+        doubt = sampling_doubt(fmu, system, case)
+    assert re.match(r"samples 0\.2 s apart do not resolve the model: with \d+ steps", doubt)
 
 
 def test_what_derivatives_leave_in_an_fmu_is_not_read(tmp_path, compiled):
