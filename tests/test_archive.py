@@ -248,7 +248,7 @@ DAMAGES: dict[str, tuple[Callable[[Path], None], str]] = {
         r"the modelIdentifier '\.\./",
     ),
     "no identifier": (edited('modelIdentifier="MinimalObserver"', ""), "the modelIdentifier ''"),
-    "no GUID": (edited('guid="', 'was="'), "no guid"),
+    "no GUID": (edited('guid="', 'was="'), "an empty guid or"),
     "wrong GUID": (edited('guid="{', 'guid="{0'), "instantiat"),
     "text for a number": (edited('start="0.0"', 'start="many"'), r"start value of '\w+' = 'many'"),
     "NaN": (edited('start="0.0"', 'start="nan"'), r"start value of '\w+' = 'nan'"),
@@ -263,7 +263,7 @@ DAMAGES: dict[str, tuple[Callable[[Path], None], str]] = {
     ),
     "reference of 5000 digits": (
         edited('valueReference="1"', f'valueReference="{"9" * 5000}"'),
-        "no FMU",
+        "found what FMI does not allow",
     ),
     "index of nothing": (
         edited('derivative="1"', 'derivative="0"'),
@@ -289,7 +289,7 @@ DAMAGES: dict[str, tuple[Callable[[Path], None], str]] = {
     "line within a name": (edited('name="tauR"', 'name="a&#10;error: b"'), r"'a\\nerror: b' of 10"),
     "name of a terminal": (edited('name="tauR"', 'name="a&#x9b;2J"'), r"'a\\x9b2J' of 4"),
     "name without end": (edited('name="tauR"', f'name="{"n" * 5000}"'), "of 5000 characters"),
-    "index too large": (edited('derivative="', 'derivative="99'), "no FMU"),
+    "index too large": (edited('derivative="', 'derivative="99'), "found what FMI does not allow"),
     "name twice": (edited('name="tauR"', 'name="pB"'), "two variables 'pB'"),
     "indicators below zero": (
         edited('numberOfEventIndicators="0"', 'numberOfEventIndicators="-1"'),

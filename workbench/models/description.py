@@ -259,10 +259,13 @@ def _read(path: Path, state: tuple[int, ...]) -> Description:
     try:
         _refuse_entities(xml)
         root = ElementTree.fromstring(xml)
+    except Exception as error:  # anything that is no FMU
+        raise damaged(path, error) from None
+    try:
         with path.open("rb") as stream:  # FMPy leaves a file open that it opened and refused
             description = fmpy.read_model_description(stream, validate=False)
-    except Exception as error:  # FMPy raises bare Exception for anything that is no FMU
-        raise damaged(path, error) from None
+    except Exception as error:  # FMPy raises bare Exception
+        raise _wrong(path, f"what FMI does not allow ({error})") from None
     if not re.fullmatch(r"2\.0|3\.0(\.\d+)?", description.fmiVersion):  # with its bug fixes
         raise InputError(
             where=str(path),
@@ -273,12 +276,16 @@ def _read(path: Path, state: tuple[int, ...]) -> Description:
     try:
         return _description(path, description, root, files)
     except _WrongError as error:
-        raise InputError(
-            where=f"{path}, {DESCRIPTION}",
-            found=str(error),
-            expected="a description as FMI asks for",
-            remedy="export the model again, or report it to the exporter's makers",
-        ) from None
+        raise _wrong(path, str(error)) from None
+
+
+def _wrong(path: Path, found: str) -> InputError:
+    return InputError(
+        where=f"{path}, {DESCRIPTION}",
+        found=found,
+        expected="a description as FMI asks for",
+        remedy="export the model again, or report it to the exporter's makers",
+    )
 
 
 _VARIABILITIES = ("constant", "fixed", "tunable", "discrete", "continuous")
@@ -312,7 +319,7 @@ def _description(
     offered = {MODEL_EXCHANGE: root.find("ModelExchange"), CO_SIMULATION: root.find("CoSimulation")}
     experiment = description.defaultExperiment
     if not description.guid:
-        raise _WrongError("no guid or instantiationToken")
+        raise _WrongError("an empty guid or instantiationToken, or none")
     places = [name.split("/") for name in files]
     _refuse_wrong_references(description.fmiVersion, root)
     _refuse_impossible(description, root)
