@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from workbench.cli.arguments import Commands, add_recording_options
 from workbench.cli.extras import require_compiler
 from workbench.cli.output import CommandResult, Output
+from workbench.system.units import with_unit
 
 if TYPE_CHECKING:
     from workbench.studies.library_check import EffectResult
@@ -65,7 +66,7 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
 
 
 def _line(effect: EffectResult) -> str:
-    size = f"{effect.name} at {effect.size:g} {effect.unit}"
+    size = f"{effect.name} at {with_unit(effect.size, effect.unit)}"
     if effect.failure:
         return f"FAILED  effect {size}: {effect.failure}"
     if effect.doubt:

@@ -31,7 +31,7 @@ from workbench.recordings.case import Case
 from workbench.system.comparison import Channel
 from workbench.system.parts import Signal
 from workbench.system.system import System
-from workbench.system.units import BAND, si_factor, with_interval, with_unit
+from workbench.system.units import BAND, si_factor, three_digits, with_interval, with_unit
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -173,7 +173,7 @@ class Outcome:
         # The channel that is most wrong of what the last model leaves there.
         channel = max(by_channel, key=lambda c: by_channel[c][0] / max(by_channel[c][1], 1e-300))
         factor = si_factor(channel.shown, channel.unit, channel.name)
-        before, after = (f"{rms / factor:.3g}" for rms in by_channel[channel])
+        before, after = (three_digits(rms / factor) for rms in by_channel[channel])
         recordings = f"{count} held-out recording{'s' * (count > 1)}"
         change = f"from {before} to {after} {channel.shown}"
         return f", and on {recordings} that of {channel.label} {change}"
@@ -339,7 +339,10 @@ class Outcome:
                 squares = np.average(np.square([e.rms for e in own]), axis=0, weights=counts)
                 means = np.average([e.mean_absolute for e in own], axis=0, weights=counts)
                 ends = zip(np.sqrt(squares) / factor, means / factor, strict=True)
-                before, after = (f"{rms:.3g} and {mean:.3g} {channel.shown}" for rms, mean in ends)
+                before, after = (
+                    f"{three_digits(rms)} and {three_digits(mean)} {channel.shown}"
+                    for rms, mean in ends
+                )
                 change = f"{before}, now {after}" if self.diagnosis.best.active else before
                 fate = "held out" if held_out else "fitted"
                 run = f" ({own[0].corrected} correct the run)" if own[0].corrected else ""
@@ -357,7 +360,7 @@ class Outcome:
             return "none, the model cannot be simulated so far"
         squares = np.square(np.array(errors, float))
         rms = np.sqrt(np.average(squares, weights=[e.samples for e in own]))
-        return f"{rms / factor:.3g} {channel.shown}"
+        return f"{three_digits(rms / factor)} {channel.shown}"
 
     def to_frame(self) -> "pd.DataFrame":
         """Causes, strongest first, a row for each of their parameters."""
@@ -887,7 +890,8 @@ def _finding(
     change = f", from the nominal model to that {extension}" if extension else ""
     return (
         f"Errors in means over {duration(seconds)}, in units of their noise{change}: {arrows}. "
-        f"Clearest in {_called(clearest)}, {rms:.3g} {clearest.shown} rms with the nominal model."
+        f"Clearest in {_called(clearest)}, {three_digits(rms)} {clearest.shown} rms with the "
+        "nominal model."
     )
 
 

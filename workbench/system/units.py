@@ -221,6 +221,7 @@ _SAID = {
 }
 _LEAST = {"m2": 0.01}  # of a unit that is said, 1 unless given: areas go by squares
 _STEPS = (1, 10, 100)  # of what a share is said per
+_WRITTEN_OUT = 99_950.0  # up to here a number has no power of ten
 _WHOLE = 0.01  # share from which on it reads as whole percents
 
 
@@ -255,6 +256,16 @@ def in_spoken_unit(values: Sequence[float], unit: str) -> tuple[list[float], str
     return [round(value / factor, 12) if factor != 1.0 else value for value in values], shown
 
 
+def three_digits(value: float) -> str:
+    """A number as people write it, to three digits.
+
+    >>> three_digits(1500.0), three_digits(12345.0), three_digits(0.0012345), three_digits(2e6)
+    ('1500', '12300', '0.00123', '2e+06')
+    """
+    text = f"{value:.3g}"
+    return f"{float(text):.0f}" if "e+0" in text and abs(value) < _WRITTEN_OUT else text
+
+
 def with_unit(value: float, unit: str) -> str:
     """A value in the unit in which people say it.
 
@@ -262,7 +273,7 @@ def with_unit(value: float, unit: str) -> str:
     ('4 % per 100 K', '2 %', '150 N')
     """
     (shown,), name = in_spoken_unit([value], unit)
-    return f"{shown:.3g} {name}".rstrip()
+    return f"{three_digits(shown)} {name}".rstrip()
 
 
 def with_interval(value: float, low: float, high: float, unit: str) -> str:
@@ -274,4 +285,5 @@ def with_interval(value: float, low: float, high: float, unit: str) -> str:
     (middle, first, last), shown = in_spoken_unit([value, low, high], unit)
     further = f", {3.6 * value:.3g} km/h" if unit == "m/s" else ""
     shown = f"{shown} " * bool(shown)
-    return f"{middle:.3g} {shown}(95 %: {first:.3g} to {last:.3g}{further})"
+    best, least, most = (three_digits(end) for end in (middle, first, last))
+    return f"{best} {shown}(95 %: {least} to {most}{further})"

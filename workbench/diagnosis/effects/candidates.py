@@ -33,7 +33,7 @@ from workbench.observers.operating import start_spreads
 from workbench.recordings.channels.matching import COLD, ZERO_CELSIUS
 from workbench.system.parts import StateNoise
 from workbench.system.system import System
-from workbench.system.units import with_unit
+from workbench.system.units import three_digits, with_unit
 
 CHANGE, COEFFICIENT = "change", "coefficient"
 # Parameters of wrong sensors, see `SensorReading`.
@@ -284,7 +284,7 @@ def _parameters(model: FMU, system: System) -> Iterator[Effect]:
         if size == 0.0:
             continue
         about = f" ({variable.text})" if variable.text else ""
-        nominal = with_unit(value, variable.unit) if variable.unit else f"{value:.3g}"
+        nominal = with_unit(value, variable.unit) if variable.unit else three_digits(value)
         yield Effect(
             name=variable.name,
             model=variable.name,
@@ -333,7 +333,7 @@ def _starts(model: FMU, system: System) -> Iterator[Effect]:
             continue
         unit = model.units.get(name, "")
         value = model.defaults[name]
-        nominal = with_unit(value, unit) if unit else f"{value:.3g}"
+        nominal = with_unit(value, unit) if unit else three_digits(value)
         yield Effect(
             name=f"Start[{name}]",
             model=name,

@@ -43,7 +43,7 @@ from workbench.system.system import System
 _DELAY_STEP = 1e-3  # of the difference, over the delay's spread; errors are linear in the delay
 _DIFFERENCE = 1e-4  # step over a typical size: far above rounding, far below what bends
 _SMALLER = 8  # times that it is made ten times smaller: then it is near rounding
-_FURTHEST = 1e100  # SI, of an error: beyond, its square in units of the noise is no number
+_FURTHEST = 1e100  # of an error and its derivatives: beyond, squares and products are no numbers
 _FINEST = 32  # steps of a sample time
 _CUT = 1e-12  # share, by which no reading differs
 _STRAIGHTENED = 2  # runs, of which each leads the next
@@ -244,6 +244,10 @@ class Simulator:
                 recording, along.errors, recording.y - errors, self._wrong(values)
             )
             by = self._whitened(number, self._late(number, by_sensor, values))
+            if not np.abs(by).max(initial=0.0) < _FURTHEST:
+                raise FMUError(
+                    f"{fmu.called}: derivatives of {recording.name} grow beyond all bounds"
+                )
             jacobian[:blocks, part] = by.reshape(-1, len(part))
             if isinstance(along, FreeDerivatives):
                 unsure |= along.unsure
