@@ -1,11 +1,12 @@
 """A model along recordings, in one process: whitened prediction errors and their derivatives."""
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from copy import copy
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,10 +36,13 @@ from workbench.diagnosis.effects.candidates import LAG, LOSS, RECTIFIED, STEP
 from workbench.diagnosis.inference.thresholds import Thresholds
 from workbench.diagnosis.simulation.free import FreeDerivatives, FreePredictor
 from workbench.diagnosis.simulation.prediction import Predictor, Variation
+from workbench.diagnosis.simulation.tangent import Tangent
 from workbench.errors import FMUError
 from workbench.models.fmu import FMU, EventError
 from workbench.system.registry import open_file
 from workbench.system.system import System
+
+More = TypeVar("More")
 
 _DELAY_STEP = 1e-3  # of the difference, over the delay's spread; errors are linear in the delay
 _DIFFERENCE = 1e-4  # step over a typical size: far above rounding, far below what bends
@@ -236,8 +240,14 @@ class Simulator:
             varied = [columns[j] for j in part]
             shares = None if courses is None else courses[:, part]
             absent = self._absent(values, varied, sizes or {})
-            given = recording, self._known(number, values), varied, shares, absent
-            errors, along = self._predictor.derivatives(*given)
+            run: Callable[[Samples], tuple[Matrix, Tangent | FreeDerivatives]] = partial(
+                self._predictor.derivatives,
+                values=self._known(number, values),
+                columns=varied,
+                courses=shares,
+                absent=absent,
+            )
+            errors, along = self._led(recording, run)
             if not any(column.setting for column in varied):
                 simulated = errors + (self._recordings[number].y - recording.y)
             by_sensor = sensed_changes(
@@ -452,12 +462,32 @@ class Simulator:
     def _simulated(self, number: int, values: Mapping[str, float]) -> tuple[Matrix, Vector]:
         """Prediction errors of all samples, and whitened errors of inputs at rest, (q,)."""
         recording, in_time = self._recordings[number], self._in_time(number, values)
-        errors = self._predictor.errors(in_time, self._known(number, values)) + (
-            recording.y - in_time.y
-        )
+        known = self._known(number, values)
+        errors, _ = self._led(in_time, lambda own: (self._predictor.errors(own, known), None))
+        errors += recording.y - in_time.y
         if not np.abs(errors).max(initial=0.0) < _FURTHEST:
             raise FMUError(f"{self._fmu.called}: signals of {recording.name} leave all bounds")
         return errors, (recording.rest - self._fmu.get(self._rest)) / recording.rest_noise
+
+    def _led(
+        self, samples: Samples, run: Callable[[Samples], tuple[Matrix, More]]
+    ) -> tuple[Matrix, More]:
+        """Prediction errors of a run that outputs lead, and what else it returns.
+
+        Outputs lead by a gain for the model as it is given. With half of its damping, that gain may
+        drive it away: where errors are larger than signals are, nothing leads, if that is nearer.
+        """
+        led = run(samples)
+        if samples.lead is None or not samples.lead.noisy or self._away(led[0]) < 1.0:
+            return led
+        free = run(samples.free)
+        return led if self._away(led[0]) <= self._away(free[0]) else free
+
+    def _away(self, errors: Matrix) -> float:
+        """Root mean square of errors (n, c) over the scale of their signal, the largest."""
+        scales = [self._system.signals[n].scale for n in self._recordings[0].signals]
+        with np.errstate(over="ignore"):
+            return float((np.sqrt(np.square(errors).mean(axis=0)) / scales).max())
 
     def _in_time(self, number: int, values: Mapping[str, float]) -> Samples:
         """A recording as by one clock, and by right sensors."""
