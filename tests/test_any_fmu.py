@@ -1475,10 +1475,11 @@ def test_a_co_simulation_that_a_reset_leaves_where_it_is_starts_anew(flag, tmp_p
             estimate = along.run(np.arange(4.0), u, u + np.nan)
             np.testing.assert_allclose(np.asarray(estimate.values)[:, 0], [1, 2, 3, 4])
     with CoSimulation(folder / "Alone.fmu") as fmu:
-        simulation = Simulation(fmu, ["u"], ["x"], [True])
-        for _ in range(3):
-            simulated = simulation.run(Drive(np.arange(4.0), u), {})[:, 0]
-            np.testing.assert_allclose(simulated, [1, 2, 3, 4])
+        for _ in range(2):  # each the first of its command
+            simulation = Simulation(fmu, ["u"], ["x"], [True])
+            for _ in range(2):
+                simulated = simulation.run(Drive(np.arange(4.0), u), {})[:, 0]
+                np.testing.assert_allclose(simulated, [1, 2, 3, 4])
 
 
 def test_a_co_simulation_that_draws_random_numbers_is_refused(tmp_path, compiled):
