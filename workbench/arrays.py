@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping
 from functools import cache
-from typing import Any, TypeVar, get_args, get_type_hints
+from typing import Annotated, Any, TypeVar, get_args, get_origin, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,7 @@ Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 Tensor = NDArray[np.float64]
 
+_Length = tuple[tuple[str, ...], ...]  # terms of a sum, each of factors
 _Record = TypeVar("_Record", bound=tuple[Any, ...])
 
 
@@ -33,23 +34,34 @@ def zeros(record: type[_Record], sizes: Mapping[str, int], **given: Any) -> _Rec
     >>> zeros(State, {"n": 1})
     State(x=array([0.]), P=array([[0., 0., 0.]]))
     """
-    for name, hint in _declared(record).items():
+    for name, (shape, dtype) in _declared(record).items():
         if name not in given:
-            array, shape = get_args(hint)
-            (dtype,) = get_args(get_args(array)[1])
-            given[name] = np.zeros([_length(text, sizes) for text in shape.split(",")], dtype)
+            given[name] = np.zeros([_length(terms, sizes) for terms in shape], dtype)
     return record(**given)
 
 
 @cache
-def _declared(record: Any) -> dict[str, Any]:
-    """Fields of a record as declared; to read them takes longer than a short loop runs."""
-    return get_type_hints(record, include_extras=True)
+def _declared(record: Any) -> dict[str, tuple[tuple[_Length, ...], Any]]:
+    """Shapes and types of the fields that declare one; to read them takes longer than a loop."""
+    declared = {}
+    for name, hint in get_type_hints(record, include_extras=True).items():
+        if get_origin(hint) is Annotated:
+            array, shape = get_args(hint)
+            (dtype,) = get_args(get_args(array)[1])
+            declared[name] = tuple(_terms(length) for length in shape.split(",")), dtype
+    return declared
 
 
-def _length(text: str, sizes: Mapping[str, int]) -> int:
+def _terms(length: str) -> _Length:
+    """Factors of the terms of a length, as ((2, s), (1,)) of "2*s + 1"."""
+    return tuple(
+        tuple(factor.strip() for factor in term.split("*")) for term in length.strip().split("+")
+    )
+
+
+def _length(terms: _Length, sizes: Mapping[str, int]) -> int:
     """A sum of products of numbers and letters."""
     return sum(
-        math.prod(sizes[part] if part in sizes else int(part) for part in term.strip().split("*"))
-        for term in text.strip().split("+")
+        math.prod(sizes[part] if part in sizes else int(part) for part in factors)
+        for factors in terms
     )

@@ -189,11 +189,12 @@ class LawInfluence:
 
 def _followed(course: Vector, time: Vector, span: float) -> Vector:
     """What follows a course, from zero, with a time constant [s], (n,)."""
-    late = np.zeros_like(course)
-    for k, share in enumerate(np.exp(-np.diff(time) / span)):
-        middle = 0.5 * (course[k] + course[k + 1])
-        late[k + 1] = middle + share * (late[k] - middle)
-    return late
+    # Numbers of Python: a third of the time of those of NumPy, one by one.
+    values, late = course.tolist(), [0.0]
+    for k, share in enumerate(np.exp(-np.diff(time) / span).tolist()):
+        middle = 0.5 * (values[k] + values[k + 1])
+        late.append(middle + share * (late[k] - middle))
+    return np.array(late)
 
 
 @dataclass(frozen=True)
