@@ -158,6 +158,36 @@ def test_a_cause_that_the_search_passed_over_is_taken_up_where_it_leaves_noise(
     assert cause["effect"] == "G"
 
 
+def test_a_start_is_not_sought_where_all_sizes_are_the_same(tmp_path, monkeypatch):
+    """For 1440 s it is as warm outside as in the room, and the loss says nothing of itself.
+
+    Of a controlled temperature of 20-sim, the slope of a ramp that begins at 8 s of 20 s was fitted
+    from a start that its first 5 s had chosen, and was not found.
+    """
+    starts = dict[str, float]()
+
+    def grown(fit: Any, best: Any, straight: Any, score: Any) -> Any:
+        start = search._grown_start(fit, best, score)
+        starts[score.effect.name] = start.size if start is not None else 0.0
+        return start
+
+    monkeypatch.setattr(search, "_simulated_start", grown)
+    write_fmu(tmp_path, alone=True)
+    rng = np.random.default_rng(6)
+    for k in range(3):
+        warming = 288.0 + k + 0.015 * TIME  # by 1500 W in 1e5 J/K
+        same = TIME < 1440.0
+        Ta = np.where(same, warming, 280.0)
+        loss, begun = 60.0, warming[same][-1] + 0.015 * 20.0
+        rest = 280.0 + 1500.0 / loss
+        T = np.where(same, warming, rest + (begun - rest) * np.exp(-loss / 1e5 * (TIME - 1440.0)))
+        columns = {"time [s]": TIME, "Ta [K]": Ta, "T [K]": T + rng.normal(0.0, 0.05, TIME.size)}
+        write_case(tmp_path / "days" / f"day{k}", columns, f"Day {k}")
+    summary = summary_of("diagnose", tmp_path)
+    assert summary["causes"][0]["effect"] == "G"
+    assert starts["G"] == pytest.approx(10.0, rel=0.2)
+
+
 @pytest.mark.parametrize("thermostat", [True, False], ids=[SWITCHING, ALWAYS])
 def test_nothing_is_missing_of_a_right_fmu(tmp_path, thermostat):
     write_fmu(tmp_path, alone=not thermostat)

@@ -309,11 +309,17 @@ def _grown_start(fit: Fit, best: FittedModel, score: CandidateScore) -> Candidat
 
     steps = score.effect.matters * np.array(_SIZES)
     sizes, size = np.unique(np.clip([0.0, *steps, *-steps], low, high)), 0.0
-    for share in _SHARES:
+    shares = list(_SHARES)
+    for share in shares:
         if sizes.size < 2:  # bounds that allow no change
             return None
-        at = int(np.argmin([misfit(float(size), share) for size in sizes]))
+        misfits = np.array([misfit(float(size), share) for size in sizes])
+        at = int(np.argmin(misfits))
         size = float(sizes[at])
+        able = misfits[np.isfinite(misfits)]
+        if share < _SHARES[-1] and able.size and np.ptp(able) < fit.decides.fall:
+            shares.append(_SHARES[-1])  # as before a ramp begins, where all sizes are the same
+            continue
         around = pairwise(sizes[max(0, at - 1) : at + 2])
         sizes = np.unique(np.concatenate([np.linspace(*ends, 4) for ends in around]))
     run = runs[size]
