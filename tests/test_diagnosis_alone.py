@@ -6,6 +6,7 @@ The recordings come from equations of their own, and an integrator with error co
 import json
 import subprocess
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from workbench.__main__ import main
-from workbench.diagnosis.inference import search
+from workbench.diagnosis.inference import search, verdict
 from workbench.models.fmu import CoSimulation
 
 from .built import machine_file, write_case
@@ -186,6 +187,41 @@ def test_a_start_is_not_sought_where_all_sizes_are_the_same(tmp_path, monkeypatc
     summary = summary_of("diagnose", tmp_path)
     assert summary["causes"][0]["effect"] == "G"
     assert starts["G"] == pytest.approx(10.0, rel=0.2)
+
+
+def test_a_cause_that_leaves_swings_explains_nothing(tmp_path, monkeypatch):
+    """No mean of a swing lasts: errors of 15 times the noise were "0.8 times the noise".
+
+    Of a controlled temperature of 20-sim, a capacity 30 % too large was named so, which was 10 %
+    too small.
+    """
+    judged = list[tuple[Any, Any]]()
+    decide = verdict._verdict
+
+    def noted(fit: Any, chosen: Any) -> str:
+        judged.append((fit, chosen))
+        return decide(fit, chosen)
+
+    monkeypatch.setattr(verdict, "_verdict", noted)
+    write_fmu(tmp_path, alone=True)
+    record(tmp_path, 60.0, thermostat=False)
+    assert summary_of("diagnose", tmp_path, "--effects", "G")["verdict"] == "found"
+    fit, chosen = judged[-1]
+
+    def swinging(model: Any, by: float) -> Any:
+        """A model whose errors change their sign from block to block."""
+        residuals = []
+        for own in model.linearised.residuals:
+            turns = np.where(np.arange(own.errors.size) % 2, by, -by)
+            residuals.append(replace(own, errors=turns.reshape(own.errors.shape)))
+        slow = np.ones_like(model.linearised.variance_factors)
+        lin = replace(model.linearised, residuals=tuple(residuals), variance_factors=slow)
+        return replace(model, linearised=lin)
+
+    swings = replace(chosen, base=swinging(chosen.base, 16.0), best=swinging(chosen.best, 15.0))
+    assert decide(fit, swings) == "unexplained"
+    less = replace(swings, best=swinging(chosen.best, 1.0))
+    assert decide(fit, less) == "found"
 
 
 @pytest.mark.parametrize("thermostat", [True, False], ids=[SWITCHING, ALWAYS])

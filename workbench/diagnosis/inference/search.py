@@ -211,7 +211,7 @@ def _misjudged(
     ----------
     straight : see `_step`.
     """
-    if best.linearised.variance_factors.max() <= fit.decides.wrong:
+    if not lacks(best, fit.decides):
         return []
     first: dict[str, CandidateScore] = {}
     for score in sorted(scores, key=lambda score: -score.gain):
@@ -474,7 +474,7 @@ def pruned(
         for effect in best.active:
             key = (effect.name, effect.label)
             size, own = abs(best.point.sizes[key]), sigma[trial.joint.known.index(key)]
-            sure, alone = _lacks(less[effect], fit.decides), len(less) == 1
+            sure, alone = lacks(less[effect], fit.decides), len(less) == 1
             clear = size / max(own, 1e-300) / fit.decides.significant
             material = _material(effect, size, own, sure=sure)
             needs = beyond(less[effect], best) / fit.decides.needed
@@ -563,7 +563,7 @@ def joined(point: Point, rival: CandidateScore) -> Point:
     return Point(sizes, point.levels, point.deviations, phases)
 
 
-def _lacks(model: FittedModel, decides: Thresholds) -> bool:
+def lacks(model: FittedModel, decides: Thresholds) -> bool:
     """Whether something is missing beside a model: errors that last, or swing beyond the noise."""
     lin = model.linearised
     return float(max(lin.variance_factors.max(), lin.squares.max())) > decides.wrong
@@ -615,7 +615,7 @@ def _rivals(
         effect explains of it: half of it is a hint, however few they are.
     """
     hinted = best.linearised.variance_factors.max() > decides.wrong
-    sure = _lacks(best, decides)
+    sure = lacks(best, decides)
     clear = min(decides.hint, np.sqrt(0.5 * wrong)) if hinted else decides.significant
     able: dict[str, list[CandidateScore]] = {}
     for score in scores:

@@ -373,7 +373,8 @@ def _verdict(fit: Fit, chosen: Selection) -> Verdict:
     best = chosen.best
     explained = _share(chosen.base, best) > 1.0 - fit.decides.left
     # What swings about zero may have no mean that lasts; noise is not so large.
-    if not best.active and best.linearised.squares.max() > fit.decides.wrong:
+    was, left = (model.linearised.squares.max() - 1.0 for model in (chosen.base, best))
+    if left > fit.decides.wrong - 1.0 and left > (1.0 - _HALF) * was:
         return "unexplained"
     if not _clean(fit, chosen) and not (best.active and (chosen.interrupted or explained)):
         return "unexplained"
