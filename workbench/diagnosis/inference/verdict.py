@@ -310,10 +310,12 @@ def _judged(
             _cause(fit, chosen, effect, noise_alone=noise_alone, whole=verdict == "found")
             for effect in _strongest_first(fit, chosen, catalogue)
         ]
-        # Beside others, a part that bends as far as its effect allows stands for another law.
+        # Beside others, a part that bends as far as its effect allows stands for another law; one
+        # of causes that all may be none is no part.
         bent = _at_bounds(causes) if len(causes) > 1 else []
-        if verdict == "partly explained" and (doubtful := [*bent, *_at_zero(causes)]):
-            objections += doubtful
+        unsure = _at_zero(causes)
+        if verdict == "partly explained" and (bent or len(unsure) == len(causes)):
+            objections += [*bent, *unsure]
             verdict, causes, gain = "unexplained", [], None
     if causes:
         twins = [fits.values() for fits in chosen.twins.values()]
