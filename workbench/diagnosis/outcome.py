@@ -222,11 +222,17 @@ class Outcome:
             shifted.insert(0, diagnosis.differing.text)
         if diagnosis.noise_alone or diagnosis.gain is None:
             return [*limits, *shifted]
+        unsure = [
+            cause.effect.name
+            for cause in diagnosis.causes
+            if cause.parameters[cause.effect.label].holds_zero
+        ]
+        zero = f" That of {' and '.join(unsure)} holds zero." if unsure else ""
         return [
             *limits,
             *shifted,
             f"What remains in cross-validation, {diagnosis.gain.after:.1f} times the noise, widens "
-            "the intervals: a law may be wrong in form.",
+            f"the intervals: a law may be wrong in form.{zero}",
         ]
 
     @property

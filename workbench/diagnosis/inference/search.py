@@ -32,9 +32,6 @@ _SIZES = tuple(10.0 ** (0.5 * k) for k in range(9))  # times what matters, where
 _SHARES = (0.125, 0.25, 0.5, 1.0)  # of a recording, over which runs are compared
 _VARIANTS, _HALVINGS = 4, 2  # of shapes, and of the size, that a fit begins with
 ROUNDS = 12  # of Gauss-Newton, most
-# Shares by which a size is unsure beside its noise: of it, since forms of laws differ in detail,
-# and of what matters, by companions that do not.
-FORM, COMPANY = 0.005, 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -476,7 +473,7 @@ def pruned(
             size, own = abs(best.point.sizes[key]), sigma[trial.joint.known.index(key)]
             sure, alone = lacks(less[effect], fit.decides), len(less) == 1
             clear = size / max(own, 1e-300) / fit.decides.significant
-            material = _material(effect, size, own, sure=sure)
+            material = _material(effect, size, own * _noise_share(best), sure=sure)
             needs = beyond(less[effect], best) / fit.decides.needed
             # Where something is missing for sure, its immaterial twins are no other answer.
             if sure and alone:
@@ -569,16 +566,21 @@ def lacks(model: FittedModel, decides: Thresholds) -> bool:
     return float(max(lin.variance_factors.max(), lin.squares.max())) > decides.wrong
 
 
+def _noise_share(model: FittedModel) -> float:
+    """Standard deviation by noise alone, over that by all that is wrong with a model."""
+    return float(model.linearised.variance_factors.max() ** -0.5)
+
+
 def _material(effect: Effect, size: float, sigma: float, *, sure: bool) -> float:
     """Size of an effect over the least that matters.
 
     Parameters
     ----------
+    sigma : standard deviation of the size by noise.
     sure : whether something is missing without it. Then the effect may be that unless its size is
-        clearly less: its 95 % interval counts.
+        clearly less, beyond its noise in 95 of 100 sets.
     """
-    reach = BAND * np.linalg.norm([sigma, FORM * size, COMPANY * effect.matters])
-    return float(abs(size) + reach * sure) / effect.matters
+    return (abs(size) + BAND * sigma * sure) / effect.matters
 
 
 def _predicting(
@@ -593,7 +595,8 @@ def _predicting(
         return []
     first: dict[str, CandidateScore] = {}
     for score in scores:
-        material = _material(score.effect, score.size, score.sigma, sure=True)
+        sigma = score.sigma * _noise_share(best)
+        material = _material(score.effect, score.size, sigma, sure=True)
         if material >= 1.0 and score.held_out.min() > 0.0:
             first.setdefault(score.effect.name, score)
     return [[score] for score in first.values()][: decides.rivals]
@@ -627,7 +630,8 @@ def _rivals(
         else:
             shown = score.gain > needed and score.held_out.sum() > odds
         significant = abs(score.size) > clear * score.sigma and shown
-        material = _material(score.effect, score.size, score.sigma, sure=sure)
+        sigma = score.sigma * _noise_share(best)
+        material = _material(score.effect, score.size, sigma, sure=sure)
         if significant and material >= 1.0:
             able.setdefault(score.effect.name, []).append(score)
     ranked = list(able.values())[: decides.rivals]

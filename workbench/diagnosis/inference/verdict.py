@@ -33,8 +33,6 @@ from workbench.diagnosis.inference.quadratic import Key
 from workbench.diagnosis.inference.score_test import CandidateScore
 from workbench.diagnosis.inference.search import (
     BEGUN,
-    COMPANY,
-    FORM,
     FittedModel,
     Step,
     beyond,
@@ -59,6 +57,7 @@ from workbench.system.units import BAND, with_interval, with_unit
 
 Verdict = Literal["nothing", "found", "partly explained", "unexplained"]
 
+_FORM, _COMPANY = 0.005, 0.1  # shares of a value, and of the size that matters
 _DRAWS = 2000  # of the bootstrap over stops
 # Share from which on a part has the right place, if not the right form: of squares, an offset in
 # place of a ramp takes 75 %, a line in place of a parabola 94 %.
@@ -310,12 +309,9 @@ def _judged(
             _cause(fit, chosen, effect, noise_alone=noise_alone, whole=verdict == "found")
             for effect in _strongest_first(fit, chosen, catalogue)
         ]
-        # Beside others, a part that bends as far as its effect allows stands for another law; one
-        # of causes that all may be none is no part.
-        bent = _at_bounds(causes) if len(causes) > 1 else []
-        unsure = _at_zero(causes)
-        if verdict == "partly explained" and (bent or len(unsure) == len(causes)):
-            objections += [*bent, *unsure]
+        # Beside others, a part that bends as far as its effect allows stands for another law.
+        if verdict == "partly explained" and len(causes) > 1 and (bent := _at_bounds(causes)):
+            objections += bent
             verdict, causes, gain = "unexplained", [], None
     if causes:
         twins = [fits.values() for fits in chosen.twins.values()]
@@ -484,15 +480,6 @@ def _at_bounds(causes: Sequence[Cause]) -> list[str]:
         for cause in causes
         for name, interval in cause.parameters.items()
         if interval.limit and interval.open
-    ]
-
-
-def _at_zero(causes: Sequence[Cause]) -> list[str]:
-    """Causes that may be none, by the intervals of their sizes, in words."""
-    return [
-        f"the size of {cause.effect.name} may be zero"
-        for cause in causes
-        if cause.parameters[cause.effect.label].holds_zero
     ]
 
 
@@ -788,14 +775,14 @@ def _cause(fit: Fit, chosen: Selection, effect: Effect, *, noise_alone: bool, wh
     """A cause with intervals, which what is left widens, or the form that noise may hide."""
     best, trial, unknowns = chosen.best, chosen.trial, fit.unknowns
     sigma = np.hypot(np.sqrt(np.diag(trial.covariance())), trial.moved())
-    fast, form_share = effect.order_locked, FORM
+    fast, form_share = effect.order_locked, _FORM
     if noise_alone:
         more = hidden_by_noise(fit, best, effect)
     else:
         left, explained = chosen.validation.where_acting(
             chosen.less[effect], best, fast=fast, whole=whole
         )
-        form_share = max(FORM, share_by_form(left, explained))
+        form_share = max(_FORM, share_by_form(left, explained))
         more = correlated_deviations(fit, best)
     parameters = {}
     for key, value in best.point.sizes.items():
@@ -803,9 +790,10 @@ def _cause(fit: Fit, chosen: Selection, effect: Effect, *, noise_alone: bool, wh
             continue
         parameter = effect.size if key[1] == effect.label else key[1]
         low, high = unknowns.bounds(effect, parameter)
+        # Beside the noise: forms of laws that differ in detail, and immaterial companions.
         of_size = key[1] == effect.label
-        share = form_share if of_size else FORM
-        form = np.hypot(share * value, COMPANY * effect.matters * of_size)
+        share = form_share if of_size else _FORM
+        form = np.hypot(share * value, _COMPANY * effect.matters * of_size)
         noise = np.hypot(sigma[trial.joint.known.index(key)], more.get(key, 0.0))
         reach = float(BAND * np.hypot(noise, form))
         limit = binding_bound(fit, best, effect, key[1])
