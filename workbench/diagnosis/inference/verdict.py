@@ -372,7 +372,8 @@ def _verdict(fit: Fit, chosen: Selection) -> Verdict:
     explained = _share(chosen.base, best) > 1.0 - fit.decides.left
     # What swings about zero may have no mean that lasts; noise is not so large.
     was, left = (model.linearised.squares.max() - 1.0 for model in (chosen.base, best))
-    if left > fit.decides.wrong - 1.0 and left > (1.0 - _HALF) * was:
+    most = max(1.0 - _HALF, fit.decides.left) * was
+    if left > fit.decides.wrong - 1.0 and (not best.active or left > most):
         return "unexplained"
     if not _clean(fit, chosen) and not (best.active and (chosen.interrupted or explained)):
         return "unexplained"
