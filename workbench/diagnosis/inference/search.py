@@ -208,7 +208,7 @@ def _misjudged(
     ----------
     straight : see `_step`.
     """
-    if not lacks(best, fit.decides):
+    if not _lacks(best, fit.decides):
         return []
     first: dict[str, CandidateScore] = {}
     for score in sorted(scores, key=lambda score: -score.gain):
@@ -471,7 +471,7 @@ def pruned(
         for effect in best.active:
             key = (effect.name, effect.label)
             size, own = abs(best.point.sizes[key]), sigma[trial.joint.known.index(key)]
-            sure, alone = lacks(less[effect], fit.decides), len(less) == 1
+            sure, alone = _lacks(less[effect], fit.decides), len(less) == 1
             clear = size / max(own, 1e-300) / fit.decides.significant
             material = _material(effect, size, own * _noise_share(best), sure=sure)
             needs = beyond(less[effect], best) / fit.decides.needed
@@ -560,7 +560,7 @@ def joined(point: Point, rival: CandidateScore) -> Point:
     return Point(sizes, point.levels, point.deviations, phases)
 
 
-def lacks(model: FittedModel, decides: Thresholds) -> bool:
+def _lacks(model: FittedModel, decides: Thresholds) -> bool:
     """Whether something is missing beside a model: errors that last, or swing beyond the noise."""
     lin = model.linearised
     return float(max(lin.variance_factors.max(), lin.squares.max())) > decides.wrong
@@ -618,7 +618,7 @@ def _rivals(
         effect explains of it: half of it is a hint, however few they are.
     """
     hinted = best.linearised.variance_factors.max() > decides.wrong
-    sure = lacks(best, decides)
+    sure = _lacks(best, decides)
     clear = min(decides.hint, np.sqrt(0.5 * wrong)) if hinted else decides.significant
     able: dict[str, list[CandidateScore]] = {}
     for score in scores:
