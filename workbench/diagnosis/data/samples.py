@@ -10,6 +10,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array, diags_array
 
 from workbench.arrays import Matrix, Vector
 from workbench.diagnosis.data.cleaning import Mask, first_value, smooth
@@ -88,8 +89,10 @@ class Samples:
         return bool(np.max(np.maximum.accumulate(u) - u) > _RELEASED * u.max())
 
     @cached_property
-    def _filters(self) -> dict[int, tuple[Vector, Vector]]:
-        """Numerator and denominator of the modes, as digital filters; of those that show."""
+    def _filters(self) -> dict[int, tuple[Vector, Vector, Vector]]:
+        """Numerator, denominator and state at rest of the modes, as digital filters; that show."""
+        from scipy.signal import lfiltic  # takes its time, and little else needs it
+
         h = float(np.median(np.diff(self.time)))
         quantised = {}
         for column, mode in self.modes.items():
@@ -101,20 +104,42 @@ class Samples:
             denominator = np.real(np.poly(z))
             # Matched poles; symmetric weights keep the delay, these the amplitude to 0.2 % below
             # three quarters of the mode's frequency.
-            quantised[column] = np.sum(denominator) * np.array([1.0, 10.0, 1.0]) / 12.0, denominator
+            numerator = np.sum(denominator) * np.array([1.0, 10.0, 1.0]) / 12.0
+            steady = lfiltic(numerator, denominator, np.ones(2), np.ones(2))
+            quantised[column] = numerator, denominator, steady
         return quantised
 
     def behind_structure(self, column: int, values: Vector) -> Vector:
         """What a sensor reads of quantities, (n, ...): a mode of second order in between."""
         if column not in self._filters:
             return values
-        from scipy.signal import lfilter, lfiltic  # takes its time, and little else needs it
+        from scipy.signal import lfilter
 
-        numerator, denominator = self._filters[column]
-        steady = lfiltic(numerator, denominator, np.ones(2), np.ones(2))
+        numerator, denominator, steady = self._filters[column]
         begin = np.multiply.outer(steady, values[0])
         read: Vector = lfilter(numerator, denominator, values, axis=0, zi=begin)[0]
         return read
+
+    @cached_property
+    def _rate(self) -> csr_array:
+        """Derivative by time of what is sampled, (n, n), as of `numpy.gradient`."""
+        h = np.diff(self.time)
+        before, after = h[:-1], h[1:]
+        middle = (after - before) / (before * after)
+        return diags_array(
+            [
+                np.append(-after / (before * (before + after)), -1.0 / h[-1]),
+                np.concatenate([[-1.0 / h[0]], middle, [1.0 / h[-1]]]),
+                np.append(1.0 / h[0], before / (after * (before + after))),
+            ],
+            offsets=[-1, 0, 1],
+            format="csr",
+        )
+
+    def rate(self, values: Matrix) -> Matrix:
+        """Rates of values (n, ...) at each sample, of second order, at the ends of first."""
+        rates: Matrix = (self._rate @ values.reshape(len(values), -1)).reshape(values.shape)
+        return rates
 
     def sizes(self, errors: Matrix) -> Matrix:
         """Root mean square and mean absolute error of samples that are told, by channel, (2, c).
@@ -173,17 +198,25 @@ class Samples:
             covariance += slopes[:, :, None] ** 2 * np.eye(slopes.shape[1])
         return replace(self, whitening=np.linalg.inv(np.linalg.cholesky(covariance)))
 
+    @cached_property
+    def _means(self) -> list[csr_array]:
+        """Means over each block of samples that a channel has, (b, n), by channel."""
+        size = self.blocks[:, 1] - self.blocks[:, 0]
+        edges = np.append(0, np.cumsum(size))
+        columns = np.concatenate([np.arange(first, end) for first, end in self.blocks])
+        shape = len(self.blocks), self.time.size
+        shares = np.repeat(1.0 / np.maximum(1, self.counts.T), size, axis=1)
+        return [
+            csr_array((own * has[columns], columns, edges), shape)
+            for own, has in zip(shares, self.measured.T, strict=True)
+        ]
+
     def channels(self, errors: Matrix) -> Matrix:
         """Means of prediction errors (n, c, ...) over each block, by channel, (b, c, ...)."""
-        total = np.zeros((len(errors) + 1, len(self.slopes), *errors.shape[2:]))
-        for c, slopes in enumerate(self.slopes):
-            sum_ = sum(slope * errors[:, j] for j, slope in enumerate(slopes) if slope)
-            if not self.measured[:, c].all():
-                sum_ = (self.measured[:, c] * np.transpose(sum_)).T
-            np.cumsum(sum_, axis=0, out=total[1:, c])
-        first, end = self.blocks.T
-        means: Matrix = ((total[end] - total[first]).T / np.maximum(1, self.counts.T)).T
-        return means
+        flat = errors.reshape(len(errors), -1)
+        means = np.array([(mean @ flat).reshape(-1, *errors.shape[1:]) for mean in self._means])
+        by_channel: Matrix = np.einsum("cj,cbj...->bc...", self.slopes, means)
+        return by_channel
 
 
 def compared(system: System, cases: Sequence[Case]) -> tuple[str, ...]:

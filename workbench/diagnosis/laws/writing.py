@@ -6,7 +6,7 @@ from pathlib import Path
 
 from workbench.diagnosis.effects.extension import USED, copied, written
 from workbench.diagnosis.laws.places import CLOCK, LOST, LawInfluence, Place
-from workbench.models.modelica import Library, read_library
+from workbench.models.modelica import Library
 from workbench.runtime.files import write_whole
 
 PACKAGE = "Proposed"  # of the classes, within the library
@@ -85,8 +85,9 @@ def package(library: Library, classes: Iterable[LawClass]) -> str:
 def extended_library(library: Library, classes: Iterable[LawClass], folder: Path) -> Library:
     """A copy of a library, in a folder, that has such a package."""
     file = copied(library, folder)
-    write_whole(file.with_name(f"{PACKAGE}.mo"), package(library, classes))
-    return read_library(file)
+    generated = file.with_name(f"{PACKAGE}.mo")
+    write_whole(generated, package(library, classes))
+    return library.extended(file, generated)
 
 
 def number(value: float) -> str:

@@ -556,7 +556,7 @@ class Simulator:
         """What sensors behind structures read of signals (n, c, ...), and its rates, by column."""
         recording = self._recordings[number]
         behind = {j: recording.behind_structure(j, signals[:, j]) for j in self._delays}
-        return {j: (own, np.gradient(own, recording.time, axis=0)) for j, own in behind.items()}
+        return {j: (own, recording.rate(own)) for j, own in behind.items()}
 
     def _late(
         self,

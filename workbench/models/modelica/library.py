@@ -3,7 +3,8 @@
 Source: Modelica Language Specification 3.6, sections 5.3 (lookup of names) and 13.4 (files).
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from copy import copy
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
@@ -43,6 +44,13 @@ class _Classes(dict[str, Class]):
     def get(self, name: str, default: Any = None) -> Any:
         """The class of a name, or `default`."""
         return super().get(name, default) if name in self else default
+
+    def beside(self, more: Iterable[Class]) -> "_Classes":
+        """The same with some more."""
+        other = copy(self)
+        other._absent = set(self._absent)
+        other.update((cls.name, cls) for cls in more)
+        return other
 
     def _read(self, name: str) -> None:
         """Read the files on the way to a class: of its library, of each package, and its own."""
@@ -102,6 +110,13 @@ class Library:
                 )
             self.classes[cls.name] = cls
         self._bases: dict[str, tuple[str, ...]] = {}
+
+    def extended(self, place: Path, more: Path) -> "Library":
+        """The library at the place of a copy, which has one file more beside its `package.mo`."""
+        other = copy(self)
+        other.file, other._bases = place, {}
+        other.classes = self.classes.beside(_read(more, self.name))
+        return other
 
     def find(self, name: str) -> Class:
         """The class of a name, dotted from the library's name on, or from what follows it."""
