@@ -64,6 +64,8 @@ def _power(a: Value, b: Value) -> Value:
     """Modelica's `^`: of a square matrix repeated products (spec 10.6.7), else of scalars."""
     if a.ndim != 2:
         return each(_scalar_power, a, b)
+    if float(b[()]) < 0:
+        raise ValueError("a negative power of a matrix")
     result = each(ca.SX, np.array(np.eye(len(a)), object))
     for _ in range(int(float(b[()]))):
         result = _product(result, a)
@@ -236,6 +238,55 @@ class Arena:
         said = f"{what}: {quote}" if quote and quote.strip("'") not in what else what
         return InputError(where=place, found=said, expected=expected, remedy=remedy)
 
+    def refuse_moved_subscripts(self) -> None:
+        """Refuse b.v[2] and b[:].v[2] of an array of components b.
+
+        The front end takes the subscript for one of b.
+        """
+        texts = {source: text.encode() for source, (_, text) in self.sources.items()}
+        for number, node in enumerate(self.nodes):
+            ((kind, body),) = node.items()
+            source, start, end = self._span(self._provenance[number])
+            if source not in texts or kind not in ("coordinate", "index"):
+                continue
+            named = re.fullmatch(rb"[^\s()]+\.\w+", texts[source][start:end])
+            if named is None or re.match(rb"\s*\[", texts[source][end : end + 80]) is None:
+                continue
+            base = body["base"] if kind == "index" else number
+            if "index" in self.nodes[base]:  # b[:].v[2], and not b[i].v[2]
+                picks = self.subscripts[base]
+                moved = any(pick == "whole" or "slice" in pick for pick in picks)
+            else:
+                parts = self.operands[base] if "array" in self.nodes[base] else [base]
+                moved = any(self._has_subscripts_beyond(p, named[0].decode()) for p in parts)
+            if moved:
+                raise self.refuse(
+                    "a subscript of what an array of components has",
+                    number,
+                    "one component or what all have, as the Modelica front end takes the subscript "
+                    "for one of the components",
+                    "for b.v[2], where b has 3 components, write {b[i].v[2] for i in 1:3}",
+                )
+
+    def _has_subscripts_beyond(self, number: int, written: str) -> bool:
+        """Whether a variable has a subscript at a part to which the source gives none."""
+        coordinate = self.nodes[number].get("coordinate")
+        ((kind, content),) = coordinate.items() if isinstance(coordinate, dict) else (("", 0),)
+        if kind not in ("parameter", "state", "algebraic", "input", "derivative"):
+            return False
+        variable = self.storage["variables"][content]
+        if not self.types[variable["value_type"]]["dimensions"]:
+            return False  # of an equation that has the place of the whole reference
+        parts = str(variable["name"]).split(".")[::-1]
+        own = re.sub(r"\[[^\]]*\]", "[]", written).split(".")[::-1]
+        pairs = [
+            (part.partition("["), mine.partition("["))
+            for part, mine in zip(parts, own, strict=False)
+        ]
+        return all(part[0] == mine[0] for part, mine in pairs) and any(
+            part[1] and not mine[1] for part, mine in pairs
+        )
+
     def evaluate(self, number: int) -> Value:
         """Value of an expression node, or the refusal of what it holds.
 
@@ -294,8 +345,8 @@ class Arena:
                 box[()] = operands
                 return box
             case "index":
-                picks = self._picks(number, call)
-                return self._index(self.value(body["base"], call), picks)
+                base = self.value(body["base"], call)
+                return self._index(base, self._picks(number, base.shape, call))
             case "array_update":
                 return self._update(number, body, call)
             case "range":
@@ -362,10 +413,10 @@ class Arena:
         kind: str = self.types[self.storage["variables"][number]["value_type"]]["scalar"]
         return kind != "real"
 
-    def _picks(self, owner: int, call: _Call | None) -> list[Any]:
-        """Places, from 0, of each subscript of a node."""
+    def _picks(self, owner: int, shape: Sequence[int], call: _Call | None) -> list[Any]:
+        """Places, from 0, of each subscript of a node in an array of this shape."""
         picks: list[Any] = []
-        for subscript in self.subscripts[owner]:
+        for subscript, length in zip(self.subscripts[owner], shape, strict=False):
             if subscript == "whole":
                 picks.append(slice(None))
                 continue
@@ -378,8 +429,15 @@ class Arena:
                     "indices that are known before the simulation",
                     "choose by if-expressions inside noEvent(...)",
                 )
-            numbers = np.array([int(float(element)) - 1 for element in chosen.flat])
-            picks.append(int(numbers[0]) if chosen.ndim == 0 else numbers)
+            numbers = np.array([int(float(element)) for element in chosen.flat], int)
+            if outside := [n for n in numbers if not 1 <= n <= length]:
+                raise self.refuse(
+                    f"index {outside[0]}",
+                    owner,
+                    f"an index from 1 to {length}",
+                    "correct the index",
+                )
+            picks.append(int(numbers[0]) - 1 if chosen.ndim == 0 else numbers - 1)
         return picks
 
     def _index(self, base: Value, picks: Sequence[Any]) -> Value:
@@ -394,7 +452,7 @@ class Arena:
         """An array with some elements assigned: what `y[i] := v` makes of y."""
         out = np.array(self.value(body["base"], call), object)
         value = self.value(body["value"], call)
-        picks = tuple(self._picks(number, call))
+        picks = tuple(self._picks(number, out.shape, call))
         out[picks] = value[()] if value.ndim == 0 else value
         return out
 
@@ -404,7 +462,9 @@ class Arena:
         )
         step_node = body["explicit_step_expression"]
         step = 1.0 if step_node is None else float(self.value(step_node, call)[()])
-        return np.stack([lift(v) for v in np.arange(start, stop + 0.5 * step, step)])
+        # Of 0:0.1:0.3 the quotient is 4e-16 below 3, by rounding; a step that is meant is not.
+        count = max(0, int(np.floor((stop - start) / step + 1e-9)) + 1)
+        return np.array([ca.SX(start + k * step) for k in range(count)], object)
 
     def _builtin(self, number: int, name: str, operands: list[Value]) -> Value:
         if name in _ELEMENTWISE:
@@ -488,6 +548,8 @@ class Arena:
 
     def _comprehension(self, domain: int, body: int, call: _Call | None) -> Value:
         values = {position: self.value(body, call) for position in self.points(domain)}
+        if not values:
+            return np.empty(0, object)
         shape = tuple(last + 1 for last in max(values))
         return np.stack(list(values.values())).reshape(shape + next(iter(values.values())).shape)
 

@@ -355,6 +355,7 @@ class _Reader:
     def flat_model(self) -> FlatModel:
         """Read variables, then equations."""
         self._refuse_events()
+        self.arena.refuse_moved_subscripts()
         for number, entry in enumerate(self.variables):
             if number not in self.arena.defined or self._interface_causality(entry):
                 self._refuse_type(entry)
