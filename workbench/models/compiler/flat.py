@@ -72,7 +72,8 @@ _REMEDIES = (
     (
         r"unresolved Flat reference",
         "correct the name, or the index, for which write a number or a parameter; a component "
-        "whose condition is false has no variables",
+        "whose condition is false has no variables. A record that is a constant of a package: "
+        "declare it as a parameter of the model",
     ),
     (r"without elements", "give the array one element at least, or remove it"),
     (r"unresolved|not found|undefined", "correct the name"),
@@ -310,7 +311,9 @@ def _placed(library: Library, reached: Sequence[str], source: Class, text: str) 
     elif "unbalanced model" in message:
         patterns = []
     else:
-        words = [word for word in quoted if re.fullmatch(r"[\w.]+", word)]
+        names = [word.split(".") for word in quoted if re.fullmatch(r"[\w.]+", word)]
+        # Of `Lib.Data.motor.R` the source may say Data.motor.R or motor.R.
+        words = [".".join(n[k:]) for n in names for k in range(max(1, len(n) - 1))]
         patterns = [
             pattern
             for word in words
