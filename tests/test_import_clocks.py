@@ -154,6 +154,17 @@ def test_a_zone_that_is_said_tells_the_hours_of_a_changing_clock(tmp_path, tank,
     assert read_clock.zoned
 
 
+@pytest.mark.parametrize(
+    "header",
+    ["Time [UTC+2]", "Time (UTC+2)", "Zeit (GMT+02:00)", "Time (Europe/Berlin)", "Time [UTC+02]"],
+)
+def test_a_zone_in_brackets_tells_when_a_recording_began(tmp_path, tank, header):
+    stamps = local(datetime(2024, 6, 1, 22, tzinfo=BERLIN), 60, "%Y-%m-%d %H:%M")
+    read_clock = clock(table(tmp_path / "a.csv", stamps, header), tank)
+    assert iso(read_clock.start) == "2024-06-01T20:00:00.000000"
+    assert read_clock.zoned
+
+
 FORMS = [
     *("%y/%m/%d %H:%M", "%y-%m-%d %H:%M", "%y.%m.%d %H:%M", "%d.%m.%y %H:%M", "%d/%m/%Y %H:%M"),
     *("%m/%d/%y %I:%M:%S %p", "%b %d, %Y %H:%M:%S", "%a %b %d %H:%M:%S %Y", "%d-%b-%y %H:%M:%S"),
@@ -398,6 +409,17 @@ def test_clocks_that_contradict_each_other_are_refused_with_both(tmp_path, tank)
         clock(path, tank)
     for time in ("Date", "Time [ms]"):
         assert_allclose(clock(path, tank, time).times, QUARTER * np.arange(60))
+
+
+@pytest.mark.parametrize(("faster", "told"), [(1.2, True), (1.002, False)])
+def test_clocks_that_differ_by_more_than_a_drift_are_told(tmp_path, tank, faster, told):
+    """Seconds beside stamps that say the same recording is a fifth shorter."""
+    stamps = local(datetime(2024, 3, 1, tzinfo=UTC), 60, "%Y-%m-%d %H:%M")
+    rows = [f"{stamp};{900 * faster * k:.0f};1.{k % 7};2{k % 9}" for k, stamp in enumerate(stamps)]
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join(["Date;Time [s];inflow [l/s];h [mm]", *rows]))
+    words = "'Time' in [s] over 63720 s, and 'Date' in [s] over 53100 s; 'Time' is taken"
+    assert list(clock(path, tank).corrections) == [words] * told
 
 
 def test_a_stated_rate_that_times_contradict_is_told(tmp_path, tank):

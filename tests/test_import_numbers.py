@@ -671,6 +671,15 @@ def test_a_pressure_has_the_zero_and_the_size_of_its_signal(
         assert_allclose(proposal.assigned["p"].values[0], first)
 
 
+def test_a_pressure_in_mpa_that_is_usual_in_megapascal_is_asked_about(tmp_path):
+    system = system_with(tmp_path / "system", "p", "Pa", "pressure", "100000 Pa")
+    for unit, asked in (("mPa", True), ("MPa", False)):
+        path = write(tmp_path / "a.csv", LEVEL, extra=f";p [{unit}]", more=";0.2")
+        doubts = [doubt for doubt in proposed(path, system).doubts if doubt.startswith("p: ")]
+        assert ["its largest value, 0.0002 Pa" in doubt for doubt in doubts] == [True] * asked
+        assert not proposed(path, system, f"p=p [{unit}]").doubts
+
+
 def test_an_angle_that_goes_round_is_asked_about(tmp_path):
     """Seven degrees a sample, within a turn; as it is, or with its turns counted."""
     system = system_with(tmp_path / "system", "phi", "rad", "angle", "6 rad")

@@ -65,6 +65,7 @@ _DAYS_OF_YEAR = frozenset(("doy", "yday", "jday"))
 _TWO_PARTS = re.compile(r"\d{1,4}:\d\d")
 _COARSE = 0.3  # of all rows: more that repeat a time are samples of one coarse stamp
 _BY_CHANCE = 1e-3  # that a channel which moves from row to row stays in all rows of one time
+_DRIFT = 1.01  # beyond which clocks differ by more than oscillators without a quartz do
 _FACTOR = 1.5  # by which two clocks of one recording do not differ
 
 
@@ -134,17 +135,15 @@ def _read_clock(
         own_clock = Clock("", time.values, reason, start=time.start, zoned=time.zoned)
         beside = [c for channel in group.channels if (c := _candidate(channel, group, system))]
         going = [clock for clock in beside if clock.certain and _goes_on(clock.times, group)]
-        own_clock = _going_on(own_clock, group, where)
-        _refuse_contradiction([own_clock, *going], where)
-        return own_clock
+        return _beside_others(_going_on(own_clock, group, where), going, where)
     if (weeks := _weeks_of_gps(group)) is not None:
         return _going_on(weeks, group, where)
     # Stamps are often coarser than a counted time beside them.
     channels = sorted(group.channels, key=lambda channel: channel.stamp)
     clocks = [clock for channel in channels if (clock := _candidate(channel, group, system))]
     if going := [clock for clock in clocks if clock.certain and _goes_on(clock.times, group)]:
-        _refuse_contradiction(going, where)
-        return _beside_stated(_going_on(going[0], group, where), group.step, where)
+        clock = _beside_others(_going_on(going[0], group, where), going[1:], where)
+        return _beside_stated(clock, group.step, where)
     for channel in channels:
         if channel.doubt:
             raise InputError(
@@ -173,22 +172,36 @@ def _read_clock(
     raise _no_time(group, system, where)
 
 
-def _refuse_contradiction(clocks: Sequence[Clock], where: str) -> None:
-    """Refuse clocks of one recording of which one is so many times as fast as another."""
-    for clock, other in combinations(clocks, 2):
-        spans = [float(np.nanmax(c.times) - np.nanmin(c.times)) for c in (clock, other)]
+def _beside_others(clock: Clock, others: Sequence[Clock], where: str) -> Clock:
+    """The clock, with what others of its recording say that differs; refuses other units."""
+    corrections = list(clock.corrections)
+    for one, other in combinations((clock, *others), 2):
+        spans = [float(np.nanmax(c.times) - np.nanmin(c.times)) for c in (one, other)]
         ratio = max(spans) / min(spans)
-        names = [f"'{c.channel}'" if c.channel else "times of the file" for c in (clock, other)]
-        rate = f"or --sample-rate '{(clock.times.size - 1) / spans[0]:.6g} Hz'"
+        names = [f"'{c.channel}'" if c.channel else "times of the file" for c in (one, other)]
+        rate = f"or --sample-rate '{(one.times.size - 1) / spans[0]:.6g} Hz'"
+        statement = (
+            f"{names[0]} in [{one.unit}] over {spans[0]:.6g} s, and {names[1]} in "
+            f"[{other.unit}] over {spans[1]:.6g} s"
+        )
         if ratio > _FACTOR:
             raise InputError(
                 where=where,
-                found=f"{names[0]} in [{clock.unit}] over {spans[0]:.6g} s, and {names[1]} in "
-                f"[{other.unit}] over {spans[1]:.6g} s, {ratio:.4g} times apart",
+                found=f"{statement}, {ratio:.4g} times apart",
                 expected="clocks of one recording that agree",
                 remedy=f"say which is right and in which unit, --column '{TIME}={other.channel}' "
-                + (f"or --column '{TIME}={clock.channel} [UNIT]'" if clock.channel else rate),
+                + (f"or --column '{TIME}={one.channel} [UNIT]'" if one.channel else rate),
             )
+        apart = abs(spans[0] - spans[1])
+        if one is clock and ratio > _DRIFT and apart > 2.0 * max(map(_tick, (one, other))):
+            corrections.append(f"{statement}; {names[0]} is taken")
+    return replace(clock, corrections=tuple(corrections))
+
+
+def _tick(clock: Clock) -> float:
+    """What a clock counts by: its shortest step [s]."""
+    steps = np.diff(clock.times[np.isfinite(clock.times)])
+    return float(steps[steps > 0.0].min(initial=math.inf))
 
 
 def _beside_stated(clock: Clock, step: float, where: str) -> Clock:

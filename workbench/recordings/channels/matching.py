@@ -160,7 +160,9 @@ def size_doubt(values: Vector, unit: str, signal: Signal, column: str) -> str:
     other = unit not in (signal.unit, signal.shown)
     fine = 0.0 < float(held.std()) < 0.2 * signal.noise
     moves = fine or (other and largest > 5.0 * signal.noise)
-    if ratio > _THOUSANDFOLD or (1e-7 < ratio < 1.0 / _THOUSANDFOLD and moves):
+    unusual = unit.startswith("m") and unit not in USUAL_UNITS.get(signal.unit, ())
+    mega = unusual and 1.0 / _THOUSANDFOLD < 1e9 * ratio < _THOUSANDFOLD  # mPa for MPa
+    if ratio > _THOUSANDFOLD or mega or (1e-7 < ratio < 1.0 / _THOUSANDFOLD and moves):
         return (
             f"its largest value, {largest:.4g} {signal.unit}, is {ratio:.3g} times the typical "
             f"{signal.scale:g} {signal.unit}; {confirms}"

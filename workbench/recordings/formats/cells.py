@@ -688,7 +688,9 @@ def read_group(
     labels, columns = _with_parts(*_join_day_and_clock(*_join_date_parts(labels, columns)))
     left: list[FileChannel] = []
     for i, cells in enumerate(columns):
-        how = labels[i][1] if is_said(labels[i][1]) else ""
+        round_brackets = re.search(r"\(([^()]+)\)$", labels[i][0])  # around what is no unit
+        statements = (labels[i][1], round_brackets[1] if round_brackets else "")
+        how = next(filter(is_said, statements), "")
         if _mostly(cells, is_stamp) and (channel := read_stamps(labels[i][0], cells, how)):
             stamps.append(channel)
             notes += [f"'{labels[i][0]}' holds {channel.doubt}"] * bool(channel.doubt)

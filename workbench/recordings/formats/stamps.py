@@ -93,6 +93,7 @@ _HOUR = 3600
 _QUARTER = 900
 _HALF_HOUR = 1800  # by which Lord Howe Island changes its clocks
 ORDERS = {"ymd": "year, month, day", "dmy": "day, month, year", "mdy": "month, day, year"}
+_OFFSET_ZONE = re.compile(r"(?:UTC|GMT)([+-])(\d\d?)(?::?00)?")
 # Hours that zones are ahead of UTC, by the letters that recorders write.
 _AHEAD = {
     **{"": 0, "Z": 0, "UTC": 0, "GMT": 0, "WET": 0, "WEST": 1, "BST": 1, "CET": 1, "MEZ": 1},
@@ -151,6 +152,8 @@ def _zone_known(zone: str | None) -> bool:
 
 
 def _zone(name: str) -> ZoneInfo | None:
+    if fixed := _OFFSET_ZONE.fullmatch(name):  # Etc/GMT-2 is two hours ahead
+        name = f"Etc/GMT{'-' if fixed[1] == '+' else '+'}{int(fixed[2])}"
     try:
         return ZoneInfo(name)
     except (ZoneInfoNotFoundError, ValueError, OSError):
@@ -197,7 +200,7 @@ def is_said(how: str) -> bool:
 def _read_statement(how: str) -> tuple[str, str, ZoneInfo | None]:
     """Order of dates, their format, and their zone, of what a user says."""
     words = how.split()
-    named = [word for word in words if word in ("UTC", "GMT") or ("/" in word and "%" not in word)]
+    named = [w for w in words if w.startswith(("UTC", "GMT")) or ("/" in w and "%" not in w)]
     zone = next((known for word in named if (known := _zone(word)) is not None), None)
     words = [word for word in words if zone is None or word not in named]
     text = " ".join(words)
