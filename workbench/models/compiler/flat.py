@@ -32,6 +32,7 @@ _MEMORY = 2 << 30
 _EXPORT = "export the model as an FMU from another Modelica tool, and use that FMU"
 # What the front end says, and what to do about it; the first that fits.
 _REMEDIES = (
+    (r"value of another type|type mismatch: expected `", "give it a value of its declared type"),
     (r"der\(\.\.\.\) must have exactly one", "name what is differentiated: e = ...; and der(e)"),
     (
         r"der\(\.\.\.\) must name a coordinate",
@@ -295,6 +296,8 @@ def _placed(library: Library, reached: Sequence[str], source: Class, text: str) 
     message = message.split(";")[0]
     if untyped := re.search(r'MissingEffectiveType \{ owner: VarName\("([^"]+)"\)', message):
         message = f"`{untyped[1]}`, of no known type, as is an array without elements"
+    if "binding type compatibility" in message:
+        message = "a component with a value of another type"
     if place := re.search(r" \[([^\[\]]+:\d+):\d+\]$", message):
         return place[1], message[: place.start()]
     quoted = re.findall(r"`([^`]+)`", message)
@@ -597,10 +600,19 @@ class _Reader:
             bound = attributes["binding"] is not None
             starts = elements(attributes["binding" if bound else "start"])
         starts = [None if start is None else substitute(start) for start in starts]
+        defaults = [0.0 if start is None else numeric(start, entry) for start in starts]
+        if beyond := [value for value in defaults if not math.isfinite(value)]:
+            raise self.arena.refuse(
+                f"'{entry['name']}' with a start of {beyond[0]:g} at the defaults of parameters",
+                entry,
+                "a finite number",
+                "correct the expression, or the parameters in it",
+            )
         fixed = attributes["fixed"] or [False]
         columns = zip(
             symbol.flat,
             starts,
+            defaults,
             numbers("min"),
             numbers("max"),
             numbers("nominal"),
@@ -611,7 +623,7 @@ class _Reader:
             FlatVariable(
                 name=s.name(),
                 symbol=s,
-                start=0.0 if start is None else numeric(start, entry),
+                start=default,
                 unit=attributes["unit"],
                 description=attributes["description"],
                 minimum=minimum,
@@ -623,7 +635,7 @@ class _Reader:
                 select=attributes["state_select"],
                 place=self.arena.place(entry),
             )
-            for s, start, minimum, maximum, nominal, is_fixed in columns
+            for s, start, default, minimum, maximum, nominal, is_fixed in columns
         ]
 
     def _equations(self, operations: Sequence[Mapping[str, Any]]) -> Iterator[tuple[ca.SX, str]]:
