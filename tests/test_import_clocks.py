@@ -418,8 +418,10 @@ def test_clocks_that_differ_by_more_than_a_drift_are_told(tmp_path, tank, faster
     rows = [f"{stamp};{900 * faster * k:.0f};1.{k % 7};2{k % 9}" for k, stamp in enumerate(stamps)]
     path = tmp_path / "a.csv"
     path.write_text("\n".join(["Date;Time [s];inflow [l/s];h [mm]", *rows]))
-    words = "'Time' in [s] over 63720 s, and 'Date' in [s] over 53100 s; 'Time' is taken"
+    words = "'Time' in [s] over 63720 s, and 'Date' in [s] over 53100 s; 'Time' is taken, "
+    words += "--column 'time=Date' takes the other"
     assert list(clock(path, tank).corrections) == [words] * told
+    assert not clock(path, tank, "Date").corrections
 
 
 def test_a_stated_rate_that_times_contradict_is_told(tmp_path, tank):

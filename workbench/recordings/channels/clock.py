@@ -194,7 +194,10 @@ def _beside_others(clock: Clock, others: Sequence[Clock], where: str) -> Clock:
             )
         apart = abs(spans[0] - spans[1])
         if one is clock and ratio > _DRIFT and apart > 2.0 * max(map(_tick, (one, other))):
-            corrections.append(f"{statement}; {names[0]} is taken")
+            corrections.append(
+                f"{statement}; {names[0]} is taken, --column '{TIME}={other.channel}' takes "
+                "the other"
+            )
     return replace(clock, corrections=tuple(corrections))
 
 
