@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.integrate import RK45, Radau
+from scipy.optimize import brentq
 
 from workbench.arrays import Matrix, Vector
 from workbench.errors import FMUError
@@ -340,24 +341,39 @@ class HybridSimulation:
         if not signs.size:
             return None
 
-        def changed(t: float, *, strictly: bool) -> bool:
+        def left(t: float) -> float:
+            """How far indicators are from a change, the nearest; below zero where one has."""
             self._place(t, x_at(t))
-            now = np.sign(self._fmu.event_indicators())
-            return bool(((now != signs) & ((now != 0.0) | (not strictly))).any())
+            now = self._fmu.event_indicators()
+            away = np.where(signs != 0.0, signs * now, np.where(now != 0.0, -np.abs(now), 1.0))
+            return float(np.nan_to_num(away, nan=-1.0).min())
 
         low, looks = begin, [float(t) for t in np.linspace(begin, end, _LOOKS + 1)[1:]]
-        if begin == self._event_at and not changed(looks[0], strictly=True):
+        if begin == self._event_at and left(looks[0]) >= 0.0:
             looks = [*self._early_looks(begin, looks[0], x_at), *looks]
         for high in looks:
-            strictly = changed(high, strictly=True)
-            if strictly or (high == end and changed(high, strictly=False)):
+            beyond = left(high)
+            if beyond < 0.0 or (high == end and beyond == 0.0):
                 break
             low = high
         else:
             return None
-        while high - low > 4.0 * np.spacing(max(abs(low), abs(high))):
+        strictly, spacing = beyond < 0.0, float(np.spacing(max(abs(low), abs(high))))
+        if strictly:
+            near, step = float(brentq(left, low, high, xtol=spacing)), 4.0 * spacing
+            while low < near < high:  # the root may be on either side of the change
+                low, high, near = (
+                    (low, near, near - step) if left(near) < 0.0 else (near, high, near + step)
+                )
+                step *= 2.0
+        while high - low > 4.0 * spacing:
             middle = 0.5 * (low + high)
-            low, high = (low, middle) if changed(middle, strictly=strictly) else (middle, high)
+            further = left(middle)
+            low, high = (
+                (low, middle)
+                if further < 0.0 or (further == 0.0 and not strictly)
+                else (middle, high)
+            )
         return high
 
     def _early_looks(self, begin: float, look: float, x_at) -> list[float]:  # type: ignore[no-untyped-def]
