@@ -20,6 +20,7 @@ from workbench.studies.fit.report import write_fmu
 from workbench.system.system import System
 
 from .built import build_text, machine_file, write_case
+from .edits import replaced
 from .schemas import check
 
 SYSTEM = machine_file("heated_block/system.toml")
@@ -149,7 +150,8 @@ def test_a_product_that_alone_is_told_is_named_with_its_direction(system, cases)
     (direction,) = outcome.directions
     assert set(direction.parts) == {"a", "b"}
     assert sorted(direction.parts.values()) == pytest.approx([-1.0, 1.0], abs=0.05)
-    assert "only their product" in str(direction)
+    first, second = direction.parts
+    assert str(direction).endswith(f"only their product {first}*{second} is identifiable")
     assert not outcome["a"].identified
     assert outcome["a"].low is None
     assert outcome["C"].identified
@@ -164,6 +166,26 @@ def test_a_parameter_that_no_output_shows_is_named(system, cases):
     outcome = fitted(system, cases[:1], "C", "G", "idle")
     assert [str(direction) for direction in outcome.directions] == ["idle: no output shows it"]
     assert outcome["C"].identified
+
+
+def test_parameters_that_no_output_shows_are_named_apart_and_keep_their_values(tmp_path):
+    # They move the temperature by 1e-12 of itself, as rounding does.
+    model = replaced(
+        machine_file("heated_block/Block.mo"),
+        ("parameter Real idle", "parameter Real spare = 3.0;\n  parameter Real idle"),
+        ("- G*T", "- G*T + 1e-11*(idle + spare)"),
+    )
+    build_text(tmp_path, model)
+    (tmp_path / "system.toml").write_text(SYSTEM)
+    columns = {"time [s]": TIME, "P [W]": power(1), "T [K]": measured(1)}
+    write_case(tmp_path / "cases" / "day1", columns, "Day 1")
+    system = wb.load_system(tmp_path)
+    day = wb.read_cases(tmp_path / "cases", system)
+    outcome = fitted(system, day, "C", "G", "idle", "spare", starts=4)
+    said = {"idle: no output shows it", "spare: no output shows it"}
+    assert {str(direction) for direction in outcome.directions} == said
+    assert outcome["spare"].value == 3.0
+    assert outcome["idle"].value == outcome["idle"].nominal
 
 
 def test_residuals_that_a_wrong_model_leaves_are_told(system, cases):

@@ -187,7 +187,7 @@ class Simulation:
                     return error
 
             best, moves = self._best_difference(tuple(column), moved, size, scale)
-            derivatives[:, :, q] = best.slope
+            derivatives[:, :, q] = best.slope if moves else 0.0  # of rounding alone
             unsure[q] = best.unsure if moves and best.unsure > _AGREES else 0.0
         return Derivatives(derivatives, unsure)
 

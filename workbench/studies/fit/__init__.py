@@ -689,12 +689,20 @@ class _Judgement:
         problem = self._problem
         jacobian, r = problem.jacobian(problem.best), problem.residuals_at_best
         bend = np.ones(r.size) if problem.loss == "linear" else (1.0 + r**2) ** -1.5
-        # Columns that are alike but for rounding are made the same.
         weighted = np.sqrt(bend)[:, None] * jacobian
-        norms = np.maximum(np.linalg.norm(weighted, axis=0), np.finfo(float).tiny)
-        left, alike, right = np.linalg.svd(weighted / norms, full_matrices=False)
-        parted = np.where(alike < _ROUNDING * alike[0], 0.0, alike)
-        _, singular, axes = np.linalg.svd(left * parted @ right * norms, full_matrices=False)
+        # What no residual shows is a direction by itself, and not one with others of its kind.
+        moves = weighted.any(axis=0)
+        problem.best = np.where(moves, problem.best, problem.start)
+        count, own = np.count_nonzero(moves), weighted[:, moves]
+        # Columns that are alike but for rounding are made the same.
+        norms = np.maximum(np.linalg.norm(own, axis=0), np.finfo(float).tiny)
+        left, alike, right = np.linalg.svd(own / norms, full_matrices=False)
+        parted = np.where(alike < _ROUNDING * alike.max(initial=0.0), 0.0, alike)
+        singular, axes = np.zeros(moves.size), np.zeros((moves.size, moves.size))
+        _, singular[:count], axes[:count, moves] = np.linalg.svd(
+            left * parted @ right * norms, full_matrices=False
+        )
+        axes[np.arange(count, moves.size), np.flatnonzero(~moves)] = 1.0
         # A direction that is not shown at all is no uncertainty of what is hardly a part of it, by
         # the noise of derivatives.
         shown, size = np.count_nonzero(parted), np.abs(axes)

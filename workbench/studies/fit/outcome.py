@@ -60,8 +60,8 @@ class Direction:
             first, second = self.parts.values()
             form = "product" if first * second < 0.0 else "ratio"
             sign = "*" if first * second < 0.0 else "/"
-            return f"{' and '.join(names)}: only their {form} {names[0]}{sign}{names[1]} is "
-            "identifiable"
+            term = f"{form} {names[0]}{sign}{names[1]}"
+            return f"{' and '.join(names)}: only their {term} is identifiable"
         return f"{', '.join(names)}: they compensate each other ({moves})"
 
 
