@@ -484,7 +484,7 @@ class Outcome:
         compare = self.system.comparison
         return {
             "measure": _MEASURE.format(
-                span=duration(compare.block if self.turns else compare.lasting)
+                span=duration(compare.block if gain.fast else compare.lasting)
             ),
             "before": gain.before,
             "after": gain.after,
@@ -674,7 +674,8 @@ def recording_figures(outcome: Outcome) -> list[CaseFigure]:
     system, diagnosis = outcome.system, outcome.diagnosis
     added = [cause.effect.name for cause in diagnosis.causes] or diagnosis.partial
     extension = f"with {', '.join(added)}" if added else ""
-    span = FAST if outcome.turns else lasting_blocks(system)
+    fast = diagnosis.gain is not None and diagnosis.gain.fast
+    span = FAST if fast else lasting_blocks(system)
     pairs = list(zip(outcome.residuals, outcome.cases, strict=True))
     pairs.sort(key=lambda pair: -_clearness(pair[0], span, bool(diagnosis.causes)))
     return [recording_figure(recording, case, system, extension, span) for recording, case in pairs]

@@ -722,8 +722,8 @@ def _terms(
         "Prediction error": f"Measured minus predicted, in means over {block}. The model is "
         f"simulated from {_driven(system)}{along if led else ''}. Shown are running "
         f"means over {duration(lasting_blocks(system) * compare.block)}, or over {block} where a "
-        "cause turns with a shaft; the band is two standard deviations of what noise alone leaves "
-        "in them.",
+        "cause turns with a shaft or errors swing; the band is two standard deviations of what "
+        "noise alone leaves in them.",
     }
     if _balanced(figures):
         terms["Residuals"] = (

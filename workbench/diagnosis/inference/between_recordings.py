@@ -93,21 +93,30 @@ def what_differs(
             deviation = float(changes.std(ddof=1) / abs(value + changes.mean()))
             explaining.append(DifferingParameter(name, deviation, removed))
     local = fit.unknowns.local
-    states = [name for name in fit.unknowns.starting if name not in fit.recorded]
+    held = fit.by_held_starts(lin)
+    slopes = {
+        name: [system.P[:, j] for system in joint.systems] for j, name in enumerate(local)
+    } | held
+    scales = {**local, **dict.fromkeys(held, 1.0)}
+    states = [name for name in fit.unknowns.starting if name not in fit.recorded] + [*held]
     tolerances = [name for name in local if name not in fit.unknowns.starting]
     together = [states] if len(states) > 1 else []
     for names in [*([name] for name in (*tolerances, *states)), *together]:
-        at, free = [[*local].index(name) for name in names], joint
-        for j in at:
-            free = free.joined(("", f"own {j}"), [system.P[:, j] for system in joint.systems])
-        own = [[len(joint.shared) + k] for k in range(len(at))]
+        free = joint
+        for name in names:
+            free = free.joined(("", f"own {name}"), slopes[name])
+        own = [[len(joint.shared) + k] for k in range(len(names))]
         changes, steps = _own_changes(free, own, _FREE)
         removed = 1.0 - _systematic(fit, lin, free, steps) / before
+        known = [[*local].index(name) for name in names if name in local]
         moved = [
-            system.deviations[at] + system.local(step)[at] + change
+            np.pad(
+                system.deviations[known] + system.local(step)[known], (0, len(names) - len(known))
+            )
+            + change
             for system, step, change in zip(free.systems, steps, changes.T, strict=True)
         ]
-        deviations = np.sqrt(np.square(moved).mean(axis=0)) * [local[name] for name in names]
+        deviations = np.sqrt(np.square(moved).mean(axis=0)) * [scales[name] for name in names]
         # Several, where they explain most of what one of them leaves.
         least = 1.0 - _MOST * min([1.0, *(1.0 - own.removed for own in explaining)])
         needed = _MOST if len(names) == 1 else least

@@ -29,6 +29,19 @@ class CrossValidation:
         self._fit = fit
         self._known: dict[int, tuple[FittedModel, list[Matrix]]] = {}
 
+    def fast(self, before: FittedModel, after: FittedModel) -> bool:
+        """Whether blocks, and not means over a lasting time, show what two fits differ by.
+
+        What turns with a shaft does, and what swings so fast that its means are less than itself.
+        """
+        if any(effect.order_locked for effect in after.active):
+            return True
+        blocks, means = (
+            np.mean([own.mean() for own in self._of_means(after, fast=fast, beside=before)])
+            for fast in (True, False)
+        )
+        return bool(means < blocks)
+
     def squares(self, fitted: FittedModel, *, fast: bool) -> Vector:
         """Mean square of errors of each recording, fitted to the others, (K,); noise leaves 1.
 

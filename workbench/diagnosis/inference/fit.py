@@ -30,16 +30,18 @@ from workbench.diagnosis.inference.quadratic import (
     Key,
     Quadratic,
     RecordingSystem,
+    minimum,
     part_edges,
 )
 from workbench.diagnosis.inference.thresholds import Thresholds, of_system
 from workbench.diagnosis.inference.unknowns import SENSOR, Unknowns
 from workbench.diagnosis.simulation.prediction import Variation
 from workbench.diagnosis.simulation.residual_model import Item, ResidualModel, Result
-from workbench.diagnosis.simulation.simulator import WhitenedResiduals
+from workbench.diagnosis.simulation.simulator import FINEST, WhitenedResiduals
 from workbench.errors import FMUError, InputError
 from workbench.models.fmu import EventError
 from workbench.recordings.case import Case
+from workbench.system.registry import open_model
 from workbench.system.units import BAND
 
 # A single recording is held out in tenths. R. Kohavi (1995), Proc. 14th IJCAI, 1137-1143.
@@ -50,6 +52,9 @@ _WORTH = 1.0  # of chi-squared: what noise moves it by
 # Times what derivatives promise that steps may gain, since laws bend: up to twice as much is seen.
 _BENT = 3.0
 _ROUNDED = 1e-9  # of a level that is held
+# Of half of an interval, that half a step may move a size by. Steps are of second order: the size
+# is off by 4/3 of that, and 94.2 of 100 intervals hold the truth in place of 95.
+_MOVED = 0.1
 _TURN = 0.5  # [rad] of a phase in one step, within which a sine is nearly straight
 
 _LOCAL = ""  # in place of an effect, of what differs between recordings
@@ -198,9 +203,35 @@ class Fit:
         """Whether whole simulations are fitted, which nothing corrects."""
         return self._simulations.free
 
-    def settle(self, point: Point) -> bool:
-        """Take finer steps if a point needs them; whether it does, so that fits are made anew."""
-        return not self.free and self._simulations.settle(self.unknowns.values(point))
+    def settle(
+        self, lin: LinearizedPoint, active: Sequence[Effect], reaches: Mapping[Key, float]
+    ) -> bool:
+        """Take finer steps if a point needs them; whether it does, so that fits are made anew.
+
+        Parameters
+        ----------
+        reaches : half of the interval of sizes, of which half a step may move them by a share.
+        """
+        if self.free:
+            return False
+        values, simulations = self.unknowns.values(lin.point), self._simulations
+        if simulations.settle(values):
+            return True
+        lin = self.linearise(lin, active)
+        joint, parts = self.quadratics(lin), simulations.simulated.parts
+        at = [joint.shared.index(key) for key in reaches]
+        most = _MOVED * np.array([*reaches.values()])
+        coarse = minimum(joint.total())[at]
+        while parts < FINEST:
+            errors = [own.errors for own in simulations.in_steps(values, 2 * parts)]
+            moved = tuple(
+                replace(own, errors=finer) for own, finer in zip(lin.residuals, errors, strict=True)
+            )
+            fine = minimum(self.quadratics(replace(lin, residuals=moved)).total())[at]
+            if np.all(np.abs(fine - coarse) <= most):
+                break
+            parts, coarse = 2 * parts, fine
+        return simulations.take_steps(parts)
 
     @property
     def restarted(self) -> list[int]:
@@ -281,6 +312,24 @@ class Fit:
         more = self._simulations.derivatives(values, list(missing.values()), sizes)
         return self.hide(lin.extended(missing, more))
 
+    def by_held_starts(self, lin: LinearizedPoint) -> dict[str, list[Vector]]:
+        """Weighed derivatives in each recording by starts that are not fitted, by state.
+
+        A library says itself how its states begin.
+        """
+        with open_model(self._simulations.system) as model:
+            fitted = {*self.unknowns.local, *self.recorded}
+            held = [name for name in model.states if name not in fitted]
+        if not held:
+            return {}
+        values = self.unknowns.values(lin.point)
+        columns = self._simulations.derivatives(values, [Variation((name,)) for name in held])
+        weighed = [
+            _weights(lin, own)[:, None] * more
+            for own, more in zip(lin.residuals, columns, strict=True)
+        ]
+        return {name: [more[:, j] for more in weighed] for j, name in enumerate(held)}
+
     def modulated(self, lin: LinearizedPoint, effect: Effect) -> tuple[LinearizedPoint, list[Key]]:
         """Add derivatives by the size of an effect as it goes with what it should not depend on.
 
@@ -331,7 +380,7 @@ class Fit:
         residuals = lin.residuals[k]
         b, m = residuals.errors.shape
         q = residuals.rest.size
-        weight = np.append(np.tile(1.0 / np.sqrt(lin.variance_factors), b), np.ones(q))
+        weight = _weights(lin, residuals)
         at = {key: residuals.jacobian[:, j] * weight for j, key in enumerate(lin.keys)}
         J, P = np.zeros((b * m + q, len(shared))), []
         for j, key in enumerate(shared):
@@ -546,3 +595,9 @@ class Fit:
         if parameter in effect.sizes:
             return low, high
         return max(low, 0.5 * old), min(high, 2.0 * old)
+
+
+def _weights(lin: LinearizedPoint, residuals: WhitenedResiduals) -> Vector:
+    """(b*m + q,) Over what is wrong with each channel; readings at rest as they are."""
+    own = np.tile(1.0 / np.sqrt(lin.variance_factors), len(residuals.errors))
+    return np.append(own, np.ones(residuals.rest.size))

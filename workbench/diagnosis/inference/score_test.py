@@ -1,6 +1,6 @@
 """Candidates about a point that is fitted: what each would explain, linearised."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -172,17 +172,22 @@ class ScoreTest:
         known: Matrix = covariance(add([*stops, prior]).N)[:count, :count]
         return known
 
-    def moved(self) -> Vector:
+    def moved(self, twins: Collection[str] = ()) -> Vector:
         """(p,) How far known unknowns move beside a candidate that is no cause, at most.
 
         Of those that matter and are significant. What forms of laws may fake is no cause, but may
         be there; then what was found stands for a part of it.
+
+        Parameters
+        ----------
+        twins : names of effects that explain in place of a cause, and are named so: beside it, one
+            would share its size with it in any way.
         """
         count, furthest = len(self._known), np.zeros(len(self._known))
         stops, prior = self._select({})
         alone = minimum(add([*stops, prior]))[:count]
         for effect, shape in self._candidates:
-            if effect.order_locked:
+            if effect.order_locked or effect.name in twins:
                 continue
             at = self.joint.shared.index((variant(effect, shape), effect.size))
             stops, prior = self._select({at: np.ones(len(self._stops))}, effect.name)

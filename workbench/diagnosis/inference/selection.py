@@ -176,7 +176,7 @@ def _idle(
     if len(best.active) < 2:
         return None
     shares = {
-        effect: validation.explained(reduced, best, fast=effect.order_locked)[0]
+        effect: validation.explained(reduced, best, fast=validation.fast(reduced, best))[0]
         for effect, reduced in less.items()
     }
     weakest = min(shares, key=lambda effect: shares[effect])

@@ -139,8 +139,8 @@ class Cause:
 class Gain:
     """Prediction error on held-out stops; 1 is noise alone.
 
-    Root mean square of means over a lasting time, or over a block where a cause turns with a shaft,
-    in units of the noise of such a mean.
+    Root mean square of means over a lasting time, or over a block where that shows what causes
+    explain, in units of the noise of such a mean.
     """
 
     # before, after: of the nominal and of the extended model, with levels calibrated alike
@@ -150,6 +150,7 @@ class Gain:
     low: float
     high: float
     recordings: Mapping[str, tuple[float, float]]  # (before, after) by name
+    fast: bool = False  # whether it is of blocks: causes turn with a shaft, or errors swing
 
     @property
     def text(self) -> str:
@@ -252,7 +253,13 @@ def conclude(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnos
     """Diagnose a set of recordings, in steps that what is found needs."""
     diagnosis = _concluded(fit, catalogue, report)
     best = diagnosis.best
-    if best.active and not diagnosis.interrupted and fit.settle(best.point):
+    reaches = {
+        (cause.effect.name, parameter): 0.5 * (interval.high - interval.low)
+        for cause in diagnosis.causes
+        for parameter, interval in cause.parameters.items()
+    }
+    settling = best.active and not diagnosis.interrupted
+    if settling and fit.settle(best.linearised, best.active, reaches):
         report("again, in the finer steps that what was found needs")
         return conclude(fit, catalogue, report)
     return diagnosis
@@ -303,7 +310,7 @@ def _judged(
     causes: list[Cause] = []
     rivals: tuple[FittedModel, ...] = ()
     if verdict in ("found", "partly explained"):
-        fast = any(effect.order_locked for effect in best.active)
+        fast = chosen.validation.fast(base, best)
         noise_alone = chosen.validation.noise_alone(best, fast=fast)
         causes = [
             _cause(fit, chosen, effect, noise_alone=noise_alone, whole=verdict == "found")
@@ -444,7 +451,7 @@ def _within_bounds(
     if beyond(needed.best, best) > fit.decides.form:
         return chosen, None
     if len(kept) > 1:
-        fast = any(effect.order_locked for effect in kept)
+        fast = needed.validation.fast(needed.base, needed.best)
         removed = needed.validation.explained(needed.base, needed.best, fast=fast)[0]
         reasons = [
             f"{effect.label} of {effect.name} is at its bound; "
@@ -494,7 +501,7 @@ def _objections(
     whole : whether they leave no more than a cause may, of what they were fitted to.
     """
     base, best, validation = chosen.base, chosen.best, chosen.validation
-    fast = any(effect.order_locked for effect in best.active)
+    fast = validation.fast(base, best)
     worse = [
         f"{name} is predicted worse ({gain.recordings[name][0]:.1f} to "
         f"{gain.recordings[name][1]:.1f} times the noise)"
@@ -509,7 +516,10 @@ def _objections(
     if len(best.active) == 1:
         enough = validation.removed(base, best, fast=fast) >= min(_HALF, most)
     else:
-        shares = [validation.explained(less, best, fast=fast)[0] for less in chosen.less.values()]
+        shares = [
+            validation.explained(less, best, fast=validation.fast(less, best))[0]
+            for less in chosen.less.values()
+        ]
         enough = min(shares, default=0.0) >= most
     if not whole or not (noise or enough):
         left.append(f"{gain.after:.1f} times the noise remains in cross-validation")
@@ -574,7 +584,7 @@ def _passed_over(
         and model is not chosen.best
         and beyond(chosen.best, model) > fit.decides.needed
         and model.linearised.variance_factors.max() < fit.decides.wrong
-        and chosen.validation.noise_alone(model, fast=model.active[0].order_locked)
+        and chosen.validation.noise_alone(model, fast=chosen.validation.fast(chosen.base, model))
     ]
     return min(able, key=lambda model: model.misfit, default=None)
 
@@ -589,7 +599,7 @@ def _nearest(
     base, best, validation = chosen.base, chosen.best, chosen.validation
     nearest = []
     for names, model in fits.items():
-        fast = any(effect.order_locked for effect in model.active)
+        fast = validation.fast(base, model)
         removed = validation.explained(base, model, fast=fast)[0]
         if removed > 0.0:
             reasons = objections if model is best else _reasons(fit, chosen, model, fast=fast)
@@ -704,7 +714,7 @@ def _share(before: FittedModel, after: FittedModel) -> float:
 def _gain(fit: Fit, chosen: Selection) -> Gain:
     from scipy.stats import bootstrap  # takes its time to load
 
-    fast = any(effect.order_locked for effect in chosen.best.active)
+    fast = chosen.validation.fast(chosen.base, chosen.best)
     before, after = (
         chosen.validation.squares(fitted_model, fast=fast)
         for fitted_model in (chosen.base, chosen.best)
@@ -725,6 +735,7 @@ def _gain(fit: Fit, chosen: Selection) -> Gain:
             name: (float(np.sqrt(b)), float(np.sqrt(a)))
             for name, b, a in zip(fit.tests, before, after, strict=True)
         },
+        fast=fast,
     )
 
 
@@ -775,8 +786,9 @@ def _apart_by_starts(fit: Fit, effect: Effect) -> list[str]:
 def _cause(fit: Fit, chosen: Selection, effect: Effect, *, noise_alone: bool, whole: bool) -> Cause:
     """A cause with intervals, which what is left widens, or the form that noise may hide."""
     best, trial, unknowns = chosen.best, chosen.trial, fit.unknowns
-    sigma = np.hypot(np.sqrt(np.diag(trial.covariance())), trial.moved())
-    fast, form_share = effect.order_locked, _FORM
+    moved = trial.moved(chosen.twins[effect])
+    sigma = np.hypot(np.sqrt(np.diag(trial.covariance())), moved)
+    fast, form_share = chosen.validation.fast(chosen.less[effect], best), _FORM
     if noise_alone:
         more = hidden_by_noise(fit, best, effect)
     else:

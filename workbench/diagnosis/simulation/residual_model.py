@@ -197,14 +197,24 @@ class ResidualModel:
 
         Friction that was found is stiff near standstill, where the nominal model has none.
         """
-        before = self.simulated.parts
-        parts = settled_parts(self._simulator(self.simulated), points, before)
-        if parts == before:
+        parts = settled_parts(self._simulator(self.simulated), points, self.simulated.parts)
+        return self.take_steps(parts)
+
+    def take_steps(self, parts: int) -> bool:
+        """Take so many steps of a sample time; whether they are others than so far."""
+        if parts == self.simulated.parts:
             return False
         self.simulated = self.simulated._replace(parts=parts)
         every = self.simulated._replace(recordings=tuple(form for form, _ in self._forms))
         self._pool = self._open.enter_context(self._workers_with(every))
         return True
+
+    def in_steps(
+        self, points: Sequence[Mapping[str, float]], parts: int
+    ) -> list[WhitenedResiduals]:
+        """As `at`, in so many steps of a sample time."""
+        own = self._simulator(self.simulated._replace(parts=parts))
+        return [own.at(k, values) for k, values in enumerate(points)]
 
     def at(self, points: Sequence[Mapping[str, float]]) -> list[WhitenedResiduals]:
         """Errors of every recording at its own point.

@@ -48,7 +48,7 @@ _DELAY_STEP = 1e-3  # of the difference, over the delay's spread; errors are lin
 _DIFFERENCE = 1e-4  # step over a typical size: far above rounding, far below what bends
 _SMALLER = 8  # times that it is made ten times smaller: then it is near rounding
 _FURTHEST = 1e100  # of an error and its derivatives: beyond, squares and products are no numbers
-_FINEST = 32  # steps of a sample time
+FINEST = 32  # steps of a sample time
 _CUT = 1e-12  # share, by which no reading differs
 _STRAIGHTENED = 2  # runs, of which each leads the next
 _DRAWS = 12  # of the noise of inputs: their variance is known to two fifths
@@ -637,7 +637,7 @@ def settled_parts(
         return simulator.stepped(parts).errors(points)
 
     coarse = errors(parts)
-    while parts < _FINEST:
+    while parts < FINEST:
         fine = errors(2 * parts)
         moved = [np.square(a - b).sum(axis=0) for a, b in zip(fine, coarse, strict=True)]
         wrong = [np.square(a).sum(axis=0) for a in fine]
