@@ -359,7 +359,7 @@ class HybridSimulation:
         else:
             return None
         strictly, spacing = beyond < 0.0, float(np.spacing(max(abs(low), abs(high))))
-        if strictly:
+        if strictly and left(low) >= 0.0:
             near, step = float(brentq(left, low, high, xtol=spacing)), 4.0 * spacing
             while low < near < high:  # the root may be on either side of the change
                 low, high, near = (

@@ -175,27 +175,27 @@ def _read_clock(
 def _beside_others(clock: Clock, others: Sequence[Clock], where: str) -> Clock:
     """The clock, with what others of its recording say that differs; refuses other units."""
     corrections = list(clock.corrections)
-    for one, other in combinations((clock, *others), 2):
-        spans = [float(np.nanmax(c.times) - np.nanmin(c.times)) for c in (one, other)]
+    for first, second in combinations((clock, *others), 2):
+        spans = [float(np.nanmax(c.times) - np.nanmin(c.times)) for c in (first, second)]
         ratio = max(spans) / min(spans)
-        names = [f"'{c.channel}'" if c.channel else "times of the file" for c in (one, other)]
-        rate = f"or --sample-rate '{(one.times.size - 1) / spans[0]:.6g} Hz'"
+        names = [f"'{c.channel}'" if c.channel else "times of the file" for c in (first, second)]
+        rate = f"or --sample-rate '{(first.times.size - 1) / spans[0]:.6g} Hz'"
         statement = (
-            f"{names[0]} in [{one.unit}] over {spans[0]:.6g} s, and {names[1]} in "
-            f"[{other.unit}] over {spans[1]:.6g} s"
+            f"{names[0]} in [{first.unit}] over {spans[0]:.6g} s, and {names[1]} in "
+            f"[{second.unit}] over {spans[1]:.6g} s"
         )
         if ratio > _FACTOR:
             raise InputError(
                 where=where,
                 found=f"{statement}, {ratio:.4g} times apart",
                 expected="clocks of one recording that agree",
-                remedy=f"say which is right and in which unit, --column '{TIME}={other.channel}' "
-                + (f"or --column '{TIME}={one.channel} [UNIT]'" if one.channel else rate),
+                remedy=f"say which is right and in which unit, --column '{TIME}={second.channel}' "
+                + (f"or --column '{TIME}={first.channel} [UNIT]'" if first.channel else rate),
             )
         apart = abs(spans[0] - spans[1])
-        if one is clock and ratio > _DRIFT and apart > 2.0 * max(map(_tick, (one, other))):
+        if first is clock and ratio > _DRIFT and apart > 2.0 * max(map(_tick, (first, second))):
             corrections.append(
-                f"{statement}; {names[0]} is taken, --column '{TIME}={other.channel}' takes "
+                f"{statement}; {names[0]} is taken, --column '{TIME}={second.channel}' takes "
                 "the other"
             )
     return replace(clock, corrections=tuple(corrections))
