@@ -289,3 +289,15 @@ def test_the_ends_of_a_clear_swing_are_no_spikes(heater):
     values = NOISE * (20.0 * swing + noise)
     values[[100, 731, 1502]] += NOISE * np.array([60.0, -60.0, 60.0])
     assert list(np.flatnonzero(outliers(values, sensor, SOUND))) == [100, 731, 1502]
+
+
+@pytest.mark.parametrize("decays", [4.0, 10.0])
+def test_what_jumps_and_decays_as_the_output_of_a_controller_is_no_wrong_sample(decays, heater):
+    """Of 500 times the noise, with time constants in samples; beside one that is wrong."""
+    sensor = heater.signals["T"]
+    values = NOISE * np.random.default_rng(1).standard_normal(2000)
+    for first in range(100, 1900, 150):
+        values[first:] += 500.0 * NOISE * np.exp(-np.arange(2000.0 - first) / decays)
+    assert not outliers(values, sensor, SOUND).any()
+    values[177] += 40.0 * NOISE
+    assert list(np.flatnonzero(outliers(values, sensor, SOUND))) == [177]

@@ -20,6 +20,10 @@ _FEW = 6  # samples; three fourth differences have no median to speak of
 _ORDER = 6
 # Share of equal samples, beyond what rounding makes, from which a channel does repeat itself.
 _OFTEN = 0.2
+# Share of its way out by which a wrong sample comes back at least. What jumps and then decays, as a
+# controller's output does, comes back in its first sample by the square of one over the samples of
+# its time constant; from three on that is less.
+_BACK = 0.1
 _MOVED = 0.5  # of what second differences say: noise comes below in a thousandth of 20 samples
 # Steps in a row of another length that are another rate. Of samples lost at random, three in ten,
 # steps of three or more have a share of 0.09, so many in a row 5e-7: once in 20 recordings of 1e5.
@@ -101,7 +105,9 @@ def _out_and_back(values: Vector, mask: Mask, scale: Vector, sound: Soundness) -
     kept = np.zeros_like(mask)
     for first, end in runs(mask):
         sides = [side for side in (before[first], after[end - 1]) if np.isfinite(side)]
+        low, high = sorted(np.abs(sides)) if len(sides) == 2 else (1.0, 1.0)
         leaves = min(sides, default=0.0) > 1.0 or max(sides, default=0.0) < -1.0
+        leaves = leaves and low > _BACK * high
         kept[first:end] = (
             leaves and _rough(values, first, end) > sound.held * scale[first:end].min()
         )

@@ -39,6 +39,7 @@ from workbench.diagnosis.simulation.prediction import Predictor, Variation
 from workbench.diagnosis.simulation.tangent import Tangent
 from workbench.errors import FMUError
 from workbench.models.fmu import FMU, EventError
+from workbench.system.parts import AT_REST
 from workbench.system.registry import open_file
 from workbench.system.system import System
 
@@ -379,9 +380,15 @@ class Simulator:
                     continue
                 if np.all(np.abs(moved - simulated).max(axis=0) <= scales):
                     return small, moved
+        unstable = (
+            ". If it is unstable, say in [points.design] of the system file where it works: "
+            "outputs correct the run by what holds there"
+        )
         raise FMUError(
             f"{self._fmu.called}: no derivative by {name} along {self._recordings[number].name}: "
             f"however little it changes, the model cannot be evaluated, or its signals jump"
+            + unstable
+            * (not self._free and self._system.design == AT_REST)
         )
 
     def weighed(self, number: int, values: Mapping[str, float]) -> Samples:
