@@ -31,8 +31,11 @@ _FACTORS = (1.0, 1.0 / 16.0, 1.0 / 256.0, 16.0)
 # Of a derivative, by which it may be wrong: Gauss-Newton steps and intervals are, by as much.
 _AGREES = 0.01
 _AS_GOOD = 2.0  # times the disagreement of before, at another point
-# Of an output's size, below which no sensor shows what a step does.
-_SHOWN = 1e-6
+# Of a derivative, by which slopes of both sides differ where errors of integration alone move the
+# outputs: they are independent, and differ by their size.
+_APART = 0.5
+# Of an output's size, below which no sensor shows what a step does; and what rounding adds up to.
+_SHOWN, _ROUNDED = 1e-6, 1e-12
 
 
 class Drive(NamedTuple):
@@ -186,9 +189,10 @@ class Simulation:
                 except FMUError as error:
                     return error
 
-            best, moves = self._best_difference(tuple(column), moved, size, scale)
-            derivatives[:, :, q] = best.slope if moves else 0.0  # of rounding alone
-            unsure[q] = best.unsure if moves and best.unsure > _AGREES else 0.0
+            best, most = self._best_difference(tuple(column), moved, size, scale)
+            noise = most < _ROUNDED or (most < _SHOWN and best.unsure > _APART)
+            derivatives[:, :, q] = 0.0 if noise else best.slope
+            unsure[q] = best.unsure if most > _SHOWN and best.unsure > _AGREES else 0.0
         return Derivatives(derivatives, unsure)
 
     def _best_difference(
@@ -197,8 +201,8 @@ class Simulation:
         moved: Callable[[float], Matrix | FMUError],
         size: float,
         scale: Vector,
-    ) -> tuple["_Difference", bool]:
-        """The slope whose halves agree best, and whether any step moves an output.
+    ) -> tuple["_Difference", float]:
+        """The slope whose halves agree best, and the largest move of an output by any step.
 
         The step that was best before is tried first, and is good enough if it is as good again.
         """
@@ -218,7 +222,7 @@ class Simulation:
             raise refused
         factor, best = min(trials.items(), key=lambda trial: trial[1].unsure)
         self._best[column] = factor, best.unsure
-        return best, max(trial.moved for trial in trials.values()) > _SHOWN
+        return best, max(trial.moved for trial in trials.values())
 
     def values(
         self, drive: Drive, values: Mapping[str, float], names: Sequence[str]
