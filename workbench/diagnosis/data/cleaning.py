@@ -105,9 +105,8 @@ def _out_and_back(values: Vector, mask: Mask, scale: Vector, sound: Soundness) -
     kept = np.zeros_like(mask)
     for first, end in runs(mask):
         sides = [side for side in (before[first], after[end - 1]) if np.isfinite(side)]
-        low, high = sorted(np.abs(sides)) if len(sides) == 2 else (1.0, 1.0)
         leaves = min(sides, default=0.0) > 1.0 or max(sides, default=0.0) < -1.0
-        leaves = leaves and low > _BACK * high
+        leaves = leaves and min(map(abs, sides)) > _BACK * max(map(abs, sides))
         kept[first:end] = (
             leaves and _rough(values, first, end) > sound.held * scale[first:end].min()
         )

@@ -90,7 +90,7 @@ class Samples:
 
     @cached_property
     def _filters(self) -> dict[int, tuple[Vector, Vector, Vector]]:
-        """Numerator, denominator and state at rest of the modes, as digital filters; that show."""
+        """Numerator, denominator and state at rest of digital filters, of modes that show."""
         from scipy.signal import lfiltic  # takes its time, and little else needs it
 
         h = float(np.median(np.diff(self.time)))
