@@ -208,6 +208,26 @@ def test_a_clock_that_is_set_right_leaves_readings_the_noise_they_have(share):
     assert abs(np.mean(errors[inside])) < 5e-3
 
 
+def test_errors_of_blocks_are_means_of_the_samples_that_a_channel_has():
+    rng = np.random.default_rng(1)
+    whole = ready(noisy(1))
+    samples = replace(whole, measured=rng.uniform(size=whole.measured.shape) < 0.7)
+    errors = rng.standard_normal((*samples.y.shape, 2))
+    channels = np.einsum("cj,njp->ncp", samples.slopes, errors)
+    means = samples.channels(errors)
+    for b, (first, end) in enumerate(samples.blocks):
+        for c, has in enumerate(samples.measured[first:end].T):
+            assert means[b, c] == pytest.approx(channels[first:end, c][has].mean(axis=0))
+
+
+def test_rates_at_uneven_samples_are_those_of_numpy():
+    rng = np.random.default_rng(1)
+    samples = ready(noisy(1))
+    samples = replace(samples, time=np.cumsum(rng.uniform(0.5, 1.5, samples.time.size)))
+    values = rng.standard_normal((samples.time.size, 3))
+    assert samples.rate(values) == pytest.approx(np.gradient(values, samples.time, axis=0))
+
+
 def test_spikes_are_set_aside_with_their_blocks():
     spikes = (1503, 2407, 3801)
     samples = ready(noisy(1, spikes))
