@@ -200,6 +200,49 @@ def test_a_refusal_says_what_helps_there(body, remedy, tmp_path):
         make_explicit(flatten(library(tmp_path, f"model M {body} end M;"), "Lib.M"))
 
 
+def test_each_element_of_an_array_has_its_own_unit(tmp_path):
+    """The front end keeps no unit of an array that has one for each element."""
+    body = (
+        'type V = Real[2](unit={"A", "V"});\n'
+        'model B Real x[2](unit={"m", "s"}, each start=1, each fixed=true); V v;\n'
+        "equation der(x)=-x; v=x; end B;\n"
+        'model M B b; B c[2](x(unit={{"kg", "N"}, {"J", "W"}}), v(each unit={"K", "Pa"}));\n'
+        'parameter Real k[2,2](unit={{"m", "s"}, {"kg", "A"}})={{1, 2}, {3, 4}};\n'
+        "output Real y=b.x[1]+b.v[1]+c[1].v[1]+c[2].v[2]+k[1,1]; end M;"
+    )
+    flat = flatten(library(tmp_path, body), "Lib.M")
+    variables = [*flat.differentiated, *flat.algebraic, *flat.parameters]
+    units = {v.name: v.unit for v in variables if v.unit}
+    assert units == {
+        **{"b.x[1]": "m", "b.x[2]": "s", "b.v[1]": "A", "b.v[2]": "V"},
+        **{"c[1].x[1]": "kg", "c[1].x[2]": "N", "c[2].x[1]": "J", "c[2].x[2]": "W"},
+        **{f"c[{i}].v[{k + 1}]": unit for i in (1, 2) for k, unit in enumerate(("K", "Pa"))},
+        **{"k[1,1]": "m", "k[1,2]": "s", "k[2,1]": "kg", "k[2,2]": "A"},
+    }
+
+
+def test_units_of_an_array_are_as_many_as_its_elements(tmp_path):
+    body = 'model M output Real y[2](unit={"m", "s", "kg"})={1, 2}; end M;'
+    with pytest.raises(InputError, match=r"'y' with units .*an array of 2"):
+        flatten(library(tmp_path, body), "Lib.M")
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_an_fmu_refuses_a_parameter_that_makes_a_start_infinite(fmi, tmp_path):
+    body = (
+        "model M parameter Real a=4; output Real x(start=sqrt(a),fixed=true); equation der(x)=1; "
+        "end M;"
+    )
+    fmu = tmp_path / "M.fmu"
+    compiler.build(library(tmp_path, body), "Lib.M", fmu, fmi=fmi, platforms=[compiler.native()])
+    for interface in ("ModelExchange", "CoSimulation"):
+        run = {"fmi_type": interface, "stop_time": 1.0, "output": ["x"]}
+        result = fmpy.simulate_fmu(str(fmu), start_values={"a": 9.0}, **run)
+        assert result["x"][[0, -1]] == pytest.approx([3.0, 4.0])
+        with pytest.raises(fmpy.fmi1.FMICallException, match="ExitInitializationMode"):
+            fmpy.simulate_fmu(str(fmu), start_values={"a": -1.0}, **run)
+
+
 def listing(constructs: list[Construct]) -> str:
     """Lists of the page: what compiles, and what is refused."""
     compiled = [c.name for c in constructs if not c.refusal]

@@ -3,7 +3,7 @@
 import math
 import re
 import xml.etree.ElementTree as ET
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -280,23 +280,6 @@ def _real_attributes(entry: _Entry) -> dict[str, str]:
     return attributes
 
 
-def _dependencies(entry: _Entry, entries: Iterable[_Entry], code: GeneratedCode) -> list[_Entry]:
-    """The knowns that a row of the Jacobian depends on."""
-    if entry.row is None:
-        return [entry] if entry.column is not None else []
-    width = code.jacobian_xu.size2()
-    known = {e.column: e for e in entries if e.column is not None}
-    columns = _row_columns(code.jacobian_xu, entry.row)
-    columns += [width + c for c in _row_columns(code.jacobian_p, entry.row)]
-    return [known[c] for c in columns]
-
-
-def _row_columns(pattern: ca.Sparsity, row: int) -> list[int]:
-    """Columns with an entry in `row`."""
-    starts, rows = pattern.colind(), pattern.row()
-    return [j for j in range(pattern.size2()) if row in rows[starts[j] : starts[j + 1]]]
-
-
 def _structure(
     parent: ET.Element, entries: Sequence[_Entry], code: GeneratedCode, fmi: int
 ) -> None:
@@ -305,6 +288,9 @@ def _structure(
     derivatives = [e for e in entries if e.derivative_of is not None]
     initial = [e for e in [*derivatives, *outputs] if e.initial == "calculated"]
     first, key = (1, "index") if fmi == 2 else (0, "valueReference")
+    by_column = {e.column: e for e in entries if e.column is not None}
+    by_row = ca.horzcat(code.jacobian_xu, code.jacobian_p).T
+    starts, columns = by_row.colind(), by_row.row()
     for unknowns, whole, tag in (
         (outputs, "Outputs", "Output"),
         (derivatives, "Derivatives", "ContinuousStateDerivative"),
@@ -315,7 +301,9 @@ def _structure(
             group, tag = ET.SubElement(parent, whole), "Unknown"
             unknowns = sorted(unknowns, key=lambda entry: entry.reference)
         for entry in unknowns:
-            knowns = _dependencies(entry, entries, code)
+            knowns = [entry]  # an output that is a state
+            if (row := entry.row) is not None:
+                knowns = [by_column[c] for c in columns[starts[row] : starts[row + 1]]]
             if whole != "InitialUnknowns":
                 knowns = [known for known in knowns if known.causality != "parameter"]
             numbers = " ".join(str(known.reference + first) for known in knowns)

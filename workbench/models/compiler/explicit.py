@@ -10,6 +10,8 @@ them, by stateSelect and start; where equations tie them to each other, they are
 is not fixed begins as initial equations say, else at its start.
 """
 
+import math
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -103,7 +105,9 @@ def make_explicit(model: FlatModel) -> StateSpace:
     )
     by_name = {v.name: v for v in [*model.differentiated, *model.algebraic]}
     outputs = [by_name[name] for name in model.outputs if name not in solver.states]
-    conditions = _column([condition for condition, _ in model.assertions])
+    _refuse_infinite(model, solver)
+    x0 = _initial_states(model, solver, states)
+    assertions = [*model.assertions, *_finite_starts(states, x0)]
     space = StateSpace(
         name=model.name,
         description=model.description,
@@ -114,19 +118,54 @@ def make_explicit(model: FlatModel) -> StateSpace:
         p=p,
         f=solver.resolve(_column([solver.rates[v.name] for v in states])),
         w=solver.resolve(_column([v.symbol for v in outputs])),
-        assertions=solver.resolve(conditions),
-        assertion_texts=[text for _, text in model.assertions],
+        assertions=solver.resolve(_column([condition for condition, _ in assertions])),
+        assertion_texts=[text for _, text in assertions],
         states=states,
         inputs=model.inputs,
         parameters=model.parameters,
         tunable=model.tunable,
         outputs=outputs,
         state_outputs=[name for name in model.outputs if name in solver.states],
-        x0=_initial_states(model, solver, states),
+        x0=x0,
         notes=model.notes,
     )
-    starts = zip(states, space.initial_states(), strict=True)
+    starts = list(zip(states, space.initial_states(), strict=True))
+    for state, start in starts:
+        if not math.isfinite(start):
+            raise _infinite(state, start)
     return replace(space, states=[replace(state, start=start) for state, start in starts])
+
+
+def _finite_starts(states: Sequence[FlatVariable], x0: ca.SX) -> list[tuple[ca.SX, str]]:
+    """Assertions that what parameters or inputs make of the starts is finite numbers."""
+    return [
+        (ca.fabs(state.symbol) <= sys.float_info.max, f"{state.name} is a finite number")
+        for state, start in zip(states, ca.vertsplit(x0), strict=True)
+        if not start.is_constant()
+    ]
+
+
+def _refuse_infinite(model: FlatModel, solver: "_Solver") -> None:
+    """Refuse variables that parameters alone give, and that are not finite at the defaults."""
+    varying = _column([v.symbol for v in [*model.differentiated, *model.inputs]])
+    known = [v for v in model.algebraic if v.symbol.name() in solver.solution]
+    values = _column([solver.solution[v.symbol.name()] for v in known])
+    constant = np.flatnonzero(~_incidence(values, ca.vertcat(model.time, varying)).any(1))
+    parameters = _column([v.symbol for v in model.parameters])
+    function = ca.Function("values", [parameters], [ca.densify(values[[int(i) for i in constant]])])
+    defaults = [v.start for v in model.parameters]
+    for i, value in zip(constant, function(defaults).full().ravel(), strict=True):
+        if not math.isfinite(value):
+            raise _infinite(known[i], value)
+
+
+def _infinite(variable: FlatVariable, value: float) -> InputError:
+    return InputError(
+        where=variable.place,
+        found=f"'{variable.name}' = {value:g} at the defaults of the parameters",
+        expected="a finite number",
+        remedy="correct its equation, or the parameters in it",
+    )
 
 
 def _initial_states(model: FlatModel, solver: "_Solver", states: list[FlatVariable]) -> ca.SX:
@@ -280,6 +319,7 @@ class _Solver:
         self.states = set(states)
         names = [v.name for v in model.differentiated]
         self.rates = dict(zip(names, model.rates, strict=True))
+        self._rate_of = {rate.name(): name for name, rate in self.rates.items()}
         self.residuals = _column([residual for residual, _ in model.equations])
         self.places = [place for _, place in model.equations]
         self.solution: dict[str, ca.SX] = {}
@@ -429,8 +469,8 @@ class _Solver:
                 "the model as an FMU from a tool that iterates",
             )
         right_hand = -ca.substitute(residual, unknowns, ca.SX.zeros(unknowns.shape))
-        rates = {self.rates[name].name() for name in self.states}
-        late = np.array([s.name() in rates for s in ca.vertsplit(unknowns)])
+        rate_of = [self._rate_of.get(s.name()) for s in ca.vertsplit(unknowns)]
+        late = np.array([name in self.states for name in rate_of])
         solved = _eliminate(coefficients, right_hand, unknowns, self.numbers(coefficients), late)
         if solved is None:
             names = [s.name() for s in ca.vertsplit(unknowns)]

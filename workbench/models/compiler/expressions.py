@@ -3,6 +3,7 @@
 Values are numpy arrays of scalar SX, so that Modelica's rules of rank hold: a vector is no matrix.
 """
 
+import math
 import operator
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -161,6 +162,7 @@ class Arena:
     symbols : value of each variable, by its number; filled by the reader of variables.
     rates : value of the time derivative of each differentiated variable.
     defined : expression of each Boolean or Integer variable that no event changes, by its number.
+    reads_equations : whether expressions are those of equations, after all values have been read.
     """
 
     def __init__(self, dae: Mapping[str, Any], model_place: str) -> None:
@@ -187,6 +189,8 @@ class Arena:
             for target, value in zip(owner["targets"], owner["branches"][0]["values"], strict=True)
         }
         self._depth = 0  # of the function call that is being evaluated
+        self._branches = 0  # around what is being evaluated, which only the simulation chooses
+        self.reads_equations = False
 
     def _deal_arenas(self, expressions: Mapping[str, Any]) -> None:
         """Operands and subscripts lie in two flat lists, in the order of their owners."""
@@ -321,7 +325,7 @@ class Arena:
             case "unary":
                 return each(_UNARY[body["operator"]], self.value(body["operand"], call))
             case "binary":
-                return self._binary(body, call)
+                return self._finite(number, self._binary(body, call))
             case "conditional":
                 return self._conditional(self.operands[number], call)
             case "comprehension":
@@ -345,15 +349,26 @@ class Arena:
                 box[()] = operands
                 return box
             case "index":
-                base = self.value(body["base"], call)
-                return self._index(base, self._picks(number, base.shape, call))
+                return self._element(number, body["base"], call)
             case "array_update":
                 return self._update(number, body, call)
             case "range":
                 return self._range(body, call)
             case "builtin":
-                return self._builtin(number, body["builtin"], operands)
+                return self._finite(number, self._builtin(number, body["builtin"], operands))
         raise self.refuse(f"the construct '{kind}'", number)
+
+    def _finite(self, number: int, value: Value) -> Value:
+        """Refuse a constant of an equation that is no finite number, unless within a branch."""
+        for element in value.flat if self.reads_equations and not self._branches else ():
+            if element.is_constant() and not math.isfinite(float(element)):
+                raise self.refuse(
+                    f"a value of {float(element):g}",
+                    number,
+                    "finite numbers",
+                    "correct the expression, or the constants in it",
+                )
+        return value
 
     def _binary(self, body: Mapping[str, Any], call: _Call | None) -> Value:
         lhs, rhs = self.value(body["lhs"], call), self.value(body["rhs"], call)
@@ -439,6 +454,16 @@ class Arena:
                 )
             picks.append(int(numbers[0]) - 1 if chosen.ndim == 0 else numbers - 1)
         return picks
+
+    def _element(self, number: int, base: int, call: _Call | None) -> Value:
+        """Elements of an array; of one that is listed, only the one that is chosen is evaluated."""
+        listed = self.operands[base] if "array" in self.nodes[base] else []
+        first = self._picks(number, [len(listed)], call)[0] if listed else None
+        if isinstance(first, int):
+            value = self.value(listed[first], call)
+            return self._index(value, self._picks(number, (len(listed), *value.shape), call)[1:])
+        value = self.value(base, call)
+        return self._index(value, self._picks(number, value.shape, call))
 
     def _index(self, base: Value, picks: Sequence[Any]) -> Value:
         out = base
@@ -531,8 +556,10 @@ class Arena:
         if condition.is_constant():
             taken = operands[1:2] if float(condition) else operands[2:]
             return self._conditional(taken, call)
+        self._branches += 1
         value = self.value(operands[1], call)
         otherwise = self._conditional(operands[2:], call)
+        self._branches -= 1
         return each(lambda x, y: ca.if_else(condition, x, y), value, otherwise)
 
     def points(self, domain: int) -> Iterator[tuple[int, ...]]:
@@ -560,7 +587,8 @@ class Arena:
             # As Modelica.Math declares its functions.
             arguments = [self.value(o, call) for o in self.operands[body["owner"]]]
             if external["symbol"] in _ELEMENTWISE and self._in_order(function):
-                return each(_ELEMENTWISE[external["symbol"]], *arguments)
+                value = each(_ELEMENTWISE[external["symbol"]], *arguments)
+                return self._finite(number, value)
         if external is not None:
             raise self.refuse(
                 f"the external function '{function['name']}'",

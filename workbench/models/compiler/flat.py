@@ -5,6 +5,7 @@ expressions. What the later stages cannot treat (events, clocks, external functi
 here, with file and line.
 """
 
+import ast
 import contextlib
 import io
 import math
@@ -25,6 +26,9 @@ from workbench.models.modelica.classes import Class, Component, Modifier
 from workbench.models.modelica.source import EXPERIMENT, KINDS
 from workbench.runtime.supervision import blaming, limited_memory, quiet_panics
 
+# The value of an expression of parameters, for an entry of the DAE, of its start or limit.
+Number = Callable[[ca.SX, Mapping[str, Any], str], float]
+
 SCHEMA = 43
 # Bytes beyond which the front end overflows; 65 MB do for the reference model.
 _MEMORY = 2 << 30
@@ -32,6 +36,8 @@ _MEMORY = 2 << 30
 _EXPORT = "export the model as an FMU from another Modelica tool, and use that FMU"
 # What the front end says, and what to do about it; the first that fits.
 _REMEDIES = (
+    (r"cannot be evaluated", "correct the expression, or the parameters in it"),
+    (r"numeric expression, found Real", "write numbers of less than 1.8e308"),
     (r"value of another type|type mismatch: expected `", "give it a value of its declared type"),
     (r"der\(\.\.\.\) must have exactly one", "name what is differentiated: e = ...; and der(e)"),
     (
@@ -40,7 +46,17 @@ _REMEDIES = (
     ),
     (r"missing source scope", "name each output of the call: (a, b) = f(u)"),
     (r"expected Real, found Integer", "write real numbers, such as 1.0"),
-    (r"shape mismatch", "make the sizes of both sides equal; '.+' adds a scalar to an array"),
+    (
+        r"shape mismatch",
+        "make the sizes of both sides equal; without 'each', {1, 2} gives each of two components "
+        "its value; '.+' adds a scalar to an array",
+    ),
+    (r"'each' modification", "remove that 'each', or give the component a size"),
+    (r"type attribute", "give all elements one value, or declare the elements one by one"),
+    (
+        r"lexically nested class",
+        f"hand the value to that class as a parameter or an argument, or {_EXPORT}",
+    ),
     (r"initial algorithm", "write it as an initial equation"),
     (
         r"function loop reduction",
@@ -51,6 +67,10 @@ _REMEDIES = (
         r"function (statement|return)",
         f"use for loops of constant length and if-expressions, or {_EXPORT}",
     ),
+    (
+        r"^the size of an array|range bound is not|array extent must be",
+        "write the size as a number or an Integer parameter; linspace needs two points at least",
+    ),
     (r"for-equation range", "loop over a range of numbers, such as 1:3"),
     (r"unresolved [\w ]+: 'Modelica\.", f"correct the name, or {STANDARD}"),
     (r"instantiates partial", "redeclare it as a class that is complete"),
@@ -60,6 +80,12 @@ _REMEDIES = (
         "write equations, or a function with this algorithm",
     ),
     (r"violates constrainedby", "extend a common class, and name it after 'constrainedby'"),
+    (
+        r"^events, ",
+        f"write that part without modes, or {_EXPORT}; if the model has no part of that class, add "
+        "the missing equation or remove the one too many",
+    ),
+    (r"^an equation of arrays in", "write it for each: for i in 1:n loop b[i].v = v[i]; end for"),
     (
         r"unbalanced model",
         "add the missing equation or remove the one too many; inputs of components need a value",
@@ -81,6 +107,11 @@ _REMEDIES = (
     (r"unsupported|no checked canonical|rejected", REWRITE),
 )
 
+# What may stand behind a model that the front end calls unbalanced.
+_UNBALANCED = {
+    r"\b(pre|edge|change|reinit)\s*\(|\bwhen\b": "events",
+    r"\b\w+(\[\w*:\w*\])?\.\w+\s*=\s*\{\s*\{": "an equation of arrays in an array of components",
+}
 
 _DECLARED = re.compile(r"\b(package|end|extends|constrainedby)\s+[\w.]+")
 _BUILT_IN = frozenset(
@@ -301,6 +332,8 @@ def _placed(library: Library, reached: Sequence[str], source: Class, text: str) 
     if place := re.search(r" \[([^\[\]]+:\d+):\d+\]$", message):
         return place[1], message[: place.start()]
     quoted = re.findall(r"`([^`]+)`", message)
+    names = [word.split(".") for word in quoted if re.fullmatch(r"[\w.]+", word)]
+    causes: dict[str, str] = {}  # by pattern of what the message does not say
     if "der(...)" in message:
         patterns = [r"\bder\s*\((?!\s*[\w.]+(\[[\w,:]*\])?\s*\))"]
     elif "for-equation range" in message:
@@ -312,12 +345,17 @@ def _placed(library: Library, reached: Sequence[str], source: Class, text: str) 
     elif "missing source scope" in message:
         patterns = [r"\(\s*,"]
     elif "unbalanced model" in message:
-        patterns = []
+        causes = _UNBALANCED
+        patterns = list(causes)
+    elif "cannot be evaluated" in message:
+        patterns = [rf"\b{name[-1]}\s*(\([^;]*\))?\s*=" for name in names]
     else:
-        names = [word.split(".") for word in quoted if re.fullmatch(r"[\w.]+", word)]
         # Of `Lib.Data.motor.R` the source may say Data.motor.R or motor.R.
         words = [".".join(n[k:]) for n in names for k in range(max(1, len(n) - 1))]
-        patterns = [
+        sized = [rf"\bsize\s*\(\s*{word}\s*,|\b{word}\s*\[[^\]]*\bend\b" for word in words]
+        sized = sized if "unresolved Flat" in message else []
+        causes = dict.fromkeys(sized, "the size of an array of components")
+        patterns = sized + [
             pattern
             for word in words
             for pattern in (rf"\b{word}\s*\(", rf"\b{word}\b")
@@ -327,8 +365,9 @@ def _placed(library: Library, reached: Sequence[str], source: Class, text: str) 
         for name in dict.fromkeys([source.name, *reached]):
             file, _, line = library.classes[name].where.rpartition(":")
             for number, words_of_line in enumerate(_own_lines(library.classes[name]), int(line)):
-                if re.search(pattern, words_of_line):
-                    return f"{file}:{number}", message
+                if match := re.search(pattern, words_of_line):
+                    cause = f"{causes[pattern]}, '{match[0]}': " if pattern in causes else ""
+                    return f"{file}:{number}", cause + message
     return source.where, message
 
 
@@ -348,7 +387,7 @@ class _Reader:
     """Reads variables and equations around the arena of expressions."""
 
     def __init__(self, dae: Mapping[str, Any], library: Library, source: Class, model: str) -> None:
-        self.source = source
+        self.library, self.source = library, source
         self.model = model
         own = library.components(source.name)
         # The front end calls parts of a record local, whose declaration is an input or output.
@@ -378,7 +417,7 @@ class _Reader:
         numeric = self._numbers(free, substitute)
         for number, _, binding in bound:
             for element in binding.flat:
-                numeric(element, self.variables[number])  # refuses what is no parameter
+                numeric(element, self.variables[number], "value")  # refuses what is no parameter
         groups: dict[str, list[FlatVariable]] = {"state": [], "algebraic": [], "input": []}
         outputs, input_equations = [], []
         for number, entry in enumerate(self.variables):
@@ -400,6 +439,7 @@ class _Reader:
             for n in free
             for _ in self.arena.symbols[n].flat
         ]
+        self.arena.reads_equations = True
         operations = self.storage["continuous_equation_operations"]
         initial = self.storage["initialization_equation_operations"]
         return FlatModel(
@@ -545,12 +585,11 @@ class _Reader:
                 bound.append((number, self.arena.symbols[number], binding))
         return free, bound
 
-    def _numbers(
-        self, free: list[int], substitute: Callable[[ca.SX], ca.SX]
-    ) -> Callable[[ca.SX, Mapping[str, Any]], float]:
+    def _numbers(self, free: list[int], substitute: Callable[[ca.SX], ca.SX]) -> Number:
         """A function that evaluates expressions of parameters at their default values.
 
-        It refuses an expression of what is no parameter, at the entry that has it.
+        It refuses an expression of what is no parameter, and a value that is no finite number, at
+        the entry that has it.
         """
         symbols, values = [], []
         for number in free:
@@ -558,20 +597,40 @@ class _Reader:
             values += list(self.arena.default(number).flat)
         free_symbols, defaults = ca.vertcat(*symbols), ca.vertcat(*values)
 
-        def number_of(expression: ca.SX, entry: Mapping[str, Any]) -> float:
-            if expression.is_constant():  # most are, and models have thousands
-                return float(expression)
-            value = ca.substitute(substitute(expression), free_symbols, defaults)
+        def number_of(expression: ca.SX, entry: Mapping[str, Any], what: str) -> float:
+            value = expression
+            if not expression.is_constant():  # most are, and models have thousands
+                expression = substitute(expression)
+                value = ca.substitute(expression, free_symbols, defaults)
             if varying := ca.symvar(value):
+                name = varying[0].name()
+                remedy = (
+                    f"declare '{name}' a parameter, or write an equation or an initial equation"
+                )
+                if ca.is_equal(varying[0], self.arena.time):
+                    remedy = (
+                        "declare it as a variable; in place of a start, write an initial equation"
+                    )
                 raise self.arena.refuse(
-                    f"'{entry['name']}' with a value, a start or a limit that depends on "
-                    f"'{varying[0].name()}'",
+                    f"'{entry['name']}' with a value, a start or a limit that depends on '{name}'",
                     entry,
                     "one that parameters alone give",
-                    f"declare '{varying[0].name()}' a parameter, or write an equation or an "
-                    f"initial equation for '{entry['name']}'",
+                    f"{remedy} for '{entry['name']}'",
                 )
-            return float(ca.evalf(value))
+            if not math.isfinite(result := float(ca.evalf(value))):
+                parameters = ca.symvar(expression)
+                given = [f"{s.name()} = {numeric_default(s):g}" for s in parameters]
+                raise self.arena.refuse(
+                    f"'{entry['name']}' with a {what} of {result:g} at the defaults of parameters"
+                    + "".join(f", {text}" for text in given),
+                    entry,
+                    "a finite number",
+                    "correct the expression, or the parameters in it",
+                )
+            return result
+
+        def numeric_default(symbol: ca.SX) -> float:
+            return float(ca.substitute(symbol, free_symbols, defaults))
 
         return number_of
 
@@ -579,7 +638,7 @@ class _Reader:
         self,
         number: int,
         substitute: Callable[[ca.SX], ca.SX],
-        numeric: Callable[[ca.SX, Mapping[str, Any]], float],
+        numeric: Number,
     ) -> list[FlatVariable]:
         entry = self.variables[number]
         attributes = entry["attributes"]
@@ -591,7 +650,8 @@ class _Reader:
             return list(np.broadcast_to(self.arena.evaluate(node), symbol.shape).flat)
 
         def numbers(name: str) -> list[float | None]:
-            return [None if e is None else numeric(e, entry) for e in elements(attributes[name])]
+            values = elements(attributes[name])
+            return [None if value is None else numeric(value, entry, name) for value in values]
 
         starts = elements(attributes["start"])
         if entry["role"] == "parameter":
@@ -600,14 +660,8 @@ class _Reader:
             bound = attributes["binding"] is not None
             starts = elements(attributes["binding" if bound else "start"])
         starts = [None if start is None else substitute(start) for start in starts]
-        defaults = [0.0 if start is None else numeric(start, entry) for start in starts]
-        if beyond := [value for value in defaults if not math.isfinite(value)]:
-            raise self.arena.refuse(
-                f"'{entry['name']}' with a start of {beyond[0]:g} at the defaults of parameters",
-                entry,
-                "a finite number",
-                "correct the expression, or the parameters in it",
-            )
+        what = "value" if entry["role"] == "parameter" else "start"
+        defaults = [0.0 if start is None else numeric(start, entry, what) for start in starts]
         fixed = attributes["fixed"] or [False]
         columns = zip(
             symbol.flat,
@@ -617,6 +671,7 @@ class _Reader:
             numbers("max"),
             numbers("nominal"),
             np.broadcast_to(np.array(fixed, bool), symbol.size) if len(fixed) == 1 else fixed,
+            self._units(entry, symbol),
             strict=True,
         )
         return [
@@ -624,7 +679,7 @@ class _Reader:
                 name=s.name(),
                 symbol=s,
                 start=default,
-                unit=attributes["unit"],
+                unit=unit,
                 description=attributes["description"],
                 minimum=minimum,
                 maximum=maximum,
@@ -635,8 +690,32 @@ class _Reader:
                 select=attributes["state_select"],
                 place=self.arena.place(entry),
             )
-            for s, start, default, minimum, maximum, nominal, is_fixed in columns
+            for s, start, default, minimum, maximum, nominal, is_fixed, unit in columns
         ]
+
+    def _units(self, entry: Mapping[str, Any], symbol: Value) -> list[str | None]:
+        """Units of the elements; where each has its own, they stand in the source alone."""
+        unit, parts = entry["attributes"]["unit"], entry["attributes"]["component_ref"]["parts"]
+        component = None
+        if symbol.shape and unit is None:
+            component = self.library.part(self.source.name, [part["ident"] for part in parts])
+        text = self.library.unit(component) if component else ""
+        if not text.startswith("{"):
+            return [unit] * symbol.size
+        units = np.array(ast.literal_eval(text.replace("{", "[").replace("}", "]")), object)
+        # Of components that are arrays the first dimensions are theirs.
+        indices = [sub["Index"]["value"] - 1 for part in parts for sub in part["subs"]]
+        outer = max(0, units.ndim - symbol.ndim)
+        with contextlib.suppress(IndexError):
+            units = units[tuple(indices[len(indices) - outer :])]
+        if units.shape != symbol.shape:
+            raise self.arena.refuse(
+                f"'{entry['name']}' with units {text}",
+                entry,
+                f"a unit for each element of an array of {' x '.join(map(str, symbol.shape))}",
+                'give each its unit, or all one: (each unit = "m")',
+            )
+        return list(units.flat)
 
     def _equations(self, operations: Sequence[Mapping[str, Any]]) -> Iterator[tuple[ca.SX, str]]:
         for operation in operations:
@@ -699,17 +778,17 @@ class _Reader:
         """Numbers of the model's experiment annotation, which the flat DAE drops."""
         numbers = {}
         for name, text in self.source.experiment.items():
-            try:
+            if name not in EXPERIMENT:
+                continue
+            with contextlib.suppress(ValueError):
                 numbers[name] = float(text)
-            except ValueError:
-                if name not in EXPERIMENT:
-                    continue
+            if not math.isfinite(numbers.get(name, math.nan)):
                 raise InputError(
                     where=self.source.where,
                     found=f"experiment({name}={text})",
-                    expected="a number",
+                    expected="a finite number",
                     remedy="write the number",
-                ) from None
+                )
         return numbers
 
 
@@ -792,6 +871,8 @@ def _refuse_shared_constants(library: Library, reached: Iterable[str]) -> None:
         return next((where for where, text in texts.items() if short.search(text)), "")
 
     for package in [c for c in library.classes.values() if c.kind == "package"]:
+        if named(package.name):
+            _refuse_two_values(library, package.name)
         for base, dotted in zip(package.extends, library.bases(package.name), strict=True):
             given = library.components(dotted) if dotted in library.classes else {}
             valued = [n for n in base.modifier.inner if n in given and given[n].modifier.value]
@@ -804,6 +885,30 @@ def _refuse_shared_constants(library: Library, reached: Iterable[str]) -> None:
                     remedy=f"declare '{valued[0]}' without a value in a partial package, and "
                     "extend that with each value",
                 )
+
+
+def _refuse_two_values(library: Library, package: str) -> None:
+    """Refuse a constant to which two extends-clauses on the way of a package give values.
+
+    The front end takes the value of the one further away.
+    """
+    given: dict[str, tuple[str, Modifier]] = {}
+    for name in (package, *library.ancestors(package)):
+        for base in library.classes[name].extends:
+            for constant, modifier in base.modifier.inner.items():
+                if modifier.value and constant in given:
+                    nearer, value = given[constant]
+                    raise InputError(
+                        where=value.where,
+                        found=f"{constant}={value.value} where {nearer} extends, and "
+                        f"{constant}={modifier.value} where {name} does, for {package}",
+                        expected="one value in extends-clauses, as the Modelica front end takes "
+                        "that further away",
+                        remedy=f"extend {base.name} in {nearer}, or declare '{constant}' with its "
+                        f"value in the body of {name}",
+                    )
+                if modifier.value:
+                    given[constant] = (name, modifier)
 
 
 def _refuse_stale_constants(library: Library, lineage: Sequence[str]) -> None:

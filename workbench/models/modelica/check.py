@@ -9,6 +9,7 @@ Source: Modelica Language Specification 3.6, sections 4.9 (attributes of predefi
 redeclarations) and 9.1 (connections).
 """
 
+import re
 from collections.abc import Iterator, Mapping
 from typing import NoReturn
 
@@ -28,6 +29,8 @@ ATTRIBUTES = {
 # Predefined, without attributes.
 _OTHERS = frozenset({"StateSelect", "AssertionLevel", "ExternalObject", "Clock"})
 _NOTHING = Modifier()
+# A text, or an array of them.
+_TEXTS = re.compile(r'"[^"]*"(\s*\+\s*"[^"]*")*|[{](\s*[{},]|\s*"[^"]*")*')
 
 
 def check(library: Library, model: str = "") -> tuple[str, ...]:
@@ -232,6 +235,13 @@ class _Checker:
                     f"a modifier {unfit} of {predefined}",
                     f"one of {', '.join(sorted(known)) or 'none'}",
                     "correct or remove it",
+                )
+            if name == "unit" and not _TEXTS.fullmatch(modification.value):
+                _refuse(
+                    modification.where,
+                    f"unit={modification.value}",
+                    "a text in quotes or, of an array, one for each element in braces",
+                    'write unit="m", unit={"m", "s"}, or each unit="m"',
                 )
             if self._final(name, type_name, before):
                 _refuse(

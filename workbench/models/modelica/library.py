@@ -245,6 +245,17 @@ class Library:
         full_name = self.resolve(name, scope)
         return f".{full_name}" if full_name in self.classes else name
 
+    def part(self, name: str, path: Sequence[str]) -> Component | None:
+        """Component of a class, or of a component of it, by its path; None if there is none."""
+        modifier, component = Modifier(), None
+        for part in path:
+            parts = self.components(name) if name in self.classes else {}
+            component = self.modified(parts, modifier).get(part)
+            if component is None:
+                return None
+            name, modifier = self.resolve(component.type, component.owner), component.modifier
+        return component
+
     def unit(self, component: Component) -> str:
         """Unit of a component; where it has none, the name of the type that could have one."""
         modifier, name, scope = component.modifier, component.type, component.owner
