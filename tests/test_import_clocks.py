@@ -174,16 +174,73 @@ FORMS = [
     *("%a, %d %b %Y %H:%M:%S GMT", "%Y-%m-%dT%H:%M:%S+00:00[Europe/London]"),
     *("%Y-%m-%d %H:%M:%S IST", "DT#%Y-%m-%d-%H:%M:%S"),
     *("%Y%m%d%H%M%S000", "%a %b %d %H:%M:%S UTC %Y", "%m/%d/%y %I:%M:%S{half}"),
+    *("%d/%m/%Y %I:%M:%S {half}. m.", "%d de %B de %Y %H:%M:%S", "%d. %B %Y um %H:%M:%S"),
+    *("%Y年%m月%d日 %H:%M:%S", "%Y年%m月%d日 {half_of_day}午%I:%M:%S", "%Y年%m月%d日%H时%M分%S秒"),
+    *("%Y. %m. %d. %H:%M:%S", "%Y/%m/%d %I:%M:%S {half_of_day}午", "%H:%M:%S.000 %d/%m/%Y"),
+    *("%a %b %d %Y %H:%M:%S GMT+0000 (Coordinated Universal Time)",),
 ]
 
 
 @pytest.mark.parametrize("form", FORMS)
 def test_dates_of_any_order_are_read_as_times_go_on(tmp_path, tank, form):
     stamps = local(datetime(2024, 3, 1, tzinfo=UTC), 300, form)
-    stamps = [stamp.format(half="ap"[k // 48 % 2]) for k, stamp in enumerate(stamps)]
+    stamps = [
+        stamp.format(half="ap"[k // 48 % 2], half_of_day="上下"[k // 48 % 2])
+        for k, stamp in enumerate(stamps)
+    ]
     read_clock = clock(table(tmp_path / "a.csv", stamps), tank)
     assert_allclose(read_clock.times, QUARTER * np.arange(300))
     assert iso(read_clock.start).startswith("2024-03-01")
+
+
+@pytest.mark.parametrize(
+    ("form", "utc"),
+    [
+        ("%a %b %d %Y %H:%M:%S GMT+0100 (CET)", "2026-11-29T23:00:00"),
+        ("%Y-%m-%d %H:%M:%S UTC+05:30", "2026-11-29T18:30:00"),
+        ("%Y-%m-%d %H:%M:%S (UTC-03:30)", "2026-11-30T03:30:00"),
+    ],
+)
+def test_an_offset_behind_each_date_tells_when_a_recording_began(tmp_path, tank, form, utc):
+    stamps = local(datetime(2026, 11, 30, tzinfo=UTC), 60, form)
+    read_clock = clock(table(tmp_path / "a.csv", stamps), tank)
+    assert_allclose(read_clock.times, QUARTER * np.arange(60))
+    assert iso(read_clock.start).startswith(utc)
+    assert read_clock.zoned
+
+
+@pytest.mark.parametrize("encoding", ["gb18030", "shift_jis", "utf-8", "big5"])
+def test_dates_of_china_are_read_in_its_encodings(tmp_path, tank, encoding):
+    stamps = local(datetime(2026, 11, 30, tzinfo=UTC), 60, "%Y年%m月%d日 %H:%M:%S")
+    path = table(tmp_path / "a.csv", stamps)
+    path.write_bytes(path.read_text().encode(encoding))
+    assert iso(clock(path, tank).start).startswith("2026-11-30T00:00:00")
+
+
+@pytest.mark.parametrize("name", ["year", "decimal_year", "Date", "Time"])
+def test_years_with_decimals_are_asked_about(tmp_path, tank, name):
+    """Of hours; as days or hours they would be 365 or 8766 times as far apart as they were."""
+    stamps = [f"{2026.912 + k / 8766:.8f}" for k in range(60)]
+    with pytest.raises(InputError, match=rf"'{name}' from 2026.912000 on, .*years.*export dates"):
+        clock(table(tmp_path / "a.csv", stamps, name), tank)
+
+
+@pytest.mark.parametrize(
+    ("names", "unit"),
+    [("Time - h;Amplitude - h", 1.0), ("Time_h;h", 1.0), ("Time_h;level", 3600.0)],
+)
+def test_the_name_of_a_signal_behind_that_of_its_times_is_no_unit(tmp_path, names, unit):
+    """Seconds beside a signal h were taken for hours."""
+    write_system(tmp_path / "tank")
+    tank = load_system(tmp_path / "tank")
+    rows = [f"{0.5 * k / unit:.9f};9{k % 10};1.{k % 7}" for k in range(60)]
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join([f"{names};inflow [l/s]", *rows]))
+    level = names.partition(";")[2]
+    (read_clock,) = propose(
+        [read_recorded_file(path)], tank, dict([parse_named(f"h={level} [cm]", "", tank.signals)])
+    ).clocks.values()
+    assert_allclose(read_clock.times, 0.5 * np.arange(60), atol=1e-4)
 
 
 @pytest.mark.parametrize(

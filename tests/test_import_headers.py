@@ -70,6 +70,13 @@ def test_a_table_below_another_has_its_own_columns(tmp_path, header, row, unit, 
     assert own.values[0] == first
 
 
+def test_numbers_of_channels_above_an_empty_line_are_no_sample(tmp_path):
+    rows = [f'"{0.5 * k}","4.{k % 9}","95{k % 7}.1"' for k in range(60)]
+    lines = ['"Time","inflow","h"', '"s","l/s","mm"', '"1","2","3"', "", *rows]
+    (group,) = read_recorded_file(table(tmp_path / "a.csv", lines)).groups
+    assert_allclose(group.channels[0].values, 0.5 * np.arange(60))
+
+
 def test_a_header_that_comes_again_on_each_page_is_no_table(tmp_path):
     header = "time [s];inflow [l/s];h [mm]"
     rows = [f"{k};4.{k % 9};95{k % 7}.1" for k in range(60)]

@@ -311,6 +311,34 @@ def test_letters_of_other_words_ask_for_nothing(tmp_path, tank, name):
 ROWS = [f"{i};5;{i}" for i in range(60)]
 
 
+@pytest.mark.parametrize(
+    ("unit", "si", "factor"),  # NIST SP 811, appendix B.8
+    [
+        *(("lps", "m3/s", 1e-3), ("US gpm", "m3/s", 6.30902e-5), ("cfs", "m3/s", 2.831685e-2)),
+        *(
+            ("L/MIN", "m3/s", 1e-3 / 60),
+            ("M3/HR", "m3/s", 1 / 3600),
+            ("ltr/min", "m3/s", 1e-3 / 60),
+        ),
+        *(("kpa", "Pa", 1e3), ("Mpa", "Pa", 1e6), ("MPA", "Pa", 1e6), ("HPa", "Pa", 100.0)),
+        *(("psig", "Pa", 6894.757), ("PSIA", "Pa", 6894.757), ("kg/cm2(g)", "Pa", 98066.5)),
+        *(("inH2O", "Pa", 249.0889), ("in. H20", "Pa", 249.0889), ("ftH2O", "Pa", 2989.067)),
+        *(("KW", "W", 1e3), ("Kwh", "J", 3.6e6), ("kVA", "W", 1e3), ("HZ", "1/s", 1.0)),
+        *(("Vrms", "V", 1.0), ("mVDC", "V", 1e-3), ("V AC", "V", 1.0), ("KG", "kg", 1.0)),
+        *(("cSt", "m2/s", 1e-6), ("cP", "Pa.s", 1e-3), ("m^3 s^-1", "m3/s", 1.0)),
+    ],
+)
+def test_units_are_read_as_loggers_spell_them(unit, si, factor):
+    scale = conversion(spell_unit(unit), si)
+    assert scale is not None
+    assert scale.factor == pytest.approx(factor, rel=1e-6)
+
+
+@pytest.mark.parametrize("unit", ["mpa", "mhz", "mt", "Min", "°dH", "NL/min", "slpm"])
+def test_a_unit_that_may_be_two_or_is_none_is_not_read(unit):
+    assert all(conversion(spell_unit(unit), si) is None for si in ("Pa", "1/s", "kg", "s", "m3/s"))
+
+
 def test_in_place_of_a_unit_that_is_not_known_none_is_proposed(tmp_path, tank):
     path = table(tmp_path / "a.csv", ["t [s];inflow [l/s];h [Zoll]", *ROWS])
     (problem,) = propose([read_recorded_file(path)], tank, {}).problems

@@ -242,6 +242,16 @@ def _no_time(group: Group, system: System, where: str) -> InputError:
                 "[%d.%m.%Y %H:%M:%S]', or give --sample-rate '200 Hz'",
             )
     for channel in group.channels:
+        named = is_time(channel.name) or {"year", "years", "jahr"}.intersection(words(channel.name))
+        if not channel.unit and named and _counts_years(channel.values):
+            return InputError(
+                where=where,
+                found=f"'{channel.name}' from {channel.values[0]:.6f} on, which may be years with "
+                "decimals, of 365, 366 or 365.25 days",
+                expected="dates, times of day, or a channel of seconds",
+                remedy="export dates, or give --sample-rate '200 Hz'; if they have a unit of their "
+                f"own, say it, --column '{TIME}={channel.name} [UNIT]'",
+            )
         if not channel.unit and is_time(channel.name):
             units = _likely_units(channel.values, system)
             likely = f"likely in {' or in '.join(units)}" if units else "likely in none"
@@ -317,9 +327,14 @@ def _candidate(channel: FileChannel, group: Group, system: System) -> Clock | No
         return since
     if scale is not None and (is_time(channel.name) or channel is group.channels[0]):
         return _count_clock(channel, channel.unit, scale.factor, "name and unit")
-    if not channel.unit and is_time(channel.name):
-        last = spell_unit(words(channel.name)[-1])  # elapsed_ms
-        scale = conversion(last, "s") if len(words(channel.name)) > 1 else None
+    if not channel.unit and is_time(channel.name) and not _counts_years(channel.values):
+        *before, last = words(channel.name)
+        # elapsed_ms; but Time - h beside Amplitude - h is of a signal h
+        own = last in system.signals and any(
+            words(c.name)[-1:] == (last,) for c in group.channels if c is not channel
+        )
+        last = spell_unit(last)
+        scale = conversion(last, "s") if before and not own else None
         since = None if last in _likely_units(channel.values, system) else _since(channel, system)
         if scale is not None and since is None:
             return _count_clock(channel, last, scale.factor, "name and unit")
@@ -333,6 +348,13 @@ def _candidate(channel: FileChannel, group: Group, system: System) -> Clock | No
             clock = _count_clock(channel, likely[0], scale.factor, _unit_reason(likely[0]))
             return replace(clock, certain=False)
     return None
+
+
+def _counts_years(values: Vector) -> bool:
+    """Whether numbers may be years with their decimals, such as 2026.912."""
+    held = values[np.isfinite(values)]
+    whole = bool((held % 1.0 == 0.0).all())
+    return not whole and bool(((held > 1900.0) & (held < 2100.0)).all())
 
 
 def _minutes_or_hours(clock: Clock, channel: FileChannel, system: System) -> Clock:

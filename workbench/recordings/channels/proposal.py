@@ -201,7 +201,7 @@ def _find(
             found=f"{len(candidates)} channels of this name" if candidates else "no such channel",
             expected=f"one for {signal} among {listed(names)}{closest(name, names)}",
             remedy=f"correct the name, --column '{signal}=NAME'"
-            + (", or GROUP/NAME where several groups have it" if candidates else ""),
+            + (", GROUP/NAME of several groups, or rename a column" if candidates else ""),
         )
     return candidates[0]
 

@@ -110,14 +110,17 @@ _PARTS_OF_TAGS = {
     **dict.fromkeys(
         ("kanal", "sensor", "point", "measurement", "_field", "messstelle", "varname"), "tag"
     ),
-    **dict.fromkeys(("series", "metric", "entity_id"), "tag"),  # of Grafana and Home Assistant
+    # of Grafana, Home Assistant and Kepware
+    **dict.fromkeys(("series", "metric", "entity_id", "_name"), "tag"),
     **dict.fromkeys(("value", "wert", "_value", "messwert", "val", "varvalue", "state"), "value"),
     **dict.fromkeys(("unit", "units", "einheit", "uom"), "unit"),
     "attributes.unit_of_measurement": "unit",  # of Home Assistant
 }
 # Columns that hold parts of a second beside time stamps, and digits of these.
 _PARTS = {
-    **dict.fromkeys(("ms", "msec", "millisecond", "milliseconds", "millisekunden", "millis"), 3),
+    **dict.fromkeys(
+        ("ms", "msec", "millisecond", "milliseconds", "millisekunden", "millis", "millitm"), 3
+    ),
     **dict.fromkeys(("us", "\u00b5s", "usec", "microseconds", "mikrosekunden", "micros"), 6),
     **dict.fromkeys(("ns", "nsec", "nsecs", "nanosec", "nanoseconds"), 9),
     **dict.fromkeys(("fraction", "frac", "subsec", "subseconds"), 0),
@@ -147,6 +150,8 @@ _WHOLE_SECONDS = re.compile(
 _WHOLE_MINUTES = re.compile(
     r"(?P<whole>(.*[T\s])?\d{1,2}:\d\d)(?P<half>(\s*[AP]\.?M\.?)?)", re.IGNORECASE
 )
+# What stands behind a name and is no unit, such as how its dates are written, or their zone.
+_BEHIND_NAME = re.compile(r"\(([^()]+)\)$|, ((?:GMT|UTC)\S*)$")
 _LAST_WORD = re.compile(r"(.*?)([^\W_]*)$")  # header.stamp.nsec, tv_usec
 
 
@@ -325,6 +330,9 @@ def _samples(
     if 2 * len(texts) < len(samples):
         samples = [i for i in samples if i not in texts]
     empty = [lines[j] - lines[i] > j - i for i, j in pairwise(samples)]  # lines that are no rows
+    numbers = [str(k + 1) for k in range(width)]  # of channels, above an empty line
+    if any(empty[:1]) and [cell.strip(' "') for cell in rows[samples[0]]] == numbers:
+        samples, empty = samples[1:], empty[1:]
     for k in range(max(2, len(samples) - _FEWEST + 1), len(samples)):
         if empty[k - 1] and not empty[k - 2]:
             return samples[:k]
@@ -531,7 +539,8 @@ def _says_nothing(cell: str) -> bool:
 
 
 def _are_units(cells: Sequence[str]) -> bool:
-    held = [cell for cell in cells if not _says_nothing(cell) and not is_number(cell)]
+    silent = (_says_nothing, is_number, is_said)  # DD/MM/YYYY is above dates
+    held = [cell for cell in cells if not any(says(cell) for says in silent)]
     return bool(held) and sum(map(is_unit, held)) >= 0.75 * len(held)
 
 
@@ -688,8 +697,8 @@ def read_group(
     labels, columns = _with_parts(*_join_day_and_clock(*_join_date_parts(labels, columns)))
     left: list[FileChannel] = []
     for i, cells in enumerate(columns):
-        round_brackets = re.search(r"\(([^()]+)\)$", labels[i][0])  # around what is no unit
-        statements = (labels[i][1], round_brackets[1] if round_brackets else "")
+        behind = _BEHIND_NAME.search(labels[i][0])
+        statements = (labels[i][1], behind[1] or behind[2] if behind else "")
         how = next(filter(is_said, statements), "")
         if _mostly(cells, is_stamp) and (channel := read_stamps(labels[i][0], cells, how)):
             stamps.append(channel)

@@ -15,8 +15,9 @@ _SPELLINGS = {
     "usec": "us", "hours": "h", "hrs": "h", "Std.": "h", "Stunden": "h", "minutes": "min",
     "Minuten": "min", "days": "d", "Tage": "d",
     "km/std": "km/h", "KM/H": "km/h", "Km/h": "km/h",
-    "kPA": "kPa", "KPa": "kPa", "KPA": "kPa", "hpa": "hPa", "HPA": "hPa",
-    "Bar": "bar", "BAR": "bar", "mBar": "mbar", "pa": "Pa",
+    "Mpa": "MPa", "MPA": "MPa", "MHZ": "MHz", "Mhz": "MHz", "mBar": "mbar", "pa": "Pa",
+    "US gpm": "gpm", "US GPM": "gpm", "USGPM": "gpm", "US gal": "gal", "iwc": "inWC",
+    "CMH": "m3/h", "cmh": "m3/h", "cbm/h": "m3/h", "r.p.m.": "rpm", "°K": "K", "g's": "g",
     "Rpm": "rpm", "r/min": "rpm", "U/Min": "rpm", "1/Min": "rpm", "upm": "rpm",
     "Upm": "rpm", "rev/min": "rpm", "/min": "1/min", "tr/min": "rpm",
     "Umdr/min": "rpm", "U/s": "rev/s",
@@ -25,25 +26,47 @@ _SPELLINGS = {
     "meters/second": "m/s", "Meters/Second": "m/s", "Watts": "W", "Watt": "W", "Amps": "A",
     "℃": "degC", "℉": "degF", "Kelvin": "K", "kelvin": "K",
     "Grad": "deg", "Grad/s": "deg/s", "degrees": "deg", "Deg": "deg", "º": "deg",
-    "radians": "rad", "m/s/s": "m/s2", "Volt": "V", "Volts": "V", "VDC": "V", "Vdc": "V",
-    "V DC": "V", "ADC": "A", "Adc": "A", "A DC": "A", "Newton": "N", "metre": "m",
+    "radians": "rad", "m/s/s": "m/s2", "Volt": "V", "Volts": "V", "Newton": "N", "metre": "m",
     "meter": "m", "Meter": "m", "inches": "in", "feet": "ft", "micron": "um", "microns": "um",
     "kp/cm2": "kgf/cm2", "kg/cm2": "kgf/cm2", "kgf/cm^2": "kgf/cm2",
     "kp/cm^2": "kgf/cm2", "kg/cm^2": "kgf/cm2", "in Hg": "inHg", "mm Hg": "mmHg", "psid": "psi",
     "%RH": "%", "% RH": "%", "%rH": "%", "% rH": "%", "%rF": "%", "% rF": "%", "% r.F.": "%",
     "Prozent": "%", "percent": "%", "pct": "%", "‰": "permille", "µε": "um/m",
 }  # fmt: skip
+# Units that mean the same whatever their case, as no other has their letters: KW, kpa. Mpa is MPa
+# above, and mpa may be millipascal.
+_ANY_CASE = {
+    unit.casefold(): unit
+    for unit in (
+        *("kPa", "hPa", "bar", "kW", "kWh", "kV", "Hz", "kHz", "kg", "kgf", "km", "sec", "hrs"),
+        *(
+            "l/min",
+            "l/h",
+            "l/s",
+            "m3/h",
+            "m3/hr",
+            "m3/s",
+            "m3/min",
+            "kg/h",
+            "kg/hr",
+            "kg/s",
+            "kg/min",
+            "ltr",
+        ),
+    )
+}
 # Units that mean the same in capitals: PSI, MPH.
 _IN_CAPITALS = re.compile(
-    "psid?|ksi|mph|kph|fps|fpm|gpm|cfm|lpm|kts|ft|lb[sf]?|rpm|deg", re.IGNORECASE
+    "psid?|ksi|mph|kph|fps|fpm|gpm|cfm|cfs|lpm|lps|kts|ft|lb[sf]?|rpm|rps|deg", re.IGNORECASE
 )
 _FORCE = r"(lb|oz)f?s?"
 _TORQUE = re.compile(rf"({_FORCE})[ .*-]?(ft|in)|(ft|in)[ .*-]?({_FORCE})", re.IGNORECASE)
 _DEGREES = re.compile(
     r"([\u00b0\u00ba]|deg(rees?)?\.?)[ _]?(?P<scale>[CF])(elsius|ahrenheit)?", re.IGNORECASE
 )
-_AROUND = re.compile(r" ?([/*.]) ?|(?<=[A-Za-z])-(?=[A-Za-z])")
-_OF_WATER = re.compile(r"(?<=[mn]) ?(H2O|w\.?c\.?|WG)", re.IGNORECASE)
+_AROUND = re.compile(r" ?([/*.]) ?|(?<=[A-Za-z])-(?=[A-Za-z])| (?=[A-Za-z]+\^?-[1-9])")
+_OF_WATER = re.compile(r"(?:(?<=[mn])|(?<=ft))[. ]*(H2[O0]|w\.?c\.?|WG)", re.IGNORECASE)
+_OF_CURRENT = re.compile(r"(?P<unit>[mkuµ]?[VA])[ _]?(?i:dc|ac|rms)")
 # A unit with a factor: 1/10 s, 0.1 s, 10 ms, 10^-3 l/s, 1e-6 s.
 _MULTIPLE = re.compile(
     r"[x*]?\s*(?P<number>\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?)(?:\s*/\s*(?P<parts>\d+)"
@@ -51,7 +74,8 @@ _MULTIPLE = re.compile(
 )
 # A pressure above that of the air, or above nothing: barg, bar(g), bar rel, psia, kPa abs.
 _FROM_ZERO = re.compile(
-    r"(?P<unit>\w*(?:bar|psi|Pa))\s*\(?(?:(?P<gauge>g|gauge|rel|ü)|a|abs)\.?\)?", re.IGNORECASE
+    r"(?P<unit>\w*(?:bar|psi|Pa)|kgf?/cm\^?2)\s*\(?(?:(?P<gauge>g|gauge|rel|ü)|a|abs)\.?\)?",
+    re.IGNORECASE,
 )
 _SIGNS = str.maketrans(
     {"²": "2", "³": "3", "⁻": "-", "¹": "1", "·": ".", "⋅": ".", "\u03a9": "Ohm", "\u2126": "Ohm"}
@@ -91,9 +115,11 @@ def spell_unit(text: str) -> str:
         return f"{force[:2]}f.{arm}".lower()
     if match := _DEGREES.fullmatch(bare):
         return f"deg{match['scale'].upper()}"
+    if match := _OF_CURRENT.fullmatch(bare):
+        return match["unit"]
     if bare not in _SPELLINGS:
         bare = _OF_WATER.sub("WC", _AROUND.sub(lambda sign: sign[1] or ".", bare))
-    return _SPELLINGS.get(bare, bare)
+    return _SPELLINGS.get(bare, _ANY_CASE.get(bare.casefold(), bare))
 
 
 def conversion(unit: str, si: str) -> Conversion | None:

@@ -9,7 +9,7 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import replace
-from datetime import UTC, date, datetime, timedelta
+from datetime import UTC, date, datetime, timedelta, timezone, tzinfo
 from itertools import pairwise
 from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
@@ -18,13 +18,13 @@ import numpy as np
 from workbench.arrays import Vector
 from workbench.recordings.formats.contents import FileChannel
 
-_HALF = r"(?P<half>[AaPp])(\.?[Mm]\.?)?"
-_PARTS_OF_DAY = r"(?P<h>\d{1,2}):(?P<m>\d\d)(:(?P<s>\d\d)((?P<dot>[.,:])(?P<f>\d{1,12}))?)?"
+_HALF = r"(?P<half>[AaPp])(\.?\s?[Mm]\.?)?"
+_PARTS_OF_DAY = r"(?P<h>\d{1,2}):(?P<m>\d\d)(:(?P<s>\d\d)((?P<dot>[.,:;])(?P<f>\d{1,12}))?)?"
 _CLOCK = rf"{_PARTS_OF_DAY}(\s*{_HALF})?"
 # Behind a date, hours and minutes may be parted by other signs, and stand alone with AM or PM.
 _CLOCK_OF_DATE = (
     rf"({_HALF.replace('half', 'early')}\s+)?"
-    + r"(?P<h>\d{1,2})([:.h-](?P<m>\d\d)([:.-](?P<s>\d\d)((?P<dot>[.,:])(?P<f>\d{1,12}))?)?"
+    + r"(?P<h>\d{1,2})([:.h-](?P<m>\d\d)([:.-](?P<s>\d\d)((?P<dot>[.,:;])(?P<f>\d{1,12}))?)?"
     rf"(\s*{_HALF})?|\s*{_HALF.replace('half', 'late')})"
 )
 _ZONE = (
@@ -86,6 +86,28 @@ _NUMBER = re.compile(r"[+-]?\d{0,13}([.,]\d*)?([eE][+-]?\d+)?")
 _OF_CONTROLLERS = re.compile(r"^(DATE_AND_TIME|DT|TIME_OF_DAY|TOD|TIME|T)#", re.IGNORECASE)
 _OF_WEEK = re.compile(r"(\d{4})-?W(\d\d)-?(\d)(?!\d)")
 _ZONE_WITHIN = re.compile(r"(?<=:\d\d )([A-Z]{3,4}) ((?:19|20)\d\d)$")  # 10:00:00 CEST 2024
+# How others write dates, where a word, a bracket or a letter of theirs may tell; and as what they
+# are read: zones in brackets, as of JavaScript; "at" in other languages; times before dates, as of
+# LabVIEW; dates of China, Japan and Korea.
+_MAY_BE_OTHER = re.compile(r"[^\x00-\xff]|[(à]|\s(at|um|kl|de)\b|\d\.\s|^\d\d?:\S+\s+(\S\S\s)?\d")
+_CLOCK_ALONE = r"(\d\d?\s*[:时時시]\s*\d\d?\s*[:分분]?(?:\s*\d\d?(?:[.,]\d+)?\s*[秒초]?)?)"
+_OTHERS = tuple(
+    (re.compile(form, re.IGNORECASE), read)
+    for form, read in (
+        (r"(?<=[+-]\d{4}) \([^()\d]+\)$", ""),
+        (r"\(((?:UTC|GMT)[+-]?[\d:]*)\)$", r"\1"),
+        (r"(?<=\d)\s+(?:à|at|um|kl\.?)\s+(?=\d)", " "),
+        (r"\sde\s", " "),
+        (r"^(\d{1,2}:\d\d\S*(?:\s[AP]M)?)\s+(\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4})$", r"\2 \1"),
+        (r"\(?(?:星期|周|週)[一二三四五六日天]\)?|\([月火水木金土日월화수목금토일]\)", " "),
+        (rf"(?:上午|午前|오전)\s*{_CLOCK_ALONE}|{_CLOCK_ALONE}\s*(?:上午|午前|오전)", r" \1\2 AM"),
+        (rf"(?:下午|午後|오후)\s*{_CLOCK_ALONE}|{_CLOCK_ALONE}\s*(?:下午|午後|오후)", r" \1\2 PM"),
+        (r"^(\d{4})\s*(?:年|년|\.\s)\s*(\d\d?)\s*[月월.]\s*(\d\d?)\s*[日일.]?", r"\1-\2-\3 "),
+        (r"\s*[时時시]\s*(?=\d)|(?<=\d)\s*[分분]\s*(?=\d)", ":"),
+        (r"(?<=\d)\s*[分분秒초]", ""),
+        (r"(?<=:)(\d)(?!\d)", r"0\1"),
+    )
+)
 _TIMES_ALONE = (_OF_DAY, _OF_HOUR, _OF_MINUTES, _DURATION)
 _EPOCH = date(1970, 1, 1).toordinal()
 _START = datetime(1970, 1, 1)
@@ -93,7 +115,7 @@ _HOUR = 3600
 _QUARTER = 900
 _HALF_HOUR = 1800  # by which Lord Howe Island changes its clocks
 ORDERS = {"ymd": "year, month, day", "dmy": "day, month, year", "mdy": "month, day, year"}
-_OFFSET_ZONE = re.compile(r"(?:UTC|GMT)([+-])(\d\d?)(?::?00)?")
+_OFFSET_ZONE = re.compile(r"(?:UTC|GMT)([+-])(\d\d?):?(\d\d)?")
 # Hours that zones are ahead of UTC, by the letters that recorders write.
 _AHEAD = {
     **{"": 0, "Z": 0, "UTC": 0, "GMT": 0, "WET": 0, "WEST": 1, "BST": 1, "CET": 1, "MEZ": 1},
@@ -141,6 +163,10 @@ def _spelled(text: str) -> str:
             return text
         return f"{day if '-' in match[0] else f'{day:%Y%m%d}'}{text[match.end() :]}"
     text = _OF_CONTROLLERS.sub("", text) if "#" in text else text
+    if text[:1].isalnum() and _MAY_BE_OTHER.search(text):
+        for form, read in _OTHERS:
+            text = form.sub(read, text)
+        text = " ".join(text.split())
     return _ZONE_WITHIN.sub(r"\2 \1", text)
 
 
@@ -151,10 +177,11 @@ def _zone_known(zone: str | None) -> bool:
     return _zone(zone) is not None if "/" in zone else zone.isupper()
 
 
-def _zone(name: str) -> ZoneInfo | None:
-    if fixed := _OFFSET_ZONE.fullmatch(name):  # Etc/GMT-2 is two hours ahead
-        name = f"Etc/GMT{'-' if fixed[1] == '+' else '+'}{int(fixed[2])}"
+def _zone(name: str) -> tzinfo | None:
     try:
+        if fixed := _OFFSET_ZONE.fullmatch(name):
+            ahead = timedelta(hours=int(fixed[2]), minutes=int(fixed[3] or 0))
+            return timezone(ahead if fixed[1] == "+" else -ahead)
         return ZoneInfo(name)
     except (ZoneInfoNotFoundError, ValueError, OSError):
         return None
@@ -197,7 +224,7 @@ def is_said(how: str) -> bool:
     return bool(order or stated or zone)
 
 
-def _read_statement(how: str) -> tuple[str, str, ZoneInfo | None]:
+def _read_statement(how: str) -> tuple[str, str, tzinfo | None]:
     """Order of dates, their format, and their zone, of what a user says."""
     words = how.split()
     named = [w for w in words if w.startswith(("UTC", "GMT")) or ("/" in w and "%" not in w)]
@@ -276,7 +303,7 @@ def _twelve_hours(matches: Sequence[re.Match[str] | None]) -> bool:
 
 
 def _by_format(
-    name: str, texts: Sequence[str], stated: str, zone: ZoneInfo | None
+    name: str, texts: Sequence[str], stated: str, zone: tzinfo | None
 ) -> FileChannel | None:
     """Times in a format that the user states."""
     moments: list[datetime | None] = []
@@ -297,7 +324,7 @@ def _by_format(
 
 
 def _by_date(
-    name: str, texts: Sequence[str], pattern: re.Pattern[str], order: str, zone: ZoneInfo | None
+    name: str, texts: Sequence[str], pattern: re.Pattern[str], order: str, zone: tzinfo | None
 ) -> FileChannel | None:
     matches = [pattern.fullmatch(text) for text in texts]
     known = np.array([match is not None for match in matches])
@@ -327,7 +354,7 @@ def _channel(
     texts: Sequence[str],
     known: np.ndarray,
     moment: tuple[np.ndarray, Vector, Vector],
-    zone: ZoneInfo | None,
+    zone: tzinfo | None,
     *,
     zoned: bool,
 ) -> FileChannel:
@@ -441,7 +468,7 @@ def _is_even(times: Vector) -> bool:
     return not ahead.size or bool(ahead.max() <= _EVEN * np.median(ahead))
 
 
-def _ahead(local: Vector, zone: ZoneInfo) -> Vector:
+def _ahead(local: Vector, zone: tzinfo) -> Vector:
     """Seconds that local times are ahead of UTC; an hour that comes twice goes on from its end."""
     quarters, where = np.unique(np.floor(local / 900.0), return_inverse=True)
     begins = [_START + timedelta(seconds=float(quarter) * 900.0) for quarter in quarters]
@@ -456,7 +483,7 @@ def _ahead(local: Vector, zone: ZoneInfo) -> Vector:
     return np.where(second, late, early)
 
 
-def _utc_offset(moment: datetime, zone: ZoneInfo, fold: int) -> float:
+def _utc_offset(moment: datetime, zone: tzinfo, fold: int) -> float:
     offset = moment.replace(tzinfo=zone, fold=fold).utcoffset()
     return offset.total_seconds() if offset is not None else 0.0
 

@@ -4,6 +4,7 @@ import csv
 import re
 import unicodedata
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -31,6 +32,9 @@ _QUOTED = re.compile(r'"([^"]*)"')
 _DIGIT = re.compile(r"(?![0-9])\d")
 _INCREMENT = re.compile(r"\s*(increment|tInc\s*=\s*(?P<value>\S+?)s?)\s*", re.IGNORECASE)
 _BEFORE_UNIT = re.compile(r"(?<=[^\s\])])\s+(?=[\[(])")  # between a name and its unit
+# Encodings that only dates or names of times in the letters of their countries tell.
+_OF_ASIA = {"gb18030": "GB 18030", "shift_jis": "Shift JIS", "euc_kr": "EUC-KR", "big5": "Big5"}
+_ASIAN_TIMES = re.compile(r"\d[年년]|日期|日時|时间|時間|時刻|시간|날짜|일시")
 _SAMPLED = 200  # lines from the middle of a file, which tell how it is laid out
 _FOLDED = 5  # lines over which a name in quotation marks may go
 _HABIT = 0.05  # of rows; fewer that end early are no habit of a writer
@@ -56,7 +60,9 @@ def read(path: Path, raw: bytes) -> Contents:
     if 2 * sum(_RECEIVED.match(line) is not None for line in lines) > len(lines):
         mark = _separator(path, [_RECEIVED.sub("", line) for line in lines])
         lines = [_RECEIVED.sub(rf"\g<time>{mark}", line) for line in lines]
-    separator = _separator(path, lines)
+    labview = lines[0].startswith("LabVIEW Measurement")
+    tabs = labview and "Separator\tTab" in map(str.strip, lines[:_SAMPLED])
+    separator = "\t" if tabs else _separator(path, lines)
     rows, numbers, broken = _rows(lines, separator)
     rows, numbers = _with_step(rows, numbers)
     rows, padded = (rows, 0) if separator == " " else _filled(rows)
@@ -65,7 +71,7 @@ def read(path: Path, raw: bytes) -> Contents:
         names = [f"column {i + 1}" for i in range(width, len(rows[0]))]
         rows = [*(row[:width] for row in rows[:height]), names, *(row[width:] for row in rows)]
         numbers = [*numbers[:height], numbers[0], *numbers]
-    if not lines[0].startswith("LabVIEW Measurement"):
+    if not labview:
         *tables, table = find_tables(rows, numbers, str(path))
     else:
         tables, table = [], _of_labview(find_table(rows, numbers, str(path)))
@@ -139,6 +145,10 @@ def _decode(path: Path, raw: bytes) -> tuple[str, str]:
     try:
         return raw.decode("utf-8-sig"), "UTF-8"
     except UnicodeDecodeError:
+        for encoding, called in _OF_ASIA.items():
+            with suppress(UnicodeDecodeError):
+                if _ASIAN_TIMES.search(text := raw.decode(encoding)):
+                    return text, called
         # Bytes that Windows-1252 leaves free are none of a table either.
         return raw.decode("cp1252", "replace"), "Windows-1252"
 
