@@ -132,6 +132,13 @@ def test_discrete_states_are_iterated_until_they_are_stable(build):
         assert run(fmu, "open_loop", 600.0)[-1] == pytest.approx(exact(1500.0, 600.0), abs=0.03)
 
 
+def test_a_model_exchange_is_told_no_tolerance_since_it_does_not_integrate(build):
+    """Dymola's warns of one: a doubt on every result, which said nothing of the model."""
+    with FMU(build("RELAYS", flags=["-DUNTOLD"])) as fmu:
+        fmu.start({})
+        assert fmu.take_warning() == ""
+
+
 @pytest.mark.parametrize("begin", [294.0, 297.0])
 def test_a_calculated_start_beyond_a_switch_is_in_the_mode_of_there(begin, build):
     """At 291 K the thermostat heats, up to 295 K: above, it does not."""

@@ -338,7 +338,9 @@ class FMUInstance:
             If the FMU refuses a call, or asks to end.
         """
         # Those built here keep 1e-6 by themselves, with which the recordings of the rig were made.
-        tolerance = None if self.is_own else TOLERANCE
+        # Model Exchange is integrated here; Dymola's warns of a tolerance that it has no use for.
+        alone = self.interface == CO_SIMULATION and not self.is_own
+        tolerance = TOLERANCE if alone else None
         try:
             if self._used:
                 self._reset()
