@@ -62,8 +62,12 @@ def record(
     late=0.0,
     lag=0.0,
     top=9.0,
+    means=False,
 ) -> Path:
-    """Four recordings of 200 s; each starts at another level, outlets are `apart` from the next."""
+    """Four recordings of 200 s; each starts at another level, outlets are `apart` from the next.
+
+    A flow is that until the next sample, or the mean since the last one.
+    """
     rng = np.random.default_rng(seed)
     time = np.arange(0.0, 200.25, 0.5)
     for number in range(4):
@@ -78,7 +82,7 @@ def record(
             solution = solve_ivp(rate, (0.0, 40.0), level[-1:], t_eval=at, rtol=1e-8, atol=1e-10)
             level.extend(solution.y[0])
         inflow = np.repeat(steps, 80)
-        flows = np.append(inflow, inflow[-1])
+        flows = np.append(inflow[0], inflow) if means else np.append(inflow, inflow[-1])
         if lag:
             fine = np.arange(0.0, 200.005, 0.01)
             level = np.interp(time, fine, behind(np.interp(fine, time, level), 0.01, lag))
@@ -170,12 +174,23 @@ def test_a_parameter_that_differs_between_recordings_is_told_and_then_allowed_fo
     assert quietly(allowing, tmp_path / "recordings").diagnosis.verdict == "nothing"
 
 
-def test_an_input_that_is_held_and_not_said_to_be_is_named_beside_the_delay(tank, tmp_path):
+@pytest.mark.parametrize(
+    ("held", "means", "right"), [(False, False, "true"), (True, True, '"before"')]
+)
+def test_an_input_that_is_held_otherwise_than_said_is_named_beside_the_delay(
+    tank, tmp_path, held, means, right
+):
+    """It acts half a sample later than on straight lines, or a sample earlier than it says."""
     (inflow,) = tank.inputs
-    straight = replace(tank, inputs=(replace(inflow, held=False),))
-    recordings = record(tmp_path / "recordings", seed=1)
-    warnings = quietly(straight, recordings, "InputDelay[inflow]").warnings
-    assert any("write held = true in [inputs.inflow]" in warning for warning in warnings)
+    wrong = replace(tank, inputs=(replace(inflow, held=held),))
+    recordings = record(tmp_path / "recordings", seed=1, means=means)
+    outcome = quietly(wrong, recordings, "InputDelay[inflow]")
+    (cause,) = outcome.diagnosis.causes
+    delay = cause.parameters["delay"]
+    later = -0.5 if held else 0.25
+    assert later - 0.2 < delay.low < later < delay.high
+    asked = f"write held = {right} in [inputs.inflow]"
+    assert any(asked in warning for warning in outcome.warnings)
 
 
 @pytest.mark.long
@@ -371,12 +386,17 @@ def test_inputs_that_are_named_alone_may_be_held_otherwise(tank):
     """Half a sample later; of a sensor that is late, all inputs may be."""
     (inflow,) = tank.inputs
     two = replace(tank, inputs=(replace(inflow, held=False), replace(inflow, name="rain")))
-    assert held_otherwise(two, {"InputLag[inflow]"}, 0.2, 0.3) == {"inflow": "held = true"}
-    assert held_otherwise(two, {"SensorDelay[level]"}, -0.3, -0.2) == {
+    assert held_otherwise(two, {"InputLag[inflow]"}, 0.25, 0.2, 0.3) == {"inflow": "held = true"}
+    assert held_otherwise(two, {"SensorDelay[level]"}, -0.25, -0.3, -0.2) == {
         "inflow": 'held = "before"',
         "rain": "held = false",
     }
-    assert held_otherwise(two, {"InputDelay[rain]"}, -0.3, -0.2) == {"rain": "held = false"}
+    assert held_otherwise(two, {"InputDelay[rain]"}, -0.25, -0.3, -0.2) == {"rain": "held = false"}
+
+
+def test_of_two_ways_to_hold_an_input_the_nearer_one_is_named(tank):
+    """Of a held one, straight lines act half a sample earlier, means of before a whole one."""
+    assert held_otherwise(tank, set(), -0.22, -0.7, 0.1) == {"inflow": "held = false"}
 
 
 # --- terms beside rates ---

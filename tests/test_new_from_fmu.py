@@ -101,6 +101,20 @@ def test_two_commands_lead_from_an_fmu_and_logs_to_an_open_loop(tmp_path, fmu, a
     assert set(summary["cases"]) == {"day1", "day2"}
 
 
+@pytest.mark.parametrize(("samples", "held"), [(1, True), (10, False)])
+def test_a_command_is_held_where_it_jumps_and_not_where_it_ramps(tmp_path, fmu, samples, held):
+    """A power that rises for 20 s and then stays was held: half a sample late, for a cause."""
+    time = np.arange(0.0, 600.0, 2.0)
+    power = 5.0 + 10.0 * np.clip((time % 150.0) / (2.0 * samples), 0.0, 1.0)
+    rows = [
+        f"{t:g},{p:.6f},{300 + 0.1 * (k % 7)}"
+        for k, (t, p) in enumerate(zip(time, power, strict=True))
+    ]
+    log = tmp_path / "log.csv"
+    log.write_text("\n".join(["time [s],P [W],T [K]", *rows]))
+    assert ("held = true" in drafted(fmu, log)) is held
+
+
 def test_an_estimator_that_acts_by_quantities_alone_is_left_out_without_any(tmp_path, fmu):
     log = write_log(tmp_path / "log.csv", 3)
     drafted(fmu, log)

@@ -512,7 +512,7 @@ def _held(system: System, cause: Cause) -> str:
     names, size = {cause.effect.name, *cause.confusable_with}, cause.parameters[cause.effect.label]
     if cause.effect.size not in (DELAY, LAG):
         return ""
-    keys = held_otherwise(system, names, size.low, size.high)
+    keys = held_otherwise(system, names, size.value, size.low, size.high)
     writing = " and ".join(f"{key} in [inputs.{name}]" for name, key in keys.items())
     return (
         "Inputs that are held otherwise between samples, which are "

@@ -460,9 +460,13 @@ def _signal_table(draft: Draft, signal: DraftSignal) -> list[str]:
 
 
 def _steps(samples: Sequence[Vector]) -> bool:
-    """Whether a signal is set and stays so: most samples are exactly the one before."""
-    moved = np.concatenate([np.diff(values) for values in samples])
-    return bool((moved == 0.0).mean() > 0.5)
+    """Whether a signal is set and stays so: most samples are exactly the one before.
+
+    Of those that are not, most stand alone; a ramp, or what lags, moves for samples on end.
+    """
+    moved = [np.diff(values) != 0.0 for values in samples]
+    further = np.concatenate([m[1:][m[:-1]] for m in moved])  # after a move
+    return bool(np.concatenate(moved).mean() < 0.5 and 2 * further.sum() <= further.size)
 
 
 def _noise(samples: Sequence[Vector], unit: str, span: float, *, may_be_exact: bool) -> list[str]:

@@ -23,6 +23,7 @@ from workbench.system.system import System
 
 KIND, OWN, SKEW = "LoggerTimeSkew", "TimeSkew", "skew"
 DELAY = "delay"
+INPUT_DELAY = "InputDelay"
 
 
 def clocks(system: System) -> tuple[Effect, ...]:
@@ -55,8 +56,8 @@ def delays(system: System) -> tuple[Effect, ...]:
         acts = signal in system.inputs
         if not others or known & {frozenset([name]), frozenset(others)}:
             continue
-        clock = _clock(system, "InputDelay", name, others)
-        text = f"{signal.label} that acts later than it is recorded"
+        clock = _clock(system, INPUT_DELAY, name, others)
+        text = f"{signal.label} that acts at another time than it is recorded"
         if not acts:
             clock = _clock(system, "SensorDelay", name, (name,))
             text = f"a sensor of {signal.label} that reads late"
@@ -65,7 +66,9 @@ def delays(system: System) -> tuple[Effect, ...]:
     return tuple(effects)
 
 
-def held_otherwise(system: System, effects: Set[str], low: float, high: float) -> dict[str, str]:
+def held_otherwise(
+    system: System, effects: Set[str], size: float, low: float, high: float
+) -> dict[str, str]:
     """Inputs that would act so much later if they were held otherwise, and the key that says so.
 
     A sample that acts until the next one acts half a sample time later, on average, than one on a
@@ -74,16 +77,19 @@ def held_otherwise(system: System, effects: Set[str], low: float, high: float) -
     Parameters
     ----------
     effects : names of those that explain the same; if inputs are among them, no others are meant.
-    low, high : ends of the interval of a delay or a lag of inputs behind outputs [s].
+    size, low, high : of a delay or a lag of inputs behind outputs, and ends of its interval [s].
     """
     half, words = 0.5 * system.sample_time, {1.0: "true", 0.0: "false", -1.0: '"before"'}
-    late = [s for s in system.inputs if {f"InputDelay[{s.name}]", f"InputLag[{s.name}]"} & effects]
-    return {
-        signal.name: f"held = {word}"
-        for signal in late or system.inputs
-        for hold, word in words.items()
-        if hold != signal.hold and low <= (hold - signal.hold) * half <= high
-    }
+    late = [
+        s for s in system.inputs if {f"{INPUT_DELAY}[{s.name}]", f"InputLag[{s.name}]"} & effects
+    ]
+    keys = {}
+    for signal in late or system.inputs:
+        later = {hold: (hold - signal.hold) * half for hold in words if hold != signal.hold}
+        hold = min(later, key=lambda hold: abs(later[hold] - size))
+        if low <= later[hold] <= high:
+            keys[signal.name] = f"held = {words[hold]}"
+    return keys
 
 
 def _clock(system: System, model: str, name: str, signals: tuple[str, ...]) -> Effect:

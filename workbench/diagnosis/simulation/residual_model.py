@@ -12,7 +12,7 @@ from dataclasses import replace
 from typing import Any, Self, TypeVar
 
 from workbench.arrays import Matrix
-from workbench.diagnosis.data.clocks import DELAY, greatest_skew, late_signals
+from workbench.diagnosis.data.clocks import DELAY, INPUT_DELAY, greatest_skew, late_signals
 from workbench.diagnosis.data.motion import ModelSource, OpenModel, opened
 from workbench.diagnosis.data.samples import Samples, compared, prepare
 from workbench.diagnosis.data.sensors import sensor_errors
@@ -122,9 +122,13 @@ class ResidualModel:
                 max(low, parameter.range[0]),
                 min(high, parameter.range[1]),
             )
+        most = greatest_skew(self.system)
         for name in late_signals(self.system):
-            self.units[name], most = "s", greatest_skew(self.system)
-            self.bounds[name] = (0.0 if name.endswith(DELAY) else -most, most)
+            # Nothing acts before its cause, but an input that is held otherwise by a sample, which
+            # is well inside of the bounds.
+            early = 2.0 * self.system.sample_time if name.startswith(INPUT_DELAY) else 0.0
+            self.units[name] = "s"
+            self.bounds[name] = (-early if name.endswith(DELAY) else -most, most)
         for name, error in sensor_errors(self.system).items():
             self.units[name], self.bounds[name] = error.unit, error.bounds
 
