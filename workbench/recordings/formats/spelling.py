@@ -182,14 +182,14 @@ def is_unit(text: str) -> bool:
 
 
 _NAMED = re.compile(
-    r"(?P<name>.*?)\s*(?:\[(?P<square>[^\[\]]*)\]|[({<](?P<round>[^(){}<>]*)[)}>])\s*"
+    r"(?P<name>(?:.*?\S)?)\s*(?:\[(?P<square>[^\[\]]*)\]|[({<](?P<round>[^(){}<>]*)[)}>])\s*"
 )
 _WITHIN = re.compile(r"(?P<name>.*\S)\s*\[(?P<unit>[^\[\]]+)\]\s*(?P<rest>\S.*)")
 # V(h) and I(R1) of circuits: a voltage of a node, a current through a part, not in hours.
 _OF_CIRCUIT = re.compile(r"(?P<kind>[VI])\((?P<of>[^()]+)\)", re.IGNORECASE)
 _KINDS_OF_CIRCUIT = {"V": ("V", "m/s", "m3"), "I": ("A",)}
 _TRAILING = re.compile(
-    r"(?P<name>.*?\S)\s*(?:\s/\s?|\s+in\s+|,\s*)(?P<unit>\S+)(\s+\((LGR|SEN) S/N.*\))?"
+    r"(?P<name>.*?\S)(?:\s+/\s?|\s+in\s+|\s*,\s*)(?P<unit>\S+)(\s+\((LGR|SEN) S/N.*\))?"
 )
 
 

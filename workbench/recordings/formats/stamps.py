@@ -164,6 +164,7 @@ def _spelled(text: str) -> str:
         return f"{day if '-' in match[0] else f'{day:%Y%m%d}'}{text[match.end() :]}"
     text = _OF_CONTROLLERS.sub("", text) if "#" in text else text
     if text[:1].isalnum() and _MAY_BE_OTHER.search(text):
+        text = " ".join(text.split())
         for form, read in _OTHERS:
             text = form.sub(read, text)
         text = " ".join(text.split())
