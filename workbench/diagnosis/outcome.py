@@ -150,6 +150,8 @@ class Outcome:
         if part:
             sizes = [size for cause in diagnosis.causes for size in cause.parameters.values()]
             remainder = f"no effect of the catalogue explains the rest{self._goes}"
+            if diagnosis.noise_alone and self._unsure:
+                remainder = f"the size of {self._unsure} may be zero"
             if any(np.isfinite(size.beyond) for size in sizes):
                 remainder = "a size beyond its bound explains more"
             more = f" This is a part: {remainder}."
@@ -158,6 +160,11 @@ class Outcome:
             f"{self._held_out}."
             f"{more}{cost}"
         )
+
+    @property
+    def _unsure(self) -> str:
+        """Causes whose sizes may be zero, by name."""
+        return " and ".join(c.effect.name for c in self.diagnosis.causes if c.may_be_zero)
 
     @property
     def _held_out(self) -> str:
@@ -222,12 +229,7 @@ class Outcome:
             shifted.insert(0, diagnosis.differing.text)
         if diagnosis.noise_alone or diagnosis.gain is None:
             return [*limits, *shifted]
-        unsure = [
-            cause.effect.name
-            for cause in diagnosis.causes
-            if cause.parameters[cause.effect.label].holds_zero
-        ]
-        zero = f" That of {' and '.join(unsure)} holds zero." if unsure else ""
+        zero = f" That of {self._unsure} holds zero." if self._unsure else ""
         return [
             *limits,
             *shifted,
@@ -266,6 +268,8 @@ class Outcome:
             "at its bound" in why for nearest in self.diagnosis.nearest for why in nearest.reasons
         )
         widen = ["widen the bounds of a parameter at its bound, if physics allows it"] * bound
+        if (change := self._change) is not None:
+            widen.insert(0, f"if {change.effects[0]} may be so, correct the model")
         if (slight := self._slight) is not None:
             name = slight.effects[0]
             widen.append(f"state a smaller size that matters for {name}, if it is worth reporting")
@@ -285,6 +289,11 @@ class Outcome:
         partial, late = self.diagnosis.partial, self.diagnosis.late
         if late is not None:
             return _late(late)
+        if (change := self._change) is not None:
+            return (
+                "Something is missing that no effect of the catalogue explains, but one other "
+                f"change would: {change.change}."
+            )
         if (slight := self._slight) is not None:
             names = " and ".join(slight.effects)
             return (
@@ -293,6 +302,11 @@ class Outcome:
             )
         part = f", though {' and '.join(partial)} would explain a part" * bool(partial)
         return f"Something is missing that no effect of the catalogue explains{part}{self._goes}."
+
+    @property
+    def _change(self) -> NearestCandidate | None:
+        """The one change that explains as much, and that no effect of the catalogue is."""
+        return next((nearest for nearest in self.diagnosis.nearest if nearest.change), None)
 
     @property
     def _slight(self) -> NearestCandidate | None:

@@ -109,8 +109,8 @@ def candidates(model: FMU, system: System) -> tuple[Effect, ...]:
     sensors = [effect for effect in wrong_sensors(system) if effect.sensor not in whole]
     zeros = [effect for effect in sensors if effect.size in (GAIN, OFFSET)]
     others = [effect for effect in sensors if effect.size not in (GAIN, OFFSET)]
-    parameters, terms = _parameters(model, system), _terms(model, system)
-    return (*parameters, *zeros, *terms, *_starts(model, system), *others)
+    own, terms = parameters(model, system), _terms(model, system)
+    return (*own, *zeros, *terms, *_starts(model, system), *others)
 
 
 def considered(system: System, candidates: Iterable[Effect]) -> tuple[Effect, ...]:
@@ -267,7 +267,8 @@ def without_guesses(system: System, model: FMU) -> System:
     return replace(system, state_noise=tuple(names.values()))
 
 
-def _parameters(model: FMU, system: System) -> Iterator[Effect]:
+def parameters(model: FMU, system: System) -> Iterator[Effect]:
+    """Parameters that may have another value; none that the system fits in any case."""
     compare = system.comparison
     fitted = {*compare.levels, *compare.tolerances, *system.corrections}
     for variable in model.description.variables:

@@ -15,7 +15,7 @@ import numpy as np
 from workbench.arrays import Vector
 from workbench.diagnosis.data.clocks import apparent_lags, greatest_skew, own_clocks, reference
 from workbench.diagnosis.data.samples import standardised
-from workbench.diagnosis.effects.candidates import own_bounds
+from workbench.diagnosis.effects.candidates import own_bounds, parameters
 from workbench.diagnosis.effects.catalogue import Effect, variant
 from workbench.diagnosis.effects.extension import sizes_by_component, variables
 from workbench.diagnosis.inference.linearized import (
@@ -151,6 +151,25 @@ class Fit:
             **{effect.name: effect for effect in effects},
         }
         return other
+
+    def changes(self) -> list[Effect]:
+        """Changes that no effect is: of a parameter of the model, or an effect in one place alone.
+
+        What turns with a shaft has a phase, which is no single change.
+        """
+        effects, simulations = self.unknowns.effects.values(), self._simulations
+        sizes = {name for e in effects for part in e.sizes for name in variables(e, part)}
+        with open_model(simulations.system) as model:
+            own = list(parameters(model, simulations.system))
+        return [
+            *(e for e in own if e.name not in sizes and e.name in simulations.nominal),
+            *(
+                replace(e, name=f"{e.name}[{slot}]", slots=(slot,), text=f"{e.text}, {slot} alone")
+                for e in effects
+                if len(e.slots) > 1 and not e.order_locked
+                for slot in e.slots
+            ),
+        ]
 
     def opened(self, effect: Effect, parameter: str, side: str) -> "Fit":
         """The same with a parameter that may pass its bound, "least" or "greatest"."""

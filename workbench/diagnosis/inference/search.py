@@ -123,17 +123,17 @@ def _step(
         ranked = [variants[0].effect for variants in rivals]
         unjudged = [s for s in scores if fit.free or s.effect not in ranked]
         simulated = _misjudged(fit, best, unjudged, straight)
-        rivals = [_starts(variants) for variants in rivals]
+        rivals = [starts_of(variants) for variants in rivals]
         for start in simulated:
             if start.effect in ranked:
                 rivals[ranked.index(start.effect)].insert(0, start)
             else:  # of a sensor, or a run that nothing corrects, it is a guess to begin with
                 guess = fit.free or start.effect.sensor
-                rivals.append(_starts([start]) if guess else [start])
+                rivals.append(starts_of([start]) if guess else [start])
     if not rivals:
         return None
     report(f"fitting {', '.join(variants[0].effect.name for variants in rivals)}")
-    fits = _fits(fit, best, rivals)
+    fits = rival_fits(fit, best, rivals)
     if not fits:
         return None
     equals = [other for other in fits if beyond(other, fits[0]) < fit.decides.tied]
@@ -340,7 +340,7 @@ def beyond(fitted: FittedModel, other: FittedModel) -> float:
     return fitted.linearised.weighed(variance_factors) - other.linearised.weighed(variance_factors)
 
 
-def _fits(
+def rival_fits(
     fit: Fit, best: FittedModel, rivals: Sequence[Sequence[CandidateScore]]
 ) -> list[FittedModel]:
     """Fits with one more effect that gain by it, best first; one far behind is not finished."""
@@ -376,7 +376,7 @@ def misfits(fits: Sequence[FittedModel]) -> Vector:
     return np.array([fit.linearised.weighed(variance_factors) for fit in fits])
 
 
-def _starts(variants: Sequence[CandidateScore]) -> list[CandidateScore]:
+def starts_of(variants: Sequence[CandidateScore]) -> list[CandidateScore]:
     """Where fits of an effect begin, one after the other where that before gained nothing.
 
     A law bends: half a stiffness is twice the deflection, and where it sets in shows only there.

@@ -15,6 +15,7 @@ from workbench.diagnosis.inference.between_recordings import (
     DifferingStarts,
     what_differs,
 )
+from workbench.diagnosis.inference.crossvalidation import CrossValidation
 from workbench.diagnosis.inference.discrepancy import (
     WRONG,
     correlated_deviations,
@@ -42,6 +43,8 @@ from workbench.diagnosis.inference.search import (
     fitted,
     forward_selection,
     misfits,
+    rival_fits,
+    starts_of,
     without,
 )
 from workbench.diagnosis.inference.selection import (
@@ -134,6 +137,11 @@ class Cause:
     explained: float  # share of the explainable that this effect explains on held-out stops
     phases: Vector | None  # (K,) [rad] in each stop, of an order-locked effect, else None
 
+    @property
+    def may_be_zero(self) -> bool:
+        """Whether its size may be none, by the interval."""
+        return self.parameters[self.effect.label].holds_zero
+
 
 @dataclass(frozen=True)
 class Gain:
@@ -180,6 +188,7 @@ class NearestCandidate:
     removed: float  # share of the explainable that they remove on held-out recordings
     reasons: tuple[str, ...]  # why they are no answer, in words
     slight: bool = False  # whether they leave noise alone, at a size less than what matters
+    change: str = ""  # what it is where no effect of the catalogue is, with its size
 
     @property
     def text(self) -> str:
@@ -267,7 +276,7 @@ def conclude(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnos
 
 def _concluded(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnosis:
     chosen, astray = _selected(fit, catalogue, report)
-    unlikely = fit.unlikely_levels(chosen.best.point, clean=_clean(fit, chosen))
+    unlikely = fit.unlikely_levels(chosen.best.point, clean=_clean(fit, chosen.best))
     if unlikely and not chosen.interrupted:
         report(f"further from the data sheet: {', '.join(sorted(name for name, _ in unlikely))}")
         chosen, astray = _beyond_sheet(fit, catalogue, (chosen, astray), unlikely, report)
@@ -287,7 +296,7 @@ def _judged(
     late = None
     if verdict != "nothing" and not astray and not outside and not chosen.interrupted:
         report("clocks of signals by themselves")
-        late = by_themselves(fit, chosen.base, chosen.best, clean=_clean(fit, chosen))
+        late = by_themselves(fit, chosen.base, chosen.best, clean=_clean(fit, chosen.best))
         if late is not None and (begun := _with_clock(fit, catalogue, chosen, late)) is not None:
             report(f"with {begun.active[0].name}, where the fits above did not get")
             timed = _selected_with(fit, catalogue, chosen, begun, report)
@@ -295,7 +304,7 @@ def _judged(
                 chosen, late = timed, None
         verdict = _verdict(fit, chosen) if late is None else "unexplained"
     base, best = chosen.base, chosen.best
-    gain, objections, noise_alone = None, list[str](), True
+    gain, objections, noise_alone, removed = None, list[str](), True, 1.0
     if best.active and late is None and not outside:
         report("held-out recordings")
         gain = _gain(fit, chosen)
@@ -304,8 +313,8 @@ def _judged(
             objections = [*worse, *left]
             before, after = gain.before**2 - 1.0, gain.after**2 - 1.0
             removed = (before - after) / max(before, 1e-9)
-            part = not worse and not astray and removed > _MOST
             if objections:
+                part = not worse and not astray and removed > _MOST
                 verdict = "partly explained" if part else "unexplained"
     causes: list[Cause] = []
     rivals: tuple[FittedModel, ...] = ()
@@ -316,10 +325,25 @@ def _judged(
             _cause(fit, chosen, effect, noise_alone=noise_alone, whole=verdict == "found")
             for effect in _strongest_first(fit, chosen, catalogue)
         ]
+        unsure = [f"the size of {c.effect.name} may be zero" for c in causes if c.may_be_zero]
+        if verdict == "found" and unsure:
+            objections += unsure
+            most = min(_MOST, 1.0 - fit.decides.left)
+            verdict = "partly explained" if removed > most else "unexplained"
         # Beside others, a part that bends as far as its effect allows stands for another law.
         if verdict == "partly explained" and len(causes) > 1 and (bent := _at_bounds(causes)):
             objections += bent
-            verdict, causes, gain = "unexplained", [], None
+            verdict = "unexplained"
+    change = None
+    if verdict != "nothing" and not (late or astray or outside or chosen.interrupted):
+        report("changes that no effect is")
+        change = _change(fit, chosen, report)
+    if change is not None:
+        if len(best.active) > 1:
+            objections.append(f"{change.effects[0]} alone explains as much")
+        verdict = "unexplained"
+    if verdict == "unexplained":
+        causes = []
     if causes:
         twins = [fits.values() for fits in chosen.twins.values()]
         rivals = (best, *(fit for fits in twins for fit in fits))
@@ -331,13 +355,16 @@ def _judged(
     if verdict == "unexplained" and late is None:
         report("candidates that come nearest")
         fits = {} if outside else _nearest_fits(fit, chosen)
-        whole = None if astray or chosen.interrupted else _passed_over(fit, chosen, fits)
+        whole = None
+        if not (astray or change or chosen.interrupted):
+            whole = _passed_over(fit, chosen, fits)
         if whole is not None:
             report(f"with {whole.active[0].name}, where the fits above did not get")
             other = _selected_with(fit, catalogue, chosen, whole, report)
             if other.best.active and other.best.misfit < best.misfit:
                 return _judged(fit, catalogue, other, astray, report)
-        nearest = (outside,) if outside else _nearest(fit, chosen, fits, objections)
+        others = () if outside else _nearest(fit, chosen, fits, objections)
+        nearest = (*filter(None, (outside, change)), *others)[:_NEAREST]
     remains = not noise_alone or (verdict == "unexplained" and late is None)
     part_of = verdict == "partly explained" or best.names in [
         candidate.effects for candidate in nearest
@@ -370,8 +397,8 @@ def _judged(
     )
 
 
-def _clean(fit: Fit, chosen: Selection) -> bool:
-    return float(chosen.best.linearised.variance_factors.max()) < fit.decides.wrong
+def _clean(fit: Fit, model: FittedModel) -> bool:
+    return float(model.linearised.variance_factors.max()) < fit.decides.wrong
 
 
 def _verdict(fit: Fit, chosen: Selection) -> Verdict:
@@ -382,7 +409,7 @@ def _verdict(fit: Fit, chosen: Selection) -> Verdict:
     most = max(1.0 - _HALF, fit.decides.left) * was
     if left > fit.decides.wrong - 1.0 and (not best.active or left > most):
         return "unexplained"
-    if not _clean(fit, chosen) and not (best.active and (chosen.interrupted or explained)):
+    if not _clean(fit, chosen.best) and not (best.active and (chosen.interrupted or explained)):
         return "unexplained"
     return "found" if best.active else "nothing"
 
@@ -570,6 +597,41 @@ def _nearest_fits(fit: Fit, chosen: Selection) -> dict[tuple[str, ...], FittedMo
     return fits
 
 
+def _change(fit: Fit, chosen: Selection, report: Reporter) -> NearestCandidate | None:
+    """A single change that no effect is, see `Fit.changes`, and that explains as much as several.
+
+    Beside one cause or none, it must explain significantly more, and leave noise alone.
+    """
+    base, best, changes = chosen.base, chosen.best, fit.changes()
+    if not changes:
+        return None
+    other = fit.beside(changes)
+    about, trial = examine(other, base, changes, report)
+    scores: dict[str, CandidateScore] = {}
+    for score in sorted(trial.scores(), key=lambda score: -score.gain):
+        scores.setdefault(score.effect.name, score)
+    tried = [starts_of([score]) for score in list(scores.values())[:_NEAREST] if score.size]
+    for model in rival_fits(other, about, tried) if tried else ():
+        validation = CrossValidation(other)
+        fast = validation.fast(about, model)
+        if len(best.active) > 1:
+            able = beyond(model, best) < fit.decides.form
+        else:
+            able = beyond(best, model) > fit.decides.needed
+            able = able and _clean(fit, model) and validation.noise_alone(model, fast=fast)
+        if able and not _below_what_matters(model):
+            (effect,) = model.active
+            size = model.point.sizes[effect.name, effect.size]
+            size += other.unknowns.nominal(effect, effect.size)
+            text = with_unit(size, other.unknowns.unit(effect, effect.size))
+            removed = validation.explained(about, model, fast=fast)[0]
+            reason = "it is no effect of the catalogue"
+            return NearestCandidate(
+                model.names, removed, (reason,), change=f"{effect.text}: {text}"
+            )
+    return None
+
+
 def _passed_over(
     fit: Fit, chosen: Selection, fits: Mapping[tuple[str, ...], FittedModel]
 ) -> FittedModel | None:
@@ -583,7 +645,7 @@ def _passed_over(
         if len(model.active) == 1
         and model is not chosen.best
         and beyond(chosen.best, model) > fit.decides.needed
-        and model.linearised.variance_factors.max() < fit.decides.wrong
+        and _clean(fit, model)
         and chosen.validation.noise_alone(model, fast=chosen.validation.fast(chosen.base, model))
     ]
     return min(able, key=lambda model: model.misfit, default=None)
@@ -676,9 +738,9 @@ def _beyond_sheet(
     before, fit.freed = fit.freed, fit.freed | unlikely
     chosen, astray = _selected(fit, catalogue, report)
     was, now = likely[0].best, chosen.best
-    clean = _clean(fit, likely[0])
+    clean = _clean(fit, likely[0].best)
     fewer = {*now.active} <= {*was.active} if clean else len(now.active) <= len(was.active)
-    if _clean(fit, chosen) and fewer and beyond(was, now) > fit.decides.fall:
+    if _clean(fit, chosen.best) and fewer and beyond(was, now) > fit.decides.fall:
         return chosen, astray
     fit.freed = before
     return likely
