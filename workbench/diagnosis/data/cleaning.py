@@ -200,8 +200,8 @@ def deviation_of(values: Vector, moving: Sequence[Vector] = ()) -> float:
     """Standard deviation of white noise on a slow signal, from its second differences.
 
     Where the signal is sampled slowly they show its motion too, and fourth differences far less: of
-    noise alone, both tell the same. It is no less than that of rounding to the least step between
-    samples. Source: T. Gasser, L. Sroka, C. Jennen-Steinmetz (1986), Biometrika 73, 625-633:
+    noise alone, both tell the same. It is no less than that of rounding to the least step that the
+    signal makes. Source: T. Gasser, L. Sroka, C. Jennen-Steinmetz (1986), Biometrika 73, 625-633:
     variance by differences.
 
     Parameters
@@ -209,7 +209,10 @@ def deviation_of(values: Vector, moving: Sequence[Vector] = ()) -> float:
     moving : inputs at the same samples. What follows those that switch is no noise; of others,
         which a controller may set by what it reads, noise itself would go with them.
     """
-    quantum = np.diff(np.unique(values)).min(initial=np.inf)
+    levels = np.unique(values)
+    # What always moves and never reads the same is rounded to less than its moves.
+    moved = np.diff(levels) if levels.size == values.size else np.abs(np.diff(values))
+    quantum = moved[moved > 0.0].min(initial=np.inf)
     rounding = quantum / np.sqrt(12.0) if np.isfinite(quantum) else np.finfo(float).tiny
     left = np.diff(values, 2)
     spread = _scatter(left) / math.sqrt(6.0)
