@@ -5,14 +5,12 @@ its parameters and the errors of its sensors.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from workbench.diagnosis.data.clocks import clocks, delays
-from workbench.diagnosis.data.gaps import gaps, parted
-from workbench.diagnosis.effects.candidates import candidates, considered, with_starts
+from workbench.diagnosis.effects.candidates import candidates, considered
 from workbench.diagnosis.effects.catalogue import Effect, choose, read_effects
 from workbench.errors import InputError
-from workbench.models.fmu import CoSimulation
 from workbench.models.modelica import Library, read_library
 from workbench.recordings.case import Case
 from workbench.system.registry import open_model
@@ -75,38 +73,6 @@ class Problem:
         return self.library
 
     @property
-    def unknown_after_gaps(self) -> str:
-        """What a recording cannot begin anew without after a gap, and what to do; empty: nothing.
-
-        Where a state begins must be measured or fitted, and nothing else may last through a gap.
-        """
-        system, compare = self.system, self.system.comparison
-        with open_model(system) as model:
-            known = system if self.library is not None else with_starts(system, model)
-            seen = {*system.signals, *(name for name, spread in known.spreads.items() if spread)}
-            hidden = [name for name in model.states if name not in seen]
-            events = isinstance(model, CoSimulation) or model.description.event_indicators
-        if events or compare.begins is not None or compare.rests:
-            return "Leave out what follows, or record it anew"
-        if hidden:
-            names = " and ".join(hidden)
-            return f"State how far {names} may be off after it, [states.NAME] spread"
-        return ""
-
-    def in_parts(self) -> "Problem":
-        """The same with recordings that begin anew after each gap in which an input moved."""
-        cases = [*self.cases, *self.held_out]
-        if not any(list(gaps(case, self.system)) for case in cases) or self.unknown_after_gaps:
-            return self
-        with open_model(self.system) as model:
-            begun = model.start_time
-        names = [case.name for case in cases]
-        fitted, held_out = (
-            tuple(parted(own, self.system, names, begun)) for own in (self.cases, self.held_out)
-        )
-        return replace(self, cases=fitted, held_out=held_out)
-
-    @property
     def base(self) -> str:
         """Name of the model that is diagnosed."""
         return self.system.models[OBSERVER].name
@@ -126,5 +92,4 @@ def problem_of(
         See `catalogue` and `choose`.
     """
     library = library_of(system)
-    chosen = choose(effects, catalogue(system, library))
-    return Problem(system, cases, library, chosen, held_out).in_parts()
+    return Problem(system, cases, library, choose(effects, catalogue(system, library)), held_out)

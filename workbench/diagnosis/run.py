@@ -12,7 +12,6 @@ import numpy as np
 from workbench.arrays import Vector
 from workbench.diagnosis.data.clocks import case_in_time, late_signals
 from workbench.diagnosis.data.counting import refuse_too_few
-from workbench.diagnosis.data.gaps import doubt
 from workbench.diagnosis.data.motion import ModelSource
 from workbench.diagnosis.data.sensors import (
     case_by_sensors,
@@ -86,9 +85,7 @@ def diagnose(
     with open_model(problem.system) as fmu:
         doubts = doubts_along(fmu, problem.system, problem.cases, moved=fmu.parameters)
     outcome = _with_effects(problem, engine, every_platform, certainty)
-    every = [*problem.cases, *problem.held_out]
-    gap = doubt(every, problem.system, lambda: problem.unknown_after_gaps)
-    return replace(outcome, warned="; ".join(filter(None, (doubts, gap, outcome.warned))))
+    return replace(outcome, warned="; ".join(filter(None, (doubts, outcome.warned))))
 
 
 def _with_effects(

@@ -24,10 +24,6 @@ _OFTEN = 0.2
 # controller's output does, comes back in its first sample by the square of one over the samples of
 # its time constant; from three on that is less.
 _BACK = 0.1
-# Share of the range that no sample reads between two levels, and standard deviations over which
-# noise scatters about one: 8.8 in 1e5 samples.
-_APART, _WIDE = 0.25, 12.0
-_FOLLOWS = 4  # samples of an input of which second differences of an output follow a jump
 _MOVED = 0.5  # of what second differences say: noise comes below in a thousandth of 20 samples
 # Steps in a row of another length that are another rate. Of samples lost at random, three in ten,
 # steps of three or more have a share of 0.09, so many in a row 5e-7: once in 20 recordings of 1e5.
@@ -69,8 +65,6 @@ def _outliers(values: Vector, signal: Signal, sound: Soundness, *, flat: bool) -
     noise = np.maximum(median_filter(away, 20 * _ABREAST + 1), median_filter(away, 2 * _ABREAST))
     scale = np.maximum(1.4826 * noise, deviation_of(values))
     wrong = _out_and_back(values, away > sound.spike * scale, scale, sound)
-    if levels_of(values):
-        wrong[:] = False  # each is where many others are
     same = np.diff(values) == 0.0
     alike = _alike(signal)
     if same.mean() < min(_OFTEN + alike, 1.0 - alike):
@@ -179,11 +173,11 @@ def _smooth_evenly(values: Vector, windows: Sequence[float], h: float, held: flo
     return best
 
 
-def noise_in(values: Vector, signal: Signal, moving: Sequence[Vector] = ()) -> float:
+def noise_in(values: Vector, signal: Signal) -> float:
     """Standard deviation of the noise of a signal's samples; see `deviation_of`."""
     if signal.exact:
         return 0.0
-    return max(deviation_of(values, moving), float(signal.resolution / np.sqrt(12.0)))
+    return max(deviation_of(values), float(signal.resolution / np.sqrt(12.0)))
 
 
 def noise_between(values: Vector, gaps: Mask, signal: Signal) -> float:
@@ -196,53 +190,21 @@ def noise_between(values: Vector, gaps: Mask, signal: Signal) -> float:
     return max(shown, signal.noise_at_scale)
 
 
-def deviation_of(values: Vector, moving: Sequence[Vector] = ()) -> float:
+def deviation_of(values: Vector) -> float:
     """Standard deviation of white noise on a slow signal, from its second differences.
 
     Where the signal is sampled slowly they show its motion too, and fourth differences far less: of
     noise alone, both tell the same. It is no less than that of rounding to the least step that the
     signal makes. Source: T. Gasser, L. Sroka, C. Jennen-Steinmetz (1986), Biometrika 73, 625-633:
     variance by differences.
-
-    Parameters
-    ----------
-    moving : inputs at the same samples. What follows those that switch is no noise; of others,
-        which a controller may set by what it reads, noise itself would go with them.
     """
-    levels = np.unique(values)
-    # What always moves and never reads the same is rounded to less than its moves.
-    moved = np.diff(levels) if levels.size == values.size else np.abs(np.diff(values))
+    moved = np.abs(np.diff(values))
     quantum = moved[moved > 0.0].min(initial=np.inf)
     rounding = quantum / np.sqrt(12.0) if np.isfinite(quantum) else np.finfo(float).tiny
-    left = np.diff(values, 2)
-    spread = _scatter(left) / math.sqrt(6.0)
-    switched = [u for u in moving if levels_of(u)]
-    if switched and left.size > _FEW * _FOLLOWS * len(switched):
-        before = [np.roll(u, late)[2:] for u in switched for late in range(_FOLLOWS)]
-        design = np.column_stack([np.ones(left.size), *before])
-        rest = left - design @ np.linalg.lstsq(design, left)[0]
-        if (still := _scatter(rest) / math.sqrt(6.0)) < _MOVED * spread:
-            spread, left = still, rest
-    finer = _scatter(np.diff(left, 2)) / math.sqrt(70.0) if values.size > _FEW else spread
+    spread = _scatter(np.diff(values, 2)) / math.sqrt(6.0)
+    finer = _scatter(np.diff(values, 4)) / math.sqrt(70.0) if values.size > _FEW else spread
     spread = finer if finer < _MOVED * spread else spread
-    about = max((_scatter(level - np.median(level)) for level in levels_of(values)), default=spread)
-    return max(min(spread, about), float(rounding))
-
-
-def levels_of(values: Vector) -> list[Vector]:
-    """Samples of each level between which a signal jumps, as of a relay; none if it reads others.
-
-    Each has as many samples as a running median has one of, on average, and scatters like noise.
-    """
-    ordered = np.sort(values)
-    edges = np.flatnonzero(np.diff(ordered) > _APART * np.ptp(ordered)) + 1
-    levels = np.split(ordered, edges)
-    jumps = len(levels) > 1 and all(
-        level.size * _ABREAST >= values.size
-        and np.ptp(level) <= _WIDE * _scatter(level - np.median(level))
-        for level in levels
-    )
-    return levels if jumps else []
+    return max(spread, float(rounding))
 
 
 def _scatter(values: Vector) -> float:
