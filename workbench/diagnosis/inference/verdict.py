@@ -611,7 +611,8 @@ def _change(fit: Fit, chosen: Selection, report: Reporter) -> NearestCandidate |
     for score in sorted(trial.scores(), key=lambda score: -score.gain):
         scores.setdefault(score.effect.name, score)
     tried = [starts_of([score]) for score in list(scores.values())[:_NEAREST] if score.size]
-    for model in rival_fits(other, about, tried) if tried else ():
+    known = best.linearised.deviance + fit.decides.form if _clean(fit, best) else np.inf
+    for model in rival_fits(other, about, tried, known) if tried else ():
         validation = CrossValidation(other)
         fast = validation.fast(about, model)
         if len(best.active) > 1:
