@@ -17,13 +17,13 @@ from scipy.optimize import curve_fit, minimize_scalar
 from workbench import case_from_frame
 from workbench.diagnosis import build_everything, read_effects
 from workbench.diagnosis.data.motion import ModelSource
+from workbench.diagnosis.inference.causes import Interval
 from workbench.diagnosis.inference.certainty import assess
 from workbench.diagnosis.inference.crossvalidation import CrossValidation
 from workbench.diagnosis.inference.discrepancy import autocovariance, share_by_form
 from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.search import FittedModel, fitted
 from workbench.diagnosis.inference.selection import anew
-from workbench.diagnosis.inference.verdict import Interval
 from workbench.diagnosis.simulation.residual_model import ResidualModel
 from workbench.models.modelica import read_library
 

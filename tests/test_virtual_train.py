@@ -14,7 +14,7 @@ from workbench.api import observe
 from workbench.arrays import Matrix
 from workbench.diagnosis import problem_of
 from workbench.diagnosis.data.motion import ModelSource
-from workbench.diagnosis.inference.verdict import Cause
+from workbench.diagnosis.inference.causes import Cause
 from workbench.diagnosis.run import with_effects
 from workbench.diagnosis.simulation.residual_model import ResidualModel
 from workbench.errors import InputError

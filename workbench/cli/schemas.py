@@ -10,11 +10,11 @@ import typing
 from collections.abc import Mapping, Sequence
 from typing import Any, Union
 
+from workbench.diagnosis.inference.nearest import NearestCandidate
 from workbench.diagnosis.inference.nuisance import ShiftedLevel
 from workbench.diagnosis.inference.residuals import Dependence
 from workbench.diagnosis.inference.sample_errors import Errors
 from workbench.diagnosis.inference.timing import LateSignals
-from workbench.diagnosis.inference.verdict import NearestCandidate
 from workbench.observers import estimators_of
 from workbench.observers.trust import Contradiction
 from workbench.pages.answer import Measure

@@ -8,9 +8,10 @@ switched on by a parameter.
 """
 
 from workbench.diagnosis.effects.catalogue import Effect, choose, read_effects
+from workbench.diagnosis.inference.causes import Cause, Interval
 from workbench.diagnosis.inference.residuals import Dependence, Residuals
 from workbench.diagnosis.inference.sample_errors import Errors
-from workbench.diagnosis.inference.verdict import Cause, Diagnosis, Gain, Interval
+from workbench.diagnosis.inference.verdict import Diagnosis, Gain
 from workbench.diagnosis.outcome import Extension, Outcome
 from workbench.diagnosis.problem import Problem, catalogue, library_of, problem_of
 from workbench.diagnosis.run import build_everything, diagnose, given_values

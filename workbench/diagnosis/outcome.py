@@ -14,7 +14,9 @@ from workbench.diagnosis.data.clocks import DELAY, held_otherwise
 from workbench.diagnosis.data.counting import FAULTY, MISSING
 from workbench.diagnosis.effects.candidates import LAG
 from workbench.diagnosis.effects.extension import variables
+from workbench.diagnosis.inference.causes import Cause
 from workbench.diagnosis.inference.certainty import Certainty
+from workbench.diagnosis.inference.nearest import NearestCandidate
 from workbench.diagnosis.inference.nuisance import remedy
 from workbench.diagnosis.inference.residuals import Dependence, Residuals
 from workbench.diagnosis.inference.rivals import Rivals
@@ -22,7 +24,7 @@ from workbench.diagnosis.inference.sample_errors import Errors
 from workbench.diagnosis.inference.score_test import CandidateScore
 from workbench.diagnosis.inference.search import Step
 from workbench.diagnosis.inference.timing import LateSignals
-from workbench.diagnosis.inference.verdict import Cause, Diagnosis, Gain, NearestCandidate
+from workbench.diagnosis.inference.verdict import Diagnosis, Gain
 from workbench.errors import require_known
 from workbench.observers.simulation import CaseResult, case_figure
 from workbench.pages.figures import LIGHT, CaseFigure, Curve, Panel, save_figure, styled

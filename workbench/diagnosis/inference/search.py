@@ -542,6 +542,19 @@ def without(point: Point, effect: Effect) -> Point:
     )
 
 
+def reduced_to(best: FittedModel, effect: Effect) -> Point:
+    """The point of a fit with one of its effects alone."""
+    point = best.point
+    for other in best.active:
+        point = point if other is effect else without(point, other)
+    return point
+
+
+def is_clean(fit: Fit, model: FittedModel) -> bool:
+    """Whether errors that last are noise alone beside a model."""
+    return float(model.linearised.variance_factors.max()) < fit.decides.wrong
+
+
 def fitted(
     fit: Fit,
     start: LinearizedPoint,

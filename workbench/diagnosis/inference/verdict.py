@@ -7,23 +7,32 @@ from typing import Literal
 
 import numpy as np
 
-from workbench.arrays import Matrix, Vector
-from workbench.diagnosis.effects.candidates import LAG, SHARES
+from workbench.arrays import Matrix
 from workbench.diagnosis.effects.catalogue import Effect
 from workbench.diagnosis.inference.between_recordings import (
     DifferingParameter,
     DifferingStarts,
     what_differs,
 )
-from workbench.diagnosis.inference.crossvalidation import CrossValidation
-from workbench.diagnosis.inference.discrepancy import (
-    WRONG,
-    correlated_deviations,
-    hidden_by_noise,
-    share_by_form,
+from workbench.diagnosis.inference.causes import (
+    Cause,
+    at_bounds,
+    binding_bound,
+    cause_of,
+    set_by_nature,
+    size_text,
+    strongest_first,
 )
+from workbench.diagnosis.inference.discrepancy import WRONG
 from workbench.diagnosis.inference.fit import Fit
-from workbench.diagnosis.inference.linearized import Point
+from workbench.diagnosis.inference.nearest import (
+    NEAREST,
+    NearestCandidate,
+    nearest_candidates,
+    nearest_fits,
+    single_change,
+    single_effect,
+)
 from workbench.diagnosis.inference.nuisance import (
     ShiftedLevel,
     hidden_by_starts,
@@ -33,19 +42,15 @@ from workbench.diagnosis.inference.nuisance import (
 from workbench.diagnosis.inference.quadratic import Key
 from workbench.diagnosis.inference.score_test import CandidateScore
 from workbench.diagnosis.inference.search import (
-    BEGUN,
     FittedModel,
     Step,
     beyond,
     differentiable,
     examine,
-    extended,
     fitted,
     forward_selection,
-    misfits,
-    rival_fits,
-    starts_of,
-    without,
+    is_clean,
+    reduced_to,
 )
 from workbench.diagnosis.inference.selection import (
     ForwardSelection,
@@ -56,91 +61,14 @@ from workbench.diagnosis.inference.selection import (
 from workbench.diagnosis.inference.timing import LateSignals, by_themselves
 from workbench.errors import InputError
 from workbench.runtime.engine import Reporter
-from workbench.system.units import BAND, with_interval, with_unit
 
 Verdict = Literal["nothing", "found", "partly explained", "unexplained"]
 
-_FORM, _COMPANY = 0.005, 0.1  # shares of a value, and of the size that matters
 _DRAWS = 2000  # of the bootstrap over stops
 # Share from which on a part has the right place, if not the right form: of squares, an offset in
 # place of a ramp takes 75 %, a line in place of a parabola 94 %.
 _MOST = 0.9
 _HALF = 0.5  # share of squares from which on a cause explains more than it leaves
-_NEAREST = 3  # candidates that are told where none is accepted
-
-
-@dataclass(frozen=True)
-class Interval:
-    """An estimate with its 95 % interval, in `unit`."""
-
-    value: float
-    # low, high: ends; infinite to the side of a bound at which the fit stopped, but for a bound
-    # that nature sets
-    low: float
-    high: float
-    unit: str
-    limit: str = ""  # that bound, "least" or "greatest": then the value is no estimate
-    # where a fit ends that may pass the bound and leaves clearly less; NaN if none does
-    beyond: float = np.nan
-    alone: bool = False  # whether that fit needs no other cause
-    plain: bool = False  # whether it is a number in a unit that nobody states, and no share
-
-    @property
-    def text(self) -> str:
-        """For people."""
-        if not self.limit:
-            return with_interval(self.value, self.low, self.high, self._spoken)
-        value = with_unit(self.value, self._spoken)
-        return f"at its limit of {value}, which is no estimate: {self.better}"
-
-    @property
-    def better(self) -> str:
-        """What is known of values beyond the limit."""
-        if np.isfinite(self.beyond):
-            alone = ", alone" * self.alone
-            return f"{with_unit(self.beyond, self._spoken)}, beyond it, fits better{alone}"
-        more = "smaller" if self.limit == "least" else "larger"
-        return f"{more} may fit better" if self.open else f"nothing is {more}"
-
-    @property
-    def _spoken(self) -> str:
-        return "" if self.plain else self.unit
-
-    @property
-    def holds_zero(self) -> bool:
-        """Whether it may be nothing at all.
-
-        >>> Interval(2.03, 0.0, 9.83, "1/s").holds_zero, Interval(0.4, 0.2, 0.6, "N").holds_zero
-        (True, False)
-        """
-        return self.low <= 0.0 <= self.high
-
-    @property
-    def open(self) -> bool:
-        """Whether there may be values beyond the limit."""
-        return not (np.isfinite(self.low) and np.isfinite(self.high))
-
-    def to_dict(self) -> dict[str, float | str | None]:
-        """As plain numbers and texts; None of an end that is open."""
-        ends = {"value": self.value, "low": self.low, "high": self.high, "beyond": self.beyond}
-        numbers = {name: end if np.isfinite(end) else None for name, end in ends.items()}
-        return {**numbers, "unit": self.unit, "limit": self.limit, "text": self.text}
-
-
-@dataclass(frozen=True, eq=False)
-class Cause:
-    """One effect that was found."""
-
-    effect: Effect
-    parameters: Mapping[str, Interval]  # by name
-    confusable_with: tuple[str, ...]  # names of effects that explain these data as well
-    explained: float  # share of the explainable that this effect explains on held-out stops
-    phases: Vector | None  # (K,) [rad] in each stop, of an order-locked effect, else None
-
-    @property
-    def may_be_zero(self) -> bool:
-        """Whether its size may be none, by the interval."""
-        return self.parameters[self.effect.label].holds_zero
 
 
 @dataclass(frozen=True)
@@ -161,6 +89,12 @@ class Gain:
     fast: bool = False  # whether it is of blocks: causes turn with a shaft, or errors swing
 
     @property
+    def removed(self) -> float:
+        """Share of the squares beyond noise that causes remove."""
+        before, after = self.before**2 - 1.0, self.after**2 - 1.0
+        return (before - after) / max(before, 1e-9)
+
+    @property
     def text(self) -> str:
         """What the error does, in words; a fit with tolerances may err as little without.
 
@@ -178,23 +112,6 @@ class Gain:
             f"its error is {after} times the noise with and without, as tolerances that are less "
             "likely make up for it"
         )
-
-
-@dataclass(frozen=True)
-class NearestCandidate:
-    """Effects that come nearest to what is missing, and why they are not accepted."""
-
-    effects: tuple[str, ...]  # their names
-    removed: float  # share of the explainable that they remove on held-out recordings
-    reasons: tuple[str, ...]  # why they are no answer, in words
-    slight: bool = False  # whether they leave noise alone, at a size less than what matters
-    change: str = ""  # what it is where no effect of the catalogue is, with its size
-
-    @property
-    def text(self) -> str:
-        """For people."""
-        names = " and ".join(self.effects)
-        return f"{names} would remove {self.removed:.0%}, but {'; '.join(self.reasons)}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -244,8 +161,7 @@ class Diagnosis:
         Several effects bend to much that is neither of them: then they are no answer.
         """
         assert self.gain is not None
-        before, after = self.gain.before**2 - 1.0, self.gain.after**2 - 1.0
-        removed = float(np.clip((before - after) / max(before, 1e-9), 0.0, 1.0))
+        removed = float(np.clip(self.gain.removed, 0.0, 1.0))
         reason = f"one law explains as much with less: {law}"
         return replace(
             self,
@@ -276,7 +192,7 @@ def conclude(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnos
 
 def _concluded(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagnosis:
     chosen, astray = _selected(fit, catalogue, report)
-    unlikely = fit.unlikely_levels(chosen.best.point, clean=_clean(fit, chosen.best))
+    unlikely = fit.unlikely_levels(chosen.best.point, clean=is_clean(fit, chosen.best))
     if unlikely and not chosen.interrupted:
         report(f"further from the data sheet: {', '.join(sorted(name for name, _ in unlikely))}")
         chosen, astray = _beyond_sheet(fit, catalogue, (chosen, astray), unlikely, report)
@@ -292,88 +208,54 @@ def _judged(
 ) -> Diagnosis:
     """What the outcome of a search amounts to; begun again from a cause that it passed over."""
     chosen, outside = _within_bounds(fit, catalogue, chosen, report)
-    verdict: Verdict = "unexplained" if astray or outside else _verdict(fit, chosen)
     late = None
-    if verdict != "nothing" and not astray and not outside and not chosen.interrupted:
-        report("clocks of signals by themselves")
-        late = by_themselves(fit, chosen.base, chosen.best, clean=_clean(fit, chosen.best))
-        if late is not None and (begun := _with_clock(fit, catalogue, chosen, late)) is not None:
-            report(f"with {begun.active[0].name}, where the fits above did not get")
-            timed = _selected_with(fit, catalogue, chosen, begun, report)
-            if begun.active[0] in timed.best.active:
-                chosen, late = timed, None
-        verdict = _verdict(fit, chosen) if late is None else "unexplained"
+    if not (astray or outside):
+        chosen, late = _with_clocks(fit, catalogue, chosen, report)
+    refused = bool(astray or outside or late)
+    verdict: Verdict = "unexplained" if refused else _verdict(fit, chosen)
     base, best = chosen.base, chosen.best
-    gain, objections, noise_alone, removed = None, list[str](), True, 1.0
-    if best.active and late is None and not outside:
+    gain, objections, noise_alone = None, list[str](), True
+    if best.active and not (outside or late):
         report("held-out recordings")
         gain = _gain(fit, chosen)
-        if not chosen.interrupted:
-            worse, left = _objections(fit, chosen, gain, whole=verdict == "found")
-            objections = [*worse, *left]
-            before, after = gain.before**2 - 1.0, gain.after**2 - 1.0
-            removed = (before - after) / max(before, 1e-9)
-            if objections:
-                part = not worse and not astray and removed > _MOST
-                verdict = "partly explained" if part else "unexplained"
+        verdict, objections = _on_held_out(fit, chosen, gain, verdict, astray)
     causes: list[Cause] = []
-    rivals: tuple[FittedModel, ...] = ()
-    if verdict in ("found", "partly explained"):
-        fast = chosen.validation.fast(base, best)
-        noise_alone = chosen.validation.noise_alone(best, fast=fast)
+    if gain is not None and verdict in ("found", "partly explained"):
+        noise_alone = chosen.validation.noise_alone(best, fast=gain.fast)
         causes = [
-            _cause(fit, chosen, effect, noise_alone=noise_alone, whole=verdict == "found")
-            for effect in _strongest_first(fit, chosen, catalogue)
+            cause_of(fit, chosen, effect, noise_alone=noise_alone, whole=verdict == "found")
+            for effect in strongest_first(fit, chosen, catalogue)
         ]
-        unsure = [f"the size of {c.effect.name} may be zero" for c in causes if c.may_be_zero]
-        if verdict == "found" and unsure:
-            objections += unsure
-            most = min(_MOST, 1.0 - fit.decides.left)
-            verdict = "partly explained" if removed > most else "unexplained"
-        # Beside others, a part that bends as far as its effect allows stands for another law.
-        if verdict == "partly explained" and len(causes) > 1 and (bent := _at_bounds(causes)):
-            objections += bent
-            verdict = "unexplained"
+        verdict, doubts = _by_intervals(fit, chosen, gain, verdict, causes)
+        objections += doubts
     change = None
-    if verdict != "nothing" and not (late or astray or outside or chosen.interrupted):
+    if verdict != "nothing" and not (refused or chosen.interrupted):
         report("changes that no effect is")
-        change = _change(fit, chosen, report)
+        change = single_change(fit, chosen, report)
     if change is not None:
+        verdict = "unexplained"
         if len(best.active) > 1:
             objections.append(f"{change.effects[0]} alone explains as much")
-        verdict = "unexplained"
-    if verdict == "unexplained":
-        causes = []
-    if causes:
-        twins = [fits.values() for fits in chosen.twins.values()]
-        rivals = (best, *(fit for fits in twins for fit in fits))
-    else:
-        gain = None
-    presence = fit.unknowns.presence
-    hidden = hidden_effects(fit, chosen.trial, catalogue)
     nearest: tuple[NearestCandidate, ...] = ()
     if verdict == "unexplained" and late is None:
         report("candidates that come nearest")
-        fits = {} if outside else _nearest_fits(fit, chosen)
-        whole = None
-        if not (astray or change or chosen.interrupted):
-            whole = _passed_over(fit, chosen, fits)
-        if whole is not None:
-            report(f"with {whole.active[0].name}, where the fits above did not get")
-            other = _selected_with(fit, catalogue, chosen, whole, report)
-            if other.best.active and other.best.misfit < best.misfit:
+        fits = {} if outside else nearest_fits(fit, chosen)
+        if not (refused or change or chosen.interrupted):
+            other = _passed_over(fit, catalogue, chosen, fits, report)
+            if other is not None:
                 return _judged(fit, catalogue, other, astray, report)
-        others = () if outside else _nearest(fit, chosen, fits, objections)
-        nearest = (*filter(None, (outside, change)), *others)[:_NEAREST]
+        others = () if outside else nearest_candidates(fit, chosen, fits, objections)
+        nearest = (*filter(None, (outside, change)), *others)[:NEAREST]
+    answered = bool(causes) and verdict != "unexplained"
+    twins = [model for fits in chosen.twins.values() for model in fits.values()]
     remains = not noise_alone or (verdict == "unexplained" and late is None)
-    part_of = verdict == "partly explained" or best.names in [
-        candidate.effects for candidate in nearest
-    ]
+    part_of = verdict == "partly explained" or best.names in [near.effects for near in nearest]
+    hidden = hidden_effects(fit, chosen.trial, catalogue)
     return Diagnosis(
         verdict=verdict,
         interrupted=chosen.interrupted,
-        causes=tuple(causes),
-        gain=gain,
+        causes=tuple(causes) if answered else (),
+        gain=gain if answered else None,
         partial=best.names if part_of else (),
         nearest=nearest,
         noise_alone=noise_alone,
@@ -381,7 +263,7 @@ def _judged(
         late=late,
         base=base,
         best=best,
-        rivals=rivals,
+        rivals=(best, *twins) if answered else (),
         steps=chosen.steps,
         scores=chosen.steps[0].scores if chosen.steps else tuple(chosen.trial.scores()),
         names=chosen.names,
@@ -389,16 +271,12 @@ def _judged(
         not_visible={
             effect.name: f"{why}; what would show it: {effect.separation}"
             for effect in catalogue
-            if (why := presence.unseen(effect))
+            if (why := fit.unknowns.presence.unseen(effect))
         },
         hidden={level: tuple(effects) for level, effects in hidden.items()},
         hidden_by_starts=hidden_by_starts(fit, chosen.trial, catalogue),
         shifted=shifted_levels(fit, best, chosen.trial, catalogue, hidden),
     )
-
-
-def _clean(fit: Fit, model: FittedModel) -> bool:
-    return float(model.linearised.variance_factors.max()) < fit.decides.wrong
 
 
 def _verdict(fit: Fit, chosen: Selection) -> Verdict:
@@ -409,24 +287,81 @@ def _verdict(fit: Fit, chosen: Selection) -> Verdict:
     most = max(1.0 - _HALF, fit.decides.left) * was
     if left > fit.decides.wrong - 1.0 and (not best.active or left > most):
         return "unexplained"
-    if not _clean(fit, chosen.best) and not (best.active and (chosen.interrupted or explained)):
+    if not is_clean(fit, chosen.best) and not (best.active and (chosen.interrupted or explained)):
         return "unexplained"
     return "found" if best.active else "nothing"
 
 
-def _with_clock(
-    fit: Fit, catalogue: Sequence[Effect], chosen: Selection, late: LateSignals
-) -> FittedModel | None:
-    """The nominal model with the clock of the declared logger whose signals are late, if any is.
+def _with_clocks(
+    fit: Fit, catalogue: Sequence[Effect], chosen: Selection, report: Reporter
+) -> tuple[Selection, LateSignals | None]:
+    """What recordings need where a logger that the system declares is late, or what else is late.
 
     By more than a machine's shortest time, no derivative about the nominal model points there.
     """
+    if chosen.interrupted or _verdict(fit, chosen) == "nothing":
+        return chosen, None
+    report("clocks of signals by themselves")
+    late = by_themselves(fit, chosen.base, chosen.best, clean=is_clean(fit, chosen.best))
+    if late is None:
+        return chosen, None
     for clock in (effect for effect in catalogue if effect.late and late.skew):
         skew = late.skew_of(clock.late, fit.recorded)
-        if skew and clock not in chosen.best.active:
-            point = replace(chosen.base.point, sizes={(clock.name, clock.size): skew})
-            return fitted(fit, fit.at(point), (clock,))
-    return None
+        if not skew or clock in chosen.best.active:
+            continue
+        report(f"with {clock.name}, where the fits above did not get")
+        point = replace(chosen.base.point, sizes={(clock.name, clock.size): skew})
+        begun = fitted(fit, fit.at(point), (clock,))
+        timed = _selected_with(fit, catalogue, chosen, begun, report)
+        return (timed, None) if clock in timed.best.active else (chosen, late)
+    return chosen, late
+
+
+def _on_held_out(
+    fit: Fit, chosen: Selection, gain: Gain, verdict: Verdict, astray: Sequence[int]
+) -> tuple[Verdict, list[str]]:
+    """The verdict by recordings that were not fitted, and what is held against the causes."""
+    if chosen.interrupted:
+        return verdict, []
+    worse, left = _objections(fit, chosen, gain, whole=verdict == "found")
+    if not (worse or left):
+        return verdict, []
+    part = not worse and not astray and gain.removed > _MOST
+    return "partly explained" if part else "unexplained", [*worse, *left]
+
+
+def _by_intervals(
+    fit: Fit, chosen: Selection, gain: Gain, verdict: Verdict, causes: Sequence[Cause]
+) -> tuple[Verdict, list[str]]:
+    """The verdict by how sure the sizes of causes are, and what is held against them."""
+    unsure = [f"the size of {c.effect.name} may be zero" for c in causes if c.may_be_zero]
+    if verdict == "found":
+        if not unsure:
+            return verdict, []
+        most = min(_MOST, 1.0 - fit.decides.left)
+        part = chosen.interrupted or gain.removed > most
+        verdict = "partly explained" if part else "unexplained"
+    else:
+        unsure = []
+    # Beside others, a part that bends as far as its effect allows stands for another law.
+    if verdict == "partly explained" and len(causes) > 1 and (bent := at_bounds(causes)):
+        return "unexplained", [*unsure, *bent]
+    return verdict, unsure
+
+
+def _passed_over(
+    fit: Fit,
+    catalogue: Sequence[Effect],
+    chosen: Selection,
+    fits: Mapping[tuple[str, ...], FittedModel],
+    report: Reporter,
+) -> Selection | None:
+    """What recordings need beside a cause where the search did not get, if that leaves less."""
+    if (whole := single_effect(fit, chosen, fits)) is None:
+        return None
+    report(f"with {whole.active[0].name}, where the fits above did not get")
+    other = _selected_with(fit, catalogue, chosen, whole, report)
+    return other if other.best.active and other.best.misfit < chosen.best.misfit else None
 
 
 def _selected_with(
@@ -456,7 +391,7 @@ def _within_bounds(
         effect: limit
         for effect in best.active
         if (limit := binding_bound(fit, best, effect, effect.label))
-        and not _set_by_nature(
+        and not set_by_nature(
             best.point.sizes[effect.name, effect.label], fit.unknowns.unit(effect, effect.size)
         )
     }
@@ -482,40 +417,17 @@ def _within_bounds(
         removed = needed.validation.explained(needed.base, needed.best, fast=fast)[0]
         reasons = [
             f"{effect.label} of {effect.name} is at its bound; "
-            f"{_size_text(fit, needed.best, effect)}, beyond it, fits better"
+            f"{size_text(fit, needed.best, effect)}, beyond it, fits better"
             for effect in outside
         ]
         return chosen, NearestCandidate(needed.best.names, removed, tuple(reasons))
     (effect,) = kept
-    begun = fit.tried(_only(best, effect))
+    begun = fit.tried(reduced_to(best, effect))
     if begun is None:
         return chosen, None
     alone, trial = examine(fit, fitted(fit, begun, (effect,)), catalogue, report)
     selection = ForwardSelection(alone, list(chosen.steps), trial, interrupted=True, begun=None)
     return replace(select(fit, catalogue, selection, report), interrupted=False), None
-
-
-def _size_text(fit: Fit, model: FittedModel, effect: Effect) -> str:
-    """The size that an effect has in a fit, in words."""
-    size = model.point.sizes[effect.name, effect.label]
-    return with_unit(size, fit.unknowns.unit(effect, effect.size))
-
-
-def _only(best: FittedModel, effect: Effect) -> Point:
-    point = best.point
-    for other in best.active:
-        point = point if other is effect else without(point, other)
-    return point
-
-
-def _at_bounds(causes: Sequence[Cause]) -> list[str]:
-    """Parameters of causes beyond whose bounds there may be values, in words."""
-    return [
-        f"{name} of {cause.effect.name} is at its bound"
-        for cause in causes
-        for name, interval in cause.parameters.items()
-        if interval.limit and interval.open
-    ]
 
 
 def _objections(
@@ -571,130 +483,6 @@ def _lacking(fit: Fit, chosen: Selection) -> str:
     return "what remains goes with other effects of the catalogue, but none explains it"
 
 
-def _nearest_fits(fit: Fit, chosen: Selection) -> dict[tuple[str, ...], FittedModel]:
-    """Fits that may come near to what is missing, by the names of their effects."""
-    base, best = chosen.base, chosen.best
-    fits = {
-        rival.names: rival
-        for step in chosen.steps
-        for rival in step.rivals
-        if len(rival.active) == 1
-    }
-    scores = chosen.steps[0].scores if chosen.steps else chosen.trial.scores()
-    if not best.active or chosen.steps:
-        others = dict[str, CandidateScore]()
-        for score in sorted(scores, key=lambda score: -score.gain):
-            if (score.effect.name,) not in fits and score.size:
-                others.setdefault(score.effect.name, score)
-        tried = list(others.values())[:_NEAREST]
-        fits |= {
-            single.names: single
-            for single in fit.together(partial(extended, fit, base), tried)
-            if single is not None
-        }
-    if best.active:
-        fits[best.names] = best
-    return fits
-
-
-def _change(fit: Fit, chosen: Selection, report: Reporter) -> NearestCandidate | None:
-    """A single change that no effect is, see `Fit.changes`, and that explains as much as several.
-
-    Beside one cause or none, it must explain significantly more, and leave noise alone.
-    """
-    base, best, changes = chosen.base, chosen.best, fit.changes()
-    if not changes:
-        return None
-    other = fit.beside(changes)
-    about, trial = examine(other, base, changes, report)
-    scores: dict[str, CandidateScore] = {}
-    for score in sorted(trial.scores(), key=lambda score: -score.gain):
-        scores.setdefault(score.effect.name, score)
-    tried = [starts_of([score]) for score in list(scores.values())[:_NEAREST] if score.size]
-    known = best.linearised.deviance + fit.decides.form if _clean(fit, best) else np.inf
-    for model in rival_fits(other, about, tried, known) if tried else ():
-        validation = CrossValidation(other)
-        fast = validation.fast(about, model)
-        if len(best.active) > 1:
-            able = beyond(model, best) < fit.decides.form
-        else:
-            able = beyond(best, model) > fit.decides.needed
-            able = able and _clean(fit, model) and validation.noise_alone(model, fast=fast)
-        if able and not _below_what_matters(model):
-            (effect,) = model.active
-            size = model.point.sizes[effect.name, effect.size]
-            size += other.unknowns.nominal(effect, effect.size)
-            text = with_unit(size, other.unknowns.unit(effect, effect.size))
-            removed = validation.explained(about, model, fast=fast)[0]
-            reason = "it is no effect of the catalogue"
-            return NearestCandidate(
-                model.names, removed, (reason,), change=f"{effect.text}: {text}"
-            )
-    return None
-
-
-def _passed_over(
-    fit: Fit, chosen: Selection, fits: Mapping[tuple[str, ...], FittedModel]
-) -> FittedModel | None:
-    """A single effect that leaves noise alone, where the search did not get.
-
-    Of what switches, derivatives hold over so little that they say nothing of it.
-    """
-    able = [
-        model
-        for model in fits.values()
-        if len(model.active) == 1
-        and model is not chosen.best
-        and beyond(chosen.best, model) > fit.decides.needed
-        and _clean(fit, model)
-        and chosen.validation.noise_alone(model, fast=chosen.validation.fast(chosen.base, model))
-    ]
-    return min(able, key=lambda model: model.misfit, default=None)
-
-
-def _nearest(
-    fit: Fit,
-    chosen: Selection,
-    fits: Mapping[tuple[str, ...], FittedModel],
-    objections: Sequence[str],
-) -> tuple[NearestCandidate, ...]:
-    """What would remove most of what is missing on held-out recordings, and why it is no answer."""
-    base, best, validation = chosen.base, chosen.best, chosen.validation
-    nearest = []
-    for names, model in fits.items():
-        fast = validation.fast(base, model)
-        removed = validation.explained(base, model, fast=fast)[0]
-        if removed > 0.0:
-            reasons = objections if model is best else _reasons(fit, chosen, model, fast=fast)
-            slight = _below_what_matters(model) and validation.noise_alone(model, fast=fast)
-            nearest.append(NearestCandidate(names, removed, tuple(reasons), slight))
-    return tuple(sorted(nearest, key=lambda candidate: -candidate.removed)[:_NEAREST])
-
-
-def _below_what_matters(model: FittedModel) -> bool:
-    sizes = model.point.sizes
-    return all(abs(sizes[effect.name, effect.label]) < effect.matters for effect in model.active)
-
-
-def _reasons(fit: Fit, chosen: Selection, fitted: FittedModel, *, fast: bool) -> list[str]:
-    validation = chosen.validation
-    (effect,) = fitted.active
-    reasons = [
-        f"{parameter} is at its bound"
-        for _, parameter in fitted.point.sizes
-        if binding_bound(fit, fitted, effect, parameter)
-    ]
-    if _below_what_matters(fitted):
-        least = with_unit(effect.matters, fit.unknowns.unit(effect, effect.size))
-        size = _size_text(fit, fitted, effect)
-        reasons.append(f"its size, {size}, is less than what matters, {least}")
-    worse = validation.worsened(chosen.base, fitted, fast=fast)
-    reasons += [f"{' and '.join(worse)} would be predicted worse"] * bool(worse)
-    left = np.sqrt(validation.squares(fitted, fast=fast))
-    worst = fit.tests[int(np.argmax(left))]
-    return [*reasons, f"it leaves {left.max():.1f} times the noise in {worst}"]
-
-
 def _selected(
     fit: Fit, catalogue: Sequence[Effect], report: Reporter
 ) -> tuple[Selection, Sequence[int]]:
@@ -739,33 +527,12 @@ def _beyond_sheet(
     before, fit.freed = fit.freed, fit.freed | unlikely
     chosen, astray = _selected(fit, catalogue, report)
     was, now = likely[0].best, chosen.best
-    clean = _clean(fit, likely[0].best)
+    clean = is_clean(fit, likely[0].best)
     fewer = {*now.active} <= {*was.active} if clean else len(now.active) <= len(was.active)
-    if _clean(fit, chosen.best) and fewer and beyond(was, now) > fit.decides.fall:
+    if is_clean(fit, chosen.best) and fewer and beyond(was, now) > fit.decides.fall:
         return chosen, astray
     fit.freed = before
     return likely
-
-
-def _strongest_first(fit: Fit, chosen: Selection, catalogue: Sequence[Effect]) -> Sequence[Effect]:
-    """Causes by what each leaves when it alone is fitted, roughly; of equals the usual one."""
-    causes = chosen.best.active
-    if len(causes) < 2:
-        return causes
-    first = chosen.steps[0]
-    alone = {rival.active[-1]: rival for rival in first.rivals if first.before is chosen.base}
-    scores = [score for step in chosen.steps for score in step.scores]
-    best = {score.effect: score for score in reversed(scores)}  # of its shapes
-    begun = [best[effect] for effect in causes if effect in best and effect not in alone]
-    fits = fit.together(partial(extended, fit, chosen.base, rounds=BEGUN), begun)
-    alone |= {fit.active[-1]: fit for fit in fits if fit is not None}
-    left = dict(zip(alone, misfits(list(alone.values())), strict=True))
-    ordered = list[Effect]()
-    while waiting := [effect for effect in causes if effect not in ordered]:
-        least = min(left.get(effect, np.inf) for effect in waiting)
-        equals = [other for other in waiting if left.get(other, np.inf) <= least + fit.decides.tied]
-        ordered.append(min(equals, key=catalogue.index))
-    return ordered
 
 
 def _share(before: FittedModel, after: FittedModel) -> float:
@@ -799,99 +566,4 @@ def _gain(fit: Fit, chosen: Selection) -> Gain:
             for name, b, a in zip(fit.tests, before, after, strict=True)
         },
         fast=fast,
-    )
-
-
-def binding_bound(fit: Fit, best: FittedModel, effect: Effect, label: str) -> str:
-    """The bound at which a fit stopped, "least" or "greatest"; empty within them."""
-    value = best.point.sizes[effect.name, label]
-    low, high = fit.unknowns.bounds(effect, effect.size if label == effect.label else label)
-    return "least" if value <= low else "greatest" if value >= high else ""
-
-
-def _passed(
-    fit: Fit, best: FittedModel, effect: Effect, label: str, limit: str
-) -> tuple[float, bool]:
-    """Where a fit ends that may pass a bound, and whether it needs no other cause; NaN: no better.
-
-    Beside a cause that is held at its bound, others stand for the rest of it.
-    """
-    key = (effect.name, label)
-    other = fit.opened(effect, effect.size if label == effect.label else label, limit)
-    start = replace(best.linearised, settled=False)
-    wide = differentiable(partial(fitted, other, start, best.active))
-    if wide is None or beyond(best, wide) < fit.decides.fall:
-        return np.nan, False
-    if len(best.active) > 1 and (begun := other.tried(_only(best, effect))) is not None:
-        alone = differentiable(partial(fitted, other, begun, (effect,)))
-        if alone is not None and beyond(alone, wide) < fit.decides.form:
-            return float(alone.point.sizes[key]), True
-    return float(wide.point.sizes[key]), False
-
-
-def _set_by_nature(value: float, unit: str) -> bool:
-    """Whether a bound is a sign, or the whole of a share, beyond which there is nothing."""
-    return value == 0.0 or (unit == "1" and abs(value) == 1.0)
-
-
-def _apart_by_starts(fit: Fit, effect: Effect) -> list[str]:
-    """Lags that differ in how a recording begins alone: of the one input, and the one output.
-
-    A linear model behind a lag is a lag behind that model. A recording that begins in motion does
-    not say where either lag begins.
-    """
-    if not effect.sensor or effect.size != LAG or len(fit.recorded) != 2:
-        return []
-    others = fit.unknowns.effects.values()
-    return [e.name for e in others if e.sensor and e.size == LAG and e.model != effect.model]
-
-
-def _cause(fit: Fit, chosen: Selection, effect: Effect, *, noise_alone: bool, whole: bool) -> Cause:
-    """A cause with intervals, which what is left widens, or the form that noise may hide."""
-    best, trial, unknowns = chosen.best, chosen.trial, fit.unknowns
-    moved = trial.moved(chosen.twins[effect])
-    sigma = np.hypot(np.sqrt(np.diag(trial.covariance())), moved)
-    fast, form_share = chosen.validation.fast(chosen.less[effect], best), _FORM
-    if noise_alone:
-        more = hidden_by_noise(fit, best, effect)
-    else:
-        left, explained = chosen.validation.where_acting(
-            chosen.less[effect], best, fast=fast, whole=whole
-        )
-        form_share = max(_FORM, share_by_form(left, explained))
-        more = correlated_deviations(fit, best)
-    parameters = {}
-    for key, value in best.point.sizes.items():
-        if key[0] != effect.name:
-            continue
-        parameter = effect.size if key[1] == effect.label else key[1]
-        low, high = unknowns.bounds(effect, parameter)
-        # Beside the noise: forms of laws that differ in detail, and immaterial companions.
-        of_size = key[1] == effect.label
-        share = form_share if of_size else _FORM
-        form = np.hypot(share * value, _COMPANY * effect.matters * of_size)
-        noise = np.hypot(sigma[trial.joint.known.index(key)], more.get(key, 0.0))
-        reach = float(BAND * np.hypot(noise, form))
-        limit = binding_bound(fit, best, effect, key[1])
-        unit = unknowns.unit(effect, parameter)
-        # A parameter or a zero without a unit may be of any size: 2 is not 200 % of anything.
-        own = bool(effect.parameter or effect.sensor) and key[1] not in SHARES
-        plain = own and unit in ("", "1")
-        least, greatest = max(value - reach, low), min(value + reach, high)
-        further = (np.nan, False)
-        # A value at a bound says nothing of the side beyond.
-        if limit and not _set_by_nature(value, "" if plain else unit):
-            least = -np.inf if limit == "least" else least
-            greatest = np.inf if limit == "greatest" else greatest
-            further = _passed(fit, best, effect, key[1], limit)
-        ends = float(least), float(greatest)
-        parameters[key[1]] = Interval(value, *ends, unit, limit, *further, plain=plain)
-    return Cause(
-        effect=effect,
-        parameters=parameters,
-        confusable_with=tuple(
-            dict.fromkeys([*chosen.twins[effect], *_apart_by_starts(fit, effect)])
-        ),
-        explained=chosen.validation.explained(chosen.less[effect], best, fast=fast)[0],
-        phases=best.point.phases.get(effect.name),
     )

@@ -21,11 +21,12 @@ from workbench.diagnosis import (
     read_effects,
 )
 from workbench.diagnosis.data.motion import ModelSource
+from workbench.diagnosis.inference.causes import binding_bound
 from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.search import FittedModel, Step, beyond, forward_selection
 from workbench.diagnosis.inference.selection import anew
 from workbench.diagnosis.inference.thresholds import Thresholds, of_system
-from workbench.diagnosis.inference.verdict import Diagnosis, binding_bound
+from workbench.diagnosis.inference.verdict import Diagnosis
 from workbench.diagnosis.laws.forms import ClosedForm, candidates
 from workbench.diagnosis.laws.free import FittedLaw, estimated
 from workbench.diagnosis.laws.outcome import Proposal, description_length

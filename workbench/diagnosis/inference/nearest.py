@@ -1,0 +1,167 @@
+"""What comes nearest to what is missing, where none of it is the answer, and why not."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from workbench.diagnosis.inference.causes import binding_bound, size_text
+from workbench.diagnosis.inference.crossvalidation import CrossValidation
+from workbench.diagnosis.inference.fit import Fit
+from workbench.diagnosis.inference.score_test import CandidateScore
+from workbench.diagnosis.inference.search import (
+    FittedModel,
+    beyond,
+    examine,
+    extended,
+    is_clean,
+    rival_fits,
+    starts_of,
+)
+from workbench.diagnosis.inference.selection import Selection
+from workbench.runtime.engine import Reporter
+from workbench.system.units import with_unit
+
+NEAREST = 3  # candidates that are named where none is accepted
+
+
+@dataclass(frozen=True)
+class NearestCandidate:
+    """Effects that come nearest to what is missing, and why they are not accepted."""
+
+    effects: tuple[str, ...]  # their names
+    removed: float  # share of the explainable that they remove on held-out recordings
+    reasons: tuple[str, ...]  # why they are no answer, in words
+    slight: bool = False  # whether they leave noise alone, at a size less than what matters
+    change: str = ""  # what it is where no effect of the catalogue is, with its size
+
+    @property
+    def text(self) -> str:
+        """For people."""
+        names = " and ".join(self.effects)
+        return f"{names} would remove {self.removed:.0%}, but {'; '.join(self.reasons)}"
+
+
+def nearest_fits(fit: Fit, chosen: Selection) -> dict[tuple[str, ...], FittedModel]:
+    """Fits that may come near to what is missing, by the names of their effects."""
+    base, best = chosen.base, chosen.best
+    fits = {
+        rival.names: rival
+        for step in chosen.steps
+        for rival in step.rivals
+        if len(rival.active) == 1
+    }
+    scores = chosen.steps[0].scores if chosen.steps else chosen.trial.scores()
+    if not best.active or chosen.steps:
+        others = dict[str, CandidateScore]()
+        for score in sorted(scores, key=lambda score: -score.gain):
+            if (score.effect.name,) not in fits and score.size:
+                others.setdefault(score.effect.name, score)
+        tried = list(others.values())[:NEAREST]
+        fits |= {
+            single.names: single
+            for single in fit.together(partial(extended, fit, base), tried)
+            if single is not None
+        }
+    if best.active:
+        fits[best.names] = best
+    return fits
+
+
+def nearest_candidates(
+    fit: Fit,
+    chosen: Selection,
+    fits: Mapping[tuple[str, ...], FittedModel],
+    objections: Sequence[str],
+) -> tuple[NearestCandidate, ...]:
+    """What would remove most of what is missing on held-out recordings, and why it is no answer."""
+    base, best, validation = chosen.base, chosen.best, chosen.validation
+    nearest = []
+    for names, model in fits.items():
+        fast = validation.fast(base, model)
+        removed = validation.explained(base, model, fast=fast)[0]
+        if removed > 0.0:
+            reasons = objections if model is best else _reasons(fit, chosen, model, fast=fast)
+            slight = _below_what_matters(model) and validation.noise_alone(model, fast=fast)
+            nearest.append(NearestCandidate(names, removed, tuple(reasons), slight))
+    return tuple(sorted(nearest, key=lambda candidate: -candidate.removed)[:NEAREST])
+
+
+def _reasons(fit: Fit, chosen: Selection, fitted: FittedModel, *, fast: bool) -> list[str]:
+    validation = chosen.validation
+    (effect,) = fitted.active
+    reasons = [
+        f"{parameter} is at its bound"
+        for _, parameter in fitted.point.sizes
+        if binding_bound(fit, fitted, effect, parameter)
+    ]
+    if _below_what_matters(fitted):
+        least = with_unit(effect.matters, fit.unknowns.unit(effect, effect.size))
+        size = size_text(fit, fitted, effect)
+        reasons.append(f"its size, {size}, is less than what matters, {least}")
+    worse = validation.worsened(chosen.base, fitted, fast=fast)
+    reasons += [f"{' and '.join(worse)} would be predicted worse"] * bool(worse)
+    left = np.sqrt(validation.squares(fitted, fast=fast))
+    worst = fit.tests[int(np.argmax(left))]
+    return [*reasons, f"it leaves {left.max():.1f} times the noise in {worst}"]
+
+
+def _below_what_matters(model: FittedModel) -> bool:
+    sizes = model.point.sizes
+    return all(abs(sizes[effect.name, effect.label]) < effect.matters for effect in model.active)
+
+
+def single_change(fit: Fit, chosen: Selection, report: Reporter) -> NearestCandidate | None:
+    """A single change that no effect is, see `Fit.changes`, and that explains as much as several.
+
+    Beside one cause or none, it must explain significantly more, and leave noise alone.
+    """
+    base, best, changes = chosen.base, chosen.best, fit.changes()
+    if not changes:
+        return None
+    other = fit.beside(changes)
+    about, trial = examine(other, base, changes, report)
+    scores: dict[str, CandidateScore] = {}
+    for score in sorted(trial.scores(), key=lambda score: -score.gain):
+        scores.setdefault(score.effect.name, score)
+    tried = [starts_of([score]) for score in list(scores.values())[:NEAREST] if score.size]
+    known = best.linearised.deviance + fit.decides.form if is_clean(fit, best) else np.inf
+    for model in rival_fits(other, about, tried, known) if tried else ():
+        validation = CrossValidation(other)
+        fast = validation.fast(about, model)
+        if len(best.active) > 1:
+            able = beyond(model, best) < fit.decides.form
+        else:
+            able = beyond(best, model) > fit.decides.needed
+            able = able and is_clean(fit, model) and validation.noise_alone(model, fast=fast)
+        if able and not _below_what_matters(model):
+            (effect,) = model.active
+            size = model.point.sizes[effect.name, effect.size]
+            size += other.unknowns.nominal(effect, effect.size)
+            text = with_unit(size, other.unknowns.unit(effect, effect.size))
+            removed = validation.explained(about, model, fast=fast)[0]
+            reason = "it is no effect of the catalogue"
+            return NearestCandidate(
+                model.names, removed, (reason,), change=f"{effect.text}: {text}"
+            )
+    return None
+
+
+def single_effect(
+    fit: Fit, chosen: Selection, fits: Mapping[tuple[str, ...], FittedModel]
+) -> FittedModel | None:
+    """A single effect that leaves noise alone, where the search did not get.
+
+    Of what switches, derivatives hold over so little that they say nothing of it.
+    """
+    able = [
+        model
+        for model in fits.values()
+        if len(model.active) == 1
+        and model is not chosen.best
+        and beyond(chosen.best, model) > fit.decides.needed
+        and is_clean(fit, model)
+        and chosen.validation.noise_alone(model, fast=chosen.validation.fast(chosen.base, model))
+    ]
+    return min(able, key=lambda model: model.misfit, default=None)
