@@ -23,7 +23,8 @@ from workbench.diagnosis.simulation.residual_model import ResidualModel
 from workbench.errors import FMUError, InputError
 from workbench.models.added import CONSTANT, RateTerm, write_extended
 from workbench.models.checks import check
-from workbench.models.fmu import FMU, TOLERANCE, CoSimulation, EventError, NoFunctionError
+from workbench.models.fmu import FMU, CoSimulation
+from workbench.models.instance import TOLERANCE, EventError, NoFunctionError
 from workbench.models.native import OK, instance, linearise, place, read
 from workbench.models.simulation import Drive, Simulation
 from workbench.observers import choose, estimators_of

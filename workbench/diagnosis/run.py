@@ -45,7 +45,8 @@ from workbench.diagnosis.simulation.simulator import delay, simulating
 from workbench.errors import InputError
 from workbench.models.added import write_extended
 from workbench.models.description import MODEL_EXCHANGE
-from workbench.models.fmu import FMU, EventError
+from workbench.models.fmu import FMU
+from workbench.models.instance import EventError
 from workbench.models.modelica import Library
 from workbench.observers.estimators.disturbance import DisturbanceObserver
 from workbench.observers.estimators.kalman import ExtendedKalmanFilter

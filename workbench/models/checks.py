@@ -33,14 +33,9 @@ from workbench.models.description import (
     Description,
     read_description,
 )
-from workbench.models.fmu import (
-    FMU,
-    CoSimulation,
-    NoFunctionError,
-    Variables,
-    central_differences,
-)
+from workbench.models.fmu import FMU, CoSimulation, Variables, central_differences
 from workbench.models.fmu_cache import cache_folder
+from workbench.models.instance import NoFunctionError
 from workbench.models.trial import ContainedError, NoAnswerError, describe_end, run_trial, unpacked
 from workbench.models.trial_calls import limit_processor, limit_sizes
 from workbench.runtime.files import parse_table, temporary_folder, write_json

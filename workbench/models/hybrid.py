@@ -20,14 +20,8 @@ from workbench.arrays import Matrix, Vector
 from workbench.errors import FMUError
 from workbench.models.description import CO_SIMULATION
 from workbench.models.explicit_steps import Samples, State, go_on
-from workbench.models.fmu import (
-    FMU,
-    SAME_RATE,
-    TOLERANCE,
-    CoSimulation,
-    TypedVariables,
-    central_differences,
-)
+from workbench.models.fmu import FMU, SAME_RATE, CoSimulation, TypedVariables, central_differences
+from workbench.models.instance import TOLERANCE
 from workbench.models.native import MOVED, OK, Instance, instance, raise_on_failure
 
 # Points within a step at which indicators are read, so that one that changes twice is found.

@@ -18,16 +18,8 @@ from numpy.typing import NDArray
 from workbench.arrays import Matrix, Vector
 from workbench.errors import FMUError, InputError
 from workbench.models.description import CO_SIMULATION
-from workbench.models.fmu import (
-    FMU,
-    REFUSED_BY,
-    STATE,
-    STATUS,
-    WARNED,
-    CoSimulation,
-    References,
-    co_simulation_alone,
-)
+from workbench.models.fmu import FMU, CoSimulation, References
+from workbench.models.instance import REFUSED_BY, STATE, STATUS, WARNED, co_simulation_alone
 from workbench.models.jit import jit
 
 compiled = jit()

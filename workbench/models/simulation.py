@@ -21,8 +21,9 @@ from numpy.typing import ArrayLike, NDArray
 from workbench.arrays import Matrix, Vector
 from workbench.errors import FMUError, InputError
 from workbench.models.description import MODEL_EXCHANGE
-from workbench.models.fmu import FMU, TOLERANCE, CoSimulation
+from workbench.models.fmu import FMU, CoSimulation
 from workbench.models.hybrid import CoSimulationRun, HybridSimulation
+from workbench.models.instance import TOLERANCE
 
 # Of a difference, over the size of what is varied: errors of truncation and of integration are
 # alike at the cube root of the tolerance. Others are for models that bend more, or have more noise.

@@ -12,7 +12,8 @@ import numpy as np
 
 from workbench.arrays import Vector
 from workbench.errors import FMUError, InputError
-from workbench.models.fmu import FMU, EventError
+from workbench.models.fmu import FMU
+from workbench.models.instance import EventError
 from workbench.observers import Estimator, Gains, label
 from workbench.observers.estimators.open_loop import OpenLoop
 from workbench.observers.estimators.smoother import Smoother

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 from workbench.arrays import Matrix, Vector
 from workbench.errors import FMUError, InputError
 from workbench.models.description import CO_SIMULATION
-from workbench.models.fmu import ALIKE, FMU, NoFunctionError
+from workbench.models.fmu import ALIKE, FMU
 from workbench.models.hybrid import HybridSimulation
+from workbench.models.instance import NoFunctionError
 from workbench.models.simulation import needs_simulation
 from workbench.pages.views import rounded
 from workbench.recordings.case import Case

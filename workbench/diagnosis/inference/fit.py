@@ -39,7 +39,7 @@ from workbench.diagnosis.simulation.prediction import Variation
 from workbench.diagnosis.simulation.residual_model import Item, ResidualModel, Result
 from workbench.diagnosis.simulation.simulator import FINEST, WhitenedResiduals
 from workbench.errors import FMUError, InputError
-from workbench.models.fmu import EventError
+from workbench.models.instance import EventError
 from workbench.recordings.case import Case
 from workbench.system.registry import open_model
 from workbench.system.units import BAND

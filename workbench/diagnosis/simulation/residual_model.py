@@ -26,7 +26,8 @@ from workbench.diagnosis.simulation.simulator import (
     simulating,
 )
 from workbench.errors import InputError
-from workbench.models.fmu import FMU, EventError
+from workbench.models.fmu import FMU
+from workbench.models.instance import EventError
 from workbench.recordings.case import Case
 from workbench.runtime.engine import ALONE, Engine, ProgressReporter
 from workbench.runtime.pool import Pool

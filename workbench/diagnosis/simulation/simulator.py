@@ -38,7 +38,8 @@ from workbench.diagnosis.simulation.free import FreeDerivatives, FreePredictor
 from workbench.diagnosis.simulation.prediction import Predictor, Variation
 from workbench.diagnosis.simulation.tangent import Tangent
 from workbench.errors import FMUError
-from workbench.models.fmu import FMU, EventError
+from workbench.models.fmu import FMU
+from workbench.models.instance import EventError
 from workbench.system.parts import AT_REST
 from workbench.system.registry import open_file
 from workbench.system.system import System

@@ -12,7 +12,8 @@ from scipy.special import chdtri
 
 from workbench.arrays import Matrix, Vector, zeros
 from workbench.errors import FMUError
-from workbench.models.fmu import FMU, EventError
+from workbench.models.fmu import FMU
+from workbench.models.instance import EventError
 from workbench.models.native import (
     assign,
     compiled,

@@ -9,8 +9,9 @@ import numpy as np
 from workbench.arrays import Matrix, Vector
 from workbench.errors import FMUError
 from workbench.models.description import MODEL_EXCHANGE
-from workbench.models.fmu import FMU, CoSimulation, EventError
+from workbench.models.fmu import FMU, CoSimulation
 from workbench.models.hybrid import CoSimulationRun, HybridSimulation
+from workbench.models.instance import EventError
 from workbench.models.native import assign, inlined, set_states
 from workbench.observers.contract import Estimate, Estimator
 from workbench.observers.estimators.step import (

@@ -6,8 +6,9 @@ import numpy as np
 
 from workbench.arrays import Matrix, Vector
 from workbench.errors import FMUError
-from workbench.models.fmu import FMU, SAME_RATE, TOLERANCE, EventError
+from workbench.models.fmu import FMU, SAME_RATE
 from workbench.models.hybrid import HybridSimulation
+from workbench.models.instance import TOLERANCE, EventError
 from workbench.observers.layout import Layout
 from workbench.system.system import System
 
