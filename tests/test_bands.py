@@ -196,6 +196,33 @@ def test_bands_hold_or_what_is_said_is_that_samples_are_too_far_apart(tmp_path, 
         assert any("do not resolve the model" in text for text in result.warnings())
 
 
+@pytest.mark.parametrize(("held", "shift"), [("true", 0), ('"before"', 1)])
+def test_bands_that_fail_as_an_input_is_held_otherwise_name_the_input_and_how(
+    tmp_path, held, shift
+):
+    """A coil whose voltage jumps, or is told as the mean since the sample before.
+
+    Of a straight line between samples, more steps make the error less as well: the coil was said
+    to be sampled too coarsely, at a third of its time constant.
+    """
+    library, text = machine("coil", step=1e-3)
+    assert "held = true" in text
+    system = declare(tmp_path / "coil", library, text.replace("held = true", "held = false"))
+    rng, count = np.random.default_rng(5), 2000
+    u = np.repeat(rng.uniform(-12.0, 12.0, count // 5), 5)
+    current = [0.0]
+    for voltage in u[shift:][: count - 1]:  # exact, for a voltage that is constant in between
+        current.append(voltage / 2.0 + (current[-1] - voltage / 2.0) * np.exp(-1.0 / 3.0))
+    measured = np.array(current) + 0.02 * rng.standard_normal(count)
+    columns = {"time [s]": 1e-3 * np.arange(count), "u [V]": u, "i [A]": measured}
+    case = case_from_frame(system, pd.DataFrame(columns), name="switched")
+    result = prepare(system, choose(system, ["ekf"])).run(case)
+    assert any(f"with held = {held} in [inputs.u]" in text for text in result.warnings())
+    assert not any("do not resolve" in text for text in result.warnings())
+    reasons = {test.reason for test in result.contradictions["ekf"] if test.narrow}
+    assert reasons == {"u is held otherwise between samples than the system file says"}
+
+
 def swing(folder: Path, samples: int, mistuned: float = 1.0) -> CaseResult:
     """Ten undamped periods by their closed form, with so many samples a period."""
     step = 1.0 / samples

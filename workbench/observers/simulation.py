@@ -38,6 +38,7 @@ from workbench.observers.score import (
 )
 from workbench.observers.trajectory import trajectory
 from workbench.observers.trust import (
+    TOO_COARSE,
     Contradiction,
     contradiction_lines,
     contradictions,
@@ -91,8 +92,8 @@ class CaseResult:
     untold: tuple[str, ...] = ()  # estimated quantities that it does not show, whatever others are
     # what is said of its start, and of its samples beside the model's time constants
     doubts: tuple[str, ...] = ()
-    # whether its samples resolve the model, see `sampling_doubt` and `time_doubt`
-    resolved: bool = True
+    # why bands are too narrow, where its samples say so, see `sampling_doubt` and `time_doubt`
+    unresolved: str = ""
     # of an open loop's error that coarse steps make, see `step_doubt`; 0 if it did not run
     step_share: float = 0.0
 
@@ -133,8 +134,8 @@ class CaseResult:
     @property
     def _reason(self) -> str:
         """Why bands are too narrow, where the recording shows it by itself."""
-        if not self.resolved:
-            return "samples are too far apart for the model's fastest time constant"
+        if self.unresolved:
+            return self.unresolved
         guessed = " and ".join(self.guessed)
         return f"estimates wander, as the recording does not tell {guessed}" if guessed else ""
 
@@ -159,10 +160,10 @@ class CaseResult:
         """Whether 95 % bands of an estimator miss more often than they hold, by its innovations.
 
         What residuals share in time may be the sensor's own, as a reading that is old: it counts
-        where the samples do not resolve the model.
+        where the samples do not resolve the model, or inputs are held otherwise.
         """
         return any(
-            test.useless and test.narrow and (test.test == "variance" or not self.resolved)
+            test.useless and test.narrow and (test.test == "variance" or self.unresolved)
             for test in self.contradictions.get(name, ())
         )
 
@@ -353,7 +354,10 @@ class Simulation:
                 path = trajectory(fmu, self.system, case)
                 clock = "" if path is None else time_doubt(fmu, self.system, case, path)
                 start = start_doubt(fmu, self.system, case)
-                sampling = sampling_doubt(fmu, self.system, case) if narrow else ""
+                sampling, why = "", TOO_COARSE if clock else ""
+                if narrow:
+                    sampling, reason = sampling_doubt(fmu, self.system, case)
+                    why = why or reason
                 share, step = 0.0, ""
                 if open_loop is not None:
                     share, step = step_doubt(fmu, self.system, case, open_loop, coarse)
@@ -369,7 +373,7 @@ class Simulation:
             "inseparable": {} if known is None else known.inseparable,
             "untold": () if known is None else known.untold,
             "doubts": tuple(filter(None, (clock, unit, start, sampling, step, assumed))),
-            "resolved": not (sampling or clock),
+            "unresolved": why,
             "step_share": share,
         }
 

@@ -46,6 +46,7 @@ _TELLING = 100_000
 # Shares of the open loop's error that are its steps'. From the first on they are said; from the
 # second on steps make more of the error than the model does.
 _NOTED, MOSTLY = 0.1, 0.5
+TOO_COARSE = "samples are too far apart for the model's fastest time constant"
 
 
 @dataclass(frozen=True)
@@ -260,41 +261,59 @@ def _farther(test: Contradiction, other: Contradiction) -> bool:
     return test.excess > other.excess if test.narrow else test.excess < other.excess
 
 
-def sampling_doubt(fmu: FMU, system: System, case: Case) -> str:
-    """Say that samples are too far apart for the model's steps; empty if more steps change nothing.
+def sampling_doubt(fmu: FMU, system: System, case: Case) -> tuple[str, str]:
+    """Say why a Kalman filter errs between samples, in a sentence and as a reason; or nothing.
 
-    A Kalman filter is run with some steps in place of each, between which nothing is measured. If
-    its innovations then exceed what it says by less than half, steps are the reason.
+    It is run with each input held otherwise; and with some steps in place of each, between which
+    nothing is measured. If its innovations then exceed what it says by less than half, that is why.
     """
-    estimator = ExtendedKalmanFilter.untuned(fmu, system)
     case = case.part(_liveliest(case, system))
-    run, size = replay(case, estimator), len(system.columns)
-    fine = estimator.run(*_finer(case, system))
-    coarse = run.estimate[:, :size], run.sigma[:, :size], run.nis
-    excesses = []
-    for values, sigma, nis in (
-        coarse,
-        (fine.values[::_FINE], fine.sigma[::_FINE], np.asarray(fine.nis)[::_FINE]),
-    ):
-        part = replace(run, columns=system.columns, estimate=values, sigma=sigma, nis=nis)
-        tests = _tests(case, part, system, tested_window(case, system))
-        excesses.append(max((test.excess for test in tests if test.narrow), default=1.0))
-    if run.ending is not Ending.OK or not np.isfinite(fine.values[-1]).any():
-        return ""
-    if not (excesses[0] > NARROW and excesses[1] - 1.0 < 0.5 * (excesses[0] - 1.0)):
-        return ""
+    excess = _excess(fmu, system, case)
+    if not excess > NARROW:
+        return "", ""
+    apart, after = f"samples {np.median(np.diff(case.time)):.3g} s apart", {}
+    for signal in system.inputs:
+        for held, other in signal.otherwise_held.items() if np.ptp(case[signal.name]) else ():
+            inputs = tuple(other if s is signal else s for s in system.inputs)
+            after[signal.name, held] = _excess(fmu, replace(system, inputs=inputs), case)
+    fine = _excess(fmu, system, case, finer=True)
+    (name, held), least = min(after.items(), key=lambda way: way[1], default=(("", ""), np.inf))
+    if min(fine, least) - 1.0 >= 0.5 * (excess - 1.0):
+        return "", ""
+    if least < fine:
+        return (
+            f"{name} acts between {apart} as if it were held otherwise: with held = "
+            f"{held} in [inputs.{name}], errors of a Kalman filter have {least:.1f} times "
+            f"the variance that it says, and {excess:.1f} times without. Say how it acts"
+        ), f"{name} is held otherwise between samples than the system file says"
     rate = np.abs(np.linalg.eigvals(fmu.state_jacobian())).max(initial=0.0)
     fastest = ""
-    if (
-        rate * np.ptp(case.time) > 1.0
-    ):  # longer ones show in no sample; of integrators there is none
+    # Longer ones show in no sample; of integrators there is none.
+    if rate * np.ptp(case.time) > 1.0:
         fastest = f", whose fastest time constant is {1.0 / rate:.2g} s at their end"
     return (
-        f"samples {np.median(np.diff(case.time)):.3g} s apart do not resolve the model{fastest}: "
-        f"with {_FINE} steps in place of each, errors of a Kalman filter have "
-        f"{excesses[1]:.1f} times the variance that it says, and {excesses[0]:.1f} times without. "
-        "Record more often"
-    )
+        f"{apart} do not resolve the model{fastest}: with {_FINE} steps in place of each, errors "
+        f"of a Kalman filter have {fine:.1f} times the variance that it says, and {excess:.1f} "
+        "times without. Record more often"
+    ), TOO_COARSE
+
+
+def _excess(fmu: FMU, system: System, case: Case, *, finer: bool = False) -> float:
+    """Variance of a Kalman filter's errors over what it says, at least 1; infinite if it fails."""
+    estimator = ExtendedKalmanFilter.untuned(fmu, system)
+    run, size = replay(case, estimator), len(system.columns)
+    if run.ending is not Ending.OK:
+        return np.inf
+    values, sigma, nis = run.estimate[:, :size], run.sigma[:, :size], run.nis
+    if finer:
+        fine = estimator.run(*_finer(case, system))
+        values, sigma = fine.values[::_FINE], fine.sigma[::_FINE]
+        nis = np.asarray(fine.nis)[::_FINE]
+        if not np.isfinite(values[-1]).any():
+            return np.inf
+    part = replace(run, columns=system.columns, estimate=values, sigma=sigma, nis=nis)
+    tests = _tests(case, part, system, tested_window(case, system))
+    return max((test.excess for test in tests if test.narrow), default=1.0)
 
 
 def _liveliest(case: Case, system: System) -> slice:

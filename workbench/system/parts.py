@@ -1,6 +1,7 @@
 """What a system is made of: models, signals, quantities, and what counts."""
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -248,6 +249,12 @@ class Signal:
         0: on a straight line to the next one.
         """
         return -1.0 if self.held == "before" else float(self.held)
+
+    @property
+    def otherwise_held(self) -> dict[str, "Signal"]:
+        """The same input, held in each other way, by how the system file says that."""
+        ways: dict[str, bool | str] = {"true": True, "false": False, '"before"': "before"}
+        return {key: replace(self, held=way) for key, way in ways.items() if way != self.held}
 
     @property
     def exact(self) -> bool:

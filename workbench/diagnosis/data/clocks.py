@@ -79,16 +79,18 @@ def held_otherwise(
     effects : names of those that explain the same; if inputs are among them, no others are meant.
     size, low, high : of a delay or a lag of inputs behind outputs, and ends of its interval [s].
     """
-    half, words = 0.5 * system.sample_time, {1.0: "true", 0.0: "false", -1.0: '"before"'}
+    half = 0.5 * system.sample_time
     late = [
         s for s in system.inputs if {f"{INPUT_DELAY}[{s.name}]", f"InputLag[{s.name}]"} & effects
     ]
     keys = {}
     for signal in late or system.inputs:
-        later = {hold: (hold - signal.hold) * half for hold in words if hold != signal.hold}
-        hold = min(later, key=lambda hold: abs(later[hold] - size))
-        if low <= later[hold] <= high:
-            keys[signal.name] = f"held = {words[hold]}"
+        later = {
+            key: (other.hold - signal.hold) * half for key, other in signal.otherwise_held.items()
+        }
+        key = min(later, key=lambda key: abs(later[key] - size))
+        if low <= later[key] <= high:
+            keys[signal.name] = f"held = {key}"
     return keys
 
 
