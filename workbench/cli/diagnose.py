@@ -90,7 +90,7 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
         require_compiler()
     cases, held_out = split_held_out(given_cases(options, system), options.held_out)
     with locked_folder(options.out):
-        return _run(options, output, Problem(system, cases, library, effects, held_out))
+        return _run(options, output, Problem(system, cases, library, effects, held_out).in_parts())
 
 
 def _propose(

@@ -86,7 +86,7 @@ def diagnose(
     with open_model(problem.system) as fmu:
         doubts = doubts_along(fmu, problem.system, problem.cases, moved=fmu.parameters)
     outcome = _with_effects(problem, engine, every_platform, certainty)
-    return replace(outcome, warned="; ".join(filter(None, (doubts, outcome.warned))))
+    return replace(outcome, warned="; ".join(filter(None, (problem.doubt, doubts, outcome.warned))))
 
 
 def _with_effects(

@@ -150,6 +150,7 @@ class Case:
     counts_from : s, time before which samples only lead a simulation to those that are compared.
     model_time : s, of the model at the first sample; None: the start time of its FMU.
     doubts : sentences on what is unlikely in the recording.
+    first_line : of the source, where its first sample stands; None: not known.
     """
 
     name: str
@@ -166,6 +167,7 @@ class Case:
     model_time: float | None = None
     doubts: tuple[str, ...] = ()
     aids: tuple[str, ...] = ()
+    first_line: int | None = None
 
     def __getitem__(self, signal: str) -> Vector:
         """One signal, (n,) SI."""
@@ -203,7 +205,9 @@ class Case:
     def part(self, samples: slice) -> "Case":
         """A piece of the recording."""
         cut = {name: values[samples] for name, values in self.signals.items()}
-        return replace(self, time=self.time[samples], signals=cut)
+        first = range(self.time.size)[samples].start
+        line = None if self.first_line is None else self.first_line + first
+        return replace(self, time=self.time[samples], signals=cut, first_line=line)
 
 
 def make_case(
@@ -232,6 +236,7 @@ def make_case(
         aids=tuple(aid.name for aid in system.intermittent),
         source=Path(name),
         doubts=doubts(time, signals, conditions, system, origin) if origin else (),
+        first_line=origin.first_line if origin else None,
     )
 
 
