@@ -143,6 +143,20 @@ def test_what_was_concluded_or_is_missing_is_said_in_the_file(tmp_path, fmu):
     assert "Tc at 293.15 [K]" in text
 
 
+def test_a_heater_that_is_on_or_off_is_held_and_its_chatter_is_no_noise(tmp_path, fmu):
+    """It switches at most samples, and is read with 50 W of noise."""
+    rng, log = np.random.default_rng(2), write_log(tmp_path / "log.csv", 1)
+    lines = log.read_text().splitlines()
+    for k, line in enumerate(lines[1:], start=1):
+        time, _, *others = line.split(";")
+        power = 30.0 * rng.integers(2) + 0.05 * rng.standard_normal()
+        lines[k] = ";".join([time, f"{power:.4f}".replace(".", ","), *others])
+    log.write_text("\n".join(lines))
+    power = tomllib.loads(drafted(fmu, log))["inputs"]["P"]
+    assert power["held"]
+    assert float(power["noise"].split()[0]) == pytest.approx(50.0, rel=0.15)
+
+
 def test_a_channel_that_only_its_unit_speaks_for_is_asked_about_once(tmp_path, fmu, answer):
     asked = answer("n")
     log = write_log(tmp_path / "log.csv", 3, "Zeit [ms];Leistung [kW];Sonde 3 [°C];p [mbar]")

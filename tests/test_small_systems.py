@@ -11,9 +11,15 @@ from numpy.testing import assert_allclose
 
 from workbench.__main__ import main
 from workbench.diagnosis import Outcome
-from workbench.diagnosis.data.cleaning import deviation_of
+from workbench.diagnosis.data.cleaning import (
+    deviation_beside_switching,
+    deviation_of,
+    levels_of,
+    outliers,
+)
 from workbench.diagnosis.data.motion import led_by, motion
 from workbench.diagnosis.inference.best_estimate import bands, best_estimate
+from workbench.diagnosis.inference.thresholds import SOUND
 from workbench.errors import InputError
 from workbench.models.checks import check, is_fit
 from workbench.models.fmu import FMU, CoSimulation
@@ -278,3 +284,45 @@ def test_curvature_of_a_signal_sampled_slowly_is_no_noise():
     decay = 7e5 * np.exp(-np.arange(40.0) / 7.0)
     assert deviation_of(decay + noise) == pytest.approx(3e2, rel=0.4)
     assert deviation_of(noise) == pytest.approx(3e2, rel=0.4)
+
+
+def test_what_a_relay_switches_is_no_noise():
+    """Noise is 0.02 K and 3 W; by the swings of a relay at each sample it was 0.86 K and 4.9 W."""
+    rng = np.random.default_rng(31)
+    set_point = np.repeat([60.0, 100.0, 40.0, 80.0], 200)
+    T, power, read = 20.0, np.empty(800), np.empty(800)
+    for k, above in enumerate(set_point):
+        read[k] = T + 0.02 * rng.standard_normal()
+        power[k] = 300.0 if read[k] < above else 0.0
+        T += (1.0 - np.exp(-0.01)) * (20.0 + power[k] / 2.0 - T)  # 2 W/K, 100 s, in closed form
+    measured = power + 3.0 * rng.standard_normal(800)
+    assert deviation_beside_switching(measured) == pytest.approx(3.0, rel=0.15)
+    for driving in (power, measured):
+        assert deviation_beside_switching(read, [driving]) == pytest.approx(0.02, rel=0.3)
+    # A controller in proportion hands the noise on: the output does not follow from that.
+    noise = 0.02 * rng.standard_normal(800)
+    assert deviation_beside_switching(noise, [-50.0 * noise]) == pytest.approx(0.02, rel=0.15)
+
+
+def test_pulses_of_a_relay_are_no_wrong_samples():
+    """One sample of eight is on, or up to twelve of 19; a lone pulse in what rests is wrong."""
+    rng = np.random.default_rng(5)
+    signal = load_system("cascaded_tanks").outputs[0]
+    pulses = np.where(np.arange(800) % 8 == 0, 5.0, 2.0) + 0.02 * rng.standard_normal(800)
+    assert not outliers(pulses, signal, SOUND).any()
+    on = np.concatenate([np.arange(19) < length for length in rng.integers(1, 13, 42)])
+    noise = 0.02 * rng.standard_normal(on.size)
+    assert not outliers(np.where(on, 5.0, 2.0) + noise, signal, SOUND).any()
+    lone = np.where(np.arange(800) == 400, 5.0, 2.0) + 0.02 * rng.standard_normal(800)
+    assert np.flatnonzero(outliers(lone, signal, SOUND)).tolist() == [400]
+    set_to = np.repeat([2.0, 5.0, 2.0, 5.0], 200)
+    set_to[300] = 2.0  # a sample that is lost, though it reads as much as others
+    assert outliers(set_to + 0.02 * rng.standard_normal(800), signal, SOUND)[300]
+
+
+def test_a_pump_that_is_set_to_many_values_has_no_levels():
+    """It reads nothing in half of its range, but is no relay; a heater of three stages is."""
+    rng = np.random.default_rng(8)
+    noise = 0.01 * rng.standard_normal(800)
+    assert not levels_of(np.repeat([1.8, 4.1, 2.9, 6.6, 1.9, 3.0, 6.5, 4.0], 100) + noise)
+    assert len(levels_of(rng.integers(3, size=800) + noise)) == 3

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from workbench.arrays import Vector
-from workbench.diagnosis.data.cleaning import deviation_of
+from workbench.diagnosis.data.cleaning import deviation_beside_switching, levels_of
 from workbench.errors import InputError
 from workbench.models.description import MODEL_EXCHANGE, Description, Variable
 from workbench.recordings.channels import (
@@ -441,7 +441,11 @@ def _signal_table(draft: Draft, signal: DraftSignal) -> list[str]:
         lines += [_entry("noise", _quantity(0.0, unit), "it stays for samples on end: a command")]
         lines += ["held = true  # it stays as it is from sample to sample, and jumps"]
     else:
-        lines += _noise(samples, unit, float(high - low), may_be_exact=signal.role == "inputs")
+        own = signal.role == "inputs"
+        inputs = [] if own else [draft.samples(s) for s in draft.signals if s.role == "inputs"]
+        lines += _noise(samples, inputs, unit, float(high - low), may_be_exact=own)
+        if own and levels_of(np.concatenate(samples)):  # the same ones in all recordings
+            lines += ["held = true  # it jumps from level to level, and reads nothing between"]
     scale, why = largest or abs(_start(variable)) or 1.0, "largest sample"
     if variable.nominal and 0.1 < largest / abs(variable.nominal) < 10.0:
         scale, why = abs(variable.nominal), "nominal value of the model"
@@ -460,22 +464,37 @@ def _signal_table(draft: Draft, signal: DraftSignal) -> list[str]:
 
 
 def _steps(samples: Sequence[Vector]) -> bool:
-    """Whether a signal is set and stays so: most samples are exactly the one before.
+    """Whether a signal is set: it is on or off, or most samples are exactly the one before.
 
     Of those that are not, most stand alone; a ramp, or what lags, moves for samples on end.
     """
     moved = [np.diff(values) != 0.0 for values in samples]
     further = np.concatenate([m[1:][m[:-1]] for m in moved])  # after a move
-    return bool(np.concatenate(moved).mean() < 0.5 and 2 * further.sum() <= further.size)
+    stays = np.concatenate(moved).mean() < 0.5 and 2 * further.sum() <= further.size
+    return bool(stays or np.unique(np.concatenate(samples)).size == 2)
 
 
-def _noise(samples: Sequence[Vector], unit: str, span: float, *, may_be_exact: bool) -> list[str]:
-    """Noise of a sensor, from differences of samples, and the step in which it is read."""
+def _noise(
+    samples: Sequence[Vector],
+    driving: Sequence[Sequence[Vector]],
+    unit: str,
+    span: float,
+    *,
+    may_be_exact: bool,
+) -> list[str]:
+    """Noise of a sensor, from differences of samples, and the step in which it is read.
+
+    Parameters
+    ----------
+    driving : samples of each input, in each recording; none of a sensor of an input.
+    """
     if span == 0.0:
         noise = _NOISELESS * (abs(float(samples[0][0])) or 1.0)
         question = "it stays where it is in all recordings: what is the noise of its sensor?"
         return [f"# QUESTION: {question}", _entry("noise", _quantity(noise, unit), "a guess")]
-    noise = float(np.median([deviation_of(values) for values in samples]))
+    moving = zip(*driving, strict=True) if driving else [()] * len(samples)
+    pairs = zip(samples, moving, strict=True)
+    noise = float(np.median([deviation_beside_switching(values, own) for values, own in pairs]))
     why = "from differences of samples; what lasts longer than a sample is not in it"
     lines = []
     if noise < _NOISELESS * span and may_be_exact:

@@ -24,6 +24,12 @@ _OFTEN = 0.2
 # controller's output does, comes back in its first sample by the square of one over the samples of
 # its time constant; from three on that is less.
 _BACK = 0.1
+# Share of the range that no sample reads between two levels, and standard deviations over which
+# noise scatters about one: 8.8 in 1e5 samples.
+_APART, _WIDE = 0.25, 12.0
+# Visits to a level by sample, from which on they are pulses of a relay: recorders lose fewer.
+_SWITCHED = 0.02
+_FOLLOWS = 4  # samples of an input of which second differences of an output follow a jump
 _MOVED = 0.5  # of what second differences say: noise comes below in a thousandth of 20 samples
 # Steps in a row of another length that are another rate. Of samples lost at random, three in ten,
 # steps of three or more have a share of 0.09, so many in a row 5e-7: once in 20 recordings of 1e5.
@@ -65,6 +71,9 @@ def _outliers(values: Vector, signal: Signal, sound: Soundness, *, flat: bool) -
     noise = np.maximum(median_filter(away, 20 * _ABREAST + 1), median_filter(away, 2 * _ABREAST))
     scale = np.maximum(1.4826 * noise, deviation_of(values))
     wrong = _out_and_back(values, away > sound.spike * scale, scale, sound)
+    for level in levels_of(values):
+        if len(runs(level)) > _SWITCHED * values.size:
+            wrong[level] = False
     same = np.diff(values) == 0.0
     alike = _alike(signal)
     if same.mean() < min(_OFTEN + alike, 1.0 - alike):
@@ -160,7 +169,7 @@ def uneven_steps(time: Vector, h: float) -> Mask:
 def _smooth_evenly(values: Vector, windows: Sequence[float], h: float, held: float) -> Vector:
     from scipy.signal import savgol_filter  # takes its time to load
 
-    best, noise = values, deviation_of(values)
+    best, noise = values, deviation_beside_switching(values)
     for seconds, order in zip(windows, (2, 1), strict=False):
         window = 2 * (round(seconds / h) // 2) + 1
         if order < window <= values.size:
@@ -173,11 +182,12 @@ def _smooth_evenly(values: Vector, windows: Sequence[float], h: float, held: flo
     return best
 
 
-def noise_in(values: Vector, signal: Signal) -> float:
-    """Standard deviation of the noise of a signal's samples; see `deviation_of`."""
+def noise_in(values: Vector, signal: Signal, moving: Sequence[Vector] = ()) -> float:
+    """Standard deviation of the noise of a signal's samples; see `deviation_beside_switching`."""
     if signal.exact:
         return 0.0
-    return max(deviation_of(values), float(signal.resolution / np.sqrt(12.0)))
+    shown = deviation_beside_switching(values, moving)
+    return max(shown, float(signal.resolution / np.sqrt(12.0)))
 
 
 def noise_between(values: Vector, gaps: Mask, signal: Signal) -> float:
@@ -198,13 +208,67 @@ def deviation_of(values: Vector) -> float:
     signal makes. Source: T. Gasser, L. Sroka, C. Jennen-Steinmetz (1986), Biometrika 73, 625-633:
     variance by differences.
     """
-    moved = np.abs(np.diff(values))
-    quantum = moved[moved > 0.0].min(initial=np.inf)
-    rounding = quantum / np.sqrt(12.0) if np.isfinite(quantum) else np.finfo(float).tiny
-    spread = _scatter(np.diff(values, 2)) / math.sqrt(6.0)
-    finer = _scatter(np.diff(values, 4)) / math.sqrt(70.0) if values.size > _FEW else spread
-    spread = finer if finer < _MOVED * spread else spread
-    return max(spread, float(rounding))
+    return max(_by_differences(np.diff(values, 2)), _rounding(np.abs(np.diff(values))))
+
+
+def deviation_beside_switching(values: Vector, moving: Sequence[Vector] = ()) -> float:
+    """As `deviation_of`, without what a relay switches, where that is most of what it tells.
+
+    Parameters
+    ----------
+    moving : inputs at the same samples. What follows those that switch is no noise; of others,
+        which a controller may set by what it reads, noise itself would go with them.
+    """
+    differences, left = deviation_of(values), np.diff(values, 2)
+    about = max((_about(values[own]) for own in levels_of(values)), default=0.0)
+    if 0.0 < about < _MOVED * differences:  # it jumps at most samples
+        return about
+    switched = [u for u in moving if levels_of(u)]
+    if switched and left.size > _FEW * _FOLLOWS * len(switched):
+        before = [np.roll(u, late)[2:] for u in switched for late in range(_FOLLOWS)]
+        design = np.column_stack([np.ones(left.size), *before])
+        rest = left - design @ np.linalg.lstsq(design, left)[0]
+        still = max(_by_differences(rest), _rounding(np.diff(np.unique(values))))
+        if still < _MOVED * differences:
+            return still
+    return differences
+
+
+def levels_of(values: Vector) -> list[Mask]:
+    """Samples at each level between which a signal jumps, as of a relay; none if it reads others.
+
+    Each has as many samples as a running median has one of, on average, and scatters like noise;
+    a pump that is set to many values leaves such spans free, too, but not so.
+    """
+    order = np.sort(values)
+    edges = np.flatnonzero(np.diff(order) > _APART * np.ptp(order)) + 1
+    at = np.searchsorted(order[edges], values, side="right")
+    levels = [at == number for number in range(edges.size + 1)]
+    jumps = len(levels) > 1 and all(
+        own.sum() * _ABREAST >= values.size
+        and np.ptp(values[own]) <= _WIDE * _about(values[own])
+        and _MOVED * _about(values[own]) <= deviation_of(values[own])
+        for own in levels
+    )
+    return levels if jumps else []
+
+
+def _by_differences(second: Vector) -> float:
+    """Standard deviation of white noise by second differences, or by fourth if that is far less."""
+    spread = _scatter(second) / math.sqrt(6.0)
+    finer = _scatter(np.diff(second, 2)) / math.sqrt(70.0) if second.size > _FEW - 2 else spread
+    return finer if finer < _MOVED * spread else spread
+
+
+def _rounding(steps: Vector) -> float:
+    """Standard deviation of rounding to the least of some steps."""
+    quantum = steps[steps > 0.0].min(initial=np.inf)
+    return float(quantum / np.sqrt(12.0)) if np.isfinite(quantum) else float(np.finfo(float).tiny)
+
+
+def _about(level: Vector) -> float:
+    """Standard deviation about the median."""
+    return _scatter(level - np.median(level))
 
 
 def _scatter(values: Vector) -> float:

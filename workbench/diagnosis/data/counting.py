@@ -108,7 +108,11 @@ def count(
     usable = ~np.logical_or.reduce(list(excluded.values()))
     blocks, seconds = blocks_of(usable, time, compare.block, h)
     refuse_too_short(case, system, seconds, excluded)
-    deviation = {n: noise_in(clean[n][~beyond[n]], system.signals[n]) for n in others}
+    deviation = {}
+    for name in others:
+        within = ~beyond[name]
+        driving = [clean[own][within] for own in case.inputs if name not in case.inputs]
+        deviation[name] = noise_in(clean[name][within], system.signals[name], driving)
     deviation |= {n: noise_between(case[n], gap, system.signals[n]) for n, gap in gaps.items()}
     lost = np.maximum(0.0, np.round(np.diff(time) / h) - 1.0)
     missing = int(lost[~uneven_steps(time, h)].sum())
