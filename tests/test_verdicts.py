@@ -111,6 +111,33 @@ def test_a_gap_is_named_before_what_is_too_short_to_begin_anew(tmp_path):
     assert "Leave out what follows, or record it anew" in outcome.summary()
 
 
+def test_a_first_sensor_that_is_late_is_no_lag_where_a_recording_begins_with_its_input(tmp_path):
+    """The current of a coil is read 8 ms late from standstill: SensorLag was 'found'."""
+    torque = '  output Real m(unit="N.m", nominal=0.1) = 0.01*i "Torque";\nequation'
+    build_text(tmp_path, COIL.replace("equation", torque))
+    (tmp_path / "system.toml").write_text(
+        COIL_SYSTEM.replace('"0.01 V"', '"0 V"\nheld = true')
+        + '[outputs.m]\nunit = "N.m"\nnoise = "1e-3 N.m"\nscale = "0.05 N.m"\n'
+    )
+    rng, time, late = np.random.default_rng(7), 2e-3 * np.arange(1500), 4
+    for k in range(3):
+        u, i = np.repeat(rng.uniform(2, 10, 15), 100), np.zeros(time.size)
+        for j in range(1, time.size):
+            i[j] = u[j - 1] / 2.0 + (i[j - 1] - u[j - 1] / 2.0) * np.exp(-2e-3 * 2.0 / 0.02)
+        columns = {
+            "time [s]": time,
+            "u [V]": u,
+            "i [A]": np.append(np.zeros(late), i[:-late]) + 0.02 * rng.standard_normal(time.size),
+            "m [N.m]": 0.01 * i + 1e-3 * rng.standard_normal(time.size),
+        }
+        write_case(tmp_path / "recordings" / f"{k}", columns, f"Run {k}")
+    outcome = diagnosed(load_system(str(tmp_path)), tmp_path / "recordings", tmp_path / "out")
+    (cause,) = outcome.diagnosis.causes
+    assert cause.effect.name == "SensorDelay[i]"
+    delay = cause.parameters["delay"]
+    assert delay.low < 2e-3 * late < delay.high < delay.low + 1e-3
+
+
 def drive(
     folder: Path,
     seed: int,

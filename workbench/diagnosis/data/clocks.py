@@ -111,14 +111,15 @@ def late_signals(system: System) -> dict[str, dict[str, float]]:
     """By the name of what says how late a clock is [s]: signals it moves, 1 later or -1 earlier.
 
     A motion follows what leads it with the noise of each sample, which would be another if that
-    were moved: where the clock of the reference is late, all others are early. Where none leads, a
-    logger of outputs alone is late: inputs that are moved bend between other samples.
+    were moved: where the clock of the reference is late, all others are early. Where none leads,
+    outputs alone are late: inputs that are moved bend between other samples, and what they do from
+    the first one on would begin later.
     """
     first, directions = reference(system), {}
     outputs = {signal.name for signal in system.outputs}
     for clock in (*clocks(system), *own_clocks(system), *delays(system)):
         others = [name for name in system.signals if name not in clock.late]
-        alone = clock.size == SKEW and system.comparison.leading is None
+        alone = system.comparison.leading is None
         early = first in clock.late and not (alone and outputs.issuperset(clock.late))
         moving = dict.fromkeys(others, -1.0) if early else dict.fromkeys(clock.late, 1.0)
         directions[variables(clock, clock.size)[0]] = moving
