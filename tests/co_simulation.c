@@ -3,7 +3,7 @@
 #include <stdlib.h>
 #include <time.h>
 #include "fmi2FunctionTypes.h"
-enum { X, U, SLOPE, TIME, BEFORE, LOOSE, SIZE };
+enum { X, U, SLOPE, TIME, BEFORE, LOOSE, FED, SIZE };
 const char *fmi2GetTypesPlatform(void) { return fmi2TypesPlatform; }
 const char *fmi2GetVersion(void) { return "2.0"; }
 #if STAYS == 2
@@ -31,7 +31,7 @@ fmi2Status fmi2Reset(fmi2Component c) { return fmi2Error; }
 #elif defined STAYS /* where it is; 2: and so begins the next instance */
 fmi2Status fmi2Reset(fmi2Component c) { return fmi2OK; }
 #else
-fmi2Status fmi2Reset(fmi2Component c) { ((double *)c)[X] = ((double *)c)[BEFORE] = 1.0, ((double *)c)[U] = ((double *)c)[TIME] = 0.0; return fmi2OK; }
+fmi2Status fmi2Reset(fmi2Component c) { ((double *)c)[X] = ((double *)c)[BEFORE] = 1.0, ((double *)c)[U] = ((double *)c)[TIME] = ((double *)c)[FED] = 0.0; return fmi2OK; }
 #endif
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean a, fmi2Real b, fmi2Real t, fmi2Boolean d, fmi2Real e) { if (a) ((double *)c)[LOOSE] = b; return fmi2OK; }
 fmi2Status fmi2EnterInitializationMode(fmi2Component c) { return fmi2OK; }
@@ -82,6 +82,10 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean n) {
 #endif
     if (ONLY && (h < 0.99 * ONLY || h > 1.01 * ONLY)) return fmi2Error;
     ((double *)c)[X] += h * ((double *)c)[U];
+#ifdef FEEDS /* x is u twice at once, too, of the step that was made */
+    double *f = c;
+    f[X] += 2.0 * (f[U] - f[FED]), f[FED] = f[U];
+#endif
 #ifdef RANDOM /* variable that is moved by what is drawn */
     static unsigned drawn;
     struct timespec now;

@@ -17,6 +17,7 @@ import pytest
 
 import workbench as wb
 from workbench.__main__ import main
+from workbench.diagnosis import Outcome
 from workbench.diagnosis.data.motion import ModelSource
 from workbench.diagnosis.effects.candidates import candidates, rate_terms
 from workbench.diagnosis.simulation.residual_model import ResidualModel
@@ -41,7 +42,7 @@ from workbench.studies.distance.forecast import stopping_of
 from workbench.studies.distance.simulation import DrivingInputs, StopSimulation
 from workbench.system.registry import load_system, open_model
 
-from .built import machine_file
+from .built import diagnosed, machine_file, write_case
 from .edits import edit, edits
 from .hostile_fmus import XML, rewritten
 from .processes import COMPILER, needs_compiler
@@ -1456,6 +1457,39 @@ def test_the_open_loop_runs_on_co_simulation_alone(integrator):
         estimate = loop(fmu, system, usual_gains(loop, fmu, system)).run(time, u, u + np.nan)
     np.testing.assert_allclose(np.asarray(estimate.values)[:, 0], [1, 2, 3, 4, 4, 4, 4])
     assert compare_with_fmpy(integrator / "Alone.fmu").verdict == RIGHT
+
+
+def straight_lines(folder: Path, x: Callable[[np.ndarray], np.ndarray]) -> Outcome:
+    """Diagnose `integrator` by recordings of x(u), of which u is said to go in straight lines."""
+    system, rng = load_system(folder), np.random.default_rng(8)
+    system = replace(system, inputs=(replace(system.inputs[0], held=False),))
+    for k in range(3):
+        time = np.arange(200.0)
+        u = 0.3 * np.sin(0.5 * time) + 0.2 * np.sin((0.9 + 0.1 * k) * time)
+        columns = {"time [s]": time, "u [1]": u, "x [1]": x(u) + rng.normal(0.0, 0.1, 200)}
+        write_case(folder / "recordings" / f"{k}", columns, f"Run {k}")
+    effects = ("InputDelay[u]", "SensorGain[u]")
+    return diagnosed(system, folder / "recordings", folder / "out", *effects)
+
+
+def test_what_a_co_simulation_makes_of_its_inputs_is_no_cause(tmp_path, compiled):
+    """u stays for a sample in the machine: half a sample on straight lines, InputDelay 'found'."""
+    folder = build_integrator(tmp_path, compiled("co_simulation.c"))
+    outcome = straight_lines(folder, lambda u: 1.0 + np.append(0.0, np.cumsum(u[:-1])))
+    assert outcome.diagnosis.verdict == "unexplained"
+    assert "no more than this FMU makes of its inputs" in outcome.sentence
+    assert "write held = true in [inputs.u], and diagnose again" in outcome.sentence
+
+
+def test_outputs_of_a_co_simulation_that_are_a_step_late_are_no_cause(tmp_path, compiled):
+    """x = 1 + 2 u + the integral of u: of u, the FMU's output has the mean of the step before."""
+    folder = build_integrator(tmp_path, compiled("co_simulation.c", "-DFEEDS"))
+    outcome = straight_lines(
+        folder, lambda u: 1.0 + 2.0 * u + np.append(0.0, np.cumsum(0.5 * (u[1:] + u[:-1])))
+    )
+    assert outcome.diagnosis.verdict == "unexplained"
+    assert "no more than this FMU makes of its inputs" in outcome.sentence
+    assert "held =" not in outcome.sentence  # neither way to hold it leaves noise
 
 
 def test_a_co_simulation_that_refuses_a_reset_has_its_library_loaded_anew(tmp_path, compiled):

@@ -16,6 +16,7 @@ from workbench.diagnosis.effects.candidates import LAG
 from workbench.diagnosis.effects.extension import variables
 from workbench.diagnosis.inference.causes import Cause
 from workbench.diagnosis.inference.certainty import Certainty
+from workbench.diagnosis.inference.coupling import Coupling
 from workbench.diagnosis.inference.nearest import NearestCandidate
 from workbench.diagnosis.inference.nuisance import remedy
 from workbench.diagnosis.inference.residuals import Dependence, Residuals
@@ -264,7 +265,7 @@ class Outcome:
         """What to do about what remains unexplained."""
         if self.diagnosis.verdict not in ("unexplained", "partly explained"):
             return []
-        if self.diagnosis.late is not None:
+        if self.diagnosis.late is not None or self.diagnosis.coupling is not None:
             return []
         bound = any(
             "at its bound" in why for nearest in self.diagnosis.nearest for why in nearest.reasons
@@ -289,6 +290,8 @@ class Outcome:
 
     def _unexplained(self) -> str:
         partial, late = self.diagnosis.partial, self.diagnosis.late
+        if self.diagnosis.coupling is not None:
+            return _coupled(self.diagnosis.coupling, self.system.sample_time)
         if late is not None:
             return _late(late)
         if (change := self._change) is not None:
@@ -329,7 +332,8 @@ class Outcome:
             lines += [f"  {effect}: {reason}" for effect, reason in self.not_visible.items()]
         for cause in self.diagnosis.causes:
             lines += ["", *_cause_lines(cause)]
-        if self.diagnosis.verdict == "unexplained" and self.diagnosis.late is None:
+        told = self.diagnosis.late is not None or self.diagnosis.coupling is not None
+        if self.diagnosis.verdict == "unexplained" and not told:
             lines += ["", "nearest candidates, in cross-validation:"]
             nearest = [candidate.text for candidate in self.diagnosis.nearest]
             lines += [f"  {text}" for text in nearest or ["none removes any of it"]]
@@ -535,6 +539,23 @@ def _held(system: System, cause: Cause) -> str:
         f"{with_unit(system.sample_time, 's')} apart, explain {cause.effect.name} as well. If they "
         f"are, write {writing}, and diagnose again."
     ) * bool(keys)
+
+
+def _coupled(coupling: Coupling, sample: float) -> str:
+    """What a Co-Simulation makes of its inputs, and what to do, for people."""
+    inputs = " and ".join(coupling.inputs)
+    held = " and ".join(f"held = {coupling.hold} in [inputs.{name}]" for name in coupling.inputs)
+    as_held = (
+        f"Nothing is missing if inputs are held in the machine, too: if they are, write {held}, "
+        "and diagnose again. "
+    )
+    return (
+        "What is wrong is no more than this FMU makes of its inputs: as a Co-Simulation that takes "
+        f"no slopes, it has the mean of {inputs} for each step of {with_unit(sample, 's')}, and "
+        "what depends on them at once is half a step late. "
+        f"{as_held * bool(coupling.hold)}Otherwise record at shorter steps, or export the model "
+        "for Model Exchange."
+    )
 
 
 def _late(late: LateSignals) -> str:

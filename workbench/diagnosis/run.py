@@ -10,7 +10,7 @@ from typing import TypeVar
 import numpy as np
 
 from workbench.arrays import Vector
-from workbench.diagnosis.data.clocks import case_in_time, late_signals
+from workbench.diagnosis.data.clocks import DELAY, case_in_time, late_signals
 from workbench.diagnosis.data.counting import refuse_too_few
 from workbench.diagnosis.data.motion import ModelSource
 from workbench.diagnosis.data.sensors import (
@@ -20,6 +20,7 @@ from workbench.diagnosis.data.sensors import (
 )
 from workbench.diagnosis.effects.candidates import (
     COEFFICIENT,
+    LAG,
     of_moving_states,
     rate_terms,
     with_starts,
@@ -33,6 +34,7 @@ from workbench.diagnosis.effects.extension import (
     variables,
 )
 from workbench.diagnosis.inference.certainty import assess
+from workbench.diagnosis.inference.coupling import coupling
 from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.residuals import dependences, residuals
 from workbench.diagnosis.inference.rivals import gathered
@@ -188,6 +190,12 @@ def _outcome(
     system, effects, report = problem.system, problem.effects, engine.report
     diagnosis = conclude(fit, effects, report)
     base, best = diagnosis.base, diagnosis.best
+    if diagnosis.verdict != "nothing":
+        coupled = coupling(simulations, fit, base)
+        sizes = {cause.effect.size for cause in diagnosis.causes}
+        # No parameter alone does what a step does to inputs so well that it leaves noise.
+        if coupled is not None and (coupled.hold or not sizes or {DELAY, LAG} & sizes):
+            diagnosis = diagnosis.within(coupled)
     asked = certainty and bool(diagnosis.causes) and not diagnosis.interrupted
     assessed = assess(fit, best, report) if asked else None
     answer = _Conclusion(problem, engine, simulations, fit, diagnosis)

@@ -839,6 +839,11 @@ class CoSimulation(FMU):
         """Say where the next step begins [s], after `restore`."""
         self._t = t
 
+    @property
+    def takes_slopes(self) -> bool:
+        """Whether real inputs may go in straight lines within a step (FMI 2.0)."""
+        return self.description.interfaces[CO_SIMULATION].interpolates
+
     def set_slopes(self, inputs: Variables, slopes: Vector) -> None:
         """Set time derivatives of real inputs, (k,), from where the next step begins (FMI 2.0)."""
         try:

@@ -18,7 +18,6 @@ from scipy.optimize import brentq
 
 from workbench.arrays import Matrix, Vector
 from workbench.errors import FMUError
-from workbench.models.description import CO_SIMULATION
 from workbench.models.explicit_steps import Samples, State, go_on
 from workbench.models.fmu import FMU, SAME_RATE, CoSimulation, TypedVariables, central_differences
 from workbench.models.instance import TOLERANCE
@@ -437,8 +436,7 @@ class CoSimulationRun:
         self._holds = np.where(still & (holds == 0.0), 1.0, holds)
         self._states = fmu.typed(fmu.states)
         lines = zip(inputs.names, self._holds == 0.0, strict=True)
-        able = fmu.description.interfaces[CO_SIMULATION].interpolates
-        sloping = [able and straight and fmu.is_real(name) for name, straight in lines]
+        sloping = [fmu.takes_slopes and straight and fmu.is_real(name) for name, straight in lines]
         self._lines_at = np.flatnonzero(sloping)
         self._lines = fmu.variables([inputs.names[i] for i in self._lines_at])
         self._t = fmu.start_time

@@ -218,6 +218,11 @@ class Samples:
         by_channel: Matrix = np.einsum("cj,cbj...->bc...", self.slopes, means)
         return by_channel
 
+    def whitened(self, errors: Matrix) -> Matrix:
+        """Means of errors (n, c, ...) over each block in units of their noise, (b, c, ...)."""
+        means: Matrix = np.einsum("bij,bj...->bi...", self.whitening, self.channels(errors))
+        return means
+
 
 def compared(system: System, cases: Sequence[Case]) -> tuple[str, ...]:
     """Signals that are compared: outputs, and what only judges or aids, if a case has it."""

@@ -23,6 +23,7 @@ from workbench.diagnosis.inference.causes import (
     size_text,
     strongest_first,
 )
+from workbench.diagnosis.inference.coupling import Coupling
 from workbench.diagnosis.inference.discrepancy import WRONG
 from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.nearest import (
@@ -154,15 +155,24 @@ class Diagnosis:
     # the same by a state, whose start each recording has of its own
     hidden_by_starts: Mapping[str, tuple[str, ...]]
     shifted: tuple[ShiftedLevel, ...]  # nuisance parameters that are far from their sheet
+    # what a Co-Simulation makes of its inputs, where all that is wrong is no larger: unexplained
+    coupling: Coupling | None = None
 
     def outdone(self, law: str) -> "Diagnosis":
         """The diagnosis where one free law explains as much as several causes with less.
 
         Several effects bend to much that is neither of them: then they are no answer.
         """
+        return self._refuted(f"one law explains as much with less: {law}")
+
+    def within(self, coupling: Coupling) -> "Diagnosis":
+        """The diagnosis where all that is wrong is no more than what the FMU makes of inputs."""
+        refuted = self if self.gain is None else self._refuted("the FMU's inputs make as much")
+        return replace(refuted, coupling=coupling, differing=None)
+
+    def _refuted(self, reason: str) -> "Diagnosis":
         assert self.gain is not None
         removed = float(np.clip(self.gain.removed, 0.0, 1.0))
-        reason = f"one law explains as much with less: {law}"
         return replace(
             self,
             verdict="unexplained",

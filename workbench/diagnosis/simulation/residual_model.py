@@ -26,7 +26,7 @@ from workbench.diagnosis.simulation.simulator import (
     simulating,
 )
 from workbench.errors import InputError
-from workbench.models.fmu import FMU
+from workbench.models.fmu import FMU, CoSimulation
 from workbench.models.instance import EventError
 from workbench.recordings.case import Case
 from workbench.runtime.engine import ALONE, Engine, ProgressReporter
@@ -109,6 +109,23 @@ class ResidualModel:
     def take_warning(self) -> str:
         """What the FMU of this process warned of, see `FMU.take_warning`."""
         return self._model.fmu.take_warning()
+
+    @property
+    def averaged(self) -> tuple[str, ...]:
+        """Inputs on straight lines, of which a Co-Simulation takes the mean of each step."""
+        fmu = self._model.fmu
+        if not isinstance(fmu, CoSimulation) or fmu.takes_slopes:
+            return ()
+        return tuple(s.name for s in self.system.inputs if s.hold == 0.0 and fmu.is_real(s.name))
+
+    def held(self, held: bool | str) -> "ResidualModel":
+        """The same model with inputs held in another way that are `averaged`; to be closed."""
+        inputs = (
+            replace(signal, held=held) if signal.name in self.averaged else signal
+            for signal in self.system.inputs
+        )
+        system = replace(self.system, inputs=tuple(inputs))
+        return ResidualModel(self.source._replace(system=system), self.cases)
 
     def _tell(self, fmu: FMU) -> None:
         self.nominal = dict(fmu.defaults)

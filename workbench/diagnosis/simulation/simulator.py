@@ -199,13 +199,13 @@ class Simulator:
         )
         behind = self._behind(number, seen)
         read_ = self._compared(number, self._late(number, seen, values, behind), values)
-        errors = self._whitened(number, read_)
+        errors = self._recordings[number].whitened(read_)
         columns = []
         for name, spread in self._delays.values():
             step = _DELAY_STEP * spread
             delayed = {**values, name: values[name] + step}
             later = self._late(number, seen, delayed, behind)
-            late = self._whitened(number, self._compared(number, later, delayed))
+            late = self._recordings[number].whitened(self._compared(number, later, delayed))
             columns.append(np.append((late - errors).ravel() / step, np.zeros(rest.size)))
         rows = errors.size + rest.size
         jacobian = np.column_stack(columns) if columns else np.zeros((rows, 0))
@@ -255,7 +255,7 @@ class Simulator:
             by_sensor = sensed_changes(
                 recording, along.errors, recording.y - errors, self._wrong(values)
             )
-            by = self._whitened(number, self._late(number, by_sensor, values))
+            by = self._recordings[number].whitened(self._late(number, by_sensor, values))
             if not np.abs(by).max(initial=0.0) < _FURTHEST:
                 raise FMUError(
                     f"{fmu.called}: derivatives of {recording.name} grow beyond all bounds"
@@ -312,7 +312,11 @@ class Simulator:
         def read(
             simulated: Matrix, values: Mapping[str, float], *clocks: Mapping[str, float]
         ) -> Matrix:
-            return self._whitened(number, self._read(number, simulated, values, *clocks)).ravel()
+            return (
+                self._recordings[number]
+                .whitened(self._read(number, simulated, values, *clocks))
+                .ravel()
+            )
 
         def errors(values: Mapping[str, float], *clocks: Mapping[str, float]) -> Matrix:
             return read(self._simulated(number, values)[0], values, *clocks)
@@ -588,14 +592,6 @@ class Simulator:
             if name in late:
                 signals[:, j] = moved(recording.time, signals[:, j], late[name])
         return signals
-
-    def _whitened(self, number: int, errors: Matrix) -> Matrix:
-        """Whitened errors of the blocks, (b, c, ...)."""
-        recording = self._recordings[number]
-        whitened: Matrix = np.einsum(
-            "bij,bj...->bi...", recording.whitening, recording.channels(errors)
-        )
-        return whitened
 
 
 def _compatible(columns: Sequence[Variation], left: Collection[int]) -> list[list[int]]:
