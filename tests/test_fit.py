@@ -13,8 +13,10 @@ from scipy.optimize import curve_fit
 
 import workbench as wb
 from workbench.__main__ import main
-from workbench.errors import InputError
+from workbench.errors import FMUError, InputError
 from workbench.models.description import read_description
+from workbench.models.fmu import FMU
+from workbench.models.simulation import Drive, Simulation
 from workbench.recordings.case import Case
 from workbench.studies.fit.report import write_fmu
 from workbench.system.system import System
@@ -168,6 +170,16 @@ def test_a_parameter_that_no_output_shows_is_named(system, cases):
     assert outcome["C"].identified
 
 
+def test_a_start_that_errors_hide_is_not_called_one_that_no_output_shows(system, cases):
+    """The block swings by 60 times the noise, which no C and G explain; its start is measured."""
+    (day, *_) = cases
+    swing = 60.0 * NOISE * np.sin(2.0 * np.pi * TIME / (3.0 * STEP))
+    outcome = fitted(system, [day.with_signals({"T": day["T"] + swing})], "C", "G")
+    (direction,) = outcome.directions
+    assert str(direction).startswith("start of T in ")
+    assert str(direction).endswith("outputs show it less than the errors that remain")
+
+
 def test_parameters_that_no_output_shows_are_named_apart_and_keep_their_values(tmp_path):
     # They move the temperature by 1e-12 of itself, as rounding does.
     model = replaced(
@@ -193,6 +205,15 @@ def test_residuals_that_a_wrong_model_leaves_are_told(system, cases):
     outcome = fitted(system, cases[:1], "C")
     assert not outcome.reliable
     assert any("residuals" in doubt and "times the variance" in doubt for doubt in outcome.doubts)
+
+
+@pytest.mark.parametrize("name", ["C", "G"])
+def test_values_at_which_a_model_runs_away_are_refused_without_a_warning_of_numpy(folder, name):
+    """A fit tries such; scipy's warnings named files of its own."""
+    drive = Drive(TIME, power(1)[:, None])
+    refused = r"is not finite|cannot be integrated"
+    with FMU(folder / "Block.fmu") as fmu, pytest.raises(FMUError, match=refused):
+        Simulation(fmu, ["P"], ["T"], [True]).run(drive, {name: -1e-3 if name == "C" else -1e6})
 
 
 def test_ctrl_c_keeps_the_best_values(system, cases):

@@ -232,6 +232,7 @@ class HybridSimulation:
             self._fmu.set_typed(self._continuous, self._inputs_at(t)[self._continuous_at])
         self._fmu.set_states(x)
 
+    @np.errstate(over="ignore", invalid="ignore")  # what is not finite is refused, by name
     def _go_on(self, end: float) -> None:
         """Integrate to the sample, the next time event, or a state or step event before."""
         end = min(end, float(self._fmu.next_event[0]))

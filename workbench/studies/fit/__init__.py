@@ -726,7 +726,7 @@ class _Judgement:
             relative = axis / at
             lead = relative[parts[np.argmax(np.abs(relative[parts]))]]
             named = {labels[q]: float(relative[q] / lead) for q in parts}
-            directions.append(Direction(named, float(1.0 / max(s, floor))))
+            directions.append(Direction(named, float(1.0 / max(s, floor)), bool(s >= BAND)))
         profiles, cost = self._settings.profiles, self._cost_of_profiles(len(lost))
         profiles = cost <= _CHEAP if profiles is None else profiles
         values = []

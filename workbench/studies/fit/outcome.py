@@ -50,11 +50,13 @@ class Direction:
     parts: Mapping[str, float]  # relative change of each, by its label; 1 of the leading one
     # of the leading one, 1 is all of its size: standard deviation that the data leave
     spread: float
+    shown: bool = True  # whether any output moves with it, however little
 
     def __str__(self) -> str:
         names = list(self.parts)
         if len(names) == 1:
-            return f"{names[0]}: no output shows it"
+            less = "outputs show it less than the errors that remain"
+            return f"{names[0]}: {less if self.shown else 'no output shows it'}"
         moves = ", ".join(f"{name} {change:+.2g} %" for name, change in self.parts.items())
         if len(names) == 2 and abs(abs(min(self.parts.values(), key=abs)) - 1.0) < _SAME:
             first, second = self.parts.values()
