@@ -264,8 +264,9 @@ def _farther(test: Contradiction, other: Contradiction) -> bool:
 def sampling_doubt(fmu: FMU, system: System, case: Case) -> tuple[str, str]:
     """Say why a Kalman filter errs between samples, in a sentence and as a reason; or nothing.
 
-    It is run with each input held otherwise; and with some steps in place of each, between which
-    nothing is measured. If its innovations then exceed what it says by less than half, that is why.
+    It is run with some steps in place of each, between which nothing is measured. If its
+    innovations then exceed what it says by less than half, that is why; or an input that is held
+    otherwise, if they then do not.
     """
     case = case.part(_liveliest(case, system))
     excess = _excess(fmu, system, case)
@@ -278,14 +279,14 @@ def sampling_doubt(fmu: FMU, system: System, case: Case) -> tuple[str, str]:
             after[signal.name, held] = _excess(fmu, replace(system, inputs=inputs), case)
     fine = _excess(fmu, system, case, finer=True)
     (name, held), least = min(after.items(), key=lambda way: way[1], default=(("", ""), np.inf))
-    if min(fine, least) - 1.0 >= 0.5 * (excess - 1.0):
-        return "", ""
-    if least < fine:
+    if least < fine and least <= NARROW:
         return (
             f"{name} acts between {apart} as if it were held otherwise: with held = "
             f"{held} in [inputs.{name}], errors of a Kalman filter have {least:.1f} times "
             f"the variance that it says, and {excess:.1f} times without. Say how it acts"
         ), f"{name} is held otherwise between samples than the system file says"
+    if fine - 1.0 >= 0.5 * (excess - 1.0):
+        return "", ""
     rate = np.abs(np.linalg.eigvals(fmu.state_jacobian())).max(initial=0.0)
     fastest = ""
     # Longer ones show in no sample; of integrators there is none.
