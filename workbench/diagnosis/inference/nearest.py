@@ -126,8 +126,7 @@ def single_change(fit: Fit, chosen: Selection, report: Reporter) -> NearestCandi
     for score in sorted(trial.scores(), key=lambda score: -score.gain):
         scores.setdefault(score.effect.name, score)
     tried = [starts_of([score]) for score in list(scores.values())[:NEAREST] if score.size]
-    known = best.linearised.deviance + fit.decides.form if is_clean(fit, best) else np.inf
-    for model in rival_fits(other, about, tried, known) if tried else ():
+    for model in rival_fits(other, about, tried) if tried else ():
         validation = CrossValidation(other)
         fast = validation.fast(about, model)
         if len(best.active) > 1:

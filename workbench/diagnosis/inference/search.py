@@ -341,17 +341,11 @@ def beyond(fitted: FittedModel, other: FittedModel) -> float:
 
 
 def rival_fits(
-    fit: Fit,
-    best: FittedModel,
-    rivals: Sequence[Sequence[CandidateScore]],
-    known: float = np.inf,
+    fit: Fit, best: FittedModel, rivals: Sequence[Sequence[CandidateScore]]
 ) -> list[FittedModel]:
-    """Fits with one more effect that gain by it, best first; one far behind is not finished.
-
-    Beside a model that leaves little, `known` is the deviance beyond which a fit is of no use.
-    """
-    likeliest = _begun(fit, best, known, rivals[0])
-    sought = known if likeliest is None else min(known, _sought(fit, best, likeliest))
+    """Fits with one more effect that gain by it, best first; one far behind is not finished."""
+    likeliest = _begun(fit, best, np.inf, rivals[0])
+    sought = np.inf if likeliest is None else _sought(fit, best, likeliest)
     others = fit.together(partial(_begun, fit, best, sought), rivals[1:])
     begun = [start for start in (likeliest, *others) if start is not None]
     if not begun:
@@ -359,7 +353,7 @@ def rival_fits(
     left = misfits(begun)
     near = left < fit.decides.behind * left.min()
     worth = [i for i, model in enumerate(begun) if near[i] and not model.linearised.settled]
-    sought = min(known, *(_sought(fit, best, model) for model in begun))
+    sought = min(_sought(fit, best, model) for model in begun)
 
     def finished(model: FittedModel) -> FittedModel | None:
         return differentiable(partial(fitted, fit, model.linearised, model.active, sought=sought))
