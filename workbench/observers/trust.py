@@ -269,15 +269,23 @@ def sampling_doubt(fmu: FMU, system: System, case: Case) -> tuple[str, str]:
     otherwise, if they then do not.
     """
     case = case.part(_liveliest(case, system))
-    excess = _excess(fmu, system, case)
-    if not excess > NARROW:
+    estimator = ExtendedKalmanFilter.untuned(fmu, system)
+    run = replay(case, estimator)
+    excess = _excess(case, run, system)
+    if not NARROW < excess < np.inf:
         return "", ""
+    steps = estimator.run(*_finer(case, system))
+    samples = slice(None, None, _FINE)
+    nis = np.asarray(steps.nis)[samples]
+    finer = replace(run, estimate=steps.values[samples], sigma=steps.sigma[samples], nis=nis)
+    fine = _excess(case, finer, system)
     apart, after = f"samples {np.median(np.diff(case.time)):.3g} s apart", {}
     for signal in system.inputs:
         for held, other in signal.otherwise_held.items() if np.ptp(case[signal.name]) else ():
             inputs = tuple(other if s is signal else s for s in system.inputs)
-            after[signal.name, held] = _excess(fmu, replace(system, inputs=inputs), case)
-    fine = _excess(fmu, system, case, finer=True)
+            other_way = replace(system, inputs=inputs)
+            again = replay(case, ExtendedKalmanFilter.untuned(fmu, other_way))
+            after[signal.name, held] = _excess(case, again, other_way)
     (name, held), least = min(after.items(), key=lambda way: way[1], default=(("", ""), np.inf))
     if least < fine and least <= NARROW:
         return (
@@ -299,20 +307,13 @@ def sampling_doubt(fmu: FMU, system: System, case: Case) -> tuple[str, str]:
     ), TOO_COARSE
 
 
-def _excess(fmu: FMU, system: System, case: Case, *, finer: bool = False) -> float:
-    """Variance of a Kalman filter's errors over what it says, at least 1; infinite if it fails."""
-    estimator = ExtendedKalmanFilter.untuned(fmu, system)
-    run, size = replay(case, estimator), len(system.columns)
-    if run.ending is not Ending.OK:
+def _excess(case: Case, run: Run, system: System) -> float:
+    """Variance of a Kalman filter's errors over what it says, at least 1; infinite if it failed."""
+    size = len(system.columns)
+    estimate, sigma = run.estimate[:, :size], run.sigma[:, :size]
+    if run.ending is not Ending.OK or not np.isfinite(estimate[-1]).any():
         return np.inf
-    values, sigma, nis = run.estimate[:, :size], run.sigma[:, :size], run.nis
-    if finer:
-        fine = estimator.run(*_finer(case, system))
-        values, sigma = fine.values[::_FINE], fine.sigma[::_FINE]
-        nis = np.asarray(fine.nis)[::_FINE]
-        if not np.isfinite(values[-1]).any():
-            return np.inf
-    part = replace(run, columns=system.columns, estimate=values, sigma=sigma, nis=nis)
+    part = replace(run, columns=system.columns, estimate=estimate, sigma=sigma)
     tests = _tests(case, part, system, tested_window(case, system))
     return max((test.excess for test in tests if test.narrow), default=1.0)
 
