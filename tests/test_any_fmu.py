@@ -1617,6 +1617,27 @@ def test_a_co_simulation_that_does_not_reach_its_samples_by_its_own_time_is_refu
             simulation.run(Drive(np.arange(4.0), u), {})
 
 
+def test_a_co_simulation_whose_own_steps_are_longer_than_samples_is_doubted(tmp_path, compiled):
+    """Its solver makes steps of 10 s: x of u = 0.01 is late by 0 to 9 s, 0.053 root mean square."""
+    folder = build_integrator(tmp_path, compiled("co_simulation.c", "-DSOLVES=10.0"))
+    rewritten(folder / "Alone.fmu", folder / "Alone.fmu", edits(XML, ANY_STEP))
+    time, rng = np.arange(200.0), np.random.default_rng(5)
+    columns = {"time [s]": time, "u [1]": np.full(200, 0.01), "x [1]": 1.0 + 0.01 * time}
+    columns["x [1]"] += rng.normal(0.0, 0.1, time.size)
+    system = load_system(folder)
+    case = read_case(write_case(folder / "recordings" / "0", columns, "Rise"), system)
+    with open_model(system) as fmu:
+        doubt = check_along(fmu, system, case)
+    assert "steps of 10 s of its own, where samples are 1 s apart" in doubt
+    assert "x by 0.05" in doubt
+    loose = replace(system, outputs=(replace(system.outputs[0], noise=1.0),))
+    with open_model(loose) as fmu:
+        assert check_along(fmu, loose, case) == ""  # no sensor shows it
+    coarse = replace(case, time=10.0 * time)
+    with open_model(system) as fmu:
+        assert check_along(fmu, system, coarse) == ""  # it steps as samples do
+
+
 def test_a_co_simulation_that_asks_to_end_says_so(tmp_path, compiled):
     """FMI 2.0 calls that a step that was discarded."""
     path = build_integrator(tmp_path, compiled("co_simulation.c", "-DENDS=2.5")) / "Alone.fmu"

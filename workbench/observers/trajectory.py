@@ -1,4 +1,7 @@
-"""Where a recording leads a model, and whether the model is a function of where it is there."""
+"""Where a recording leads a model, and whether the model is a function of where it is there.
+
+Of a Co-Simulation, whether it makes a step for each sample.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,12 +15,14 @@ from workbench.models.description import CO_SIMULATION
 from workbench.models.fmu import ALIKE, FMU
 from workbench.models.hybrid import HybridSimulation
 from workbench.models.instance import NoFunctionError
-from workbench.models.simulation import needs_simulation
+from workbench.models.simulation import Drive, Simulation, needs_simulation
 from workbench.pages.views import rounded
 from workbench.recordings.case import Case
 from workbench.system.system import System
 
 _POINTS = 200  # of a recording, along which a model is led
+_STEPS = 500  # first samples of a recording, by which a Co-Simulation shows its own steps
+_INTERVALS = 10  # between samples at which it moves: that none is a single one is no chance then
 # Shares of their values by which parameters are moved where derivatives are compared once more:
 # each by its own, as a quotient of two would else stay as it is.
 _MOVED = (0.2, 0.5)
@@ -68,13 +73,16 @@ def check_along(
 
     Returns
     -------
-    Which states are of another size than is taken, see `size_doubt`; or nothing.
+    Which states are of another size than is taken, see `size_doubt`, or which outputs of a
+    Co-Simulation are late, see `own_step_doubt`; or nothing.
 
     Raises
     ------
     NoFunctionError
     """
-    if fmu.interface == CO_SIMULATION or (fmu.is_function and not _unsized(fmu, system)):
+    if fmu.interface == CO_SIMULATION:
+        return own_step_doubt(fmu, system, case)
+    if fmu.is_function and not _unsized(fmu, system):
         return ""
     kept, held = _kept(case), _held(fmu, system)
     time = case.time[kept]
@@ -162,6 +170,71 @@ def size_doubt(fmu: FMU, system: System, x: Matrix, *, walks: bool = True) -> st
         "of differences may be far off. Write a nominal value in the model, or [states.NAME] walk "
         "and spread"
     )
+
+
+def own_step_doubt(fmu: FMU, system: System, case: Case) -> str:
+    """Say which outputs a Co-Simulation keeps for several samples, as its own steps are longer.
+
+    What is continuous moves from each sample to the next. Where all of it stays for some samples,
+    at even intervals that are not those of the inputs, it is the FMU that steps so: FMI has no word
+    for it. Outputs then are late, which counts from a tenth of their noise on.
+
+    Parameters
+    ----------
+    fmu : Co-Simulation.
+    """
+    variables = fmu.description.by_name
+    outputs = [
+        output for output in system.outputs if variables[output.reading].variability == "continuous"
+    ]
+    inputs = [signal.name for signal in system.inputs]
+    time, u = case.time[:_STEPS], _filled(case.time, case.u)[:_STEPS]
+    known = {**system.set_by(case.conditions), **_begin(fmu, system, case)}
+    simulation = Simulation(fmu, inputs, [output.reading for output in outputs], system.holds)
+    try:
+        y = simulation.run(Drive(time, u, case.model_time), known)
+    except (InputError, FMUError):
+        return ""  # the run says why
+    fmu.take_warning()  # of a run alone
+    moves, driven = (np.any(np.diff(rows, axis=0) != 0.0, axis=1) for rows in (y, u))
+    at = np.flatnonzero(moves) + 1
+    intervals = np.diff(at)
+    if intervals.size < _INTERVALS or intervals.min() == 1:
+        return ""
+    even = np.abs(intervals - np.median(intervals)) <= 1  # a step may be no multiple of samples
+    switches = len(np.unique(y[at], axis=0)) <= at.size // 2
+    if even.sum() < _INTERVALS or switches or abs(driven.sum() - at.size) <= 1:
+        return ""
+    late = [
+        (output, float(np.sqrt(np.mean(np.square(np.interp(time, time[at], column[at]) - column)))))
+        for output, column in zip(outputs, y.T, strict=True)
+    ]
+    shown = [
+        f"{output.name} by {rounded(off)} {output.unit}"
+        for output, off in late
+        if off > 0.1 * output.noise_at_scale
+    ]
+    if not shown:
+        return ""
+    own = float(np.mean(np.diff(time[at])[even]))
+    return (
+        f"{fmu.called} makes steps of {own:.4g} s of its own, where samples are "
+        f"{np.median(np.diff(time)):.4g} s apart: until the next one its outputs stay, and are "
+        f"late, {', '.join(shown)} (root mean square). Export the model with a shorter step, or "
+        f"record every {own:.4g} s"
+    )
+
+
+def _begin(fmu: FMU, system: System, case: Case) -> dict[str, float]:
+    """Start values that are measured, of what the FMU lets be set."""
+    variables = fmu.description.by_name
+    return {
+        output.name: float(case[output.name][0])
+        for output in system.outputs
+        if output.name in variables
+        and variables[output.name].initial in ("exact", "approx")
+        and np.isfinite(case[output.name][0])
+    }
 
 
 def _led(
