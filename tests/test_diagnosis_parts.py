@@ -636,7 +636,9 @@ def test_a_fit_that_leads_to_no_derivative_is_no_rival(everything):
         nominal = anew(fit, fit.unknowns.start(), ())
         # Half the inertia is a machine; less than none is not, though its motion stays finite.
         half, none = (
-            CandidateScore(inertia, {}, size, 0.1, {}, 0.0, 0.0, 0.0, np.zeros(1), np.zeros(0))
+            CandidateScore(
+                inertia, {}, size, 0.1, size, {}, 0.0, 0.0, 0.0, np.zeros(1), np.zeros(0)
+            )
             for size in (-0.5, -1.5)
         )
         assert extended(fit, nominal, half, rounds=1) is not None

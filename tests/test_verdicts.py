@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.signal import lfilter
 
 from workbench.arrays import Vector
 from workbench.diagnosis import Outcome
@@ -240,3 +241,28 @@ def test_a_gap_is_named_where_a_state_after_it_is_not_known(tmp_path):
     outcome = drive(tmp_path / "stated", 77, gap=True, spread="0.05 rad")
     assert outcome.diagnosis.verdict == "nothing"
     assert len(outcome.cases) == 4
+
+
+def test_what_may_be_too_small_to_matter_is_not_called_nothing(tmp_path):
+    """A voltage late by 0.15 samples looks like an inductance that is larger by 15 %."""
+    build_text(tmp_path, COIL.replace("0.02", "0.004"))
+    (tmp_path / "system.toml").write_text(COIL_SYSTEM.replace('"0.01 V"', '"0 V"'))
+    rng, time = np.random.default_rng(3), 2e-3 * np.arange(1500)
+    for k in range(3):
+        u = lfilter([0.1], [1.0, -0.9], np.repeat(rng.uniform(2, 10, 10), 150))
+
+        def rate(t, i, u=u):
+            return (np.interp(t, time, u) - 2.0 * i) / (1.15 * 0.004)
+
+        run = solve_ivp(rate, (0.0, time[-1]), [0.0], t_eval=time, rtol=1e-9, max_step=1e-3)
+        i = run.y[0] + 0.02 * rng.standard_normal(time.size)
+        columns = {"time [s]": time, "u [V]": u, "i [A]": i}
+        write_case(tmp_path / "recordings" / f"{k}", columns, f"Run {k}")
+    outcome = diagnosed(load_system(str(tmp_path)), tmp_path / "recordings", tmp_path / "out")
+    assert outcome.diagnosis.verdict == "nothing"
+    assert outcome.sentence.startswith("Nothing is missing for sure: L would explain errors")
+    assert (
+        "changes too small to matter, of SensorLag[i] or InputLag[u], do as well"
+        in outcome.sentence
+    )
+    assert "L would remove" in outcome.summary()

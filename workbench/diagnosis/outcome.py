@@ -139,7 +139,7 @@ class Outcome:
             cost += " All figures are of free simulations of the FMU, which nothing corrects"
             cost += f"{'; terms beside its rates are no candidates' * alone}."
         if diagnosis.verdict == "nothing":
-            return f"Nothing significant is missing: what remains is noise and tolerance.{cost}"
+            return f"{self._nothing}{cost}"
         if diagnosis.verdict == "unexplained":
             return f"{self._unexplained()}{cost}"
         part = diagnosis.verdict == "partly explained"
@@ -288,6 +288,19 @@ class Outcome:
             "add an effect for it to the library, and diagnose again",
         ]
 
+    @property
+    def _nothing(self) -> str:
+        if nearest := self.diagnosis.nearest:
+            material, slight = (
+                " or ".join(near.effects[0] for near in nearest if near.slight is small)
+                for small in (False, True)
+            )
+            return (
+                f"Nothing is missing for sure: {material} would explain errors beyond the noise, "
+                f"but changes too small to matter{f', of {slight},' * bool(slight)} do as well."
+            )
+        return "Nothing significant is missing: what remains is noise and tolerance."
+
     def _unexplained(self) -> str:
         partial, late = self.diagnosis.partial, self.diagnosis.late
         if self.diagnosis.coupling is not None:
@@ -333,7 +346,8 @@ class Outcome:
         for cause in self.diagnosis.causes:
             lines += ["", *_cause_lines(cause)]
         told = self.diagnosis.late is not None or self.diagnosis.coupling is not None
-        if self.diagnosis.verdict == "unexplained" and not told:
+        unexplained = self.diagnosis.verdict == "unexplained"
+        if (unexplained or self.diagnosis.nearest) and not told:
             lines += ["", "nearest candidates, in cross-validation:"]
             nearest = [candidate.text for candidate in self.diagnosis.nearest]
             lines += [f"  {text}" for text in nearest or ["none removes any of it"]]

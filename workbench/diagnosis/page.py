@@ -265,14 +265,6 @@ def _causes(summary: Mapping[str, Any]) -> list[Block]:
                 "</a>."
             ).format(part)
         )
-        if summary["nearest"]:
-            rows = [
-                (" and ".join(n["effects"]), number(n["removed"], ".0%"), "; ".join(n["reasons"]))
-                for n in summary["nearest"]
-            ]
-            caption = "Candidates that come nearest, and why they are not accepted."
-            columns = ("effects", Numbers("removed in cross-validation"), "why not")
-            blocks.append(Table("nearest-table", caption, columns, rows, sortable=False))
     elif verdict == "partly explained":
         blocks.append(
             Markup(
@@ -280,6 +272,14 @@ def _causes(summary: Mapping[str, Any]) -> list[Block]:
                 'the rest; what that goes with is <a href="#dependences">above</a>.'
             )
         )
+    if summary["nearest"]:
+        rows = [
+            (" and ".join(n["effects"]), number(n["removed"], ".0%"), "; ".join(n["reasons"]))
+            for n in summary["nearest"]
+        ]
+        caption = "Candidates that come nearest, and why they are not accepted."
+        columns = ("effects", Numbers("removed in cross-validation"), "why not")
+        blocks.append(Table("nearest-table", caption, columns, rows, sortable=False))
     if summary["next_steps"]:
         blocks.append(f"What to do: {'; '.join(summary['next_steps'])}.")
     for place, cause in enumerate(summary["causes"], 1):

@@ -1,7 +1,7 @@
 """What comes nearest to what is missing, where none of it is the answer, and why not."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -86,6 +86,32 @@ def nearest_candidates(
             slight = _below_what_matters(model) and validation.noise_alone(model, fast=fast)
             nearest.append(NearestCandidate(names, removed, tuple(reasons), slight))
     return tuple(sorted(nearest, key=lambda candidate: -candidate.removed)[:NEAREST])
+
+
+def undecided(fit: Fit, chosen: Selection) -> tuple[NearestCandidate, ...]:
+    """Candidates that explain errors beyond noise, of which nobody knows whether they matter.
+
+    One would matter, but another explains as well at a size that does not: a signal late by a fifth
+    of a sample looks like a larger inductance. Empty where all that explains is too small.
+    """
+    shown: dict[str, CandidateScore] = {}
+    for score in chosen.trial.scores():
+        if score.held_out.sum() > fit.decides.needed and not score.like_levels:
+            shown.setdefault(score.effect.name, score)
+    if all(abs(score.alone) < score.effect.matters for score in shown.values()):
+        return ()
+    tried = [extended(fit, chosen.base, score) for score in list(shown.values())[:NEAREST]]
+    fits = {model.names: model for model in tried if model is not None}
+    small = {names for names, model in fits.items() if _below_what_matters(model)}
+    if len(small) == len(fits):
+        return ()
+    reasons = ("changes too small to matter explain as much",)
+    return tuple(
+        replace(candidate, slight=True)
+        if candidate.effects in small
+        else replace(candidate, reasons=reasons)
+        for candidate in nearest_candidates(fit, chosen, fits, ())
+    )
 
 
 def _reasons(fit: Fit, chosen: Selection, fitted: FittedModel, *, fast: bool) -> list[str]:

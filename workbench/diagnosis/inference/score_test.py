@@ -35,6 +35,7 @@ class CandidateScore:
     # size, sigma: estimate of its size and standard deviation
     size: float
     sigma: float
+    alone: float  # estimate of its size beside no companions
     units: Mapping[str, str]  # of the size and of the parameters of the shape, by name
     gain: float  # fall of chi-squared when it is fitted to all stops, beside immaterial companions
     # what of it is that levels, or the one recording's own, are less far from expected
@@ -261,6 +262,7 @@ class ScoreTest:
             shape=shape,
             size=size,
             sigma=sigma,
+            alone=single,
             units={name: self._fit.unknowns.unit(effect, name) for name in (effect.size, *shape)},
             gain=absent.at(none) - total.at(best),
             by_levels=self._far(none) - self._far(best),

@@ -33,6 +33,7 @@ from workbench.diagnosis.inference.nearest import (
     nearest_fits,
     single_change,
     single_effect,
+    undecided,
 )
 from workbench.diagnosis.inference.nuisance import (
     ShiftedLevel,
@@ -256,6 +257,8 @@ def _judged(
                 return _judged(fit, catalogue, other, astray, report)
         others = () if outside else nearest_candidates(fit, chosen, fits, objections)
         nearest = (*filter(None, (outside, change)), *others)[:NEAREST]
+    if verdict == "nothing" and not chosen.interrupted:
+        nearest = undecided(fit, chosen)
     answered = bool(causes) and verdict != "unexplained"
     twins = [model for fits in chosen.twins.values() for model in fits.values()]
     remains = not noise_alone or (verdict == "unexplained" and late is None)
