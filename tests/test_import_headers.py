@@ -95,6 +95,32 @@ def test_a_row_of_other_units_below_a_header_that_comes_again_begins_a_table(tmp
     assert groups[-1].channels[2].unit == unit
 
 
+def test_samples_that_are_marked_as_comments_are_none(tmp_path):
+    rows = [f"{k};4.{k % 9};95{k % 7}.1" for k in range(60)]
+    rows[50:52] = [f"#{row}" for row in rows[50:52]]
+    lines = ["# time [s];inflow [l/s];h [mm]", *rows]
+    recorded = read_recorded_file(table(tmp_path / "a.csv", lines))
+    (group,) = recorded.groups
+    assert_allclose(group.channels[0].values, [*range(50), *range(52, 60)])
+    assert recorded.notes == ("2 lines that are no samples were left out, the first in line 52",)
+
+
+@pytest.mark.parametrize(
+    ("header", "row"),
+    [
+        ("t1 [s];inflow [ml/s];t2 [s];h [mm]", "{k};4.{k:03d};{m};95{d}.1"),
+        ("time [s];tag;value;unit", "{k};inflow;4.{k:03d};ml/s\n{k};h;95{d}.1;mm"),
+    ],
+)
+def test_numbers_of_one_file_are_written_in_one_way(tmp_path, header, row):
+    """4.001 alone may be four thousand; 950.1 beside it tells that it is none."""
+    rows = [row.format(k=k, m=2 * k, d=k % 7) for k in range(60)]
+    groups = read_recorded_file(table(tmp_path / "a.csv", [header, *rows])).groups
+    values = {channel.name: channel.values for group in groups for channel in group.channels}
+    assert_allclose(values["inflow"], 4.0 + np.arange(60) / 1e3)
+    assert_allclose(values["h"], [950.1 + k % 7 for k in range(60)])
+
+
 def test_marks_of_order_within_a_file_are_no_part_of_a_number(tmp_path):
     parts = [f"{k};4.{k % 9};95{k % 7}.1\n" for k in range(60)]
     text = "\ufefftime [s];inflow [l/s];h [mm]\n" + "\ufeff".join(
@@ -270,6 +296,7 @@ def test_a_time_of_something_else_is_none_of_the_columns_behind_it(tmp_path):
         ("inflow [l/s];Quality;h [mm];Quality", "Good", "Bad"),
         ("inflow [l/s];x;h [mm];Validity", "1", "2"),
         ("inflow [l/s];x;h [mm];h quality", "0", "3"),
+        ("inflow [l/s];Status;h [mm];Status", "Good", "Bad - Comm Failure"),
     ],
 )
 def test_samples_that_a_column_calls_bad_are_gaps(tmp_path, names, good, bad):
@@ -284,6 +311,49 @@ def test_samples_that_a_column_calls_bad_are_gaps(tmp_path, names, good, bad):
     assert np.flatnonzero(np.isnan(channels["h"])).tolist() == list(gone)
     assert np.isfinite(channels["time"]).all()
     assert any("'h': 3 samples that" in note for note in recorded.notes)
+
+
+def test_samples_that_are_good_in_several_ways_are_samples(tmp_path):
+    states = ["Good", "Good, Local Override", "Good_Clamped"]
+    rows = [f"{k};4.5;950.{k};{'Bad' if k == 30 else states[k % 3]}" for k in range(60)]
+    lines = ["time [s];inflow [l/s];h [mm];h Quality", *rows]
+    (group,) = read_recorded_file(table(tmp_path / "a.csv", lines)).groups
+    assert np.flatnonzero(np.isnan(group.channels[2].values)).tolist() == [30]
+
+
+def test_a_status_of_a_machine_is_no_verdict_on_samples(tmp_path):
+    rows = [f"{k};4.5;950.{k};{'Running' if k % 3 else 'OK'}" for k in range(60)]
+    lines = ["time [s];inflow [l/s];h [mm];Status", *rows]
+    (group,) = read_recorded_file(table(tmp_path / "a.csv", lines)).groups
+    assert np.isfinite([channel.values for channel in group.channels]).all()
+
+
+@pytest.mark.parametrize(
+    ("header", "small", "large"),
+    [
+        ("time [s];inflow [l/s];h", "{k};4.5;9{k}.5 mm", "{k};4.5;0.9{k}5 m"),
+        ("time [s];inflow [l/s];h;Unit", "{k};4.5;9{k}.5;mm", "{k};4.5;0.9{k}5;m"),
+        ("time [s];inflow [l/s];h unit;h", "{k};4.5;mm;9{k}.5", "{k};4.5;m;0.9{k}5"),
+        ("time [s];unit;value;tag", "{k};mm;9{k}.5;h", "{k};m;0.9{k}5;h"),
+    ],
+)
+def test_meters_that_choose_a_range_write_several_units(tmp_path, header, small, large):
+    rows = [(small if k % 3 else large).format(k=k) for k in range(10, 70)]
+    if "tag" in header:
+        rows += [f"{k};l/s;4.5;inflow" for k in range(10, 70)]
+    recorded = read_recorded_file(table(tmp_path / "a.csv", [header, *rows]))
+    channels = {c.name: c for group in recorded.groups for c in group.channels}
+    assert channels["h"].unit == "mm"
+    assert_allclose(channels["h"].values, 900.5 + np.arange(10, 70))
+    assert "'h': 20 samples in other units were taken to [mm]" in recorded.notes
+
+
+def test_values_in_units_of_other_dimensions_are_no_channel(tmp_path):
+    rows = [f"{k};4.5;9{k}.5;{'mm' if k % 3 else 'degC'}" for k in range(10, 70)]
+    lines = ["time [s];inflow [l/s];h;h unit", *rows]
+    (group,) = read_recorded_file(table(tmp_path / "a.csv", lines)).groups
+    assert [channel.name for channel in group.channels] == ["time", "inflow"]
+    assert group.left[0].texts[:2] == ("910.5 mm", "911.5 mm")
 
 
 @pytest.mark.parametrize(
@@ -390,6 +460,23 @@ def test_encodings_are_found(tmp_path, encoding):
     text = "\n".join(["time [s];T [°C]", *(f"{k};2{k % 7}.5" for k in range(60))])
     (tmp_path / "a.csv").write_bytes(text.encode(encoding) + b"\0" * 512)
     assert channels(tmp_path / "a.csv") == [("time", "s"), ("T", "degC")]
+
+
+@pytest.mark.parametrize(
+    ("text", "first"), [("4,5{k:02d}6", 4.5106), ("4,5{k:02d}", None), ("4.5{k:02d}", None)]
+)
+def test_numbers_of_a_workbook_tell_nothing_of_texts_beside_them(tmp_path, text, first):
+    """Texts are written as people do, who may part thousands; numbers have no mark at all."""
+    book = openpyxl.Workbook()
+    book.active.append(["time [s]", "inflow [ml/s]", "h [mm]"])
+    for k in range(10, 70):
+        book.active.append([k, text.format(k=k) if k % 3 else 4500.0 + k, 950.5 + k])
+    book.save(tmp_path / "a.xlsx")
+    refusal = pytest.raises(InputError, match="can be read with")
+    with nullcontext() if first else refusal:
+        (group,) = read_recorded_file(tmp_path / "a.xlsx").groups
+        assert group.channels[1].values[0] == first
+        assert_allclose(group.channels[2].values, 950.5 + np.arange(10, 70))
 
 
 def test_merged_cells_of_a_workbook_name_all_columns_below(tmp_path):

@@ -4,13 +4,14 @@ import math
 import re
 from bisect import bisect_left
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 from itertools import pairwise, zip_longest
 
 import numpy as np
 
+from workbench.arrays import Vector
 from workbench.errors import InputError
 from workbench.recordings.formats.contents import FileChannel, Group
 from workbench.recordings.formats.numbers import (
@@ -89,11 +90,12 @@ _FORTRAN = re.compile(r"(\d\.?)[dD]([+-]?\d+)")
 # say so, and the code of OPC from which on samples are.
 _VALID = ("validity", "valid", "g\u00fcltig", "gueltig")
 _VERDICT = re.compile(
-    rf"((?P<own>.+?)[ _.])?(?P<word>quality|qual|qualit\u00e4t|{'|'.join(_VALID)}|(?<=_)q)",
+    rf"((?P<own>.+?)[ _.])?(?P<word>quality|qual|qualit\u00e4t|status|{'|'.join(_VALID)}|(?<=_)q)",
     re.IGNORECASE,
 )
 _FEW_STATES = 3  # more are no verdicts, but a measure
 _GOOD, _OPC_GOOD = frozenset(("good", "ok", "valid", "gut", "true", "g")), 192
+_BAD = frozenset(("bad", "uncertain", "invalid", "error", "fault", "schlecht", "unsicher"))
 _STATES = {"true": "1", "false": "0", "on": "1", "off": "0"}
 _WORDS = re.compile(r"[^\W\d_]+")
 _LETTERS = frozenset("abcdefghijklmnopqrstuvwxyz")  # that count columns: Time A, Time B; t1 has one
@@ -594,9 +596,10 @@ def by_tag(group: Group) -> list[Group]:
     groups = []
     for tag in called:
         rows = [k for k, own in enumerate(tags) if own == tag]
-        units = {texts["unit"][k] for k in rows} if "unit" in texts else {value.unit}
-        unit = spell_unit(units.pop()) if len(units) == 1 else ""
-        own_value = replace(_rows_of(value, rows), name=tag, unit=unit)
+        units = [texts["unit"][k] if "unit" in texts else value.unit for k in rows]
+        unit, factors = _one_unit(units) or ("", np.ones(len(rows)))
+        own_value = _rows_of(value, rows)
+        own_value = replace(own_value, name=tag, unit=unit, values=factors * own_value.values)
         channels = (own_value if c is value else _rows_of(c, rows) for c in group.channels)
         own_group = replace(
             group,
@@ -670,13 +673,29 @@ def _words(names: Sequence[str]) -> set[str]:
     return {word for name in names for word in _WORDS.findall(name.casefold())}
 
 
+def numbers_of(table: Cells) -> list[list[str]]:
+    """Columns of a table that hold numbers, without those of dates such as 14.03.2026."""
+    columns = ([cell.strip() for cell in column] for column in zip(*table.rows, strict=True))
+    return [
+        all_plain(cells)
+        for cells in columns
+        if _mostly(cells, is_number) and not _mostly(cells, is_stamp)
+    ]
+
+
 def read_group(
-    table: Cells, name: str, where: str, *, commas: bool = True
+    table: Cells,
+    name: str,
+    where: str,
+    beside: Sequence[Sequence[str]] = (),
+    *,
+    commas: bool = True,
 ) -> tuple[Group, str, list[str]]:
     """Channels of a table, how its numbers are written, and notes on what was left out.
 
     Parameters
     ----------
+    beside : numbers of other tables of the file, which are written in the same way.
     commas : whether numbers may hold commas.
 
     Raises
@@ -687,6 +706,8 @@ def read_group(
     columns = [[cell.strip() for cell in column] for column in zip(*table.rows, strict=True)]
     stamps: list[FileChannel] = []
     numbers: dict[int, list[str]] = {}
+    factors: dict[int, Vector] = {}  # by row, of columns with several units
+    texts: dict[int, list[str]] = {}
     notes: list[str] = []
     labels = [_label(table, i) for i in range(len(columns))]
     about = {name: text for (name, _), text in zip(labels, table.about, strict=False)}
@@ -707,16 +728,31 @@ def read_group(
             numbers[i] = all_plain(cells)
         elif (bare := _numbers_within(cells, labels[i][1])) is not None:
             numbers[i] = all_plain(bare[0])
-            labels[i] = labels[i][0], bare[1]
+            labels[i] = labels[i][0], bare[1][0]
+            factors[i] = bare[1][1]
         elif any(cells) or table.names[i].strip():
-            notes.append(f"'{labels[i][0]}' holds {'texts' if any(cells) else 'nothing'}")
-            none = np.full(len(cells), math.nan)
-            left.append(FileChannel(labels[i][0], "", none, texts=tuple(cells)))
+            texts[i] = cells
+    for k, i in _units_beside(labels, numbers, texts).items():
+        rows = list(zip(numbers[k], texts.pop(i), strict=True))
+        if one := _one_unit([unit if is_number(cell) else None for cell, unit in rows]):
+            labels[k], factors[k] = (labels[k][0], one[0]), one[1]
+        else:
+            del numbers[k]
+            texts[k] = [" ".join(row) for row in rows]
+    notes += [
+        f"'{labels[k][0]}': {count} samples in other units were taken to [{labels[k][1]}]"
+        for k, factor in factors.items()
+        if (count := int((factor != 1.0).sum()))
+    ]
+    for i, cells in texts.items():
+        notes.append(f"'{labels[i][0]}' holds {'texts' if any(cells) else 'nothing'}")
+        none = np.full(len(cells), math.nan)
+        left.append(FileChannel(labels[i][0], "", none, texts=tuple(cells)))
     notes += _leave_out_bad(labels, columns, numbers)
-    reading = reading_of(list(numbers.values()), where, commas=commas)
+    reading = reading_of([*numbers.values(), *beside], where, commas=commas)
     channels: list[FileChannel] = []
     for i, cells in numbers.items():
-        values = values_of(cells, reading)
+        values = factors.get(i, 1.0) * values_of(cells, reading)
         gaps = np.flatnonzero(np.isnan(values)).tolist()
         beyond = [k for k in gaps if is_censored(cells[k])]
         if beyond:
@@ -768,6 +804,9 @@ def _leave_out_bad(
             if (labels[k][0].casefold() == own if own else len(verdicts) == 1 or k == i - 1)
         ]
         states = [cell.strip().casefold() for cell in columns[i]]
+        words = {_first_word(state) for state in states if state}
+        if match["word"].casefold() == "status" and not words <= _GOOD | _BAD:
+            continue  # of a machine
         good = {state for state in states if _is_good(state, match["word"])}
         counts = Counter(filter(None, states)).most_common(_FEW_STATES + 1)
         if not good and len(counts) <= _FEW_STATES and 2 * counts[0][1] > len(states):
@@ -789,8 +828,67 @@ def _leave_out_bad(
 
 def _is_good(state: str, word: str) -> bool:
     """Whether a state, in a column of some name, says that a sample is good."""
-    stated = state in _GOOD or (state == "1" and word.casefold() in _VALID)
+    stated = _first_word(state) in _GOOD or (state == "1" and word.casefold() in _VALID)
     return stated or (state.isdecimal() and int(state) >= _OPC_GOOD)
+
+
+def _first_word(state: str) -> str:
+    """What a state begins with: Good, Local Override is a good one."""
+    return re.split(r"[\W_]", state, maxsplit=1)[0]
+
+
+def _units_beside(
+    labels: Sequence[tuple[str, str]],
+    numbers: Mapping[int, Sequence[str]],
+    texts: Mapping[int, Sequence[str]],
+) -> dict[int, int]:
+    """For columns of numbers with their units in one beside them, the column of these.
+
+    So meters write them that choose a range by themselves. A column of values of several signals,
+    which another one names, is for `by_tag`.
+    """
+    parts = [_PARTS_OF_TAGS.get(name.casefold(), "") for name, _ in labels]
+    tagged = any(parts[i] == "tag" and len(set(cells)) > 1 for i, cells in texts.items())
+    units = {}
+    for k in numbers:
+        name, unit = labels[k]
+        if unit or (tagged and parts[k] == "value"):
+            continue
+        # One before belongs to a column of numbers before that, if it has no unit.
+        taken = k - 2 in numbers and not any((labels[k - 2][1], _TIME_NAME.match(labels[k - 2][0])))
+        near = {k + 1, *([] if taken else [k - 1])} & texts.keys()
+        own = (i for i in near if _is_label_of_units(labels[i][0], name))
+        if (at := max(own, default=-1)) >= 0:
+            units[k] = at
+    return units
+
+
+def _is_label_of_units(label: str, name: str) -> bool:
+    """Whether a column has the units of one of some name: Unit, or h unit of h."""
+    own = label.casefold().removeprefix(name.casefold()).strip(" _.")
+    return _PARTS_OF_TAGS.get(own) == "unit"
+
+
+def _one_unit(units: Sequence[str | None]) -> tuple[str, Vector] | None:
+    """The unit that most rows have, and factors that take the values of each to it, (n,).
+
+    None where there are several, of which one cannot be converted.
+
+    Parameters
+    ----------
+    units : (n,), None of a row without a number.
+    """
+    counts = Counter(unit for unit in units if unit is not None)
+    if not counts:
+        return None
+    common = spell_unit(counts.most_common(1)[0][0])
+    factors = dict.fromkeys(counts, 1.0)
+    for unit in counts if len(counts) > 1 else ():
+        scale = conversion(spell_unit(unit), common)
+        if scale is None or scale.zero:
+            return None
+        factors[unit] = scale.factor
+    return common, np.array([1.0 if unit is None else factors[unit] for unit in units])
 
 
 def _newest_first(columns: Sequence[Sequence[str]]) -> str:
@@ -810,25 +908,25 @@ def _is_ordered(cells: Sequence[str]) -> bool:
     return stamps is not None and not stamps.doubt and goes_on(stamps.values)
 
 
-def _numbers_within(cells: Sequence[str], unit: str) -> tuple[list[str], str] | None:
-    """Numbers of cells that hold their unit, too, or are written as no other; and the unit.
+def _numbers_within(cells: Sequence[str], unit: str) -> tuple[list[str], tuple[str, Vector]] | None:
+    """Numbers of cells that hold their unit, too, or are written as no other; and `_one_unit`.
 
     Texts of a spreadsheet (="1.5"), exponents of Fortran (1.5D+02), and what is on or off.
     """
     held = [cell for cell in cells if not is_missing(cell) or cell.casefold() in _STATES]
+    ones = np.ones(len(cells))
     if held and unit in ("", "1") and all(cell.casefold() in _STATES for cell in held):
-        return [_STATES.get(cell.casefold(), cell) for cell in cells], unit or "1"
+        return [_STATES.get(cell.casefold(), cell) for cell in cells], (unit or "1", ones)
     plainer = [_FORTRAN.sub(r"\1E\2", cell.removeprefix("=").strip("'\"")) for cell in cells]
     if _mostly(plainer, is_number):
-        return plainer, unit
+        return plainer, (unit, ones)
     matches = [_WITH_UNIT.fullmatch(cell) for cell in plainer]
-    units = Counter(match["unit"] for match in matches if match)
-    own = next(iter(units), "")
-    if len(units) != 1 or not is_unit(own) or 2 * units[own] <= len(held):
+    one = _one_unit([match["unit"] if match else None for match in matches])
+    if one is None or not is_unit(one[0]) or 2 * sum(map(bool, matches)) <= len(held):
         return None
-    if unit and spell_unit(unit) != spell_unit(own):
+    if unit and spell_unit(unit) != one[0]:
         return None
-    return _without_units(plainer), spell_unit(own)
+    return _without_units(plainer), one
 
 
 def _join_date_parts(

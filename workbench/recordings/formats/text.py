@@ -18,6 +18,7 @@ from workbench.recordings.formats.cells import (
     find_table,
     find_tables,
     is_quantity,
+    numbers_of,
     parts_of_tables,
     read_group,
 )
@@ -93,7 +94,9 @@ def read(path: Path, raw: bytes) -> Contents:
     tables.append(table)
     # Between commas, a number has a comma only in quotation marks.
     commas = separator != "," or any("," in c for own in tables for row in own.rows for c in row)
-    parts = [read_group(own, tag, str(path), commas=commas) for tag, own in parts_of_tables(tables)]
+    tagged = parts_of_tables(tables)
+    written = [cells for _, own in tagged for cells in numbers_of(own)] if len(tagged) > 1 else []
+    parts = [read_group(own, tag, str(path), written, commas=commas) for tag, own in tagged]
     groups, reading = [group for group, *_ in parts], parts[0][1]
     notes = list(dict.fromkeys(note for *_, own in parts for note in own))
     words = ["CSV", _SEPARATORS[separator], reading, encoding]
@@ -199,6 +202,7 @@ def _rows(lines: Sequence[str], separator: str) -> tuple[list[list[str]], list[i
     numbers: list[int] = []
     broken = 0
     left = 0  # lines that are part of one above
+    sampled = False  # whether a line of samples without a mark of comments has come
     edges = _edges(lines) if separator == " " else []
     for number, line in enumerate(lines, 1):
         if left:
@@ -219,6 +223,9 @@ def _rows(lines: Sequence[str], separator: str) -> tuple[list[list[str]], list[i
             except (csv.Error, ValueError):
                 broken += 1
                 continue
+        if match and sampled and _are_numbers(cells):
+            cells = [line]  # samples that somebody took out
+        sampled = sampled or (match is None and len(cells) > 1 and _are_numbers(cells))
         rows.append(cells)
         numbers.append(number)
     return rows, numbers, broken

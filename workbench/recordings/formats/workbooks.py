@@ -4,17 +4,20 @@ Formulas are as their program last computed them. Each reader imports the packag
 """
 
 import io
+import math
 import re
 import struct
 import zipfile
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from datetime import date, datetime, time, timedelta
+from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
 from workbench.errors import InputError
 from workbench.recordings.formats.cells import find_tables, parts_of_tables, read_group
 from workbench.recordings.formats.contents import Contents, Group
+from workbench.recordings.formats.numbers import is_number
 from workbench.runtime.supervision import quiet_panics
 
 _LOOKED = 200  # rows that tell whether a sheet shows percent
@@ -190,7 +193,9 @@ def _read_sheets(
     refusal: InputError | None = None
     for title, content in sheets.items():
         where = f"{path}, sheet '{title}'"
-        rows = [[_text(cell) for cell in row] for row in content[:_MOST]]
+        marked = any(isinstance(c, str) and _is_marked(c) for row in content[:_MOST] for c in row)
+        write = _unmarked if marked else _text
+        rows = [[write(cell) for cell in row] for row in content[:_MOST]]
         filled = [i for i, row in enumerate(rows) if any(row)]
         try:
             tables = find_tables([rows[i] for i in filled], [i + 1 for i in filled], where)
@@ -249,3 +254,20 @@ def _text(cell: Any) -> str:
         case date():
             return cell.isoformat()
     return str(cell)
+
+
+def _is_marked(text: str) -> bool:
+    """Whether a text is a number with a decimal mark, or one between thousands."""
+    return ("." in text or "," in text) and is_number(text.strip())
+
+
+def _unmarked(cell: Any) -> str:
+    """The same, numbers without decimal marks: they tell nothing of texts beside them.
+
+    >>> _unmarked(4.071), _unmarked(-1e-7), _unmarked(5.0)
+    ('4071E-3', '-1E-7', '5')
+    """
+    if not isinstance(cell, float) or cell.is_integer() or not math.isfinite(cell):
+        return _text(cell)
+    sign, digits, exponent = Decimal(repr(cell)).as_tuple()
+    return f"{'-' * sign}{''.join(map(str, digits))}E{exponent}"
