@@ -112,6 +112,53 @@ def test_a_gap_is_named_before_what_is_too_short_to_begin_anew(tmp_path):
     assert "Leave out what follows, or record it anew" in outcome.summary()
 
 
+def held_current(u: np.ndarray) -> np.ndarray:
+    """Current of the coil at 500 Hz, by voltages (n,) that stay until the next sample."""
+    i = np.zeros(u.size)
+    for j in range(1, u.size):
+        i[j] = u[j - 1] / 2.0 + (i[j - 1] - u[j - 1] / 2.0) * np.exp(-2e-3 * 2.0 / 0.02)
+    return i
+
+
+def stepping_coil(folder: Path, every: int, noise: float, held: str) -> Outcome:
+    """Diagnose three recordings of a coil whose voltage is set every so many samples.
+
+    Parameters
+    ----------
+    noise : standard deviation of the current's sensor [A].
+    held : line on that in [inputs.u].
+    """
+    build_text(folder, COIL)
+    system = COIL_SYSTEM.replace('"0.02 A"', f'"{noise} A"').replace('"10 V"', f'"10 V"\n{held}')
+    (folder / "system.toml").write_text(system)
+    rng, time = np.random.default_rng(7), 2e-3 * np.arange(1500)
+    for k in range(3):
+        u = np.repeat(rng.uniform(2, 10, time.size // every), every)
+        columns = {
+            "time [s]": time,
+            "u [V]": u + 0.01 * rng.standard_normal(time.size),
+            "i [A]": held_current(u) + noise * rng.standard_normal(time.size),
+        }
+        write_case(folder / "recordings" / f"{k}", columns, f"Run {k}")
+    return diagnosed(load_system(str(folder)), folder / "recordings", folder / "out")
+
+
+def test_an_input_that_is_set_every_few_samples_has_no_wrong_ones(tmp_path):
+    """Voltages above those on both sides of them were taken for spikes: 'unexplained'."""
+    outcome = stepping_coil(tmp_path, every=5, noise=0.02, held="held = true")
+    assert outcome.diagnosis.verdict == "nothing"
+    assert sum(sum(counts.values()) for counts in outcome.set_aside.values()) == 0
+
+
+def test_an_input_that_is_held_otherwise_than_said_is_no_delay(tmp_path):
+    """It acts until the next sample: half a sample late on straight lines, InputDelay 'found'."""
+    outcome = stepping_coil(tmp_path, every=20, noise=0.002, held="")
+    assert outcome.diagnosis.verdict == "unexplained"
+    assert "u with held = true in [inputs.u]" in outcome.sentence
+    assert "correct the system file" in outcome.summary()
+    assert outcome.warnings == []
+
+
 def test_a_first_sensor_that_is_late_is_no_lag_where_a_recording_begins_with_its_input(tmp_path):
     """The current of a coil is read 8 ms late from standstill: SensorLag was 'found'."""
     torque = '  output Real m(unit="N.m", nominal=0.1) = 0.01*i "Torque";\nequation'
@@ -122,9 +169,8 @@ def test_a_first_sensor_that_is_late_is_no_lag_where_a_recording_begins_with_its
     )
     rng, time, late = np.random.default_rng(7), 2e-3 * np.arange(1500), 4
     for k in range(3):
-        u, i = np.repeat(rng.uniform(2, 10, 15), 100), np.zeros(time.size)
-        for j in range(1, time.size):
-            i[j] = u[j - 1] / 2.0 + (i[j - 1] - u[j - 1] / 2.0) * np.exp(-2e-3 * 2.0 / 0.02)
+        u = np.repeat(rng.uniform(2, 10, 15), 100)
+        i = held_current(u)
         columns = {
             "time [s]": time,
             "u [V]": u,

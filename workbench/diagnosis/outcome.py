@@ -272,7 +272,7 @@ class Outcome:
         )
         widen = ["widen the bounds of a parameter at its bound, if physics allows it"] * bound
         if (change := self._change) is not None:
-            widen.insert(0, f"if {change.effects[0]} may be so, correct the model")
+            widen.insert(0, f"if {change.effects[0]} may be so, correct {change.corrected}")
         if (slight := self._slight) is not None:
             name = slight.effects[0]
             widen.append(f"state a smaller size that matters for {name}, if it is worth reporting")

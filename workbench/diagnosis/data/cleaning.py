@@ -27,7 +27,8 @@ _BACK = 0.1
 # Share of the range that no sample reads between two levels, and standard deviations over which
 # noise scatters about one: 8.8 in 1e5 samples.
 _APART, _WIDE = 0.25, 12.0
-# Visits to a level by sample, from which on they are pulses of a relay: recorders lose fewer.
+# Visits to a level, and steps to others, by sample, from which on that is how a signal goes:
+# recorders lose fewer.
 _SWITCHED = 0.02
 _FOLLOWS = 4  # samples of an input of which second differences of an output follow a jump
 _MOVED = 0.5  # of what second differences say: noise comes below in a thousandth of 20 samples
@@ -74,6 +75,9 @@ def _outliers(values: Vector, signal: Signal, sound: Soundness, *, flat: bool) -
     for level in levels_of(values):
         if len(runs(level)) > _SWITCHED * values.size:
             wrong[level] = False
+    if _steps(values, sound) > _SWITCHED * values.size:
+        for first, end in runs(wrong):
+            wrong[first:end] = end - first == 1
     same = np.diff(values) == 0.0
     alike = _alike(signal)
     if same.mean() < min(_OFTEN + alike, 1.0 - alike):
@@ -89,6 +93,16 @@ def _outliers(values: Vector, signal: Signal, sound: Soundness, *, flat: bool) -
             if at.sum() > 2 * stuck and same[at[1:]].mean() > 0.5:
                 wrong |= at
     return wrong
+
+
+def _steps(values: Vector, sound: Soundness) -> int:
+    """How often a signal goes to another level in one sample, and stays for two or more.
+
+    As what is set step by step does; a wrong sample goes and comes in two.
+    """
+    moves = np.abs(np.diff(values))
+    large = moves > sound.spike * max(1.4826 * float(np.median(moves)), _rounding(moves))
+    return sum(end - first == 1 for first, end in runs(large))
 
 
 def _alike(signal: Signal) -> float:

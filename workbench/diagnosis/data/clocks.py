@@ -15,7 +15,7 @@ from scipy.ndimage import uniform_filter1d
 from workbench.arrays import Matrix, Vector
 from workbench.diagnosis.data.cleaning import first_value
 from workbench.diagnosis.data.samples import Samples, starting
-from workbench.diagnosis.effects.candidates import LEAST_SKEWS
+from workbench.diagnosis.effects.candidates import INPUT_LAG, LEAST_SKEWS
 from workbench.diagnosis.effects.catalogue import Effect
 from workbench.diagnosis.effects.extension import variables
 from workbench.recordings.case import Case
@@ -81,7 +81,7 @@ def held_otherwise(
     """
     half = 0.5 * system.sample_time
     late = [
-        s for s in system.inputs if {f"{INPUT_DELAY}[{s.name}]", f"InputLag[{s.name}]"} & effects
+        s for s in system.inputs if {f"{INPUT_DELAY}[{s.name}]", f"{INPUT_LAG}[{s.name}]"} & effects
     ]
     keys = {}
     for signal in late or system.inputs:

@@ -38,6 +38,7 @@ from workbench.system.units import three_digits, with_unit
 CHANGE, COEFFICIENT = "change", "coefficient"
 # Parameters of wrong sensors, see `SensorReading`.
 GAIN, OFFSET, LAG, LOSS, LIMIT = "gain", "offset", "lag", "loss", "limit"
+INPUT_LAG = "InputLag"
 WIDTH, RECTIFIED, STEP = "width", "rectified", "step"
 SHARES = (GAIN, LOSS, RECTIFIED)  # of a signal
 
@@ -55,7 +56,7 @@ _ZERO = (
     _SensorForm("SensorGain", GAIN, "a sensor of {label} with another gain"),
     _SensorForm("SensorOffset", OFFSET, "a sensor of {label} with another zero"),
 )
-_INPUT = (_SensorForm("InputLag", LAG, "{label} that acts behind a lag of first order"),)
+_INPUT = (_SensorForm(INPUT_LAG, LAG, "{label} that acts behind a lag of first order"),)
 _OUTPUT = (
     _SensorForm("SensorLag", LAG, "a sensor of {label} behind a lag of first order"),
     _SensorForm(

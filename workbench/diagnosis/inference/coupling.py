@@ -35,7 +35,7 @@ def coupling(simulations: ResidualModel, fit: Fit, base: FittedModel) -> Couplin
     ways: dict[str, bool | str] = {"true": True, '"before"': "before"}
     moves: dict[str, list[Matrix]] = {}
     for hold, held in ways.items():
-        with simulations.held(held) as other:
+        with simulations.held(dict.fromkeys(simulations.averaged, held)) as other:
             pairs = zip(simulations.recordings, other.predicted(points), straight, strict=True)
             moves[hold] = [own.whitened(run - line) for own, run, line in pairs]
     errors = [recording.errors for recording in base.linearised.residuals]

@@ -5,7 +5,8 @@ left of a recording is a small quadratic form in the common unknowns, which sums
 leaves-one-out are made of.
 """
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from copy import copy
 from dataclasses import replace
 from types import MappingProxyType
@@ -41,6 +42,7 @@ from workbench.diagnosis.simulation.simulator import FINEST, WhitenedResiduals
 from workbench.errors import FMUError, InputError
 from workbench.models.instance import EventError
 from workbench.recordings.case import Case
+from workbench.system.parts import Signal
 from workbench.system.registry import open_model
 from workbench.system.units import BAND
 
@@ -170,6 +172,17 @@ class Fit:
                 for slot in e.slots
             ),
         ]
+
+    @contextmanager
+    def held(self, name: str, way: bool | str) -> Iterator["Fit"]:
+        """The same with an input that is held otherwise between samples."""
+        with self._simulations.held({name: way}) as simulations:
+            yield Fit(simulations, list(self.unknowns.effects.values()), self.decides)
+
+    @property
+    def inputs(self) -> tuple[Signal, ...]:
+        """What drives the model."""
+        return self._simulations.system.inputs
 
     def opened(self, effect: Effect, parameter: str, side: str) -> "Fit":
         """The same with a parameter that may pass its bound, "least" or "greatest"."""

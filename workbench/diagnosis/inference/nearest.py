@@ -6,6 +6,8 @@ from functools import partial
 
 import numpy as np
 
+from workbench.diagnosis.data.clocks import INPUT_DELAY
+from workbench.diagnosis.effects.candidates import INPUT_LAG
 from workbench.diagnosis.inference.causes import binding_bound, size_text
 from workbench.diagnosis.inference.crossvalidation import CrossValidation
 from workbench.diagnosis.inference.fit import Fit
@@ -19,7 +21,7 @@ from workbench.diagnosis.inference.search import (
     rival_fits,
     starts_of,
 )
-from workbench.diagnosis.inference.selection import Selection
+from workbench.diagnosis.inference.selection import Selection, anew
 from workbench.runtime.engine import Reporter
 from workbench.system.units import with_unit
 
@@ -35,6 +37,7 @@ class NearestCandidate:
     reasons: tuple[str, ...]  # why they are no answer, in words
     slight: bool = False  # whether they leave noise alone, at a size less than what matters
     change: str = ""  # what it is where no effect of the catalogue is, with its size
+    corrected: str = "the model"  # what is corrected for that
 
     @property
     def text(self) -> str:
@@ -170,6 +173,36 @@ def single_change(fit: Fit, chosen: Selection, report: Reporter) -> NearestCandi
             return NearestCandidate(
                 model.names, removed, (reason,), change=f"{effect.text}: {text}"
             )
+    return None
+
+
+def otherwise_held(fit: Fit, chosen: Selection) -> NearestCandidate | None:
+    """An input that is held otherwise between samples than is said, which alone explains more.
+
+    It then acts up to a sample earlier or later, which its own delay or lag is most like: inputs
+    for which one of these was fitted are tried.
+    """
+    late = {name for step in chosen.steps for rival in step.rivals for name in rival.names}
+    for signal in fit.inputs:
+        if not {f"{INPUT_DELAY}[{signal.name}]", f"{INPUT_LAG}[{signal.name}]"} & late:
+            continue
+        for key, other in signal.otherwise_held.items():
+            with fit.held(signal.name, other.held) as as_held:
+                model = anew(as_held, chosen.base.point, ())
+            was, left = (float(m.linearised.squares.max()) for m in (chosen.base, model))
+            if left > 1.0 + fit.decides.excess or not is_clean(fit, model):
+                continue
+            if beyond(chosen.best, model) > fit.decides.needed:
+                removed = 1.0 - max(left - 1.0, 0.0) / (was - 1.0)
+                text = f"{signal.label} with held = {key} in [inputs.{signal.name}]"
+                reason = "it is no effect of the catalogue"
+                return NearestCandidate(
+                    (f"held = {key}",),
+                    removed,
+                    (reason,),
+                    change=text,
+                    corrected="the system file",
+                )
     return None
 
 

@@ -31,6 +31,7 @@ from workbench.diagnosis.inference.nearest import (
     NearestCandidate,
     nearest_candidates,
     nearest_fits,
+    otherwise_held,
     single_change,
     single_effect,
     undecided,
@@ -242,11 +243,12 @@ def _judged(
     change = None
     if verdict != "nothing" and not (refused or chosen.interrupted):
         report("changes that no effect is")
-        change = single_change(fit, chosen, report)
+        change = single_change(fit, chosen, report) or otherwise_held(fit, chosen)
     if change is not None:
         verdict = "unexplained"
-        if len(best.active) > 1:
-            objections.append(f"{change.effects[0]} alone explains as much")
+        if best.active:
+            much = "as much" if len(best.active) > 1 else "more"
+            objections.append(f"{change.effects[0]} alone explains {much}")
     nearest: tuple[NearestCandidate, ...] = ()
     if verdict == "unexplained" and late is None:
         report("candidates that come nearest")
@@ -262,6 +264,7 @@ def _judged(
     answered = bool(causes) and verdict != "unexplained"
     twins = [model for fits in chosen.twins.values() for model in fits.values()]
     remains = not noise_alone or (verdict == "unexplained" and late is None)
+    remains = remains and change is None
     part_of = verdict == "partly explained" or best.names in [near.effects for near in nearest]
     hidden = hidden_effects(fit, chosen.trial, catalogue)
     return Diagnosis(

@@ -118,10 +118,10 @@ class ResidualModel:
             return ()
         return tuple(s.name for s in self.system.inputs if s.hold == 0.0 and fmu.is_real(s.name))
 
-    def held(self, held: bool | str) -> "ResidualModel":
-        """The same model with inputs held in another way that are `averaged`; to be closed."""
+    def held(self, ways: Mapping[str, bool | str]) -> "ResidualModel":
+        """The same model with inputs held in other ways between samples, by name; to be closed."""
         inputs = (
-            replace(signal, held=held) if signal.name in self.averaged else signal
+            replace(signal, held=ways.get(signal.name, signal.held))
             for signal in self.system.inputs
         )
         system = replace(self.system, inputs=tuple(inputs))
