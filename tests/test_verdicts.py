@@ -3,6 +3,7 @@
 Plants are simulated by SciPy, never by the model's own FMU.
 """
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -242,6 +243,9 @@ def test_causes_that_imitate_a_parameter_together_are_no_answer(tmp_path):
     assert not outcome.diagnosis.causes
     text = "another value of Jl (Inertia of the flywheel) than 0.01 kg.m2: 0.011 kg.m2"
     assert text in outcome.sentence
+    ends = re.search(r"95 %: ([\d.]+) to ([\d.]+)", outcome.sentence)
+    assert ends is not None
+    assert 0.0109 < float(ends[1]) < 0.011 < float(ends[2]) < 0.0111
     assert outcome.diagnosis.nearest[0].effects == ("Jl",)
     assert "Jl alone explains as much" in outcome.diagnosis.nearest[1].text
 

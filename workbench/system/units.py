@@ -277,13 +277,18 @@ def with_unit(value: float, unit: str) -> str:
 
 
 def with_interval(value: float, low: float, high: float, unit: str) -> str:
-    """A value with its 95 % interval, in one unit.
+    """A value with its 95 % interval, in one unit, in three digits or as many as part its ends.
 
     >>> with_interval(7.07e-4, 6.8e-4, 7.4e-4, "1/K")
     '7.07 % per 100 K (95 %: 6.8 to 7.4)'
+    >>> with_interval(0.011, 0.01098, 0.01103, "kg.m2")
+    '0.011 kg.m2 (95 %: 0.01098 to 0.01103)'
     """
     (middle, first, last), shown = in_spoken_unit([value, low, high], unit)
     further = f", {3.6 * value:.3g} km/h" if unit == "m/s" else ""
     shown = f"{shown} " * bool(shown)
     best, least, most = (three_digits(end) for end in (middle, first, last))
+    if least == most:
+        texts = ([f"{end:.{digits}g}" for end in (first, last)] for digits in range(4, 16))
+        least, most = next((ends for ends in texts if ends[0] != ends[1]), (least, most))
     return f"{best} {shown}(95 %: {least} to {most}{further})"

@@ -11,7 +11,7 @@ from workbench.diagnosis.effects.candidates import INPUT_LAG
 from workbench.diagnosis.inference.causes import binding_bound, size_text
 from workbench.diagnosis.inference.crossvalidation import CrossValidation
 from workbench.diagnosis.inference.fit import Fit
-from workbench.diagnosis.inference.score_test import CandidateScore
+from workbench.diagnosis.inference.score_test import CandidateScore, score_test
 from workbench.diagnosis.inference.search import (
     FittedModel,
     beyond,
@@ -23,7 +23,7 @@ from workbench.diagnosis.inference.search import (
 )
 from workbench.diagnosis.inference.selection import Selection, anew
 from workbench.runtime.engine import Reporter
-from workbench.system.units import with_unit
+from workbench.system.units import BAND, with_interval, with_unit
 
 NEAREST = 3  # candidates that are named where none is accepted
 
@@ -36,7 +36,7 @@ class NearestCandidate:
     removed: float  # share of the explainable that they remove on held-out recordings
     reasons: tuple[str, ...]  # why they are no answer, in words
     slight: bool = False  # whether they leave noise alone, at a size less than what matters
-    change: str = ""  # what it is where no effect of the catalogue is, with its size
+    change: str = ""  # what it is where no effect of the catalogue is, size and 95 % interval
     corrected: str = "the model"  # what is corrected for that
 
     @property
@@ -167,7 +167,11 @@ def single_change(fit: Fit, chosen: Selection, report: Reporter) -> NearestCandi
             (effect,) = model.active
             size = model.point.sizes[effect.name, effect.size]
             size += other.unknowns.nominal(effect, effect.size)
-            text = with_unit(size, other.unknowns.unit(effect, effect.size))
+            trial = score_test(other, other.linearise(model.linearised, model.active), ())
+            at = trial.joint.known.index((effect.name, effect.size))
+            reach = BAND * float(np.sqrt(trial.covariance()[at, at]))
+            unit = other.unknowns.unit(effect, effect.size)
+            text = with_interval(size, size - reach, size + reach, unit)
             removed = validation.explained(about, model, fast=fast)[0]
             reason = "it is no effect of the catalogue"
             return NearestCandidate(
