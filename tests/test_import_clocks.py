@@ -304,6 +304,27 @@ def test_hours_to_12_go_on_from_12_to_1(tmp_path, tank):
         clock(dated, tank)
 
 
+@pytest.mark.parametrize(
+    ("count", "words", "padded"),
+    [
+        (lambda k: 50 * k % 1000, "milliseconds", False),  # .50 beside .100
+        (lambda k: 7 + 4 * k, "milliseconds", False),  # a loop that is late by 4 ms each time
+        (lambda k: 125 * k % 1000, "", True),  # without zeros behind them
+        (lambda k: 250 + 37 * k % 500, "", True),
+    ],
+)
+def test_parts_of_a_second_may_be_counts(tmp_path, tank, count, words, padded):
+    parts = [
+        f".{count(k):03d}".rstrip("0").rstrip(".") if padded else f".{count(k)}" for k in range(200)
+    ]
+    begin = datetime(2024, 3, 5, tzinfo=UTC)
+    stamps = map("".join, zip(local(begin, 200, "%H:%M:%S"), parts, strict=True))
+    read_clock = clock(table(tmp_path / "a.csv", list(stamps)), tank)
+    expected = QUARTER * np.arange(200) + [count(k) / 1e3 for k in range(200)]
+    assert_allclose(read_clock.times, expected - expected[0], atol=1e-6)
+    assert words in read_clock.reason
+
+
 def test_parts_of_a_second_before_the_year_count(tmp_path, tank):
     stamps = local(datetime(2024, 3, 1, tzinfo=UTC), 60, "%a %b %d %H:%M:%S.250 %Y")
     stamps[1::2] = [stamp.replace(".250", ".750") for stamp in stamps[1::2]]
@@ -450,6 +471,14 @@ def test_counts_are_seconds_from_their_first(tmp_path, tank, name, values, start
     assert bool(start) == bool(iso(read_clock.start))
 
 
+@pytest.mark.parametrize("times", [1, 2])
+def test_a_count_that_begins_anew_is_of_another_recording(tmp_path, tank, times):
+    """An hour of samples may follow itself; a counter of an hour seldom begins at its zero."""
+    path = table(tmp_path / "a.csv", [f"{900 * k % 3600}" for k in range(4 + 4 * times)], "t [s]")
+    with pytest.raises(InputError, match=r"in sample 5.*times begin anew"):
+        clock(path, tank)
+
+
 def test_days_that_may_count_from_1904_are_told(tmp_path, tank):
     (correction,) = clock(
         table(tmp_path / "a.csv", every(lambda k: f"{43890 + k / 96:.9f}")), tank
@@ -530,6 +559,27 @@ def test_rows_of_one_time_that_hold_other_channels_are_all_read(tmp_path, tank):
     assert_allclose(held.signals["h"], 1e-3 * (20.0 + np.arange(0, 60, 2)))
 
 
+def test_channels_of_one_time_may_each_have_a_row(tmp_path, tank):
+    lines = [
+        line
+        for k in range(60)
+        for line in (f"{900 * k};1.{k % 7};;", f"{900 * k};;{20 + k};", f"{900 * k};;;21.5")
+    ]
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join(["time [s];inflow [l/s];h [mm];T [degC]", *lines]))
+    recorded = read_recorded_file(path)
+    held = merge([recorded], propose([recorded], tank, {}), tank)
+    assert_allclose(held.time, QUARTER * np.arange(60))
+    assert_allclose(held.signals["h"], 1e-3 * (20.0 + np.arange(60)))
+
+
+def test_minutes_of_samples_each_second_are_too_coarse(tmp_path, tank):
+    """Two stamps show no rate of a signal: it is no clock, and its samples are not one."""
+    path = table(tmp_path / "a.csv", [f"10:{15 + k // 40}" for k in range(80)])
+    with pytest.raises(InputError, match="stamps are coarser than samples"):
+        clock(path, tank)
+
+
 def test_a_row_of_the_time_before_in_which_all_moves_is_refused(tmp_path, tank):
     rows = [(QUARTER * min(k, 40), 1.0 + k % 7, 20.0 + k) for k in range(42)]
     with pytest.raises(InputError, match="36000 s after 36000 s in sample 42"):
@@ -548,6 +598,7 @@ COUNTED = [str(900 * k) for k in range(60)]
         ("Date: 05.03.2024\nTime: 10:00:00", "t [s]", COUNTED, "2024-03-05T10:00:00"),
         ("Date: 05.03.2024", "t", [f"10:{k:02d}:00" for k in range(60)], "2024-03-05T10:00:00"),
         ("Calibrated: 05.03.2024 10:00:00", "t [s]", COUNTED, ""),
+        (f"Date;2024/03/05\nTime;10:00:00.{0:019d}", "t [s]", COUNTED, "2024-03-05T10:00:00"),
     ],
 )
 def test_a_preamble_tells_the_date_of_a_recording(tmp_path, tank, head, name, stamps, date):
@@ -717,6 +768,7 @@ def test_a_recording_begins_as_its_preamble_says_where_its_times_begin_at_zero(t
     [
         (range(299, -1, -1), r"the newest sample stands first.*sort the rows"),
         ([*range(150), *range(150)], r"times begin anew.*part the file before sample 151"),
+        ([*range(150), *range(100, 250)], r"in sample 151.*delete rows that stand there twice"),
     ],
 )
 def test_times_that_go_back_say_what_to_do(tmp_path, tank, order, message):

@@ -121,6 +121,28 @@ def test_numbers_of_one_file_are_written_in_one_way(tmp_path, header, row):
     assert_allclose(values["h"], [950.1 + k % 7 for k in range(60)])
 
 
+def test_other_units_among_samples_are_refused(tmp_path):
+    rows = [f"{k};4.{k % 9};95{k % 7}.1" for k in range(60)]
+    lines = ["time;inflow;h", "s;l/s;mm", *rows[:40], "s;l/s;cm", *rows[40:]]
+    with pytest.raises(InputError, match=r"line 43: found .*\[cm\] below \[mm\].*part the file"):
+        read_recorded_file(table(tmp_path / "a.csv", lines))
+
+
+@pytest.mark.parametrize("tags", [0, 2])
+def test_samples_of_texts_are_no_header(tmp_path, tags):
+    """Historians begin with a word: Pt Created."""
+    stamps = [f"2024-03-05 10:00:{k:02d}" for k in range(60)]
+    head, rows = "time;inflow;h", [f"{stamp};4.5;950.5" for stamp in stamps]
+    if tags:
+        head = "time;tag;value"
+        rows = [f"{stamp};{tag};950.5" for stamp in stamps for tag in ("inflow", "h")]
+    words = [row.replace("950.5", "Pt Created").replace("4.5", "") for row in rows[: tags or 1]]
+    lines = [head, *words, *rows[tags or 1 :]]
+    groups = read_recorded_file(table(tmp_path / "a.csv", lines)).groups
+    names = {channel.name for group in groups for channel in group.channels}
+    assert names == {"time", "inflow", "h"}
+
+
 def test_marks_of_order_within_a_file_are_no_part_of_a_number(tmp_path):
     parts = [f"{k};4.{k % 9};95{k % 7}.1\n" for k in range(60)]
     text = "\ufefftime [s];inflow [l/s];h [mm]\n" + "\ufeff".join(
@@ -161,7 +183,10 @@ def test_statistics_above_samples_are_no_samples(tmp_path):
     assert channels(path)[1:] == [("Time", "s"), ("inflow", "l/s"), ("h", "mm")]
 
 
-@pytest.mark.parametrize("row", ["Scale;1;10;1", "Gain;1,0;1,5;1", "Offset;0;2;0", "Faktor;1;1;1"])
+@pytest.mark.parametrize(
+    "row",
+    ["Scale;1;10;1", "Gain;1,0;1,5;1", "Offset;0;2;0", "Faktor;1;1;1", "x1;x10;x1;1"],
+)
 def test_factors_above_samples_are_refused_unless_they_change_nothing(tmp_path, row):
     rows = [f"{k};4,{k % 9};95{k % 7},1" for k in range(60)]
     path = table(tmp_path / "a.csv", ["time [s];inflow [l/s];h [mm]", row[:-2], *rows])
@@ -321,9 +346,11 @@ def test_samples_that_are_good_in_several_ways_are_samples(tmp_path):
     assert np.flatnonzero(np.isnan(group.channels[2].values)).tolist() == [30]
 
 
-def test_a_status_of_a_machine_is_no_verdict_on_samples(tmp_path):
-    rows = [f"{k};4.5;950.{k};{'Running' if k % 3 else 'OK'}" for k in range(60)]
-    lines = ["time [s];inflow [l/s];h [mm];Status", *rows]
+@pytest.mark.parametrize(("name", "states"), [("Status", ["OK", "Running"]), ("Quality", [""])])
+def test_a_status_of_a_machine_is_no_verdict_on_samples(tmp_path, name, states):
+    """Nor is a column of quality that nobody fills, as of ThingSpeak."""
+    rows = [f"{k};4.5;950.{k};{states[k % len(states)]}" for k in range(60)]
+    lines = [f"time [s];inflow [l/s];h [mm];{name}", *rows]
     (group,) = read_recorded_file(table(tmp_path / "a.csv", lines)).groups
     assert np.isfinite([channel.values for channel in group.channels]).all()
 
@@ -346,6 +373,18 @@ def test_meters_that_choose_a_range_write_several_units(tmp_path, header, small,
     assert channels["h"].unit == "mm"
     assert_allclose(channels["h"].values, 900.5 + np.arange(10, 70))
     assert "'h': 20 samples in other units were taken to [mm]" in recorded.notes
+
+
+@pytest.mark.parametrize("names", ["t;x1;x2", "t;x1;y"])
+def test_names_of_states_are_no_factors(tmp_path, names):
+    rows = [f"{k};4.{k % 9};95{k % 7}.1" for k in range(60)]
+    path = table(tmp_path / "a.csv", [names, *rows])
+    assert [name for name, _ in channels(path)] == names.split(";")
+
+
+def test_units_of_a_plant_are_none_of_samples(tmp_path):
+    rows = [f"{k};9{k}.5;Pump {k % 2}" for k in range(10, 70)]
+    assert channels(table(tmp_path / "a.csv", ["time [s];h;Unit", *rows]))[1] == ("h", "")
 
 
 def test_values_in_units_of_other_dimensions_are_no_channel(tmp_path):

@@ -257,7 +257,16 @@ def test_times_that_may_be_seconds_or_minutes_are_asked_for(tmp_path, tank, name
 
 
 @pytest.mark.parametrize(
-    "day", ["01-Mar-2024", "1 March 2024", "01-MAR-2024", "1. März 2024", "01.03.2024"]
+    "day",
+    [
+        "01-Mar-2024",
+        "1 March 2024",
+        "01-MAR-2024",
+        "1. März 2024",
+        "01.03.2024",
+        "1. 3. 2024",
+        "01.03.2024.",
+    ],
 )
 def test_months_may_be_written_by_their_names(tmp_path, tank, day):
     """The first as MATLAB writes it."""
@@ -449,6 +458,24 @@ def test_a_gallon_is_asked_about(tmp_path, tank):
     named = {"inflow": NamedChannel("inflow", "igal/min")}
     inflow = propose([read_recorded_file(path)], tank, named).assigned["inflow"]
     assert inflow.factor == pytest.approx(4.54609e-3 / 60)
+
+
+@pytest.mark.parametrize(
+    ("name", "asked"),
+    [
+        ("inflow x10", "x10"),
+        ("inflow/1000", "/1000"),
+        ("inflow (*10)", "*10"),
+        ("inflow Aux10", ""),
+    ],
+)
+def test_a_factor_in_a_name_is_asked_about(tmp_path, tank, name, asked):
+    path = table(tmp_path / "a.csv", [f"t [s];{name} [l/s];h [mm]", *ROWS])
+    doubt = propose([read_recorded_file(path)], tank, {}).assigned["inflow"].doubt
+    assert (f"its name has '{asked}'" in doubt) if asked else not doubt
+    named = {"inflow": NamedChannel(name, "0.1 l/s")}
+    inflow = propose([read_recorded_file(path)], tank, named).assigned["inflow"]
+    assert inflow.factor == pytest.approx(1e-4)
 
 
 def test_a_torque_without_a_unit_may_be_in_that_of_another_country(tmp_path, system):

@@ -34,6 +34,7 @@ _ROUNDS = tuple(
         | {12.0, 24.0, 1440.0}
     )
 )
+_TURNS = 3  # of a counter to its first count, from which on they are no recordings begun anew
 _UNIX = 8e8, 2.3e9  # [s] since 1970, that recordings are of: 1995 to 2042
 # Counts from other dates: seconds from there to 1970, seconds of a count, and counts from 1995 on.
 _EPOCHS = {
@@ -63,6 +64,7 @@ _MIDNIGHT = 0.5  # of a day, by which times go back at its end
 _UNITS_APART = (60.0, 3600.0, 86400.0, 1e3, 1e6, 1e9)
 _DAYS_OF_YEAR = frozenset(("doy", "yday", "jday"))
 _TWO_PARTS = re.compile(r"\d{1,4}:\d\d")
+_FEWEST_RATES = 3  # of a channel, which are equal if it is a clock; one always is
 _COARSE = 0.3  # of all rows: more that repeat a time are samples of one coarse stamp
 _BY_CHANCE = 1e-3  # that a channel which moves from row to row stays in all rows of one time
 _DRIFT = 1.01  # beyond which clocks differ by more than oscillators without a quartz do
@@ -209,7 +211,8 @@ def _tick(clock: Clock) -> float:
 
 def _beside_stated(clock: Clock, step: float, where: str) -> Clock:
     """The clock, with what a file states of its steps where that is another one."""
-    usual = float(np.median(np.diff(clock.times[np.isfinite(clock.times)])))
+    steps = np.diff(clock.times[np.isfinite(clock.times)])
+    usual = float(np.median(steps[steps > 0.0]))  # rows of one time have other channels
     ratio = max(usual, step) / min(usual, step)
     if not ratio > _FACTOR:
         return clock
@@ -445,6 +448,9 @@ def _unwrap(values: Vector) -> tuple[Vector, tuple[str, ...]]:
     back, ahead = np.flatnonzero(steps < 0.0), steps[steps > 0.0]
     if not back.size or back.size > 0.5 * steps.size:
         return values, ()
+    # Once or twice back to the very first count, it is as likely that of another recording.
+    if back.size < _TURNS and (values[known[back + 1]] == values[known[0]]).all():
+        return values, ()
     usual = float(np.median(ahead))
     residual = {
         period: float(np.abs(steps[back] + period - usual).max()) / usual
@@ -609,7 +615,7 @@ def _is_clock(channel: FileChannel, moves: Vector, steps: Vector) -> bool:
         return True
     known = np.isfinite(moves) & (steps > 0.0)
     rates = moves[known] / steps[known]
-    usual = float(np.median(rates)) if rates.size else 0.0
+    usual = float(np.median(rates)) if rates.size >= _FEWEST_RATES else 0.0
     return usual != 0.0 and float(np.isclose(rates, usual, rtol=1e-3).mean()) > 0.9
 
 
@@ -652,8 +658,10 @@ def _going_on(clock: Clock, group: Group, where: str) -> Clock:
     elif held.size > 1 and (held[1:][np.diff(held) <= 0] <= held[0]).all() and held[0] < held[-1]:
         fault += ": times begin anew"
         remedy = f"part the file before sample {late + 2}, where another recording begins"
-    elif held.size > 1 and count < 0.1 * held.size and np.unique(held).size == held.size:
+    elif held.size > 1 and count < 0.1 * held.size and (np.diff(held) < 0).any():
         remedy = "sort the rows by their time if they were mixed, or part the file there"
+        if np.unique(held).size < held.size:
+            remedy = "delete rows that stand there twice, or part the file there"
     elif held.size > 1 and count >= _COARSE * held.size and not (np.diff(held) < 0).any():
         fault += ": stamps are coarser than samples"
         # From the first sample of one stamp to that of another: both ends may be cut.

@@ -217,6 +217,11 @@ def meaning_doubt(
             f"[{unit}] may be a unit of {size.factor:.4g} {si}, or [{own}] with the range of a "
             f"sensor; --column '{column} [{unit}]' takes the one, [{own}] the other"
         )
+    if factor := _FACTOR.search(channel):
+        return (
+            f"its name has {factor[0]!r}; --column '{column} [{unit}]' takes the values as they "
+            f"are, [0.1 {unit}] a tenth of them"
+        )
     turn = conversion(si, "rad")
     if turn is not None and (rounds := _rounds(turn.factor * values)):
         return (
@@ -419,6 +424,8 @@ _DIFFERENCE = re.compile(
     re.IGNORECASE,
 )
 _IN_BRACKETS = re.compile(r"[({<][^(){}<>\d]+[)}>]$")
+# A factor in a name: flow x10, flow/1000; but Aux10 and x10 are none.
+_FACTOR = re.compile(r"((?<=[\s([])x|(?<=.)[\u00d7*/])\s?10(0*|\^[+-]?\d+)(?!\w)")
 _GALLON = re.compile(r"\b(gal|gallon|gpm)\b")
 _WORDS = frozenset(("in", "atm"))  # units that mean something else in a name: h_in, p_atm
 _HUGE = 1e100  # no sample, and its square would be no number

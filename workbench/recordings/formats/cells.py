@@ -54,7 +54,12 @@ _SCALES = re.compile(
     re.IGNORECASE,
 )
 _OF_A_SCREEN = re.compile("horizontal|vertical", re.IGNORECASE)  # of an oscilloscope
-_ONE, _NOTHING = re.compile(r"\+?1([.,]0*)?([eE][+-]?0+)?"), re.compile(r"[+-]?0([.,]0*)?([eE].*)?")
+# Powers of ten, as x2 is the name of a state.
+_FACTOR = re.compile(r"[x\u00d7*]\s?(10*|0[.,]0*1|10\^[+-]?\d+)|10\^[+-]?\d+")
+_ONE, _NOTHING = (
+    re.compile(r"\+?1([.,]0*)?([eE][+-]?0+)?|10\^0"),
+    re.compile(r"[+-]?0([.,]0*)?([eE].*)?"),
+)
 _ABOUT = 100  # characters before a quantity that may say of what it is
 # Words for samples, for their rate and for the time between two; and of what else there are such.
 _SAMPLES = re.compile("sampl|abtast|scan|mess(?!age)|meas|zeit|time|\\bdt\\b", re.IGNORECASE)
@@ -185,11 +190,32 @@ def find_tables(rows: Sequence[Sequence[str]], lines: Sequence[int], where: str)
     InputError
         See `find_table`.
     """
-    tables = []
+    tables: list[Cells] = []
+    rows_at = dict(zip(lines, rows, strict=True))
     while (begin := _next_table(table := find_table(rows, lines, where), rows, lines)) is not None:
         tables.append(find_table(rows[:begin], lines[:begin], where))
         rows, lines = rows[begin:], lines[begin:]
+    for own in (*tables, table):
+        _refuse_units_within(own, rows_at, where)
     return [*tables, table]
+
+
+def _refuse_units_within(table: Cells, rows: Mapping[int, Sequence[str]], where: str) -> None:
+    """Refuse a row of other units among samples, without names above it."""
+    samples = set(table.lines)
+    units = [_label(table, i)[1] for i in range(len(table.names))]
+    for line in range(table.lines[0], table.lines[-1]):
+        row = [spell_unit(cell) for cell in rows.get(line, ())]
+        if line in samples or len(row) != len(units) or not _are_units(row):
+            continue
+        pairs = [pair for pair in zip(row, units, strict=True) if all(pair)]
+        if others := [f"[{own}] below [{above}]" for own, above in pairs if own != above]:
+            raise InputError(
+                where=f"{where}, line {line}",
+                found=f"a row of other units among samples, {', '.join(others)}",
+                expected="samples in the units that stand above them",
+                remedy="part the file there, and write the names above the units",
+            )
 
 
 def _next_table(table: Cells, rows: Sequence[Sequence[str]], lines: Sequence[int]) -> int | None:
@@ -263,7 +289,7 @@ def find_table(rows: Sequence[Sequence[str]], lines: Sequence[int], where: str) 
             remedy="export the recording as a table",
         )
     _refuse_scales(rows[:first], lines, width, where)
-    names, units = _header(rows[:first], width)
+    names, units = _header(_with_index_name(rows[:first], width), width)
     own = len(_trim(names)) - 1
     if len(units) == own > 0 and _TIME_NAME.match(names[0]) and conversion(units[0], "s") is None:
         units = ["", *units]  # between spaces, dates and times have none
@@ -292,11 +318,15 @@ def _refuse_scales(
     for row, line in zip(rows, lines, strict=False):
         label, *cells = row or [""]
         match = None if _OF_A_SCREEN.search(label) else _SCALES.search(label)
-        numbers = [cell for cell in cells if is_number(cell)]
-        if match is None or 2 * len(numbers) < width - 1:
+        numbers = [cell.strip() for cell in cells if is_number(cell)]
+        factors = [cell.strip() for cell in row if _FACTOR.fullmatch(cell.strip())]
+        # Without a label, over all columns but that of times: x1;x10.
+        if len(factors) > 1 and len(factors) + 1 >= len([cell for cell in row if cell.strip()]):
+            label, numbers = factors[0], [cell.lstrip("x\u00d7* ") for cell in factors]
+        elif match is None or 2 * len(numbers) < width - 1:
             continue
-        neutral = _NOTHING if match["offset"] else _ONE
-        if other := next((n for n in numbers if not neutral.fullmatch(n.strip())), ""):
+        neutral = _NOTHING if match and match["offset"] else _ONE
+        if other := next((n for n in numbers if not neutral.fullmatch(n)), ""):
             raise InputError(
                 where=f"{where}, line {line}",
                 found=f"'{label.strip()}' of columns, {other} among them",
@@ -426,6 +456,22 @@ def _is_time_alone(row: Sequence[str], width: int) -> bool:
     return bool(text) and not any(map(str.strip, row[1:])) and (is_number(text) or is_stamp(text))
 
 
+def _with_index_name(above: Sequence[Sequence[str]], width: int) -> Sequence[Sequence[str]]:
+    """The same rows; where the last holds the name of times alone, this in the first of the names.
+
+    So pandas writes it, below columns with names of several levels.
+    """
+    last = above[-1] if above else []
+    begin = len(above) - 1
+    while begin > 0 and len(above[begin - 1]) == width:
+        begin -= 1
+    if len(last) != width or len(_trim(last)) != 1 or not _TIME_NAME.match(last[0].strip()):
+        return above
+    names = above[begin:-1]
+    named = [[last[0] if k == 0 else "", *row[1:]] for k, row in enumerate(names)]
+    return [*above[:begin], *named]
+
+
 def _header(above: Sequence[Sequence[str]], width: int) -> tuple[list[str], list[str]]:
     """Names and units as they stand above the samples; empty where there are none."""
     rows: list[list[str]] = []
@@ -435,7 +481,9 @@ def _header(above: Sequence[Sequence[str]], width: int) -> tuple[list[str], list
             cells = cells[:width]
         if not _trim(cells) or all(_RULE.fullmatch(cell) for cell in cells):
             continue
-        if len(_trim(cells)) > width or len(_trim(cells)) < max(2, width // 2):
+        if len(cells) == width and any(map(_is_moment, cells)):
+            continue  # a sample of texts, as historians begin with: Pt Created
+        if len(_trim(cells)) > width or len(_trim(cells)) < max(2, (width + 1) // 2):
             break
         rows.insert(0, cells)
         if len(rows) == _HEADER_ROWS:
@@ -470,6 +518,11 @@ def _header(above: Sequence[Sequence[str]], width: int) -> tuple[list[str], list
             if not any(units[i : i + 1]) and cell.casefold() in {*_PARTS, *_PARTS_OF_TIME}:
                 names[i] = cell
     return names, [spell_unit(cell) for cell in units]
+
+
+def _is_moment(cell: str) -> bool:
+    """Whether a cell is a date with a time of day, as no header has it."""
+    return is_stamp(cell) and has_day([cell]) and not has_day_alone([cell])
 
 
 def _header_below(
@@ -513,7 +566,7 @@ def _labelled_row(above: Sequence[Sequence[str]], label: re.Pattern[str], width:
     """The row of a preamble that a label of its own says what it is, over all columns; or none."""
     for row in reversed(above):
         cells = [cell.strip() for cell in row]
-        if 2 <= len(_trim(cells)) <= width and label.fullmatch(cells[0]):
+        if width < 2 * len(_trim(cells)) <= 2 * width and label.fullmatch(cells[0]):
             return ["", *cells[1:], *[""] * (width - len(cells))]
     return []
 
@@ -543,7 +596,7 @@ def _says_nothing(cell: str) -> bool:
 def _are_units(cells: Sequence[str]) -> bool:
     silent = (_says_nothing, is_number, is_said)  # DD/MM/YYYY is above dates
     held = [cell for cell in cells if not any(says(cell) for says in silent)]
-    return bool(held) and sum(map(is_unit, held)) >= 0.75 * len(held)
+    return bool(held) and sum(map(is_unit, held)) >= 0.6 * len(held)
 
 
 def parts_of_tables(tables: Sequence[Cells]) -> list[tuple[str, Cells]]:
@@ -805,7 +858,7 @@ def _leave_out_bad(
         ]
         states = [cell.strip().casefold() for cell in columns[i]]
         words = {_first_word(state) for state in states if state}
-        if match["word"].casefold() == "status" and not words <= _GOOD | _BAD:
+        if not words or (match["word"].casefold() == "status" and not words <= _GOOD | _BAD):
             continue  # of a machine
         good = {state for state in states if _is_good(state, match["word"])}
         counts = Counter(filter(None, states)).most_common(_FEW_STATES + 1)
@@ -857,7 +910,11 @@ def _units_beside(
         # One before belongs to a column of numbers before that, if it has no unit.
         taken = k - 2 in numbers and not any((labels[k - 2][1], _TIME_NAME.match(labels[k - 2][0])))
         near = {k + 1, *([] if taken else [k - 1])} & texts.keys()
-        own = (i for i in near if _is_label_of_units(labels[i][0], name))
+        own = (
+            i
+            for i in near
+            if _is_label_of_units(labels[i][0], name) and any(map(is_unit, {*texts[i]} - {""}))
+        )
         if (at := max(own, default=-1)) >= 0:
             units[k] = at
     return units

@@ -19,12 +19,12 @@ from workbench.arrays import Vector
 from workbench.recordings.formats.contents import FileChannel
 
 _HALF = r"(?P<half>[AaPp])(\.?\s?[Mm]\.?)?"
-_PARTS_OF_DAY = r"(?P<h>\d{1,2}):(?P<m>\d\d)(:(?P<s>\d\d)((?P<dot>[.,:;])(?P<f>\d{1,12}))?)?"
+_PARTS_OF_DAY = r"(?P<h>\d{1,2}):(?P<m>\d\d)(:(?P<s>\d\d)((?P<dot>[.,:;])(?P<f>\d{1,24}))?)?"
 _CLOCK = rf"{_PARTS_OF_DAY}(\s*{_HALF})?"
 # Behind a date, hours and minutes may be parted by other signs, and stand alone with AM or PM.
 _CLOCK_OF_DATE = (
     rf"({_HALF.replace('half', 'early')}\s+)?"
-    + r"(?P<h>\d{1,2})([:.h-](?P<m>\d\d)([:.-](?P<s>\d\d)((?P<dot>[.,:;])(?P<f>\d{1,12}))?)?"
+    + r"(?P<h>\d{1,2})([:.h-](?P<m>\d\d)([:.-](?P<s>\d\d)((?P<dot>[.,:;])(?P<f>\d{1,24}))?)?"
     rf"(\s*{_HALF})?|\s*{_HALF.replace('half', 'late')})"
 )
 _ZONE = (
@@ -37,7 +37,7 @@ _MONTHS = {  # English, German, French, Spanish, Italian and Dutch, by the lette
     **{"maa": 3, "apr": 4, "avr": 4, "abr": 4, "may": 5, "mai": 5, "mag": 5, "mei": 5, "jun": 6},
     **{"juin": 6, "giu": 6, "jul": 7, "juil": 7, "lug": 7, "aug": 8, "aoû": 8, "aou": 8, "ago": 8},
     **{"sep": 9, "set": 9, "oct": 10, "okt": 10, "ott": 10, "nov": 11},
-    **{"dec": 12, "dez": 12, "déc": 12, "dic": 12},
+    **{"dec": 12, "dez": 12, "déc": 12, "dic": 12, "des": 12, "maj": 5},  # and of the north
 }
 _CALLED = rf"(?P<called>{'|'.join(_MONTHS)})[^\W\d]{{0,8}}"
 _WEEKDAYS = (
@@ -64,7 +64,7 @@ _COMPACT = re.compile(  # 20240305T101500.25
 )
 _COMPACT_SHORT = re.compile(  # 240305 101500
     r"(?P<one>\d\d)(?P<mark>)(?P<two>\d\d)(?P<last>\d\d)[T_\s-]"
-    r"(?P<h>[01]\d|2[0-3])(?P<m>[0-5]\d)(?P<s>[0-5]\d)([.,](?P<f>\d{1,12}))?"
+    r"(?P<h>[01]\d|2[0-3])(?P<m>[0-5]\d)(?P<s>[0-5]\d)([.,](?P<f>\d{1,24}))?"
 )
 # Durations of days go on with d, days or a point: 1d 10:00:00, 1 days 10:00:00, 1.10:00:00.
 _BEFORE = r"(?P<sign>-(?=\d+:\d\d[:.,]\d))?"  # a trigger; -05:00 is an offset of UTC
@@ -72,12 +72,12 @@ _OF_DAY = re.compile(
     rf"{_BEFORE}((?P<days>\d+)(\s*d(ays?)?,?\s+|\s+Tage?,?\s+|\.(?=\d\d:)))?{_CLOCK}{_ZONE}"
 )
 _OF_HOUR = re.compile(
-    _BEFORE + r"(?P<m>\d{1,2}):(?P<s>\d\d)[.,](?P<f>\d{1,12})"
+    _BEFORE + r"(?P<m>\d{1,2}):(?P<s>\d\d)[.,](?P<f>\d{1,24})"
 )  # as spreadsheets save it
 _OF_MINUTES = re.compile(r"(?P<m>\d{1,4}):(?P<s>\d\d)")  # where it is said that they are minutes
 _OF_DURATION = (
     r"(?=.*\d)P?((?P<days>\d+)\s*d\s*)?T?((?P<h>\d+)\s*h\s*)?((?P<m>\d+)\s*m(in)?\s*)?"
-    r"((?P<s>\d+)([.,](?P<f>\d{1,12}))?\s*s(ec)?)?"
+    r"((?P<s>\d+)([.,](?P<f>\d{1,24}))?\s*s(ec)?)?"
 )
 _DURATION = re.compile(rf"(?=P|.*\d\s*[hm].*\d){_OF_DURATION}", re.IGNORECASE)  # PT1H15M, 1h 15m 0s
 _SHORT_DURATION = re.compile(_OF_DURATION, re.IGNORECASE)  # beside these, 5.2s
@@ -102,7 +102,9 @@ _OTHERS = tuple(
         (r"\(?(?:星期|周|週)[一二三四五六日天]\)?|\([月火水木金土日월화수목금토일]\)", " "),
         (rf"(?:上午|午前|오전)\s*{_CLOCK_ALONE}|{_CLOCK_ALONE}\s*(?:上午|午前|오전)", r" \1\2 AM"),
         (rf"(?:下午|午後|오후)\s*{_CLOCK_ALONE}|{_CLOCK_ALONE}\s*(?:下午|午後|오후)", r" \1\2 PM"),
+        (r"^(\d{1,2}\.)\s+(\d{1,2}\.)\s+(?=\d{4}\b)", r"\1\2"),  # of Prague and Ljubljana
         (r"^(\d{4})\s*(?:年|년|\.\s)\s*(\d\d?)\s*[月월.]\s*(\d\d?)\s*[日일.]?", r"\1-\2-\3 "),
+        (r"(?<=\d{4})\.(?=\s\d)", ""),  # of Zagreb
         (r"\s*[时時시]\s*(?=\d)|(?<=\d)\s*[分분]\s*(?=\d)", ":"),
         (r"(?<=\d)\s*[分분秒초]", ""),
         (r"(?<=:)(\d)(?!\d)", r"0\1"),
@@ -135,6 +137,7 @@ _CHANGING = (
 _AMBIGUOUS = frozenset(("CST", "IST", "BST", "AST", "SST"))
 MINUTES, HOURS = "min:s", "h:min"  # what 10:15 may be
 _FRAMES = (24, 25, 30, 50, 60)  # in a second, of films and television (SMPTE ST 12-1)
+_EVENER = 0.3  # of the deviation of steps as decimals, below which those as counts are even
 _EVEN = 3.0  # median steps, above which one step is a jump
 
 
@@ -655,17 +658,32 @@ def _clock(match: re.Match[str]) -> int:
     return hour * _HOUR + int(parts.get(f"{c}m") or 0) * 60 + int(parts.get(f"{c}s") or 0)
 
 
-def _fractions(matches: Sequence[re.Match[str] | None]) -> Vector:
-    """Parts of a second, (n,); behind a colon they count milliseconds where digits differ."""
-    digits = [_of_second(match) for match in matches]
-    held = [own for own in digits if own.get("f")]
-    if not held:
-        return np.zeros(len(matches))
-    colons = all(own.get("dot") == ":" for own in held)
-    widths = {len(own["f"] or "") for own in held}
-    if colons and max(widths) <= 3 < 3 * len(widths):
-        return np.array([int(own["f"]) * 1e-3 if own.get("f") else 0.0 for own in digits])
-    return np.array([float(f"0.{own['f']}") if own.get("f") else 0.0 for own in digits])
+def _fractions(
+    matches: Sequence[re.Match[str] | None], whole: np.ndarray
+) -> tuple[Vector, list[str]]:
+    """Parts of a second, (n,), and what is said of them: where digits differ they may be counts.
+
+    They are of milliseconds behind a colon; where one of fewer digits than others ends in 0, as .50
+    beside .125; and where times go on evenly as such, and not as decimals, and none begins with 0.
+    """
+    seconds = [_of_second(match) for match in matches]
+    digits = [own["f"] for own in seconds]
+    held = [own for own in digits if own]
+    parts = np.array([float(f"0.{own or 0}") for own in digits])
+    widths = set(map(len, held))
+    if not held or not max(widths) <= 3 < 3 * len(widths):
+        return parts, []
+    counts = np.array([int(own or 0) * 1e-3 for own in digits])
+    if all(own["dot"] == ":" for own in seconds if own["f"]):
+        return counts, []
+    short = any(own.endswith("0") for own in held if 1 < len(own) < max(widths))
+    padded = any(own.startswith("0") for own in held if len(own) > 1)
+    steps = np.diff(whole + parts), np.diff(whole + counts)
+    uneven = np.array([np.abs(own - np.median(own)) for own in steps])
+    uneven = uneven[:, (uneven < 1.0).all(axis=0)].sum(axis=1)  # without those over midnight
+    if not short and (padded or uneven[1] >= _EVENER * uneven[0]):
+        return parts, []
+    return counts, ["parts of a second are milliseconds without zeros before them"]
 
 
 def _of_second(match: re.Match[str] | None) -> dict[str, str]:
@@ -681,12 +699,12 @@ def _counted_frames(
 
     They are where times go on evenly as such, and not as decimals.
     """
-    parts = _fractions(matches)
+    parts, notes = _fractions(matches, whole)
     held = [match for match in matches if match and match.groupdict().get("f")]
     if len(held) < len(matches) or any(
         m.groupdict().get("dot") != ":" or len(m["f"]) != 2 for m in held
     ):
-        return parts, []
+        return parts, notes
     frames = np.array([int(match["f"]) for match in held])
     for rate in [0, *(rate for rate in _FRAMES if rate > frames.max())]:
         steps = np.diff(whole + (frames / rate if rate else parts))
