@@ -10,6 +10,7 @@ import openpyxl
 import pytest
 from numpy.testing import assert_allclose
 
+from workbench.__main__ import main
 from workbench.errors import InputError
 from workbench.recordings.case import read_cases
 from workbench.recordings.channels import (
@@ -559,7 +560,7 @@ def test_rows_of_one_time_that_hold_other_channels_are_all_read(tmp_path, tank):
     assert_allclose(held.signals["h"], 1e-3 * (20.0 + np.arange(0, 60, 2)))
 
 
-def test_channels_of_one_time_may_each_have_a_row(tmp_path, tank):
+def test_channels_of_one_time_may_each_have_a_row(tmp_path, tank, capsys):
     lines = [
         line
         for k in range(60)
@@ -571,6 +572,9 @@ def test_channels_of_one_time_may_each_have_a_row(tmp_path, tank):
     held = merge([recorded], propose([recorded], tank, {}), tank)
     assert_allclose(held.time, QUARTER * np.arange(60))
     assert_allclose(held.signals["h"], 1e-3 * (20.0 + np.arange(60)))
+    taken = ["--system", str(tank.source), "--out", str(tmp_path / "out"), "--yes"]
+    assert main(["import", str(path), *taken]) == 0
+    assert "180 samples, every 900 s" in capsys.readouterr().out
 
 
 def test_minutes_of_samples_each_second_are_too_coarse(tmp_path, tank):

@@ -518,6 +518,18 @@ def test_numbers_of_a_workbook_tell_nothing_of_texts_beside_them(tmp_path, text,
         assert_allclose(group.channels[2].values, 950.5 + np.arange(10, 70))
 
 
+def test_texts_of_a_preamble_leave_seconds_of_a_workbook_as_they_are(tmp_path):
+    book = openpyxl.Workbook()
+    book.active.append(["Version", "1.2"])
+    book.active.append(["Date", "Hour", "Minute", "Second", "h [mm]"])
+    for k in range(60):
+        minute, second = divmod(90.5 * k, 60.0)
+        book.active.append([20240305, int(minute // 60), int(minute % 60), second, 950.5 + k])
+    book.save(tmp_path / "a.xlsx")
+    (group,) = read_recorded_file(tmp_path / "a.xlsx").groups
+    assert_allclose(group.channels[0].values, 90.5 * np.arange(60))
+
+
 def test_merged_cells_of_a_workbook_name_all_columns_below(tmp_path):
     book = openpyxl.Workbook()
     sheet = book.active

@@ -112,7 +112,7 @@ def _clocks(held: Sequence[ProposedRecording]) -> Iterator[str]:
         for clock in recording.proposal.clocks.values():
             times = clock.times[np.isfinite(clock.times)]
             channel = f"{clock.channel} [{clock.unit}]" if clock.channel else "-"
-            step = f"{float(np.median(np.diff(times))):.4g} s"
+            step = f"{float(np.median(np.diff(np.unique(times)))):.4g} s"
             rows.append(((channel, step, clock.reason), recording.name, times.size, times.size))
     for (channel, step, reason), low, high, where in _merge_alike(rows, len(held)):
         samples = f"{low:.0f}" if low == high else f"{low:.0f} to {high:.0f}"

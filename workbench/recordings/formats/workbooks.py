@@ -193,7 +193,7 @@ def _read_sheets(
     refusal: InputError | None = None
     for title, content in sheets.items():
         where = f"{path}, sheet '{title}'"
-        marked = any(isinstance(c, str) and _is_marked(c) for row in content[:_MOST] for c in row)
+        marked = any(map(_has_marked_text, content[:_MOST]))
         write = _unmarked if marked else _text
         rows = [[write(cell) for cell in row] for row in content[:_MOST]]
         filled = [i for i, row in enumerate(rows) if any(row)]
@@ -256,9 +256,12 @@ def _text(cell: Any) -> str:
     return str(cell)
 
 
-def _is_marked(text: str) -> bool:
-    """Whether a text is a number with a decimal mark, or one between thousands."""
-    return ("." in text or "," in text) and is_number(text.strip())
+def _has_marked_text(row: Sequence[Any]) -> bool:
+    """Whether a text beside numbers is one with a decimal mark, or one between thousands."""
+    texts = [
+        c for c in row if isinstance(c, str) and ("." in c or "," in c) and is_number(c.strip())
+    ]
+    return bool(texts) and any(isinstance(cell, int | float) for cell in row)
 
 
 def _unmarked(cell: Any) -> str:
