@@ -131,8 +131,8 @@ def cause_of(
 ) -> Cause:
     """A cause with intervals, which what is left widens, or the form that noise may hide."""
     best, trial, less = chosen.best, chosen.trial, chosen.less[effect]
-    twins = chosen.twins[effect]
-    sigma = np.hypot(np.sqrt(np.diag(trial.covariance(twins))), trial.moved(twins))
+    moved = trial.moved(chosen.twins[effect])
+    sigma = np.hypot(np.sqrt(np.diag(trial.covariance())), moved)
     fast, form_share = chosen.validation.fast(less, best), _FORM
     if noise_alone:
         more = hidden_by_noise(fit, best, effect)
@@ -151,7 +151,7 @@ def cause_of(
         noise = np.hypot(sigma[trial.joint.known.index(key)], more.get(key, 0.0))
         reach = float(BAND * np.hypot(noise, form))
         parameters[key[1]] = _interval(fit, best, effect, key[1], reach)
-    alike = [*twins, *_apart_by_starts(fit, effect)]
+    alike = [*chosen.twins[effect], *_apart_by_starts(fit, effect)]
     return Cause(
         effect=effect,
         parameters=parameters,

@@ -147,15 +147,10 @@ class ScoreTest:
         return left
 
     def _select(
-        self, own: Mapping[int, Matrix], absent: Collection[str] = (), *, alone: bool = False
+        self, own: Mapping[int, Matrix], name: str = "", *, alone: bool = False
     ) -> tuple[list[Quadratic], Quadratic]:
-        """Stops and prior over known unknowns, immaterial ones and, last, the candidate.
-
-        Parameters
-        ----------
-        absent : names of effects that are no immaterial companions.
-        """
-        others = [form for key, form in self._immaterial.items() if key not in absent and not alone]
+        """Stops and prior over known unknowns, immaterial ones and, last, the candidate."""
+        others = [form for key, form in self._immaterial.items() if key != name and not alone]
         columns = [*self._known, *(at for at, _ in others)]
         count = len(columns) + bool(own)
         transforms = []
@@ -171,15 +166,9 @@ class ScoreTest:
             prior.N[j, j] += (self._fit.decides.immaterial / matters) ** 2
         return stops, prior
 
-    def covariance(self, twins: Collection[str] = ()) -> Matrix:
-        """Of the known unknowns, while all candidates may be present immaterially, (p, p).
-
-        Parameters
-        ----------
-        twins : names of effects that explain in place of a cause, and are named so: as companions,
-            they would say that it may be nothing.
-        """
-        stops, prior = self._select({}, twins)
+    def covariance(self) -> Matrix:
+        """Of the known unknowns, while all candidates may be present immaterially, (p, p)."""
+        stops, prior = self._select({})
         count = len(self._known)
         known: Matrix = covariance(add([*stops, prior]).N)[:count, :count]
         return known
@@ -202,7 +191,7 @@ class ScoreTest:
             if effect.order_locked or effect.name in twins:
                 continue
             at = self.joint.shared.index((variant(effect, shape), effect.size))
-            stops, prior = self._select({at: np.ones(len(self._stops))}, [effect.name])
+            stops, prior = self._select({at: np.ones(len(self._stops))}, effect.name)
             total = add([*stops, prior])
             best, sigma = minimum(total), float(np.sqrt(covariance(total.N)[-1, -1]))
             low, high = self._fit.unknowns.bounds(effect, effect.size)
@@ -247,7 +236,7 @@ class ScoreTest:
             phases = np.array([_phase(stop, at) for stop in self._stops])
             own = {at[0]: np.cos(phases), at[1]: np.sin(phases)}
         low, high = self._fit.unknowns.bounds(effect, effect.size)
-        stops, prior = self._select(own, [effect.name])
+        stops, prior = self._select(own, effect.name)
         total = add([*stops, prior])
         best = minimum(total)
         sigma = float(np.sqrt(covariance(total.N)[-1, -1]))
