@@ -15,6 +15,7 @@ from workbench.diagnosis.inference.score_test import CandidateScore, score_test
 from workbench.diagnosis.inference.search import (
     FittedModel,
     beyond,
+    differentiable,
     examine,
     extended,
     is_clean,
@@ -23,9 +24,11 @@ from workbench.diagnosis.inference.search import (
 )
 from workbench.diagnosis.inference.selection import Selection, anew
 from workbench.runtime.engine import Reporter
+from workbench.system.parts import Signal
 from workbench.system.units import BAND, with_interval, with_unit
 
 NEAREST = 3  # candidates that are named where none is accepted
+_OUTSIDE = ("it is no effect of the catalogue",)  # why a single change is no cause
 
 
 @dataclass(frozen=True)
@@ -173,10 +176,7 @@ def single_change(fit: Fit, chosen: Selection, report: Reporter) -> NearestCandi
             unit = other.unknowns.unit(effect, effect.size)
             text = with_interval(size, size - reach, size + reach, unit)
             removed = validation.explained(about, model, fast=fast)[0]
-            reason = "it is no effect of the catalogue"
-            return NearestCandidate(
-                model.names, removed, (reason,), change=f"{effect.text}: {text}"
-            )
+            return NearestCandidate(model.names, removed, _OUTSIDE, change=f"{effect.text}: {text}")
     return None
 
 
@@ -191,23 +191,25 @@ def otherwise_held(fit: Fit, chosen: Selection) -> NearestCandidate | None:
         if not {f"{INPUT_DELAY}[{signal.name}]", f"{INPUT_LAG}[{signal.name}]"} & late:
             continue
         for key, other in signal.otherwise_held.items():
-            with fit.held(signal.name, other.held) as as_held:
-                model = anew(as_held, chosen.base.point, ())
+            model = differentiable(partial(_nominal_as_held, fit, chosen, other))
+            if model is None:
+                continue
             was, left = (float(m.linearised.squares.max()) for m in (chosen.base, model))
             if left > 1.0 + fit.decides.excess or not is_clean(fit, model):
                 continue
             if beyond(chosen.best, model) > fit.decides.needed:
                 removed = 1.0 - max(left - 1.0, 0.0) / (was - 1.0)
                 text = f"{signal.label} with held = {key} in [inputs.{signal.name}]"
-                reason = "it is no effect of the catalogue"
                 return NearestCandidate(
-                    (f"held = {key}",),
-                    removed,
-                    (reason,),
-                    change=text,
-                    corrected="the system file",
+                    (f"held = {key}",), removed, _OUTSIDE, change=text, corrected="the system file"
                 )
     return None
+
+
+def _nominal_as_held(fit: Fit, chosen: Selection, signal: Signal) -> FittedModel:
+    """The nominal model, fitted where an input is held as this one is."""
+    with fit.held(signal.name, signal.held) as as_held:
+        return anew(as_held, chosen.base.point, ())
 
 
 def single_effect(
