@@ -21,7 +21,7 @@ from numpy.testing import assert_allclose
 from pyarrow import feather
 
 from workbench.errors import InputError
-from workbench.recordings.channels import propose
+from workbench.recordings.channels import NamedChannel, propose
 from workbench.recordings.formats import read_recorded_file
 from workbench.recordings.formats.numbers import is_missing
 from workbench.recordings.formats.spelling import name_and_unit
@@ -196,6 +196,98 @@ def test_factors_above_samples_are_refused_unless_they_change_nothing(tmp_path, 
         else pytest.raises(InputError, match=r"line 2: found '\w+' of columns, .*apply it to the")
     ):
         assert read_recorded_file(path).groups[0].channels[0].values.size == 60
+
+
+STATISTICS = ["Min", "Max:", "Mean", "Std. Dev."]
+
+
+@pytest.mark.parametrize("first", [True, False], ids=["above", "below"])
+@pytest.mark.parametrize("place", [0, 3], ids=["label before", "label behind"])
+def test_rows_of_statistics_are_no_samples_though_their_times_go_on(tmp_path, first, place):
+    def row(label: str, *cells: object) -> str:
+        listed = [str(cell) for cell in cells]
+        return ";".join([*listed[:place], label, *listed[place:]])
+
+    rows = [row("", k, 4.5, 950.0 + k) for k in range(60)]
+    begin = -4 if first else 60
+    sums = [row(label, begin + k, 3.5, 850.0) for k, label in enumerate(STATISTICS)]
+    lines = [row("note", "time [s]", "inflow [l/s]", "h [mm]"), *sums * first, *rows]
+    (group,) = read_recorded_file(table(tmp_path / "a.csv", lines + sums * (not first))).groups
+    (level,) = (channel for channel in group.channels if channel.name == "h")
+    assert_allclose(level.values, 950.0 + np.arange(60))
+
+
+def test_a_table_of_statistics_below_samples_is_none_of_samples(tmp_path):
+    rows = [f"{k};4.5;950.{k}" for k in range(60)]
+    below = ["", "Statistic;inflow;h", *(f"{label};3.5;850" for label in STATISTICS)]
+    lines = ["time [s];inflow [l/s];h [mm]", *rows, *below]
+    (group,) = read_recorded_file(table(tmp_path / "a.csv", lines)).groups
+    assert [channel.values.size for channel in group.channels] == [60, 60, 60]
+
+
+@pytest.mark.parametrize(
+    "remark",
+    [
+        *("# scale: h 0.1 mm/count", "# all values x 10", "# h is multiplied by 10"),
+        *("Gain h: 10", "# h in cm", "# h: raw 1/10"),
+    ],
+)
+def test_words_above_samples_that_say_a_factor_are_asked_about(tmp_path, tank, remark):
+    rows = [f"{k};4.5;950.{k}" for k in range(60)]
+    path = table(tmp_path / "a.csv", [remark, "time [s];inflow [l/s];h [mm]", *rows])
+    proposal = propose([read_recorded_file(path)], tank, {})
+    words = remark.strip("# ")
+    assert any(f"h: the file says '{words}'" in doubt for doubt in proposal.doubts)
+    assert not proposal.certain
+    named = {"h": NamedChannel("h", "mm"), "inflow": NamedChannel("inflow", "l/s")}
+    assert propose([read_recorded_file(path)], tank, named).certain
+
+
+@pytest.mark.parametrize(
+    "remark",
+    [
+        *("# scale: h 1 mm/count", "# offset of h: 0", "# h in mm", "# gain of the amplifier 10"),
+        *("# Vertical scale of h: 0.5", "# decimation of all values: factor 10"),
+    ],
+)
+def test_words_above_samples_that_change_nothing_are_not_asked_about(tmp_path, tank, remark):
+    rows = [f"{k};4.5;950.{k}" for k in range(60)]
+    path = table(tmp_path / "a.csv", [remark, "time [s];inflow [l/s];h [mm]", *rows])
+    assert propose([read_recorded_file(path)], tank, {}).certain
+
+
+@pytest.mark.parametrize(
+    "label", ["# units: s, l/s, cm", "# Unit = s; l/s; cm", "Einheiten: s l/s cm"]
+)
+@pytest.mark.parametrize("mark", [";", ","])
+def test_units_in_words_above_samples_are_those_of_the_columns(tmp_path, label, mark):
+    rows = [mark.join((str(k), "4.5", f"95.{k}")) for k in range(60)]
+    lines = [label, mark.join(("time", "inflow", "h")), *rows]
+    assert channels(table(tmp_path / "a.csv", lines)) == [
+        ("time", "s"),
+        ("inflow", "l/s"),
+        ("h", "cm"),
+    ]
+
+
+@pytest.mark.parametrize("remark", ["# Unit of h changed to cm", "# range: h x 10"])
+def test_words_among_samples_that_change_their_unit_are_refused(tmp_path, remark):
+    rows = [f"{k};4.5;950.{k}" for k in range(60)]
+    lines = ["time [s];inflow [l/s];h [mm]", *rows[:30], remark, *rows[30:]]
+    with pytest.raises(
+        InputError, match=r"line 32: found .* among samples, which says what 'h' is"
+    ):
+        read_recorded_file(table(tmp_path / "a.csv", lines))
+
+
+def test_a_unit_that_nobody_measures_in_is_a_misspelt_one(tmp_path, tank):
+    rows = [f"{k};4.5;950.{k}" for k in range(60)]
+    lines = ["time [s];inflow [l/s];h [Mm]", *rows]
+    (problem,) = propose([read_recorded_file(table(tmp_path / "a.csv", lines))], tank, {}).problems
+    assert "'h' is in [Mm], a unit that is not known" in problem
+    lines = ["time [Ms];inflow [l/s];h [mm]", *rows]
+    with pytest.raises(InputError, match=r"'time' in \[Ms\], no unit of time"):
+        propose([read_recorded_file(table(tmp_path / "b.csv", lines))], tank, {})
 
 
 def test_columns_of_fixed_places_may_be_empty(tmp_path):

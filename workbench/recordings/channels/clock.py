@@ -245,6 +245,8 @@ def _no_time(group: Group, system: System, where: str) -> InputError:
                 "[%d.%m.%Y %H:%M:%S]', or give --sample-rate '200 Hz'",
             )
     for channel in group.channels:
+        if is_time(channel.name) and channel.unit and conversion(channel.unit, "s") is None:
+            problem, name = f"'{channel.name}' in [{channel.unit}], no unit of time", channel.name
         named = is_time(channel.name) or {"year", "years", "jahr"}.intersection(words(channel.name))
         if not channel.unit and named and _counts_years(channel.values):
             return InputError(

@@ -231,6 +231,16 @@ def meaning_doubt(
     return ""
 
 
+def remark_doubt(channel: FileChannel, unit: str, column: str) -> str:
+    """What a line of the file says of the size of a channel's values; empty: nothing."""
+    if not channel.remark:
+        return ""
+    return (
+        f"the file says {channel.remark!r}, and not whether it is applied; --column "
+        f"'{column} [{unit}]' takes the values as they are, [0.1 {unit}] a tenth of them"
+    )
+
+
 def _zero_in(name: str) -> str:
     """What words of a name say of the zero of a pressure: "gauge", "absolute", or nothing."""
     own = set(words(name))
@@ -321,6 +331,7 @@ def _candidate(
     own_doubts = (
         marked,
         size_doubt(values, unit, signal, column),
+        remark_doubt(channel, unit, column),
         meaning_doubt(channel.name, unit, values, signal.names, signal.unit, column),
     )
     doubt = "; ".join(filter(None, (doubt, *own_doubts)))

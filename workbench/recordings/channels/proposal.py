@@ -16,6 +16,7 @@ from workbench.recordings.channels.matching import (
     match,
     meaning_doubt,
     missing_of,
+    remark_doubt,
     samples_of,
     size_doubt,
     unit_doubt,
@@ -233,6 +234,7 @@ def _as_named(
     doubts = [marked]
     if not channel.unit:
         doubts.append(size_doubt(values, unit, signal, column))
+        doubts.append(remark_doubt(place.channel, unit, column))
         called = signal.names, signal.unit
         doubts.append(meaning_doubt(place.channel.name, unit, values, *called, column))
     doubt = unit_doubt(signal.name, place.label, unit) if concluded else ""

@@ -53,6 +53,22 @@ _SCALES = re.compile(
     r"|(?P<offset>offset))\b",
     re.IGNORECASE,
 )
+_SIZES = re.compile(  # and what else says, in a line of words, that samples are not as named
+    rf"{_SCALES.pattern}|\b(multipl|divid)\w+|(\bper |/ ?)(count|digit|lsb)s?\b"
+    r"|(?P<power>(?<!\w)[x\u00d7*/] ?10+|\b1 ?/ ?10+)\b(?!/)",
+    re.IGNORECASE,
+)
+_ALL_SAMPLES = re.compile(r"\b(all|values|signals|channels|alle|werte)\b", re.IGNORECASE)
+_SIZE = re.compile(r"(?<![\w.,])[+-]?\d+([.,]\d+)?([eE][+-]?\d+)?(?!\w)")
+_STATED_UNITS = re.compile(r"\W*(units?|einheit(en)?)\s*[:=]\s*(?P<units>\S.*)", re.IGNORECASE)
+_STATISTICS = re.compile(
+    r"(min|max|avg|mean|std|average|median|rms|sum|total|minim\w+|maxim\w+|st(d|andard)[ ._]*dev\w*"
+    r"|mittel\w*|mw|summe|standardabw\w*|stabw|moyenne|gemiddelde)\W*",
+    re.IGNORECASE,
+)
+_LISTED = (r"[,;|\t]\s*", r"[,;|]?\s+")  # marks between units in words
+_NEAR = 4  # words behind a name that may say its unit: h changed to cm
+_MOST_STATISTICS = 10  # rows at an end of a table; more are states
 _OF_A_SCREEN = re.compile("horizontal|vertical", re.IGNORECASE)  # of an oscilloscope
 # Powers of ten, as x2 is the name of a state.
 _FACTOR = re.compile(r"[x\u00d7*]\s?(10*|0[.,]0*1|10\^[+-]?\d+)|10\^[+-]?\d+")
@@ -67,7 +83,9 @@ _RATE = re.compile("rate|freq", re.IGNORECASE)
 _INTERVAL = re.compile(
     r"interval|in[ck]rement|step|schritt|abtastzeit|sampl\w*[ _]?time|\bdt\b", re.IGNORECASE
 )
-_OTHERS = re.compile("filter|pass|cut-?off|grenz|tr\u00e4ger|carrier|netz|mains", re.IGNORECASE)
+_OTHERS = re.compile(
+    "decim|reduc|filter|pass|cut-?off|grenz|tr\u00e4ger|carrier|netz|mains", re.IGNORECASE
+)
 
 _DIGITS = frozenset("0123456789+-.,eE")
 _HEADER_ROWS = 5  # of names, units and kinds
@@ -174,6 +192,8 @@ class Cells:
     units: tuple[str, ...]
     # what a row of the preamble says of each column, which begins with its name
     about: tuple[str, ...] = ()
+    # the line above samples that says of each column that its values are not as named
+    remarks: tuple[str, ...] = ()
 
 
 def find_tables(rows: Sequence[Sequence[str]], lines: Sequence[int], where: str) -> list[Cells]:
@@ -197,6 +217,7 @@ def find_tables(rows: Sequence[Sequence[str]], lines: Sequence[int], where: str)
         rows, lines = rows[begin:], lines[begin:]
     for own in (*tables, table):
         _refuse_units_within(own, rows_at, where)
+        _refuse_remarks_within(own, rows_at, where)
     return [*tables, table]
 
 
@@ -216,6 +237,57 @@ def _refuse_units_within(table: Cells, rows: Mapping[int, Sequence[str]], where:
                 expected="samples in the units that stand above them",
                 remedy="part the file there, and write the names above the units",
             )
+
+
+def _refuse_remarks_within(table: Cells, rows: Mapping[int, Sequence[str]], where: str) -> None:
+    """Refuse a line among samples that says that a column is in other units from there on."""
+    samples = set(table.lines)
+    for line in range(table.lines[0], table.lines[-1]):
+        row = rows.get(line, ()) if line not in samples else ()
+        for i in range(len(table.names) if row else 0):
+            if text := _remark(table, i, [row]):
+                raise InputError(
+                    where=f"{where}, line {line}",
+                    found=f"'{text}' among samples, which says what '{_label(table, i)[0]}' is "
+                    "there",
+                    expected="samples in the units that stand above them",
+                    remedy="part the file there if its units or its range change, or delete the "
+                    "line",
+                )
+
+
+def _has_factor(text: str) -> bool:
+    """Whether a line of words says a factor or an offset that changes values."""
+    scales = None if _OF_A_SCREEN.search(text) else _SIZES.search(text)
+    if scales is None:
+        return False
+    neutral = _NOTHING if scales["offset"] else _ONE
+    numbers = [match[0] for match in _SIZE.finditer(text)]
+    return bool(scales["power"]) or not all(map(neutral.fullmatch, numbers))
+
+
+def _has_other_unit(behind: str, unit: str) -> bool:
+    """Whether words behind the name of a column say another unit of its kind."""
+    near = (word.strip(",;:.=") for word in behind.split()[:_NEAR])
+    others = {spell_unit(word) for word in near if word not in ("in", "at", "a")}
+    known = [base for base in (unit, "K") if unit and conversion(unit, base)]
+    return any(conversion(other, base) for other in others - {"", "1", unit} for base in known)
+
+
+def _remark(table: Cells, i: int, above: Sequence[Sequence[str]]) -> str:
+    """The line above samples that says of a column that its values are not as named; or nothing."""
+    name, unit = _label(table, i)
+    names = {name_and_unit(cell)[0] for cell in table.names}
+    for row in above:
+        text = " ".join(filter(None, (cell.strip() for cell in row)))
+        if 2 * sum(name_and_unit(cell)[0] in names for cell in row) > len(names):
+            continue  # names above columns
+        word = re.compile(rf"(?<!\w){re.escape(name)}(?!\w)")
+        if word.search(text) or (_ALL_SAMPLES.search(text) and not _OTHERS.search(text)):
+            _, *behind = word.split(text, maxsplit=1)
+            if _has_factor(word.sub("", text)) or _has_other_unit("".join(behind), unit):
+                return text
+    return ""
 
 
 def _next_table(table: Cells, rows: Sequence[Sequence[str]], lines: Sequence[int]) -> int | None:
@@ -239,7 +311,7 @@ def _begins_table(
         return False
     below = next((k for k in range(i + 1, len(rows)) if _is_data(rows[k])), len(rows))
     following = rows[below : below + _FEWEST]
-    if below - i > _HEADER_ROWS or len(following) < _FEWEST:
+    if below - i > _HEADER_ROWS or len(following) < _FEWEST or all(map(_is_statistic, following)):
         return False
     if any(len(_trim(row)) > len(names) or not _is_data(row) for row in following):
         return False
@@ -289,7 +361,8 @@ def find_table(rows: Sequence[Sequence[str]], lines: Sequence[int], where: str) 
             remedy="export the recording as a table",
         )
     _refuse_scales(rows[:first], lines, width, where)
-    names, units = _header(_with_index_name(rows[:first], width), width)
+    above = [_with_own_cells(row, width) for row in rows[:first]]
+    names, units = _header(_with_index_name(above, width), width)
     own = len(_trim(names)) - 1
     if len(units) == own > 0 and _TIME_NAME.match(names[0]) and conversion(units[0], "s") is None:
         units = ["", *units]  # between spaces, dates and times have none
@@ -308,7 +381,15 @@ def find_table(rows: Sequence[Sequence[str]], lines: Sequence[int], where: str) 
     # Recorders of portable kind name channels CH1 above samples, and say further up what they are.
     listed = {row[0].strip(): row[1].strip() for row in rows[:first] if len(row) > 2}
     about = tuple(text if (text := listed.get(name, "")) not in names else "" for name in names)
-    return Cells(body, [lines[i] for i in kept], head, own_names, own_units, about)
+    table = Cells(body, [lines[i] for i in kept], head, own_names, own_units, about)
+    return replace(table, remarks=tuple(_remark(table, i, rows[:first]) for i in range(width)))
+
+
+def _with_own_cells(row: Sequence[str], width: int) -> Sequence[str]:
+    """A row of units behind their label as cells, which other marks may part: units: s, mm."""
+    match = _STATED_UNITS.fullmatch(" ".join(filter(None, map(str.strip, row))))
+    cells = [re.split(mark, match["units"].strip()) for mark in _LISTED] if match else []
+    return next((own for own in cells if len(own) == width and _are_units(own)), row)
 
 
 def _refuse_scales(
@@ -353,7 +434,8 @@ def _samples(
     """Places of the rows that are samples, of one width.
 
     A row whose first cell is a text, where those of samples are none, is one of statistics or of
-    settings; one or two rows below an empty line at the end are sums.
+    settings, and so are rows that say it at the begin or the end; one or two rows below an empty
+    line at the end are sums.
     """
     data = [i for i, row in enumerate(rows) if is_sample(row)]
     width = Counter(len(rows[i]) for i in data).most_common(1)[0][0] if data else 0
@@ -361,6 +443,9 @@ def _samples(
     texts = {i for i in samples if _is_text(rows[i][0])}
     if 2 * len(texts) < len(samples):
         samples = [i for i in samples if i not in texts]
+    above = _statistics_at_begin([rows[i] for i in samples[: 2 * _MOST_STATISTICS]])
+    below = _statistics_at_begin([rows[i] for i in samples[: -2 * _MOST_STATISTICS : -1]])
+    samples = samples[above : len(samples) - below]
     empty = [lines[j] - lines[i] > j - i for i, j in pairwise(samples)]  # lines that are no rows
     numbers = [str(k + 1) for k in range(width)]  # of channels, above an empty line
     if any(empty[:1]) and [cell.strip(' "') for cell in rows[samples[0]]] == numbers:
@@ -369,6 +454,17 @@ def _samples(
         if empty[k - 1] and not empty[k - 2]:
             return samples[:k]
     return samples
+
+
+def _is_statistic(row: Sequence[str]) -> bool:
+    return any(map(_STATISTICS.fullmatch, map(str.strip, row)))
+
+
+def _statistics_at_begin(rows: Sequence[Sequence[str]]) -> int:
+    """How many rows at an end say that they are statistics, where those beside them do not."""
+    says = [_is_statistic(row) for row in rows]
+    count = sum(says)
+    return count if count <= min(_MOST_STATISTICS, len(says) - 1) and all(says[:count]) else 0
 
 
 def _is_text(cell: str) -> bool:
@@ -706,6 +802,7 @@ def _by_clock(table: Cells) -> list[tuple[str, Cells]]:
             names=table.names[a:b],
             units=table.units[a:b],
             about=table.about[a:b],
+            remarks=table.remarks[a:b],
         )
         tables.append((own[0], part))
     return tables
@@ -763,7 +860,10 @@ def read_group(
     texts: dict[int, list[str]] = {}
     notes: list[str] = []
     labels = [_label(table, i) for i in range(len(columns))]
-    about = {name: text for (name, _), text in zip(labels, table.about, strict=False)}
+    about, remarks = (
+        {name: text for (name, _), text in zip(labels, own, strict=False)}
+        for own in (table.about, table.remarks)
+    )
     if turned := _newest_first(columns):
         columns = [cells[::-1] for cells in columns]
         table = replace(table, lines=table.lines[::-1])
@@ -820,10 +920,16 @@ def read_group(
                 f"'{labels[i][0]}': {len(bad)} cells that are no numbers are gaps, the first "
                 f"{columns[i][bad[0]]!r} in line {table.lines[bad[0]]}"
             )
-        remark = about.get(labels[i][0], "")
         like = [k for k in bad if is_like_number(cells[k])]
         unread = f"{len(like)} cells such as {columns[i][like[0]]!r}" if like else ""
-        channel = FileChannel(*labels[i], values, remark, censored=tuple(beyond), unread=unread)
+        channel = FileChannel(
+            *labels[i],
+            values,
+            about.get(labels[i][0], ""),
+            censored=tuple(beyond),
+            unread=unread,
+            remark=remarks.get(labels[i][0], ""),
+        )
         channels.append(channel)
     step, doubt = stated_step(table.head)
     within = (name,) if name else ()

@@ -31,6 +31,8 @@ class FileChannel:
     # a cell that looks like a number and is not read as one, and how many there are, in words;
     # empty: there is none
     unread: str = ""
+    # a line of the file that says that values are not in its unit, or have a factor; empty: none
+    remark: str = ""
     # (n,) cells of time stamps, or of texts that nobody knows; empty for numbers
     texts: tuple[str, ...] = ()
 

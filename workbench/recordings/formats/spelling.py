@@ -81,6 +81,8 @@ _SIGNS = str.maketrans(
     {"²": "2", "³": "3", "⁻": "-", "¹": "1", "·": ".", "⋅": ".", "\u03a9": "Ohm", "\u2126": "Ohm"}
 )
 # Temperatures have a zero of their own in SI; and what a unit is for a quantity that has no other.
+# What SI has, and nobody measures in: Ms is written for ms, Mm for mm.
+_NEVER = frozenset({"Mm", "Ms"})
 _SCALES = {"degC": (1.0, 273.15), "degF": (5.0 / 9.0, 459.67 * 5.0 / 9.0)}
 _FOR = {
     "m/s2": {"g": "gn", "G": "gn", "mg": "mgn"},
@@ -131,6 +133,8 @@ def conversion(unit: str, si: str) -> Conversion | None:
     """
     unit, _ = pressure_zero(unit) if si == "Pa" else (unit, "")
     unit = _FOR.get(si, {}).get(unit, unit)
+    if unit in _NEVER:
+        return None
     factor, zero = _SCALES.get(unit, (1.0, 0.0))
     try:
         return Conversion(factor * si_factor("K" if zero else unit, si, ""), zero)
@@ -178,7 +182,7 @@ def is_unit(text: str) -> bool:
         check_unit(unit, "")
     except InputError:
         return unit in _SCALES
-    return True
+    return unit not in _NEVER
 
 
 _NAMED = re.compile(
