@@ -326,6 +326,78 @@ def test_parts_of_a_second_may_be_counts(tmp_path, tank, count, words, padded):
     assert words in read_clock.reason
 
 
+def jitter(seed: int, count: int) -> list[int]:
+    """Milliseconds of a clock that is late by chance."""
+    return np.random.default_rng(seed).integers(0, 1000, count).tolist()
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("count", [60, 200])
+@pytest.mark.parametrize("form", ["counts", "decimals"])
+def test_parts_of_a_second_of_an_uneven_clock_are_what_their_zeros_tell(
+    tmp_path, tank, seed, count, form
+):
+    parts = jitter(seed, count)
+    texts = [f".{k}" if form == "counts" else f".{k:03d}".rstrip("0").rstrip(".") for k in parts]
+    begin = datetime(2024, 3, 5, tzinfo=UTC)
+    stamps = map("".join, zip(local(begin, count, "%Y-%m-%d %H:%M:%S"), texts, strict=True))
+    path = table(tmp_path / "a.csv", list(stamps))
+    expected = QUARTER * np.arange(count) + np.array(parts) / 1e3
+    read_clock = clock(path, tank)
+    assert_allclose(read_clock.times, expected - expected[0], atol=1e-6)
+
+
+def test_parts_of_a_second_that_nothing_tells_are_decimals_where_that_is_said(tmp_path, tank):
+    begin = datetime(2024, 3, 5, tzinfo=UTC)
+    parts = [5, 71, 123, 9, 212, 34, 611, 3]
+    stamps = [f"{stamp}.{k}" for stamp, k in zip(local(begin, 8, "%H:%M:%S"), parts, strict=True)]
+    path = table(tmp_path / "a.csv", stamps)
+    with pytest.raises(InputError, match=r"parts of a second such as \.5 and \.123"):
+        clock(path, tank)
+    times = clock(path, tank, "Time [%H:%M:%S.%f]").times
+    assert_allclose(times[:2], [0.0, QUARTER + 0.21], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("unit", "digits", "step"),
+    [("min", 2, 1.0), ("min", 2, 2.5), ("h", 4, 1.0), ("s", 1, 0.75), ("s", 0, 1.4)],
+)
+def test_even_times_in_few_digits_are_even(tmp_path, unit, digits, step):
+    """0.00, 0.02, 0.03, 0.05 min are seconds."""
+    write_system(tmp_path / "tank")
+    tank = load_system(tmp_path / "tank")
+    size = {"min": 60.0, "h": 3600.0, "s": 1.0}[unit]
+    stamps = [f"{k * step / size:.{digits}f}" for k in range(200)]
+    read_clock = clock(table(tmp_path / "a.csv", stamps, f"Time [{unit}]"), tank)
+    assert_allclose(read_clock.times - read_clock.times[0], step * np.arange(200.0), atol=1e-9)
+    assert f"taken as even, every {step:g} s" in read_clock.corrections[0]
+
+
+def test_samples_that_were_lost_are_no_digits_of_times(tmp_path):
+    write_system(tmp_path / "tank")
+    tank = load_system(tmp_path / "tank")
+    places = [k for k in range(200) if k not in (50, 90, 91)]
+    read_clock = clock(table(tmp_path / "a.csv", [f"{k}" for k in places], "Time [s]"), tank)
+    assert_allclose(read_clock.times, places)
+    assert not read_clock.corrections
+
+
+def test_seconds_since_1900_are_of_ntp_where_those_of_labview_were_of_tomorrow(tmp_path):
+    write_system(tmp_path / "tank")
+    tank = load_system(tmp_path / "tank")
+    now = datetime.now(UTC).replace(microsecond=0) - timedelta(days=2)
+    seconds = [(now - datetime(1900, 1, 1, tzinfo=UTC)).total_seconds() + k for k in range(60)]
+    path = table(tmp_path / "a.csv", [f"{second:.1f}" for second in seconds], "timestamp")
+    assert iso(clock(path, tank).start)[:10] == f"{now:%Y-%m-%d}"
+    past = [second - 1460 * 86400.0 for second in seconds]  # of NTP, or of LabVIEW now
+    path = table(tmp_path / "b.csv", [f"{second:.1f}" for second in past], "timestamp")
+    assert iso(clock(path, tank).start)[:10] == f"{now:%Y-%m-%d}"
+    other = f"{now - timedelta(days=1460):%Y-%m-%d}"
+    assert f"NTP, from 1900, means {other}" in clock(path, tank).corrections[0]
+    path = table(tmp_path / "c.csv", [f"{second:.1f}" for second in past], "ntp time")
+    assert iso(clock(path, tank).start)[:10] == other
+
+
 def test_parts_of_a_second_before_the_year_count(tmp_path, tank):
     stamps = local(datetime(2024, 3, 1, tzinfo=UTC), 60, "%a %b %d %H:%M:%S.250 %Y")
     stamps[1::2] = [stamp.replace(".250", ".750") for stamp in stamps[1::2]]

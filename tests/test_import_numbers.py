@@ -68,6 +68,17 @@ def test_digits_of_other_scripts_are_numbers(tmp_path, zero):
     assert_allclose(group.channels[1].values, 900.25 + np.arange(60.0))
 
 
+@pytest.mark.parametrize("mark", [".", ","])
+def test_three_decimals_throughout_say_what_would_tell(tmp_path, mark):
+    rows = [f"{k};4{mark}071" for k in range(60)]
+    path = table(tmp_path / "a.csv", ["time [s];inflow [l/s]", *rows])
+    with pytest.raises(InputError, match=f"write this number as '4{mark}0710', if its mark is"):
+        read_recorded_file(path)
+    table(path, ["time [s];inflow [l/s]", f"0;4{mark}0710", *rows[1:]])
+    (group,) = read_recorded_file(path).groups
+    assert_allclose(group.channels[1].values, 4.071)
+
+
 # --- times ---
 
 
@@ -266,6 +277,8 @@ def test_times_that_may_be_seconds_or_minutes_are_asked_for(tmp_path, tank, name
         "01.03.2024",
         "1. 3. 2024",
         "01.03.2024.",
+        *("1 marca 2024", "za 1 mrt. 2024", "pt., 1 mar 2024", "lör 1 mars 2024 kl."),
+        *("1 březen 2024", "1 maaliskuuta 2024", "1 de março de 2024", "1 мар 2024"),
     ],
 )
 def test_months_may_be_written_by_their_names(tmp_path, tank, day):
@@ -274,6 +287,28 @@ def test_months_may_be_written_by_their_names(tmp_path, tank, day):
     read_clock = clock(table(tmp_path / "a.csv", ["Time;h [mm]", *rows]), tank)
     assert_allclose(read_clock.times, MINUTE, atol=1e-9)
     assert iso(read_clock.start) == "2024-03-01T08:15:00.000000"
+
+
+@pytest.mark.parametrize(
+    ("day", "month"),
+    [
+        *(
+            ("14 stycznia 2024", 1),
+            ("14 paź 2024", 10),
+            ("14 grudnia 2024", 12),
+            ("14 lipca 2024", 7),
+        ),
+        *(("14 července 2024", 7), ("14 června 2024", 6), ("14 marraskuuta 2024", 11)),
+        *(("14 lipnja 2024", 6), ("14 srpnja 2024", 7), ("14 Ekim 2024", 10), ("14 out 2024", 10)),
+        *(("14 lis 2024", 0), ("14 listopada 2024", 0), ("14 lip 2024", 0)),  # or of Zagreb
+    ],
+)
+def test_months_of_other_languages_are_not_those_of_their_first_letters(tmp_path, tank, day, month):
+    rows = [f"{day} 08:15:{t:06.3f};{t}" for t in MINUTE]
+    read_clock = clock(table(tmp_path / "a.csv", ["Time;h [mm]", *rows]), tank)
+    assert_allclose(read_clock.times, MINUTE, atol=1e-9)
+    assert iso(read_clock.start)[5:7] == (f"{month:02d}" if month else "")
+    assert month or "another one in Croatian" in read_clock.corrections[0]
 
 
 @pytest.mark.parametrize("day", ["01-Mon-2024", "31-Feb-2024", "Mar-2024", "01-Mar-24 x"])

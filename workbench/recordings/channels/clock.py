@@ -38,6 +38,7 @@ _TURNS = 3  # of a counter to its first count, from which on they are no recordi
 _UNIX = 8e8, 2.3e9  # [s] since 1970, that recordings are of: 1995 to 2042
 # Counts from other dates: seconds from there to 1970, seconds of a count, and counts from 1995 on.
 _EPOCHS = {
+    "s since 1900, as NTP counts": (2208988800.0, 1.0),
     "s since 1904, as LabVIEW counts": (2082844800.0, 1.0),
     "100 ns since 1601, as Windows counts": (11644473600.0, 1e-7),
     "100 ns since the year 1, as .NET counts": (62135596800.0, 1e-7),
@@ -65,6 +66,10 @@ _UNITS_APART = (60.0, 3600.0, 86400.0, 1e3, 1e6, 1e9)
 _DAYS_OF_YEAR = frozenset(("doy", "yday", "jday"))
 _TWO_PARTS = re.compile(r"\d{1,4}:\d\d")
 _FEWEST_RATES = 3  # of a channel, which are equal if it is a clock; one always is
+_STEP_DIGITS = 6  # of a step beside the usual one that numbers of a file tell
+_FEWEST_STEPS, _OFTEN = 4, 0.1  # of each size: fewer are samples that were lost
+_SAME = 1e-3  # of a digit, which numbers in binary do not tell
+_COARSE_DIGIT = 0.1  # of a step, below which digits of times cost nothing
 _COARSE = 0.3  # of all rows: more that repeat a time are samples of one coarse stamp
 _BY_CHANCE = 1e-3  # that a channel which moves from row to row stays in all rows of one time
 _DRIFT = 1.01  # beyond which clocks differ by more than oscillators without a quartz do
@@ -153,7 +158,8 @@ def _read_clock(
                 found=channel.doubt,
                 expected="times that go on in one way",
                 remedy=f"say the order of days, --column '{TIME}={channel.name} [YMD]', or [DMY] "
-                "or [MDY]; where hours count to 12, export them to 24",
+                "or [MDY]; where hours count to 12, export them to 24; of parts of a second, "
+                "export as many digits of each, or say [%H:%M:%S.%f] of decimals",
             )
     if group.step_doubt:
         raise InputError(
@@ -488,7 +494,11 @@ def _since(channel: FileChannel, system: System) -> Clock | None:
         if _UNIX[0] <= held.min() * factor - zero and held.max() * factor - zero <= _UNIX[1]:
             times = (channel.values - held[0]) * factor
             start = float(held[0]) * factor - zero
-            clock = Clock(channel.name, times, reason, start=start)
+            if clock and ("ntp" in words(channel.name) or start > datetime.now(UTC).timestamp()):
+                continue
+            counted = "seconds are counted from 1904, as LabVIEW does", "NTP, from 1900,"
+            other = _other_zero(start, clock.start, *counted) if clock else ()
+            clock = Clock(channel.name, times, reason, start=start, corrections=other)
     likely = _likely_units(channel.values, system)
     for name, (zero, least, most) in _DAYS.items():
         whole = bool((held == np.round(held)).all())
@@ -497,7 +507,8 @@ def _since(channel: FileChannel, system: System) -> Clock | None:
             times = np.round((channel.values - held[0]) * _DAY, 6)
             start = round((float(held[0]) - zero) * _DAY, 3)
             reason = f"days as {name} counts them" if name in ("Excel", "MATLAB") else name
-            other = _by_1904(start) if name == "Excel" else ()
+            counted = "days are counted from 1900", "a workbook that counts from 1904"
+            other = _other_zero(start, start + _FROM_1904, *counted) if name == "Excel" else ()
             clock = Clock(channel.name, times, reason, start=start, unit="d", corrections=other)
     if _DAYS_OF_YEAR.intersection(words(channel.name)) and held.max() <= 367.0:
         clock = Clock(channel.name, channel.values * _DAY, "days of a year", unit="d")
@@ -548,16 +559,14 @@ def _weeks_of_gps(group: Group) -> Clock | None:
     return Clock(within.name, times, reason, start=start, unit=unit, zoned=True)
 
 
-def _by_1904(start: float) -> tuple[str, ...]:
-    """That days of a spreadsheet may count from 1904, where they are not of tomorrow then."""
-    days = (start, start + _FROM_1904)
-    first, other = (datetime.fromtimestamp(day, UTC) for day in days)
-    if other > datetime.now(UTC):
+def _other_zero(start: float, other: float, counted: str, called: str) -> tuple[str, ...]:
+    """That times may count from another date, where they are not of tomorrow then."""
+    first, second = (datetime.fromtimestamp(day, UTC) for day in (start, other))
+    if second > datetime.now(UTC):
         return ()
     return (
-        f"days are counted from 1900, the first is {first:%Y-%m-%d}; a workbook that counts from "
-        f"1904 means {other:%Y-%m-%d}. Times are the same, correct 'date' in case.toml if it is "
-        "so",
+        f"{counted}, the first is {first:%Y-%m-%d}; {called} means {second:%Y-%m-%d}. Times are "
+        "the same, correct 'date' in case.toml if it is so",
     )
 
 
@@ -583,6 +592,34 @@ def _increases(times: Vector) -> bool:
 def _goes_on(times: Vector, group: Group) -> bool:
     """Whether times go on, but for rows of one time that hold one sample, or an event."""
     return _increases(times) or _rows_of_one_time(times, group) > 0
+
+
+def _as_even(clock: Clock) -> Clock:
+    """The clock with even times, where its own are these in few digits: 0, 0.02, 0.03, 0.05 min.
+
+    Steps are then of two sizes, one digit apart, and all times within half a digit of a line.
+    """
+    known = np.flatnonzero(np.isfinite(clock.times))
+    times = clock.times[known]
+    steps = np.round(np.diff(times) / np.median(np.diff(times)), _STEP_DIGITS)
+    sizes, counts = np.unique(steps, return_counts=True)
+    if sizes.size != 2 or counts.min() < max(_FEWEST_STEPS, _OFTEN * steps.size):
+        return clock
+    digit = float(np.ptp(sizes)) * float(np.median(np.diff(times)))
+    places = np.arange(times.size)
+    slope = float(np.polyfit(places, times - times[0], 1)[0])
+    # The roundest step, or rate, that all times allow.
+    for figures in range(1, _STEP_DIGITS):
+        for step in (float(f"{slope:.{figures}g}"), 1.0 / float(f"{1.0 / slope:.{figures}g}")):
+            apart = times - times[0] - step * places
+            # Half a digit around all times; within, the first stays where it is.
+            zeros = float(apart.max()) - 0.5 * digit, float(apart.min()) + 0.5 * digit
+            if zeros[0] <= zeros[1] + _SAME * digit and digit > _COARSE_DIGIT * step:
+                even = clock.times.copy()
+                even[known] = times[0] + min(max(zeros[0], 0.0), zeros[1]) + step * places
+                note = f"times have digits of {digit:.4g} s; taken as even, every {step:.6g} s"
+                return replace(clock, times=even, corrections=(*clock.corrections, note))
+    return clock
 
 
 def _rows_of_one_time(times: Vector, group: Group) -> int:
@@ -641,7 +678,7 @@ def _going_on(clock: Clock, group: Group, where: str) -> Clock:
         note = f"{lost.size} samples without a time are left out, the first is sample {lost[0] + 1}"
         clock = replace(clock, corrections=(*clock.corrections, note))
     if _increases(clock.times):
-        return clock
+        return clock if clock.counted else _as_even(clock)
     if again := _rows_of_one_time(clock.times, group):
         note = f"{again} rows have the time of the row before; of one time, the last value is kept"
         return replace(clock, reason=f"{clock.reason}; {note}")

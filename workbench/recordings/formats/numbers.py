@@ -173,7 +173,9 @@ def reading_of(columns: Sequence[Sequence[str]], where: str, *, commas: bool) ->
         if different
         else "numbers with decimal points and others with decimal commas",
         expected="one decimal mark, and a number that tells it from one between thousands",
-        remedy="export the recording again, with more decimals and no marks between thousands",
+        remedy="export the recording again, with more decimals and no marks between thousands"
+        + f"; or write this number as '{example}0', if its mark is that of decimals"
+        * (len(different) == 2 and len(marks) == 1),
     )
 
 

@@ -32,18 +32,38 @@ _ZONE = (
     r"\s*(?P<zone>(UTC|GMT)?[+-]\d\d?(:?\d\d)?|[A-Z][A-Za-z]+/[A-Za-z_/]+|[A-Za-z]{2,5}|[zZ])?"
     r"(\[[A-Za-z_/+-]+\])?"
 )
-_MONTHS = {  # English, German, French, Spanish, Italian and Dutch, by the letters that tell
-    **{"jan": 1, "ene": 1, "gen": 1, "feb": 2, "fév": 2, "fev": 2, "mar": 3, "mär": 3, "mrt": 3},
-    **{"maa": 3, "apr": 4, "avr": 4, "abr": 4, "may": 5, "mai": 5, "mag": 5, "mei": 5, "jun": 6},
-    **{"juin": 6, "giu": 6, "jul": 7, "juil": 7, "lug": 7, "aug": 8, "aoû": 8, "aou": 8, "ago": 8},
-    **{"sep": 9, "set": 9, "oct": 10, "okt": 10, "ott": 10, "nov": 11},
-    **{"dec": 12, "dez": 12, "déc": 12, "dic": 12, "des": 12, "maj": 5},  # and of the north
+_MONTHS = {  # by the letters that tell, in the languages of Europe; jan, feb, ...
+    begin: number
+    for number, begins in enumerate(
+        (
+            "jan ene gen ian sty led jaan tammi oca sij янв яну",
+            "feb fév fev lut úno veebr helmi şub velj фев",
+            "mar mär mrt maa bře márc ožu мар",
+            "apr avr abr kwi dub ápr huhti nis tra апр",
+            "may mai mag mei maj maí máj kvě touko svi май мая",
+            "jun juin giu cze jún čvn červen červn iun juun kesä haz lipan lipnja meith июн юни",
+            "jul juil lug lipi lipc lip júl čvc červenec červenc iul juul heinä tem srpan srpnja"
+            " июл юли",
+            "aug aoû aou ago avg sie srp elo ağu kolo авг",
+            "sep set wrz zář szept syys eyl ruj сен",
+            "oct okt ott out paź říj loka eki окт",
+            "nov noi lis marras kas stu ноя ное",
+            "dec dez déc dic des gru pro joulu ara дек",
+        ),
+        1,
+    )
+    for begin in begins.split()
 }
-_CALLED = rf"(?P<called>{'|'.join(_MONTHS)})[^\W\d]{{0,8}}"
+# Months that are others in Zagreb: 11 and 10, 7 and 6, 8 and 7.
+_MONTHS_OF_TWO = re.compile("lis(topada?)?|lip|srp", re.IGNORECASE)
+_CALLED = rf"(?P<called>{'|'.join(sorted(_MONTHS, key=len, reverse=True))})[^\W\d]{{0,9}}"
 _WEEKDAYS = (
-    "mon|tue|wed|thu|fri|sat|sun|mo|di|mi|do|fr|sa|so|lun|mar|mer|jeu|ven|sam|dim|mié|jue|vie|sáb"
+    r"(mo|di|mi|do|fr|sa|so|ma|wo|vr|za|zo|pn|wt|śr|cz|pt|nd|po|út|st|čt|pá|ne|pe|la|su)\b"
+    "|mon|tue|wed|thu|fri|sat|sun|diens|mitt|don|frei|sams|sonn|lun|mar|mer|mié|jue|jeu|gio|ven|vie"
+    "|sam|sab|sáb|dim|dom|maa|din|woe|zat|zon|vri|mån|man|tis|tir|ons|tor|lör|lør|sön|søn|pon|wto"
+    "|śro|czw|pią|sob|nie|seg|ter|qua|qui|sex"
 )
-_WEEKDAY = rf"((?:{_WEEKDAYS})[^\W\d]{{0,8}}\.?,?\s+)?"
+_WEEKDAY = rf"((?:{_WEEKDAYS})[^\W\d]{{0,9}}\.?,?\s+)?"
 _DAY = re.compile(
     rf"{_WEEKDAY}((?P<year>\d{{4}})(?P<by>[-/.:_\s])(?P<month>\d{{1,2}})(?P=by)(?P<day>\d{{1,2}})"
     # Behind a point, three figures alone are decimals: 1013.250.
@@ -89,14 +109,14 @@ _ZONE_WITHIN = re.compile(r"(?<=:\d\d )([A-Z]{3,4}) ((?:19|20)\d\d)$")  # 10:00:
 # How others write dates, where a word, a bracket or a letter of theirs may tell; and as what they
 # are read: zones in brackets, as of JavaScript; "at" in other languages; times before dates, as of
 # LabVIEW; dates of China, Japan and Korea.
-_MAY_BE_OTHER = re.compile(r"[^\x00-\xff]|[(à]|\s(at|um|kl|de)\b|\d\.\s|^\d\d?:\S+\s+(\S\S\s)?\d")
+_MAY_BE_OTHER = re.compile(r"[^\x00-\xff]|[(à]|\b(at|um|kl|de)\b|\d\.\s|^\d\d?:\S+\s+(\S\S\s)?\d")
 _CLOCK_ALONE = r"(\d\d?\s*[:时時시]\s*\d\d?\s*[:分분]?(?:\s*\d\d?(?:[.,]\d+)?\s*[秒초]?)?)"
 _OTHERS = tuple(
     (re.compile(form, re.IGNORECASE), read)
     for form, read in (
         (r"(?<=[+-]\d{4}) \([^()\d]+\)$", ""),
         (r"\(((?:UTC|GMT)[+-]?[\d:]*)\)$", r"\1"),
-        (r"(?<=\d)\s+(?:à|at|um|kl\.?)\s+(?=\d)", " "),
+        (r"((?<=\d)\s+|^)(?:à|at|um|kl\.?)\s+(?=\d)", " "),
         (r"\sde\s", " "),
         (r"^(\d{1,2}:\d\d\S*(?:\s[AP]M)?)\s+(\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4})$", r"\2 \1"),
         (r"\(?(?:星期|周|週)[一二三四五六日天]\)?|\([月火水木金土日월화수목금토일]\)", " "),
@@ -271,7 +291,9 @@ def _of_day(name: str, texts: Sequence[str], pattern: re.Pattern[str]) -> FileCh
     matches = [pattern.fullmatch(text) for text in texts]
     known = np.array([match is not None for match in matches])
     whole = np.array([_clock(match) if match else 0 for match in matches])
-    parts, words = _counted_frames(matches, whole)
+    parts, words, doubt = _counted_frames(matches, whole)
+    if doubt:
+        return _in_doubt(name, texts, doubt)
     signs = np.array(
         [-1.0 if match and match.groupdict().get("sign") else 1.0 for match in matches]
     )
@@ -333,7 +355,9 @@ def _by_date(
     matches = [pattern.fullmatch(text) for text in texts]
     known = np.array([match is not None for match in matches])
     clocks = np.array([_clock(match) if match else 0 for match in matches])
-    parts, notes = _counted_frames(matches, clocks)
+    parts, notes, doubt = _counted_frames(matches, clocks)
+    if doubt:
+        return _in_doubt(name, texts, doubt)
     zones = {str(match["zone"]) for match in matches if match and match.groupdict().get("zone")}
     letters = {own.upper() for own in zones if own.isalpha()}
     local = len(zones) == 1 and bool(letters & _AMBIGUOUS or letters - _AHEAD.keys())
@@ -350,7 +374,12 @@ def _by_date(
         zoned = bool(zones) and not local
         channel = _channel(name, texts, known, (whole, parts, shift), zone, zoned=zoned)
         readings[reading] = replace(channel, corrections=(*notes, *leap, *channel.corrections))
-    return _choose_reading(name, texts, readings, matches)
+    chosen = _choose_reading(name, texts, readings, matches)
+    called = pattern in (_DAY, _CALLED_FIRST) and texts[int(np.argmax(known))]
+    if chosen and called and any(map(_MONTHS_OF_TWO.fullmatch, re.split(r"[\W\d]+", called))):
+        note = f"the month of '{called}' is another one in Croatian: the date is not taken"
+        return replace(chosen, start=math.nan, corrections=(*chosen.corrections, note))
+    return chosen
 
 
 def _channel(
@@ -447,6 +476,10 @@ def _choose_reading(
         doubt = f"times such as '{first}', whose hours count to 12 without AM or PM"
     elif not going:
         doubt = f"dates such as '{first}' that go back in each order of day, month and year"
+    return _in_doubt(name, texts, doubt)
+
+
+def _in_doubt(name: str, texts: Sequence[str], doubt: str) -> FileChannel:
     none = np.full(len(texts), math.nan)
     return FileChannel(name, "s", none, stamp=True, doubt=doubt, texts=tuple(texts))
 
@@ -660,30 +693,40 @@ def _clock(match: re.Match[str]) -> int:
 
 def _fractions(
     matches: Sequence[re.Match[str] | None], whole: np.ndarray
-) -> tuple[Vector, list[str]]:
-    """Parts of a second, (n,), and what is said of them: where digits differ they may be counts.
+) -> tuple[Vector, list[str], str]:
+    """Parts of a second, (n,), what is said of them, and why they are in doubt.
 
-    They are of milliseconds behind a colon; where one of fewer digits than others ends in 0, as .50
-    beside .125; and where times go on evenly as such, and not as decimals, and none begins with 0.
+    Where their digits differ, they may be counts of milliseconds. Behind a colon they are; decimals
+    are none where one ends in 0, as .50 beside .125, and counts none where one begins with 0. Else
+    those are taken with which times go on evenly.
     """
     seconds = [_of_second(match) for match in matches]
     digits = [own["f"] for own in seconds]
-    held = [own for own in digits if own]
+    held = [own for own in digits if len(own) > 1]
     parts = np.array([float(f"0.{own or 0}") for own in digits])
-    widths = set(map(len, held))
-    if not held or not max(widths) <= 3 < 3 * len(widths):
-        return parts, []
+    widths = {len(own) for own in digits if own}
+    if not widths or not max(widths) <= 3 < 3 * len(widths):
+        return parts, [], ""
     counts = np.array([int(own or 0) * 1e-3 for own in digits])
     if all(own["dot"] == ":" for own in seconds if own["f"]):
-        return counts, []
-    short = any(own.endswith("0") for own in held if 1 < len(own) < max(widths))
-    padded = any(own.startswith("0") for own in held if len(own) > 1)
+        return counts, [], ""
+    short = any(own.endswith("0") and len(own) < max(widths) for own in held)
+    padded = any(own.startswith("0") for own in held)
+    if padded and not short:
+        return parts, [], ""
     steps = np.diff(whole + parts), np.diff(whole + counts)
     uneven = np.array([np.abs(own - np.median(own)) for own in steps])
     uneven = uneven[:, (uneven < 1.0).all(axis=0)].sum(axis=1)  # without those over midnight
-    if not short and (padded or uneven[1] >= _EVENER * uneven[0]):
-        return parts, []
-    return counts, ["parts of a second are milliseconds without zeros before them"]
+    whole_digits = any(own.endswith("0") for own in held)
+    if short or whole_digits or uneven[1] < _EVENER * uneven[0]:
+        return counts, ["parts of a second are milliseconds without zeros before them"], ""
+    if uneven[0] < _EVENER * uneven[1] or not uneven.any():
+        return parts, [], ""
+    text = min((own for own in digits if own), key=len)
+    doubt = (
+        f"parts of a second such as .{text} and .{max(digits, key=len)}, which may be decimals, or"
+    )
+    return parts, [], f"{doubt} milliseconds without zeros before them"
 
 
 def _of_second(match: re.Match[str] | None) -> dict[str, str]:
@@ -694,17 +737,17 @@ def _of_second(match: re.Match[str] | None) -> dict[str, str]:
 
 def _counted_frames(
     matches: Sequence[re.Match[str] | None], whole: np.ndarray
-) -> tuple[Vector, list[str]]:
-    """Parts of a second, (n,), and what is said of them: behind a colon may be frames of a film.
+) -> tuple[Vector, list[str], str]:
+    """Parts of a second, as `_fractions`: behind a colon may be frames of a film.
 
     They are where times go on evenly as such, and not as decimals.
     """
-    parts, notes = _fractions(matches, whole)
+    parts, notes, doubt = _fractions(matches, whole)
     held = [match for match in matches if match and match.groupdict().get("f")]
     if len(held) < len(matches) or any(
         m.groupdict().get("dot") != ":" or len(m["f"]) != 2 for m in held
     ):
-        return parts, notes
+        return parts, notes, doubt
     frames = np.array([int(match["f"]) for match in held])
     for rate in [0, *(rate for rate in _FRAMES if rate > frames.max())]:
         steps = np.diff(whole + (frames / rate if rate else parts))
@@ -713,7 +756,7 @@ def _counted_frames(
     else:
         rate = 0
     notes = [f"behind the last colon are frames, {rate} in a second"] if rate else []
-    return frames / rate if rate else parts, notes
+    return frames / rate if rate else parts, notes, ""
 
 
 def _with_leap_second(
