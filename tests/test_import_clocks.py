@@ -620,6 +620,12 @@ def test_of_rows_of_one_time_the_last_values_are_kept(tmp_path, tank):
     assert held.time.size == 61
     assert held.signals["inflow"][held.time == 27450.0] == pytest.approx(2e-3)
     assert not held.doubts  # the inflow stays as it is set; a line to its jump would be told
+    write_system(tmp_path / "tank")
+    other = ('sample_time = "0.5 s"', 'sample_time = "900 s"'), ("held = true", "held = false")
+    edit(tmp_path / "tank" / "system.toml", *other)
+    line = load_system(tmp_path / "tank")
+    (told,) = merge([recorded], propose([recorded], line, {}), line).doubts
+    assert "inflow: it jumps between rows of one time" in told
 
 
 def test_rows_of_one_time_that_hold_other_channels_are_all_read(tmp_path, tank):

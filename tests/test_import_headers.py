@@ -21,7 +21,7 @@ from numpy.testing import assert_allclose
 from pyarrow import feather
 
 from workbench.errors import InputError
-from workbench.recordings.channels import NamedChannel, propose
+from workbench.recordings.channels import NamedChannel, merge, propose
 from workbench.recordings.formats import read_recorded_file
 from workbench.recordings.formats.numbers import is_missing
 from workbench.recordings.formats.spelling import name_and_unit
@@ -465,6 +465,71 @@ def test_meters_that_choose_a_range_write_several_units(tmp_path, header, small,
     assert channels["h"].unit == "mm"
     assert_allclose(channels["h"].values, 900.5 + np.arange(10, 70))
     assert "'h': 20 samples in other units were taken to [mm]" in recorded.notes
+
+
+@pytest.mark.parametrize(
+    ("header", "row"),
+    [
+        ("time [s];sign;h [mm];inflow [l/s]", "{k};{sign};{size};4.5"),
+        ("time [s];inflow [l/s];h [mm];Vorzeichen", "{k};4.5;{size};{sign}1"),
+        ("time [s];h [mm];inflow [l/s];h sign", "{k};{size};4.5;{sign}"),
+        ("time [s];sign of h;inflow [l/s];h [mm]", "{k};{word};4.5;{size}"),
+    ],
+)
+def test_a_column_of_signs_is_that_of_numbers_beside_it(tmp_path, tank, header, row):
+    level = np.array([k - 30.5 for k in range(60)])
+    rows = [
+        row.format(k=k, sign="+-"[int(h < 0)], word=("pos", "neg")[int(h < 0)], size=abs(h))
+        for k, h in enumerate(level)
+    ]
+    recorded = read_recorded_file(table(tmp_path / "a.csv", [header, *rows]))
+    (own,) = (c for c in recorded.groups[0].channels if c.name == "h")
+    assert_allclose(own.values, level)
+    assert "its sign is taken from" in own.corrections[0]
+
+
+@pytest.mark.parametrize(
+    ("name", "signs"),
+    [("sign", "01"), ("sign", "+-"), ("trend", "+-"), ("polarity", ["", "-"])],
+)
+def test_a_column_that_may_hold_signs_is_asked_about(tmp_path, tank, name, signs):
+    rows = [f"{k};4.5;{signs[k % 2]};950.{k}" for k in range(60)]
+    lines = [f"time [s];inflow [l/s];{name};h [mm]", *rows]
+    proposal = propose([read_recorded_file(table(tmp_path / "a.csv", lines))], tank, {})
+    for signal in ("inflow", "h"):
+        assert any(f"{signal}: the file says \"'{name}' beside it" in d for d in proposal.doubts)
+
+
+def test_dashes_in_a_column_of_remarks_are_no_signs(tmp_path, tank):
+    rows = [f"{k};4.5;-;950.{k}" for k in range(60)]
+    lines = ["time [s];inflow [l/s];remark;h [mm]", *rows]
+    assert propose([read_recorded_file(table(tmp_path / "a.csv", lines))], tank, {}).certain
+
+
+@pytest.mark.parametrize(
+    ("header", "row", "words"),
+    [
+        ("h [mm];h Status", "{k}.5;{good}", "20 samples that 'h Status' calls 'Bad' are gaps"),
+        ("h;Unit", "{k}.5;{unit}", "20 samples in other units were taken to [mm]"),
+        ("h [mm]", "{cell}", "20 cells say only that a value is below"),
+    ],
+)
+def test_what_was_changed_of_samples_is_said_on_the_terminal(tmp_path, tank, header, row, words):
+    rows = [
+        f"{k};4.5;"
+        + row.format(
+            k=k,
+            good="Bad" if k % 3 == 0 else "Good",
+            unit="cm" if k % 3 == 0 else "mm",
+            cell="<1.5" if k % 3 == 0 else f"{k}.5",
+        )
+        for k in range(60)
+    ]
+    path = table(tmp_path / "a.csv", [f"time [s];inflow [l/s];{header}", *rows])
+    recorded = read_recorded_file(path)
+    merged = merge([recorded], propose([recorded], tank, {}), tank)
+    (doubt,) = merged.doubts
+    assert doubt.startswith(f"{path}, 'h': {words}")
 
 
 @pytest.mark.parametrize("names", ["t;x1;x2", "t;x1;y"])

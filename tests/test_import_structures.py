@@ -142,6 +142,19 @@ def test_signals_over_common_times_are_those_of_a_test_stand(tmp_path):
     ]
 
 
+def test_signals_of_a_test_stand_keep_the_times_of_their_raster(tmp_path):
+    clocks = array(struct(Data=TIME[::4], Unit="s"), struct(Data=TIME, Unit="s"))
+    signals = array(
+        struct(Name="inflow", Data=FLOW, Unit="l/s", XIndex=2),
+        struct(Name="h", Data=LEVEL[::4], Unit="mm", XIndex=1),
+    )
+    savemat(tmp_path / "a.mat", {"exp": {"X": clocks, "Y": signals}})
+    slow, fast = (held.channels for held in read_recorded_file(tmp_path / "a.mat").groups)
+    assert [channel.name for channel in (*slow, *fast)] == ["time", "h", "time", "inflow"]
+    assert_allclose(slow[0].values, TIME[::4])
+    assert_allclose(fast[0].values, TIME)
+
+
 def test_a_table_of_inputs_beside_an_output_is_not_lost(tmp_path):
     inputs = np.column_stack([FLOW, 2.0 * FLOW])
     recorded = group(tmp_path / "a.mat", {"z": {"u": inputs, "y": column(LEVEL), "Ts": 0.5}})

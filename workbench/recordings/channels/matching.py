@@ -237,7 +237,8 @@ def remark_doubt(channel: FileChannel, unit: str, column: str) -> str:
         return ""
     return (
         f"the file says {channel.remark!r}, and not whether it is applied; --column "
-        f"'{column} [{unit}]' takes the values as they are, [0.1 {unit}] a tenth of them"
+        f"'{column} [{unit}]' takes the values as they are, [0.1 {unit}] a tenth of them; a minus "
+        "before the channel turns their sign"
     )
 
 

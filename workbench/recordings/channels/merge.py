@@ -122,13 +122,18 @@ def merge(
         for (file, _), clock in proposal.clocks.items()
         for text in clock.corrections
     ]
-    doubts = *damaged, *proposal.contradictions, *mended, *_mixed_groups(files, proposal)
+    mended += [
+        f"{files[assigned.file].path}, '{assigned.label}': {text}"
+        for assigned in proposal.assigned.values()
+        for text in assigned.channel.corrections
+    ]
     mended += [
         f"{track.signal.name}: it jumps between rows of one time, and is taken to move in a "
         "straight line from the sample before; if it is set and stays, add held = true to it"
         for track in tracks
         if track.jumps and track.signal.hold == 0.0 and track.signal in system.inputs
     ]
+    doubts = *damaged, *proposal.contradictions, *mended, *_mixed_groups(files, proposal)
     zoned = bool(begun) and all(c.zoned for c in proposal.clocks.values() if math.isfinite(c.start))
     return MergedRecording(time[known], signals, zero, tuple(notes), doubts, zoned)
 

@@ -118,22 +118,30 @@ def _element(name: str, content: Mapping[str, Any]) -> tuple[str, Mapping[str, A
 
 
 def _plotted_signals(content: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Signals `Y` over the times `X`, as test stands store what they plot, by their names."""
+    """Signals `Y` over the times `X`, as test stands store what they plot, by their names.
+
+    Of several times, `XIndex` of each signal says which are its own.
+    """
     parts = {key.lower(): value for key, value in content.items()}
     times, signals = parts.get("x"), parts.get("y")
     if not isinstance(times, Mapping) or not isinstance(signals, Mapping):
         return content
     held = {"(1)": signals} if "(1)" not in signals else signals
-    members = {"time": times, **held}
-    plotted: dict[str, Any] = {}
-    for key, member in members.items():
+    clocks = {"(1)": times} if "(1)" not in times else times
+    rasters: dict[str, dict[str, Any]] = {place: {} for place in clocks}
+    for key, member in [*clocks.items(), *held.items()]:
         _, values = _entry(member, _VALUES) if isinstance(member, Mapping) else ("", None)
         if not isinstance(values, np.ndarray):
             return content
-        name = "time" if member is times else _element(key, member)[0]
+        is_clock = member is clocks.get(key)
+        index = 1 if len(clocks) == 1 else _entry(member, ("xindex",))[1]
+        place = key if is_clock else f"({index})"
+        if place not in rasters:
+            return content
+        name = "time" if is_clock else _element(key, member)[0]
         _, unit = _entry(member, ("unit", "units"))
-        plotted |= {name: values, f"{name}_unit": unit if isinstance(unit, str) else ""}
-    return plotted
+        rasters[place] |= {name: values, f"{name}_unit": unit if isinstance(unit, str) else ""}
+    return rasters if len(rasters) > 1 else rasters["(1)"]
 
 
 def _with_headers(content: Mapping[str, Any]) -> Mapping[str, Any]:

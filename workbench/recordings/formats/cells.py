@@ -119,6 +119,17 @@ _VERDICT = re.compile(
 _FEW_STATES = 3  # more are no verdicts, but a measure
 _GOOD, _OPC_GOOD = frozenset(("good", "ok", "valid", "gut", "true", "g")), 192
 _BAD = frozenset(("bad", "uncertain", "invalid", "error", "fault", "schlecht", "unsicher"))
+# A column that holds the signs of another one, by its name, and what stands in it.
+_SIGN_NAME = re.compile(
+    r"((?P<own>.+?)[ _.])??(sign|signum|vorzeichen|vz|polarity|polarit\u00e4t|signe|signo|segno"
+    r"|\+/?-|\u00b1)([ _.]*(of|von)[ _.](?P<of>.+))?",
+    re.IGNORECASE,
+)
+_SIGNS = {
+    **dict.fromkeys(("+", "plus", "pos", "positive", "positiv"), ""),
+    **dict.fromkeys(("-", "\u2212", "minus", "neg", "negative", "negativ"), "-"),
+}
+_SIGNS_IN_FIGURES = {"1": "", "+1": "", "-1": "-", "0": ""}
 _STATES = {"true": "1", "false": "0", "on": "1", "off": "0"}
 _WORDS = re.compile(r"[^\W\d_]+")
 _LETTERS = frozenset("abcdefghijklmnopqrstuvwxyz")  # that count columns: Time A, Time B; t1 has one
@@ -749,6 +760,9 @@ def by_tag(group: Group) -> list[Group]:
         unit, factors = _one_unit(units) or ("", np.ones(len(rows)))
         own_value = _rows_of(value, rows)
         own_value = replace(own_value, name=tag, unit=unit, values=factors * own_value.values)
+        if count := int((factors != 1.0).sum()):
+            note = f"{count} samples in other units were taken to [{unit}]"
+            own_value = replace(own_value, corrections=(note,))
         channels = (own_value if c is value else _rows_of(c, rows) for c in group.channels)
         own_group = replace(
             group,
@@ -869,6 +883,14 @@ def read_group(
         table = replace(table, lines=table.lines[::-1])
         notes.append(f"rows with the newest first were turned, by {turned}")
     labels, columns = _with_parts(*_join_day_and_clock(*_join_date_parts(labels, columns)))
+    said: dict[int, list[str]] = {i: [] for i in range(len(columns))}  # of what was changed
+    for i, k, signs in _signs_beside(labels, columns):
+        if signs:
+            columns[k] = list(map("".join, zip(signs, columns[k], strict=True)))
+            said[k].append(f"its sign is taken from '{labels[i][0]}'")
+        else:
+            held = ", ".join(sorted({*columns[i]} - {""}))
+            remarks[labels[k][0]] = f"'{labels[i][0]}' beside it with {held}"
     left: list[FileChannel] = []
     for i, cells in enumerate(columns):
         behind = _BEHIND_NAME.search(labels[i][0])
@@ -892,16 +914,15 @@ def read_group(
         else:
             del numbers[k]
             texts[k] = [" ".join(row) for row in rows]
-    notes += [
-        f"'{labels[k][0]}': {count} samples in other units were taken to [{labels[k][1]}]"
-        for k, factor in factors.items()
-        if (count := int((factor != 1.0).sum()))
-    ]
+    for k, factor in factors.items():
+        if count := int((factor != 1.0).sum()):
+            said[k].append(f"{count} samples in other units were taken to [{labels[k][1]}]")
     for i, cells in texts.items():
         notes.append(f"'{labels[i][0]}' holds {'texts' if any(cells) else 'nothing'}")
         none = np.full(len(cells), math.nan)
         left.append(FileChannel(labels[i][0], "", none, texts=tuple(cells)))
-    notes += _leave_out_bad(labels, columns, numbers)
+    for k, text in _leave_out_bad(labels, columns, numbers):
+        said[k].append(text)
     reading = reading_of([*numbers.values(), *beside], where, commas=commas)
     channels: list[FileChannel] = []
     for i, cells in numbers.items():
@@ -909,15 +930,15 @@ def read_group(
         gaps = np.flatnonzero(np.isnan(values)).tolist()
         beyond = [k for k in gaps if is_censored(cells[k])]
         if beyond:
-            notes.append(
-                f"'{labels[i][0]}': {len(beyond)} cells say only that a value is below or above "
+            said[i].append(
+                f"{len(beyond)} cells say only that a value is below or above "
                 f"another, the first {cells[beyond[0]]!r} in line {table.lines[beyond[0]]}; they "
                 "are no samples"
             )
         bad = [k for k in gaps if not is_missing(cells[k]) and k not in set(beyond)]
         if bad:
-            notes.append(
-                f"'{labels[i][0]}': {len(bad)} cells that are no numbers are gaps, the first "
+            said[i].append(
+                f"{len(bad)} cells that are no numbers are gaps, the first "
                 f"{columns[i][bad[0]]!r} in line {table.lines[bad[0]]}"
             )
         like = [k for k in bad if is_like_number(cells[k])]
@@ -929,7 +950,9 @@ def read_group(
             censored=tuple(beyond),
             unread=unread,
             remark=remarks.get(labels[i][0], ""),
+            corrections=tuple(said[i]),
         )
+        notes += [f"'{labels[i][0]}': {text}" for text in said[i]]
         channels.append(channel)
     step, doubt = stated_step(table.head)
     within = (name,) if name else ()
@@ -949,8 +972,8 @@ def _leave_out_bad(
     labels: Sequence[tuple[str, str]],
     columns: Sequence[Sequence[str]],
     numbers: dict[int, list[str]],
-) -> Iterator[str]:
-    """Empty the cells that another column calls bad, as servers of plants do; say which."""
+) -> Iterator[tuple[int, str]]:
+    """Empty the cells that another column calls bad, as servers of plants do; say of which."""
     verdicts = {
         i: match for i, (name, _) in enumerate(labels) if (match := _VERDICT.fullmatch(name))
     }
@@ -973,16 +996,40 @@ def _leave_out_bad(
         bad = [k for k, state in enumerate(states) if state and state not in good]
         if not judged or not bad:
             continue
-        if not good:
-            yield f"'{labels[i][0]}' may tell good samples from bad ones; all were taken"
-            continue
-        left = set(bad)
+        left = set(bad) if good else set()
+        called = f"{len(bad)} samples that '{labels[i][0]}' calls {columns[i][bad[0]]!r} are gaps"
+        unknown = f"'{labels[i][0]}' may tell good samples from bad ones; all were taken"
         for k in judged:
             numbers[k] = ["" if n in left else cell for n, cell in enumerate(numbers[k])]
-        yield (
-            f"{', '.join(repr(labels[k][0]) for k in judged)}: {len(bad)} samples that "
-            f"'{labels[i][0]}' calls {columns[i][bad[0]]!r} are gaps"
-        )
+            yield k, called if good else unknown
+
+
+def _signs_beside(
+    labels: Sequence[tuple[str, str]], columns: Sequence[Sequence[str]]
+) -> Iterator[tuple[int, int, list[str]]]:
+    """Columns of signs, the column of numbers that each is of, and the signs; none: in doubt."""
+    numeric = [
+        _mostly(cells, is_number) and not _is_clock(*labels[k], cells)
+        for k, cells in enumerate(columns)
+    ]
+    for i, (name, _) in enumerate(labels):
+        match = _SIGN_NAME.fullmatch(name)
+        held = {cell.casefold() for cell in columns[i] if cell}
+        if match and held and held <= _SIGNS.keys() | _SIGNS_IN_FIGURES.keys():
+            own = (match["own"] or match["of"] or "").casefold()
+        elif "+" in held <= {"+", "-", "\u2212"}:
+            own = ""
+        else:
+            continue
+        beside = [k for k in (i + 1, i - 1) if 0 <= k < len(numeric) and numeric[k]]
+        if own:
+            beside = [k for k, label in enumerate(labels) if label[0].casefold() == own]
+        signs = [(_SIGNS | _SIGNS_IN_FIGURES).get(cell.casefold(), "") for cell in columns[i]]
+        for k in beside:
+            rows = zip(columns[i], columns[k], strict=True)
+            bare = all(sign and number[0].isdigit() for sign, number in rows if number)
+            sure = match and bare and "0" not in held and len(beside) == 1
+            yield i, k, signs if sure else []
 
 
 def _is_good(state: str, word: str) -> bool:

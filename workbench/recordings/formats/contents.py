@@ -23,7 +23,8 @@ class FileChannel:
     # day
     shown: float = math.nan
     zoned: bool = False  # whether `start` is in UTC; else in some local time
-    corrections: tuple[str, ...] = ()  # how time stamps were made to go on, in words
+    # how time stamps were made to go on, and what of values was changed or left out, in words
+    corrections: tuple[str, ...] = ()
     # why time stamps cannot be read before somebody says how, in words; empty: they can
     doubt: str = ""
     # samples of which the file says only that they are below or above another value
