@@ -1090,6 +1090,22 @@ def test_the_open_loop_sets_discrete_inputs_at_events_and_reads_whole_numbers(bu
     assert values[:, 1].tolist() == [10, 10, 11, 11, 10, 10, 10]
 
 
+def test_filters_are_not_offered_for_a_model_with_a_switch_as_input(build, tmp_path, capsys):
+    """`fmu check` found it fit for them, and `new` recommended what refused it."""
+    path = build("RELAYS", variables=SWITCHED)
+    assert main(["fmu", "check", str(path), "--instantiations", "5"]) == 1
+    shown = capsys.readouterr().out
+    assert "ekf and ukf on recordings: no, for real inputs" in shown
+    assert "fit and diagnosis: it would do" in shown
+    log = tmp_path / "log.csv"
+    rows = [f"{10 * k},{280 + k % 2},{290 + 0.1 * k:.3f},{k % 3 > 1:d}" for k in range(60)]
+    log.write_text("\n".join(["time [s],Ta [K],T [K],flag", *rows]))
+    folder = tmp_path / "new"
+    assert main(["new", str(folder), "--fmu", str(path), "--recordings", str(log), "--yes"]) == 0
+    (following,) = re.findall(r"next: (.*--estimator.*)", capsys.readouterr().out)
+    assert main([*following.split()[1:], "--out", str(tmp_path / "out")]) in (0, 1)
+
+
 @pytest.mark.parametrize(
     ("correction", "message"),
     [

@@ -171,6 +171,20 @@ def test_a_channel_that_only_its_unit_speaks_for_is_asked_about_once(tmp_path, f
     assert 294.0 < case["T"][0] < 296.0
 
 
+def test_a_channel_that_is_named_alone_has_the_unit_of_its_file(tmp_path, fmu, capsys):
+    """Its size was taken for W and K, and each gave a question that the file answers."""
+    log = write_log(tmp_path / "log.csv", 3, "Zeit [ms];Leistung [W];Sonde 3 [°C];p [mbar]")
+    log.write_text(log.read_text("utf-8").replace("[W]", "[mW]"), "utf-8")
+    columns = ["--column", "T=Sonde 3", "--column", "P=Leistung"]
+    command = ["new", str(tmp_path / "oven"), "--fmu", str(fmu), "--recordings", str(log)]
+    assert main([*command, *columns, "--yes"]) == 0
+    assert "[1]" not in capsys.readouterr().out
+    text = (tmp_path / "oven" / "system.toml").read_text()
+    assert not [
+        line for line in text.splitlines() if "QUESTION: " in line and "draught" not in line
+    ]
+
+
 def test_an_output_that_no_channel_can_be_is_asked_for_by_name(tmp_path, fmu, capsys):
     log = write_log(tmp_path / "log.csv", 3, "Zeit [ms];Leistung [kW];Sonde 3 [V];p [mbar]")
     command = ["new", str(tmp_path / "oven"), "--fmu", str(fmu), "--recordings", str(log)]

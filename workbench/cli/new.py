@@ -98,7 +98,9 @@ def _from_fmu(options: argparse.Namespace, output: Output) -> CommandResult:
     )
     imports = import_module("workbench.cli.import").run(importing, output, files)
     smooth = MODEL_EXCHANGE in description.interfaces and not description.event_indicators
-    which = "" if smooth else " --estimator open_loop"
+    real = all(signal.variable.real for signal in draft.signals)
+    real &= all(s.variable.variability == "continuous" for s in draft.signals if s.role == "inputs")
+    which = "" if smooth and real else " --estimator open_loop"
     output.result(
         f"wrote {nearby(path)}: read its comments"
         + (f", {len(draft.questions)} of them questions" if draft.questions else "")
@@ -152,8 +154,9 @@ def _format(draft: Draft) -> str:
     for signal in draft.signals:
         samples = draft.samples(signal)
         low, high = min(v.min() for v in samples), max(v.max() for v in samples)
+        unit = f" [{signal.channel.unit}]" if signal.channel.unit else ""
         lines.append(
-            f"  {signal.name:<16} {signal.channel.channel} [{signal.channel.unit or '1'}]: "
+            f"  {signal.name:<16} {signal.channel.channel}{unit}: "
             f"{low:.4g} to {high:.4g} {signal.unit} ({signal.reason})"
         )
     if draft.time:

@@ -76,6 +76,8 @@ SAMPLE = 5000.0
 START = CheckResult("start", limit=1, unit="instances")
 # Filters correct states one by one.
 SCALARS = CheckResult("scalar states", limit=0, unit="elements of arrays")
+# Observers drive a model by inputs that are real and continuous.
+INPUTS = CheckResult("real inputs", limit=0, unit="others")
 # The step of most observers takes the model for smooth: it would pass over a jump.
 EVENTS = CheckResult("smoothness", limit=0, unit="event indicators")
 FUNCTION = CheckResult("function of states", limit=0)
@@ -100,7 +102,7 @@ TIME_STEP = CheckResult("time of states and step", limit=SAMPLE, unit="us")
 # Every estimator sets states and steps by the Jacobian. Kalman filters go through events where they
 # can roll back, also where they are tuned and beside a rig. What makes many instances are tuning,
 # fit and diagnosis, the last two of which simulate through events.
-_OBSERVING = (START, SCALARS, EVENTS, FUNCTION, RESET, INJECTION, DERIVATIVES)
+_OBSERVING = (START, SCALARS, INPUTS, EVENTS, FUNCTION, RESET, INJECTION, DERIVATIVES)
 _OTHERS = "other observers on recordings"
 _ROLLING_BACK, _SOLVING = "tools that roll back", "tools that use its own solver"
 _USES = {
@@ -627,6 +629,12 @@ def _start(path: Path, instantiations: int) -> Iterator[CheckResult]:
     yield replace(START, passed=not reason, value=1, reason=reason)
     reason = "only open loop, fit and diagnosis go on; export the model with scalar variables"
     yield replace(SCALARS, passed=not arrays, value=arrays, reason=reason if arrays else "")
+    inputs = [v for v in fmu.description.variables if v.causality == "input"]
+    others = [f"'{v.name}'" for v in inputs if not (v.real and v.variability == "continuous")]
+    reason = (
+        f"with {', '.join(others)}, only open loop, fit and diagnosis go on; export continuous ones"
+    )
+    yield replace(INPUTS, passed=not others, value=len(others), reason=reason if others else "")
     count, timed = fmu.description.event_indicators, float(fmu.next_event[0])
     smooth = not fmu.has_events
     reason = "" if timed == np.inf else f"a time event at {timed:g} s; "
@@ -886,7 +894,7 @@ def _integrate(fmu: FMU, excitation: Excitation, start: Vector, end: float) -> M
 _Attempt = Callable[[Path, int], Iterator[int | CheckResult]]
 # What is run, the questions it answers, and those whose answers it rests on.
 _CHECKS: tuple[tuple[_Attempt, tuple[CheckResult, ...], tuple[CheckResult, ...]], ...] = (
-    (_start, (START, SCALARS, EVENTS), ()),
+    (_start, (START, SCALARS, INPUTS, EVENTS), ()),
     (_revisit, (FUNCTION,), (START,)),
     (_reset, (RESET,), (START, FUNCTION)),
     (_inject, (INJECTION,), (START, FUNCTION)),

@@ -28,7 +28,7 @@ from workbench.recordings.channels import (
     propose_recordings,
 )
 from workbench.recordings.channels.clock import usual_step
-from workbench.recordings.channels.matching import USUAL_UNITS, PlacedChannel, meaning_doubt
+from workbench.recordings.channels.matching import COLD, USUAL_UNITS, PlacedChannel, meaning_doubt
 from workbench.recordings.channels.names import (
     EXACT,
     is_asked,
@@ -349,14 +349,16 @@ def _provisional(
         "sample_time": f"{next((s for s in steps if s > 0.0), 1.0):.6g} s",
         "models": {"observer": {"fmu": str(description.path.resolve())}},
     }
-    sizes = {
-        channel.name: float(np.nanmax(np.abs(channel.values), initial=0.0))
-        for group in files[0].groups
-        for channel in group.channels
-    }
+    channels = {channel.name: channel for group in files[0].groups for channel in group.channels}
     for signal in signals:
-        way = conversion(signal.channel.unit or signal.unit, signal.unit)
-        size = (sizes.get(signal.channel.channel, 1.0) or 1.0) * (way.factor if way else 1.0)
+        channel = channels.get(signal.channel.channel)
+        values = channel.values if channel else np.ones(1)
+        stated = signal.channel.unit or (channel.unit if channel else "")
+        if way := conversion(stated or signal.unit, signal.unit):
+            # A model that is warm at its start does not mean a difference of temperatures.
+            warm = abs(signal.variable.nominal or _start(signal.variable)) >= COLD
+            values = way.factor * values + way.zero * warm
+        size = float(np.nanmax(np.abs(values), initial=0.0)) or 1.0
         content.setdefault(signal.role, {})[signal.name] = {
             "variable": signal.variable.name,
             "unit": signal.unit,
