@@ -95,8 +95,9 @@ def run(
                 refused.append(str(refusal))
     if record is not before:
         output.result(f"see {IMPORTED} in {nearby(options.out)}")
-        again = shlex.join(["--system", options.system, str(nearby(options.out))])
-        output.result(f"next: workbench simulate {again}")
+        if read is None:  # else the command that read the files says what comes next
+            again = shlex.join(["--system", options.system, str(nearby(options.out))])
+            output.result(f"next: workbench simulate {again}")
     result = {"out": options.out, "imports": record, "refused": refused}
     return CommandResult(result, {"begins": "s", "ends": "s", "seconds": "s"}, 2 if refused else 0)
 
