@@ -191,6 +191,10 @@ def drive(
     seed: int,
     *,
     heavier: float = 0.0,
+    motor: float = 0.0,
+    stiffer: float = 0.0,
+    damped: float = 0.0,
+    weaker: float = 0.0,
     rubbing: float = 0.0,
     gap: bool = False,
     spread: str = "",
@@ -199,7 +203,9 @@ def drive(
 
     Parameters
     ----------
-    heavier : share by which the flywheel has more inertia than the model says.
+    heavier, motor : shares by which flywheel and motor have more inertia than the model says.
+    stiffer, damped : shares by which the shaft is stiffer and damps more.
+    weaker : share of its torque that the motor does not give.
     rubbing : more friction in the bearing of the flywheel alone [N.m.s/rad].
     gap : whether the second recording lacks 0.2 s.
     spread : of the twist where a recording begins; that of the model if empty.
@@ -215,10 +221,11 @@ def drive(
 
             def rates(_t, x, torque=torques[first]):
                 wm, wl, twist = x
-                m = STIFFNESS * twist + DAMPING * (wm - wl)
+                m = STIFFNESS * (1.0 + stiffer) * twist + DAMPING * (1.0 + damped) * (wm - wl)
                 lost = (FRICTION + rubbing) * wl
+                given = (1.0 - weaker) * torque
                 return (
-                    (torque - m - FRICTION * wm) / JM,
+                    (given - m - FRICTION * wm) / (JM * (1.0 + motor)),
                     (m - lost) / (JL * (1.0 + heavier)),
                     wm - wl,
                 )
@@ -248,6 +255,46 @@ def test_causes_that_imitate_a_parameter_together_are_no_answer(tmp_path):
     assert 0.0109 < float(ends[1]) < 0.011 < float(ends[2]) < 0.0111
     assert outcome.diagnosis.nearest[0].effects == ("Jl",)
     assert "Jl alone explains as much" in outcome.diagnosis.nearest[1].text
+
+
+def sizes_in(sentence: str) -> list[tuple[float, float, float]]:
+    """Each size that a sentence names, with both ends of its interval."""
+    texts = re.findall(r"(-?[\d.]+) \S+ \(95 %: (-?[\d.]+) to (-?[\d.]+)\)", sentence)
+    return [(float(size), float(low), float(high)) for size, low, high in texts]
+
+
+def test_causes_that_imitate_two_parameters_together_are_no_answer(tmp_path):
+    """Two inertias were 'found' as a drive, a shaft and bearings that each are wrong."""
+    outcome = drive(tmp_path, 201, heavier=0.1, motor=0.15)
+    assert outcome.diagnosis.verdict == "unexplained"
+    assert outcome.diagnosis.nearest[0].effects == ("Jm", "Jl")
+    assert "but other changes would: another value of Jm" in outcome.sentence
+    (_, *motor), (_, *wheel) = sizes_in(outcome.sentence)
+    assert motor[0] < 2.3e-3 < motor[1] < motor[0] + 1e-4
+    assert wheel[0] < 1.1e-2 < wheel[1] < wheel[0] + 1e-4
+    assert any("if Jm and Jl may be so, correct the model" in step for step in outcome.next_steps)
+
+
+@pytest.mark.long
+def test_a_parameter_beside_an_effect_explains_what_no_effects_do(tmp_path):
+    """Of a light motor on a stiff shaft nothing was said but that a softer one explains a part."""
+    outcome = drive(tmp_path, 202, motor=-0.15, stiffer=0.15)
+    assert outcome.diagnosis.verdict == "unexplained"
+    assert outcome.diagnosis.nearest[0].effects == ("SoftShaft", "Jm")
+    (_, *softer), (_, *motor) = sizes_in(outcome.sentence)
+    assert softer[0] < -3.0 < softer[1] < 0.0
+    assert motor[0] < 1.7e-3 < motor[1] < motor[0] + 1e-4
+
+
+@pytest.mark.long
+def test_three_causes_of_the_catalogue_are_found_beside_parameters_that_imitate_some(tmp_path):
+    """Neither inertia explains, alone or beside one of them, as much as they do."""
+    outcome = drive(tmp_path, 300, weaker=0.08, stiffer=-0.115, damped=0.4)
+    assert outcome.diagnosis.verdict == "found"
+    sizes = {c.effect.name: next(iter(c.parameters.values())) for c in outcome.diagnosis.causes}
+    truth = {"DriveGain": -0.08, "SoftShaft": 2.3, "ShaftDamping": 0.016}
+    assert set(sizes) == set(truth)
+    assert all(sizes[name].low < size < sizes[name].high for name, size in truth.items())
 
 
 @pytest.mark.long

@@ -272,7 +272,8 @@ class Outcome:
         )
         widen = ["widen the bounds of a parameter at its bound, if physics allows it"] * bound
         if (change := self._change) is not None:
-            widen.insert(0, f"if {change.effects[0]} may be so, correct {change.corrected}")
+            names = " and ".join(change.effects)
+            widen.insert(0, f"if {names} may be so, correct {change.corrected}")
         if (slight := self._slight) is not None:
             name = slight.effects[0]
             widen.append(f"state a smaller size that matters for {name}, if it is worth reporting")
@@ -309,8 +310,9 @@ class Outcome:
             return _late(late)
         if (change := self._change) is not None:
             return (
-                "Something is missing that no effect of the catalogue explains, but one other "
-                f"change would: {change.change}."
+                "Something is missing that no effect of the catalogue explains, but "
+                f"{'one other change' if len(change.effects) == 1 else 'other changes'} would: "
+                f"{change.change}."
             )
         if (slight := self._slight) is not None:
             names = " and ".join(slight.effects)
@@ -323,7 +325,7 @@ class Outcome:
 
     @property
     def _change(self) -> NearestCandidate | None:
-        """The one change that explains as much, and that no effect of the catalogue is."""
+        """Changes that explain as much, and not all of which an effect of the catalogue is."""
         return next((nearest for nearest in self.diagnosis.nearest if nearest.change), None)
 
     @property

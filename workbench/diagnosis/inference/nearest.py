@@ -6,29 +6,19 @@ from functools import partial
 
 import numpy as np
 
-from workbench.diagnosis.data.clocks import INPUT_DELAY
-from workbench.diagnosis.effects.candidates import INPUT_LAG
 from workbench.diagnosis.inference.causes import binding_bound, size_text
-from workbench.diagnosis.inference.crossvalidation import CrossValidation
 from workbench.diagnosis.inference.fit import Fit
-from workbench.diagnosis.inference.score_test import CandidateScore, score_test
+from workbench.diagnosis.inference.score_test import CandidateScore
 from workbench.diagnosis.inference.search import (
     FittedModel,
     beyond,
-    differentiable,
-    examine,
     extended,
     is_clean,
-    rival_fits,
-    starts_of,
 )
-from workbench.diagnosis.inference.selection import Selection, anew
-from workbench.runtime.engine import Reporter
-from workbench.system.parts import Signal
-from workbench.system.units import BAND, with_interval, with_unit
+from workbench.diagnosis.inference.selection import Selection
+from workbench.system.units import with_unit
 
 NEAREST = 3  # candidates that are named where none is accepted
-_OUTSIDE = ("it is no effect of the catalogue",)  # why a single change is no cause
 
 
 @dataclass(frozen=True)
@@ -39,7 +29,7 @@ class NearestCandidate:
     removed: float  # share of the explainable that they remove on held-out recordings
     reasons: tuple[str, ...]  # why they are no answer, in words
     slight: bool = False  # whether they leave noise alone, at a size less than what matters
-    change: str = ""  # what it is where no effect of the catalogue is, size and 95 % interval
+    change: str = ""  # what it is where it is no effect of the catalogue, sizes and 95 % intervals
     corrected: str = "the model"  # what is corrected for that
 
     @property
@@ -89,7 +79,7 @@ def nearest_candidates(
         removed = validation.explained(base, model, fast=fast)[0]
         if removed > 0.0:
             reasons = objections if model is best else _reasons(fit, chosen, model, fast=fast)
-            slight = _below_what_matters(model) and validation.noise_alone(model, fast=fast)
+            slight = below_what_matters(model) and validation.noise_alone(model, fast=fast)
             nearest.append(NearestCandidate(names, removed, tuple(reasons), slight))
     return tuple(sorted(nearest, key=lambda candidate: -candidate.removed)[:NEAREST])
 
@@ -108,7 +98,7 @@ def undecided(fit: Fit, chosen: Selection) -> tuple[NearestCandidate, ...]:
         return ()
     tried = [extended(fit, chosen.base, score) for score in list(shown.values())[:NEAREST]]
     fits = {model.names: model for model in tried if model is not None}
-    small = {names for names, model in fits.items() if _below_what_matters(model)}
+    small = {names for names, model in fits.items() if below_what_matters(model)}
     if len(small) == len(fits):
         return ()
     reasons = ("changes too small to matter explain as much",)
@@ -128,7 +118,7 @@ def _reasons(fit: Fit, chosen: Selection, fitted: FittedModel, *, fast: bool) ->
         for _, parameter in fitted.point.sizes
         if binding_bound(fit, fitted, effect, parameter)
     ]
-    if _below_what_matters(fitted):
+    if below_what_matters(fitted):
         least = with_unit(effect.matters, fit.unknowns.unit(effect, effect.size))
         size = size_text(fit, fitted, effect)
         reasons.append(f"its size, {size}, is less than what matters, {least}")
@@ -139,77 +129,10 @@ def _reasons(fit: Fit, chosen: Selection, fitted: FittedModel, *, fast: bool) ->
     return [*reasons, f"it leaves {left.max():.1f} times the noise in {worst}"]
 
 
-def _below_what_matters(model: FittedModel) -> bool:
+def below_what_matters(model: FittedModel) -> bool:
+    """Whether all effects of a fit are smaller than what matters."""
     sizes = model.point.sizes
     return all(abs(sizes[effect.name, effect.label]) < effect.matters for effect in model.active)
-
-
-def single_change(fit: Fit, chosen: Selection, report: Reporter) -> NearestCandidate | None:
-    """A single change that no effect is, see `Fit.changes`, and that explains as much as several.
-
-    Beside one cause or none, it must explain significantly more, and leave noise alone.
-    """
-    base, best, changes = chosen.base, chosen.best, fit.changes()
-    if not changes:
-        return None
-    other = fit.beside(changes)
-    about, trial = examine(other, base, changes, report)
-    scores: dict[str, CandidateScore] = {}
-    for score in sorted(trial.scores(), key=lambda score: -score.gain):
-        scores.setdefault(score.effect.name, score)
-    tried = [starts_of([score]) for score in list(scores.values())[:NEAREST] if score.size]
-    for model in rival_fits(other, about, tried) if tried else ():
-        validation = CrossValidation(other)
-        fast = validation.fast(about, model)
-        if len(best.active) > 1:
-            able = beyond(model, best) < fit.decides.form
-        else:
-            able = beyond(best, model) > fit.decides.needed
-            able = able and is_clean(fit, model) and validation.noise_alone(model, fast=fast)
-        if able and not _below_what_matters(model):
-            (effect,) = model.active
-            size = model.point.sizes[effect.name, effect.size]
-            size += other.unknowns.nominal(effect, effect.size)
-            trial = score_test(other, other.linearise(model.linearised, model.active), ())
-            at = trial.joint.known.index((effect.name, effect.size))
-            reach = BAND * float(np.sqrt(trial.covariance()[at, at]))
-            unit = other.unknowns.unit(effect, effect.size)
-            text = with_interval(size, size - reach, size + reach, unit)
-            removed = validation.explained(about, model, fast=fast)[0]
-            return NearestCandidate(model.names, removed, _OUTSIDE, change=f"{effect.text}: {text}")
-    return None
-
-
-def otherwise_held(fit: Fit, chosen: Selection) -> NearestCandidate | None:
-    """An input that is held otherwise between samples than is said, which alone explains more.
-
-    It then acts up to a sample earlier or later, which its own delay or lag is most like: inputs
-    for which one of these was fitted are tried.
-    """
-    late = {name for step in chosen.steps for rival in step.rivals for name in rival.names}
-    for signal in fit.inputs:
-        if not {f"{INPUT_DELAY}[{signal.name}]", f"{INPUT_LAG}[{signal.name}]"} & late:
-            continue
-        for key, other in signal.otherwise_held.items():
-            model = differentiable(partial(_nominal_as_held, fit, chosen, other))
-            if model is None:
-                continue
-            was, left = (float(m.linearised.squares.max()) for m in (chosen.base, model))
-            if left > 1.0 + fit.decides.excess or not is_clean(fit, model):
-                continue
-            if beyond(chosen.best, model) > fit.decides.needed:
-                removed = 1.0 - max(left - 1.0, 0.0) / (was - 1.0)
-                text = f"{signal.label} with held = {key} in [inputs.{signal.name}]"
-                return NearestCandidate(
-                    (f"held = {key}",), removed, _OUTSIDE, change=text, corrected="the system file"
-                )
-    return None
-
-
-def _nominal_as_held(fit: Fit, chosen: Selection, signal: Signal) -> FittedModel:
-    """The nominal model, fitted where an input is held as this one is."""
-    with fit.held(signal.name, signal.held) as as_held:
-        return anew(as_held, chosen.base.point, ())
 
 
 def single_effect(

@@ -112,6 +112,25 @@ def minimum(total: Quadratic) -> Vector:
     return step
 
 
+def minima_of(N: Matrix, g: Vector, sets: NDArray[np.intp]) -> tuple[Matrix, Vector]:
+    """Where chi-squared 2 g z + z N z is least over few unknowns, the others zero; its falls.
+
+    Parameters
+    ----------
+    sets : (k, m) numbers of the unknowns of each set.
+
+    Returns
+    -------
+    z : (k, m) of each set; the least of them where its unknowns are twins.
+    falls : (k,) of chi-squared.
+    """
+    scale, scaled = _scaled(N)
+    own, slopes = scaled[sets[:, :, None], sets[:, None, :]], (scale * g)[sets]
+    z = -np.einsum("kij,kj->ki", np.linalg.pinv(own, rcond=_ROUNDING, hermitian=True), slopes)
+    falls: Vector = -np.einsum("ki,ki->k", z, slopes)
+    return z * scale[sets], falls
+
+
 def minimum_within(total: Quadratic, low: Vector, high: Vector) -> Vector:
     """Where chi-squared is least within bounds of the step, (p,) each.
 

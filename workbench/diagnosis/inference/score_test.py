@@ -99,7 +99,7 @@ class ScoreTest:
         joint: Joint,
         candidates: Sequence[Candidate],
     ) -> None:
-        self._fit, self.joint, self._candidates = fit, joint, candidates
+        self._fit, self.joint, self.candidates = fit, joint, candidates
         self._stops = joint.stops()
         self._known = list(range(len(joint.known)))
         self.levels = joint.levels
@@ -187,7 +187,7 @@ class ScoreTest:
         count, furthest = len(self._known), np.zeros(len(self._known))
         stops, prior = self._select({})
         alone = minimum(add([*stops, prior]))[:count]
-        for effect, shape in self._candidates:
+        for effect, shape in self.candidates:
             if effect.order_locked or effect.name in twins:
                 continue
             at = self.joint.shared.index((variant(effect, shape), effect.size))
@@ -225,7 +225,7 @@ class ScoreTest:
 
     def scores(self) -> list[CandidateScore]:
         """All candidates, best first."""
-        scores = [self._score(effect, shape) for effect, shape in self._candidates]
+        scores = [self._score(effect, shape) for effect, shape in self.candidates]
         return sorted(scores, key=lambda score: -score.score)
 
     def _score(self, effect: Effect, shape: Mapping[str, float]) -> CandidateScore:

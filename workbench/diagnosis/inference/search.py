@@ -564,13 +564,17 @@ def fitted(
 
 def joined(point: Point, rival: CandidateScore) -> Point:
     """The point with one more effect."""
-    name = rival.effect.name
-    sizes = {**point.sizes, (name, rival.effect.label): rival.effect.told or rival.size}
-    sizes |= {(name, parameter): value for parameter, value in rival.shape.items()}
-    phases = dict(point.phases)
+    placed = sized(point, rival.effect, rival.shape, rival.size)
     if rival.effect.order_locked:
-        phases[name] = rival.phases
-    return Point(sizes, point.levels, point.deviations, phases)
+        return replace(placed, phases={**point.phases, rival.effect.name: rival.phases})
+    return placed
+
+
+def sized(point: Point, effect: Effect, shape: Mapping[str, float], size: float) -> Point:
+    """The point with an effect of some size and shape, which has no phases."""
+    own = {(effect.name, parameter): value for parameter, value in shape.items()}
+    own[effect.name, effect.label] = effect.told or size
+    return replace(point, sizes={**point.sizes, **own})
 
 
 def _lacks(model: FittedModel, decides: Thresholds) -> bool:

@@ -31,8 +31,6 @@ from workbench.diagnosis.inference.nearest import (
     NearestCandidate,
     nearest_candidates,
     nearest_fits,
-    otherwise_held,
-    single_change,
     single_effect,
     undecided,
 )
@@ -42,6 +40,7 @@ from workbench.diagnosis.inference.nuisance import (
     hidden_effects,
     shifted_levels,
 )
+from workbench.diagnosis.inference.outside import otherwise_held, outside_changes
 from workbench.diagnosis.inference.quadratic import Key
 from workbench.diagnosis.inference.score_test import CandidateScore
 from workbench.diagnosis.inference.search import (
@@ -243,12 +242,14 @@ def _judged(
     change = None
     if verdict != "nothing" and not (refused or chosen.interrupted):
         report("changes that no effect is")
-        change = single_change(fit, chosen, report) or otherwise_held(fit, chosen)
+        change = outside_changes(fit, chosen, report, explained=verdict != "unexplained")
+        change = change or otherwise_held(fit, chosen)
     if change is not None:
         verdict = "unexplained"
         if best.active:
-            much = "as much" if len(best.active) > 1 else "more"
-            objections.append(f"{change.effects[0]} alone explains {much}")
+            much = "as much" if len(change.effects) < len(best.active) else "more"
+            does = "alone explains" if len(change.effects) == 1 else "explain"
+            objections.append(f"{' and '.join(change.effects)} {does} {much}")
     nearest: tuple[NearestCandidate, ...] = ()
     if verdict == "unexplained" and late is None:
         report("candidates that come nearest")

@@ -1,0 +1,237 @@
+"""Changes that no effect of the catalogue is, and that explain as much as causes do, or more."""
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+
+from workbench.arrays import Vector
+from workbench.diagnosis.data.clocks import INPUT_DELAY
+from workbench.diagnosis.effects.candidates import INPUT_LAG
+from workbench.diagnosis.effects.catalogue import Effect, variant
+from workbench.diagnosis.inference.crossvalidation import CrossValidation
+from workbench.diagnosis.inference.fit import Fit
+from workbench.diagnosis.inference.nearest import NEAREST, NearestCandidate, below_what_matters
+from workbench.diagnosis.inference.quadratic import minima_of
+from workbench.diagnosis.inference.score_test import CandidateScore, ScoreTest, score_test
+from workbench.diagnosis.inference.search import (
+    FittedModel,
+    beyond,
+    differentiable,
+    examine,
+    fitted,
+    is_clean,
+    rival_fits,
+    sized,
+    starts_of,
+    without,
+)
+from workbench.diagnosis.inference.selection import Selection, anew
+from workbench.runtime.engine import Reporter
+from workbench.system.parts import Signal
+from workbench.system.units import BAND, with_interval
+
+_REASONS = ("it is no effect of the catalogue",)  # why such a change is no cause
+_TOGETHER = 2  # changes that are sought together where causes are no answer
+
+
+class _Member(NamedTuple):
+    """An effect or another change that may be one of several."""
+
+    effect: Effect
+    shape: Mapping[str, float]  # to begin a fit with; empty of a cause, which has its own
+    at: int  # of its size among the unknowns
+
+
+class _Sets:
+    """Sets of changes and effects in place of all causes, as derivatives about these have them.
+
+    Parameters
+    ----------
+    best, trial : the causes, and all else about them.
+    changes : at least one of which each set has.
+    """
+
+    def __init__(self, best: FittedModel, trial: ScoreTest, changes: Sequence[Effect]) -> None:
+        keys = [key for key in trial.joint.shared if key not in trial.levels]
+        causes = [_Member(e, {}, keys.index((e.name, e.label))) for e in best.active]
+        others = [
+            _Member(effect, shape, keys.index((variant(effect, shape), effect.size)))
+            for effect, shape in trial.candidates
+        ]
+        self._able = [m for m in (*causes, *others) if not m.effect.order_locked]
+        self._changes = {change.name for change in changes}
+        self._N, g = trial.joint.reduced(keys)
+        removed = np.zeros(len(keys))
+        for cause in causes:
+            removed[cause.at] = -best.point.sizes[keys[cause.at]]
+        self._slope = g + self._N @ removed
+        self._explained = float((g + self._slope) @ removed)  # chi-squared, by the causes
+
+    def likeliest(self, count: int, near: float) -> list[tuple[tuple[_Member, ...], Vector]]:
+        """Sets of so many that explain most, a share of what causes do or more, and their sizes."""
+        sets = [members for members in combinations(self._able, count) if self._allowed(members)]
+        at = np.array([[member.at for member in members] for members in sets], np.intp)
+        sizes, falls = minima_of(self._N, self._slope, at.reshape(-1, count))
+        first = np.argsort(-falls)[:NEAREST]
+        return [(sets[k], sizes[k]) for k in first if falls[k] > near * self._explained]
+
+    def _allowed(self, members: Sequence[_Member]) -> bool:
+        """Whether some of them are no effects, and none stands twice."""
+        names = {member.effect.name for member in members}
+        return len(names) == len(members) and not names.isdisjoint(self._changes)
+
+
+def outside_changes(
+    fit: Fit, chosen: Selection, report: Reporter, *, explained: bool
+) -> NearestCandidate | None:
+    """Changes that no effect is, see `Fit.changes`, alone or beside effects.
+
+    They are fewer than the causes and explain as much; or they explain significantly more, and
+    leave noise alone: one in place of one cause or none, two where causes are no answer.
+
+    Parameters
+    ----------
+    explained : whether causes are an answer, if only to a part.
+    """
+    changes = fit.changes()
+    if not changes:
+        return None
+    other, model = fit.beside(changes), None
+    if len(chosen.best.active) < 2:
+        model = _single(other, chosen, changes, report)
+    if model is None:
+        most = max(len(chosen.best.active) - 1, 0 if explained else _TOGETHER)
+        model = _several(other, chosen, changes, most, report)
+    if model is None:
+        return None
+    validation = CrossValidation(other)
+    fast = validation.fast(chosen.base, model)
+    removed = validation.explained(chosen.base, model, fast=fast)[0]
+    text = " and ".join(_sizes_in_words(other, model))
+    return NearestCandidate(model.names, removed, _REASONS, change=text)
+
+
+def _single(
+    fit: Fit, chosen: Selection, changes: Sequence[Effect], report: Reporter
+) -> FittedModel | None:
+    """One change in place of one cause or none."""
+    about, trial = examine(fit, chosen.base, changes, report)
+    scores: dict[str, CandidateScore] = {}
+    for score in sorted(trial.scores(), key=lambda score: -score.gain):
+        scores.setdefault(score.effect.name, score)
+    tried = [starts_of([score]) for score in list(scores.values())[:NEAREST] if score.size]
+    models = rival_fits(fit, about, tried) if tried else []
+    return next((model for model in models if _explains(fit, chosen, model)), None)
+
+
+def _several(
+    fit: Fit, chosen: Selection, changes: Sequence[Effect], most: int, report: Reporter
+) -> FittedModel | None:
+    """Changes, or changes and effects, in place of all causes: as few as explain what more do.
+
+    Parameters
+    ----------
+    most : of them, unless more explain significantly more.
+    """
+    if most < 1:
+        return None
+    causes, needed = len(chosen.best.active), fit.decides.needed
+    best, trial = examine(fit, chosen.best, [*fit.unknowns.effects.values()], report)
+    sets, fewest = _Sets(best, trial, changes), None
+    for count in range(1 if causes > 1 else _TOGETHER, fit.decides.most + 1):
+        if fewest is None and count > most:
+            break
+        begun = fit.together(partial(_begun, fit, best), sets.likeliest(count, fit.decides.near))
+        models = [model for model in begun if model is not None]
+        if fewest is None:
+            able = [model for model in models if _explains(fit, chosen, model)]
+        elif not (able := [model for model in models if beyond(fewest, model) > needed]):
+            break
+        fewest = min(able, key=lambda model: model.misfit, default=None)
+    return fewest
+
+
+def _begun(
+    fit: Fit, best: FittedModel, item: tuple[Sequence[_Member], Vector]
+) -> FittedModel | None:
+    """Fit a set in place of all causes, begun where derivatives have it; None: no model has it."""
+    members, sizes = item
+    active, point = tuple(member.effect for member in members), best.point
+    for effect in best.active:
+        point = point if effect in active else without(point, effect)
+    for member, size in zip(members, sizes, strict=True):
+        low, high = fit.unknowns.bounds(member.effect, member.effect.size)
+        point = sized(point, member.effect, member.shape, float(np.clip(size, low, high)))
+    start = fit.tried(point)
+    if start is None:
+        return None
+    spread, sought = best.linearised.spread, best.linearised.deviance + fit.decides.form
+    return differentiable(partial(fitted, fit, start, active, spread=spread, sought=sought))
+
+
+def _explains(fit: Fit, chosen: Selection, model: FittedModel) -> bool:
+    """Whether a fit needs less than the causes and explains as much, or explains what is left."""
+    best = chosen.best
+    if below_what_matters(model):
+        return False
+    if len(model.active) < len(best.active) and beyond(model, best) < fit.decides.form:
+        return True
+    more = beyond(best, model) > fit.decides.needed
+    return more and _noise_alone(fit, chosen, model)
+
+
+def _noise_alone(fit: Fit, chosen: Selection, model: FittedModel) -> bool:
+    """Whether a fit leaves noise alone, of what it was fitted to and of what was held out."""
+    validation = CrossValidation(fit)
+    fast = validation.fast(chosen.base, model)
+    return is_clean(fit, model) and validation.noise_alone(model, fast=fast)
+
+
+def _sizes_in_words(fit: Fit, model: FittedModel) -> list[str]:
+    """Each member of a fit with its size and the 95 % interval of that."""
+    trial = score_test(fit, fit.linearise(model.linearised, model.active), ())
+    reaches = BAND * np.sqrt(np.diag(trial.covariance()))
+    texts = []
+    for effect in model.active:
+        size = model.point.sizes[effect.name, effect.label]
+        size += fit.unknowns.nominal(effect, effect.size)
+        reach = float(reaches[trial.joint.known.index((effect.name, effect.label))])
+        unit = fit.unknowns.unit(effect, effect.size)
+        text = with_interval(size, size - reach, size + reach, unit)
+        texts.append(f"{effect.text}: {text}")
+    return texts
+
+
+def otherwise_held(fit: Fit, chosen: Selection) -> NearestCandidate | None:
+    """An input that is held otherwise between samples than is said, which alone explains more.
+
+    It then acts up to a sample earlier or later, which its own delay or lag is most like: inputs
+    for which one of these was fitted are tried.
+    """
+    late = {name for step in chosen.steps for rival in step.rivals for name in rival.names}
+    for signal in fit.inputs:
+        if not {f"{INPUT_DELAY}[{signal.name}]", f"{INPUT_LAG}[{signal.name}]"} & late:
+            continue
+        for key, other in signal.otherwise_held.items():
+            model = differentiable(partial(_nominal_as_held, fit, chosen, other))
+            if model is None:
+                continue
+            was, left = (float(m.linearised.squares.max()) for m in (chosen.base, model))
+            if left > 1.0 + fit.decides.excess or not is_clean(fit, model):
+                continue
+            if beyond(chosen.best, model) > fit.decides.needed:
+                removed = 1.0 - max(left - 1.0, 0.0) / (was - 1.0)
+                text = f"{signal.label} with held = {key} in [inputs.{signal.name}]"
+                return NearestCandidate(
+                    (f"held = {key}",), removed, _REASONS, change=text, corrected="the system file"
+                )
+    return None
+
+
+def _nominal_as_held(fit: Fit, chosen: Selection, signal: Signal) -> FittedModel:
+    """The nominal model, fitted where an input is held as this one is."""
+    with fit.held(signal.name, signal.held) as as_held:
+        return anew(as_held, chosen.base.point, ())
