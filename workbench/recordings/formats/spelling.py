@@ -80,9 +80,9 @@ _FROM_ZERO = re.compile(
 _SIGNS = str.maketrans(
     {"²": "2", "³": "3", "⁻": "-", "¹": "1", "·": ".", "⋅": ".", "\u03a9": "Ohm", "\u2126": "Ohm"}
 )
-# Temperatures have a zero of their own in SI; and what a unit is for a quantity that has no other.
 # What SI has, and nobody measures in: Ms is written for ms, Mm for mm.
 _NEVER = frozenset({"Mm", "Ms"})
+# Temperatures have a zero of their own in SI; and what a unit is for a quantity that has no other.
 _SCALES = {"degC": (1.0, 273.15), "degF": (5.0 / 9.0, 459.67 * 5.0 / 9.0)}
 _FOR = {
     "m/s2": {"g": "gn", "G": "gn", "mg": "mgn"},
