@@ -780,6 +780,30 @@ def test_a_gain_for_another_model_leads_no_run_astray(tmp_path):
     assert cause.parameters["change"].low < cs - 1500.0 < cause.parameters["change"].high
 
 
+def test_what_a_sensor_lacks_is_taken_from_no_run_that_was_led_astray(tmp_path, monkeypatch):
+    """A reading that lags was made straight by a led run of 1e159 K, which ended the diagnosis."""
+    build_text(tmp_path, machine_file("quarter_car/Quarter.mo"))
+    (tmp_path / "system.toml").write_text(machine_file("quarter_car/system.toml"))
+    time, rng = np.arange(0.0, 4.0, 0.005), np.random.default_rng(5)
+    shaker = 0.01 * np.sin(9.0 * time) + 7e-4 * rng.standard_normal(time.size)
+    a, travel = 0.05 * rng.standard_normal(time.size), 2e-4 * rng.standard_normal(time.size)
+    columns = {"time [s]": time, "zr [m]": shaker, "a [m/s2]": a, "travel [m]": travel}
+    write_case(tmp_path / "recordings/0", columns, "Shaken")
+    system = load_system(tmp_path)
+    cases, lagging = read_cases(tmp_path / "recordings", system), {"SensorLag[travel].lag": 0.005}
+    right = Predictor.errors
+    with ResidualModel(ModelSource(tmp_path / "Quarter.fmu", system, {}), cases) as simulations:
+        assert simulations.recordings[0].lead.noisy
+        away = 1e30 * time[:, None]
+        monkeypatch.setattr(
+            Predictor,
+            "errors",
+            lambda self, own, values: right(self, own, values) + away * (own.lead is not None),
+        )
+        (free,), (straight,) = simulations.predicted([{}]), simulations.predicted([lagging])
+    assert_allclose(straight, free, atol=1e-9)
+
+
 @pytest.fixture(scope="module")
 def kettle(tmp_path_factory) -> Path:
     """Folder of an FMU whose states are temperatures, with its system file."""

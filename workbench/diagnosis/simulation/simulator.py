@@ -515,8 +515,8 @@ class Simulator:
         # by one that nothing leads.
         straight, known = read_.free, self._known(number, values)
         for _ in range(_STRAIGHTENED):
-            seen = straight.y - self._predictor.errors(straight, known)
-            straight = straightened(read_, seen, wrong)
+            errors, _ = self._led(straight, lambda own: (self._predictor.errors(own, known), None))
+            straight = straightened(read_, straight.y - errors, wrong)
         return straight
 
     def _wrong(self, values: Mapping[str, float]) -> dict[str, SensorReading]:
