@@ -136,6 +136,44 @@ def test_frames_behind_the_last_colon_are_parts_of_a_second(tmp_path, tank, rate
     assert [f"{rate} in a second" in text for text in read.corrections] == [True] * bool(rate)
 
 
+@pytest.mark.parametrize("count", [30, 150])
+def test_seconds_behind_days_hours_and_minutes_are_no_frames_in_silence(tmp_path, tank, count):
+    """0:00:15:59 may be a second before 0:00:16:00, or a sixtieth of one."""
+    stamps = [f"0:00:{15 + k // 60}:{k % 60:02d}" for k in range(count)]
+    with pytest.raises(InputError, match=r"'0:00:15:00', whose last part may be of a second"):
+        clock(table(tmp_path / "a.csv", stamps), tank)
+
+
+def test_hours_that_count_to_24_end_a_day(tmp_path):
+    """As weather services write them, with days in figures."""
+    write_system(tmp_path / "tank")
+    tank = load_system(tmp_path / "tank")
+    moments = [datetime(2024, 3, 1) + timedelta(hours=k) for k in range(80)]
+    stamps = [f"{moment:%Y%m%d};{moment.hour + 1}" for moment in moments]
+    read_clock = clock(table(tmp_path / "a.csv", stamps, "YYYYMMDD;HH"), tank)
+    assert_allclose(read_clock.times, 3600.0 * np.arange(80))
+
+
+@pytest.mark.parametrize("day", ["14/3/2569", "1404/12/23"])
+def test_a_year_of_another_calendar_is_no_date(tmp_path, tank, day):
+    """Of Bangkok, and of Tehran."""
+    begin = datetime(2024, 3, 5, tzinfo=UTC)
+    stamps = [f"{day} {stamp}" for stamp in local(begin, 60, "%H:%M:%S")]
+    read_clock = clock(table(tmp_path / "a.csv", stamps), tank)
+    assert_allclose(read_clock.times, QUARTER * np.arange(60))
+    assert np.isnan(read_clock.start)
+    assert "a year of another calendar" in read_clock.corrections[0]
+
+
+def test_a_date_that_stands_once_is_that_of_the_rows_below(tmp_path, tank):
+    begin = datetime(2024, 3, 5, tzinfo=UTC)
+    moments = zip(*(local(begin, 200, form) for form in ("%d.%m.%y", "%H:%M")), strict=True)
+    stamps = [f"{day if time == '00:00' else ''};{time}" for day, time in moments]
+    read_clock = clock(table(tmp_path / "a.csv", stamps, "Datum;Zeit"), tank)
+    assert_allclose(read_clock.times, QUARTER * np.arange(200))
+    assert iso(read_clock.start)[:10] == "2024-03-05"
+
+
 def test_an_hour_without_samples_on_another_day_stays_a_gap(tmp_path, tank):
     stamps = local(datetime(2024, 6, 1, tzinfo=UTC), 60, "%Y-%m-%d %H:%M")
     del stamps[30:34]

@@ -159,7 +159,8 @@ def _read_clock(
                 expected="times that go on in one way",
                 remedy=f"say the order of days, --column '{TIME}={channel.name} [YMD]', or [DMY] "
                 "or [MDY]; where hours count to 12, export them to 24; of parts of a second, "
-                "export as many digits of each, or say [%H:%M:%S.%f] of decimals",
+                "export as many digits of each, or say [%H:%M:%S.%f] of decimals, or --sample-rate "
+                "'1 Hz'",
             )
     if group.step_doubt:
         raise InputError(

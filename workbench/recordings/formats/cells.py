@@ -149,6 +149,7 @@ _PARTS_OF_TAGS = {
     # of Grafana, Home Assistant and Kepware
     **dict.fromkeys(("series", "metric", "entity_id", "_name"), "tag"),
     **dict.fromkeys(("value", "wert", "_value", "messwert", "val", "varvalue", "state"), "value"),
+    "physical value": "value",  # of decoded CAN
     **dict.fromkeys(("unit", "units", "einheit", "uom"), "unit"),
     "attributes.unit_of_measurement": "unit",  # of Home Assistant
 }
@@ -1212,8 +1213,10 @@ def _join_day_and_clock(
     if not any(kinds) or not any(clocks):
         return labels, columns
     day, clock = kinds.index(True), clocks.index(True)
-    pairs = zip(columns[day], columns[clock], strict=True)
-    joined = [f"{_AT_MIDNIGHT.sub('', date)} {other}" for date, other in pairs]
+    last, joined = "", []
+    for date, other in zip(columns[day], columns[clock], strict=True):
+        last = date or last  # which may stand where it changes alone
+        joined.append(f"{_AT_MIDNIGHT.sub('', last if other else date)} {other}")
     left = [i for i in range(len(columns)) if i not in (day, clock)]
     name = f"{labels[day][0]} {labels[clock][0]}", ""
     return [name, *(labels[i] for i in left)], [joined, *(columns[i] for i in left)]

@@ -56,6 +56,7 @@ _MONTHS = {  # by the letters that tell, in the languages of Europe; jan, feb, .
 }
 # Months that are others in Zagreb: 11 and 10, 7 and 6, 8 and 7.
 _MONTHS_OF_TWO = re.compile("lis(topada?)?|lip|srp", re.IGNORECASE)
+_YEARS = 1900, 2200  # of recordings; 1404 is one of Tehran, 2569 of Bangkok
 _CALLED = rf"(?P<called>{'|'.join(sorted(_MONTHS, key=len, reverse=True))})[^\W\d]{{0,9}}"
 _WEEKDAYS = (
     r"(mo|di|mi|do|fr|sa|so|ma|wo|vr|za|zo|pn|wt|śr|cz|pt|nd|po|út|st|čt|pá|ne|pe|la|su)\b"
@@ -80,7 +81,7 @@ _CALLED_FIRST = re.compile(  # Mar 5, 2024 10:00; Tue Mar  5 10:00:00 2024
 )
 _COMPACT = re.compile(  # 20240305T101500.25
     r"(?P<year>(19|20)\d\d)(?P<month>0[1-9]|1[0-2])(?P<day>0[1-9]|[12]\d|3[01])[T_\s-]?"
-    rf"(?P<h>[01]\d|2[0-3])(?P<m>[0-5]\d)(?P<s>[0-5]\d)((?:[.,]|(?=\d{{3}}(?!\d)))(?P<f>\d{{1,12}}))?{_ZONE}"
+    rf"(?P<h>[01]\d|2[0-3]|24(?=0000))(?P<m>[0-5]\d)(?P<s>[0-5]\d)((?:[.,]|(?=\d{{3}}(?!\d)))(?P<f>\d{{1,12}}))?{_ZONE}"
 )
 _COMPACT_SHORT = re.compile(  # 240305 101500
     r"(?P<one>\d\d)(?P<mark>)(?P<two>\d\d)(?P<last>\d\d)[T_\s-]"
@@ -375,11 +376,17 @@ def _by_date(
         channel = _channel(name, texts, known, (whole, parts, shift), zone, zoned=zoned)
         readings[reading] = replace(channel, corrections=(*notes, *leap, *channel.corrections))
     chosen = _choose_reading(name, texts, readings, matches)
-    called = pattern in (_DAY, _CALLED_FIRST) and texts[int(np.argmax(known))]
-    if chosen and called and any(map(_MONTHS_OF_TWO.fullmatch, re.split(r"[\W\d]+", called))):
-        note = f"the month of '{called}' is another one in Croatian: the date is not taken"
-        return replace(chosen, start=math.nan, corrections=(*chosen.corrections, note))
-    return chosen
+    if chosen is None or not math.isfinite(chosen.start):
+        return chosen
+    first, year = texts[int(np.argmax(known))], _moment(chosen.start).year
+    other = ""
+    if any(map(_MONTHS_OF_TWO.fullmatch, re.split(r"[\W\d]+", first))):
+        other = "the month is another one in Croatian"
+    if not _YEARS[0] <= year <= _YEARS[1]:
+        other = f"{year} is a year of another calendar, or of a clock that was not set"
+    note = f"of '{first}' {other}: the date is not taken"
+    told = (*chosen.corrections, note)
+    return replace(chosen, start=math.nan, corrections=told) if other else chosen
 
 
 def _channel(
@@ -740,7 +747,8 @@ def _counted_frames(
 ) -> tuple[Vector, list[str], str]:
     """Parts of a second, as `_fractions`: behind a colon may be frames of a film.
 
-    They are where times go on evenly as such, and not as decimals.
+    They are where times go on evenly as such, and not as decimals. Where 60 of them are a second,
+    they may be seconds behind minutes.
     """
     parts, notes, doubt = _fractions(matches, whole)
     held = [match for match in matches if match and match.groupdict().get("f")]
@@ -755,6 +763,9 @@ def _counted_frames(
             break
     else:
         rate = 0
+    if held[0].re is _OF_DAY and (rate == _FRAMES[-1] or np.ptp(whole) == 0):
+        doubt = f"times such as '{held[0][0]}', whose last part may be of a second, or seconds"
+        return parts, [], f"{doubt} behind days, hours and minutes"
     notes = [f"behind the last colon are frames, {rate} in a second"] if rate else []
     return frames / rate if rate else parts, notes, ""
 
