@@ -438,6 +438,32 @@ def test_samples_that_are_good_in_several_ways_are_samples(tmp_path):
     assert np.flatnonzero(np.isnan(group.channels[2].values)).tolist() == [30]
 
 
+@pytest.mark.parametrize(
+    ("name", "good", "bad"),
+    [
+        *(("quality_code", "192", "24"), ("h IsValid", "True", "False"), ("h quality", "0", "1")),
+        *(("h.Status", "Good", "NoData"), ("h Quality Code", "0", "2147483648")),
+        *(("h_quality", "65472", "24"), ("is_valid", "1", "0")),
+    ],
+)
+def test_plausible_samples_that_a_column_of_codes_calls_bad_are_gaps(tmp_path, name, good, bad):
+    rows = [f"{k};4.5;950.{k};{bad if k % 20 == 3 else good}" for k in range(60)]
+    lines = [f"time [s];inflow [l/s];h [mm];{name}", *rows]
+    (group,) = read_recorded_file(table(tmp_path / "a.csv", lines)).groups
+    (level,) = (channel for channel in group.channels if channel.name == "h")
+    assert np.flatnonzero(np.isnan(level.values)).tolist() == [3, 23, 43]
+
+
+@pytest.mark.parametrize(
+    ("name", "codes"), [("h_flag", "01"), ("h StatusCode", ["0", "2147483648"])]
+)
+def test_codes_of_one_channel_that_may_call_it_bad_are_asked_about(tmp_path, tank, name, codes):
+    rows = [f"{k};4.5;950.{k};{codes[k % 20 == 3]}" for k in range(60)]
+    lines = [f"time [s];inflow [l/s];h [mm];{name}", *rows]
+    (doubt,) = propose([read_recorded_file(table(tmp_path / "a.csv", lines))], tank, {}).doubts
+    assert f"'{name}' beside it with {codes[0]}, {codes[1]}" in doubt
+
+
 @pytest.mark.parametrize(("name", "states"), [("Status", ["OK", "Running"]), ("Quality", [""])])
 def test_a_status_of_a_machine_is_no_verdict_on_samples(tmp_path, name, states):
     """Nor is a column of quality that nobody fills, as of ThingSpeak."""

@@ -113,9 +113,12 @@ _FORTRAN = re.compile(r"(\d\.?)[dD]([+-]?\d+)")
 # say so, and the code of OPC from which on samples are.
 _VALID = ("validity", "valid", "g\u00fcltig", "gueltig")
 _VERDICT = re.compile(
-    rf"((?P<own>.+?)[ _.])?(?P<word>quality|qual|qualit\u00e4t|status|{'|'.join(_VALID)}|(?<=_)q)",
+    r"((?!is[ _])(?P<own>.+?)[ _.])?(?P<word>quality|qual|qualit\u00e4t|status|flag"
+    rf"|(is[ _]?)?({'|'.join(_VALID)})"
+    r"|(?<=_)q)([ _]?(code|flag))?",
     re.IGNORECASE,
 )
+_OF_MACHINES = ("status", "flag")  # unless they say of one column that it is good
 _FEW_STATES = 3  # more are no verdicts, but a measure
 _GOOD, _OPC_GOOD = frozenset(("good", "ok", "valid", "gut", "true", "g")), 192
 _BAD = frozenset(("bad", "uncertain", "invalid", "error", "fault", "schlecht", "unsicher"))
@@ -922,8 +925,10 @@ def read_group(
         notes.append(f"'{labels[i][0]}' holds {'texts' if any(cells) else 'nothing'}")
         none = np.full(len(cells), math.nan)
         left.append(FileChannel(labels[i][0], "", none, texts=tuple(cells)))
-    for k, text in _leave_out_bad(labels, columns, numbers):
-        said[k].append(text)
+    for k, text, question in _leave_out_bad(labels, columns, numbers):
+        said[k] += [text] * bool(text)
+        if question:
+            remarks[labels[k][0]] = question
     reading = reading_of([*numbers.values(), *beside], where, commas=commas)
     channels: list[FileChannel] = []
     for i, cells in numbers.items():
@@ -973,8 +978,11 @@ def _leave_out_bad(
     labels: Sequence[tuple[str, str]],
     columns: Sequence[Sequence[str]],
     numbers: dict[int, list[str]],
-) -> Iterator[tuple[int, str]]:
-    """Empty the cells that another column calls bad, as servers of plants do; say of which."""
+) -> Iterator[tuple[int, str, str]]:
+    """Empty the cells that another column calls bad, as servers of plants do; say of which.
+
+    And what may be verdicts of another column, which somebody must say.
+    """
     verdicts = {
         i: match for i, (name, _) in enumerate(labels) if (match := _VERDICT.fullmatch(name))
     }
@@ -988,21 +996,28 @@ def _leave_out_bad(
         ]
         states = [cell.strip().casefold() for cell in columns[i]]
         words = {_first_word(state) for state in states if state}
-        if not words or (match["word"].casefold() == "status" and not words <= _GOOD | _BAD):
+        unclear = match["word"].casefold() in _OF_MACHINES and not (
+            words <= _GOOD | _BAD or "good" in words
+        )
+        if not words or (unclear and not own):
             continue  # of a machine
         good = {state for state in states if _is_good(state, match["word"])}
         counts = Counter(filter(None, states)).most_common(_FEW_STATES + 1)
         if not good and len(counts) <= _FEW_STATES and 2 * counts[0][1] > len(states):
             good = {counts[0][0]}  # of codes that are not known, what most samples have
         bad = [k for k, state in enumerate(states) if state and state not in good]
-        if not judged or not bad:
+        if not judged or not bad or (unclear and len(counts) > _FEW_STATES):
+            continue
+        if unclear:
+            codes = ", ".join(sorted(state for state, _ in counts))
+            yield from ((k, "", f"'{labels[i][0]}' beside it with {codes}") for k in judged)
             continue
         left = set(bad) if good else set()
         called = f"{len(bad)} samples that '{labels[i][0]}' calls {columns[i][bad[0]]!r} are gaps"
         unknown = f"'{labels[i][0]}' may tell good samples from bad ones; all were taken"
         for k in judged:
             numbers[k] = ["" if n in left else cell for n, cell in enumerate(numbers[k])]
-            yield k, called if good else unknown
+            yield k, called if good else unknown, ""
 
 
 def _signs_beside(
@@ -1035,8 +1050,9 @@ def _signs_beside(
 
 def _is_good(state: str, word: str) -> bool:
     """Whether a state, in a column of some name, says that a sample is good."""
-    stated = _first_word(state) in _GOOD or (state == "1" and word.casefold() in _VALID)
-    return stated or (state.isdecimal() and int(state) >= _OPC_GOOD)
+    is_valid = state == "1" and word.casefold().endswith(_VALID)
+    of_opc = state.isdecimal() and int(state) & _OPC_GOOD == _OPC_GOOD
+    return _first_word(state) in _GOOD or is_valid or of_opc
 
 
 def _first_word(state: str) -> str:
