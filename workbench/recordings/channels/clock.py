@@ -158,9 +158,9 @@ def _read_clock(
                 found=channel.doubt,
                 expected="times that go on in one way",
                 remedy=f"say the order of days, --column '{TIME}={channel.name} [YMD]', or [DMY] "
-                "or [MDY]; where hours count to 12, export them to 24; of parts of a second, "
-                "export as many digits of each, or say [%H:%M:%S.%f] of decimals, or --sample-rate "
-                "'1 Hz'",
+                "or [MDY]; where hours count to 12, export them to 24. Where parts of a second are "
+                "in doubt, export as many digits of each, or say [%H:%M:%S.%f] of decimals. Or "
+                "give --sample-rate '200 Hz'",
             )
     if group.step_doubt:
         raise InputError(
