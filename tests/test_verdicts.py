@@ -272,6 +272,7 @@ def test_causes_that_imitate_two_parameters_together_are_no_answer(tmp_path):
     (_, *motor), (_, *wheel) = sizes_in(outcome.sentence)
     assert motor[0] < 2.3e-3 < motor[1] < motor[0] + 1e-4
     assert wheel[0] < 1.1e-2 < wheel[1] < wheel[0] + 1e-4
+    assert "but not all of them are effects" in outcome.diagnosis.nearest[0].text
     assert any("if Jm and Jl may be so, correct the model" in step for step in outcome.next_steps)
 
 

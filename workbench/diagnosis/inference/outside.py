@@ -33,7 +33,8 @@ from workbench.runtime.engine import Reporter
 from workbench.system.parts import Signal
 from workbench.system.units import BAND, with_interval
 
-_REASONS = ("it is no effect of the catalogue",)  # why such a change is no cause
+_ONE = ("it is no effect of the catalogue",)  # why such a change is no cause
+_SOME = ("not all of them are effects of the catalogue",)
 _TOGETHER = 2  # changes that are sought together where causes are no answer
 
 
@@ -111,7 +112,8 @@ def outside_changes(
     fast = validation.fast(chosen.base, model)
     removed = validation.explained(chosen.base, model, fast=fast)[0]
     text = " and ".join(_sizes_in_words(other, model))
-    return NearestCandidate(model.names, removed, _REASONS, change=text)
+    reasons = _ONE if len(model.active) == 1 else _SOME
+    return NearestCandidate(model.names, removed, reasons, change=text)
 
 
 def _single(
@@ -226,7 +228,7 @@ def otherwise_held(fit: Fit, chosen: Selection) -> NearestCandidate | None:
                 removed = 1.0 - max(left - 1.0, 0.0) / (was - 1.0)
                 text = f"{signal.label} with held = {key} in [inputs.{signal.name}]"
                 return NearestCandidate(
-                    (f"held = {key}",), removed, _REASONS, change=text, corrected="the system file"
+                    (f"held = {key}",), removed, _ONE, change=text, corrected="the system file"
                 )
     return None
 
