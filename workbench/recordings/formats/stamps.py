@@ -385,8 +385,8 @@ def _by_date(
     if not _YEARS[0] <= year <= _YEARS[1]:
         other = f"{year} is a year of another calendar, or of a clock that was not set"
     note = f"of '{first}' {other}: the date is not taken"
-    told = (*chosen.corrections, note)
-    return replace(chosen, start=math.nan, corrections=told) if other else chosen
+    corrections = (*chosen.corrections, note)
+    return replace(chosen, start=math.nan, corrections=corrections) if other else chosen
 
 
 def _channel(
