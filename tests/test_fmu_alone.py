@@ -303,6 +303,7 @@ def test_what_needs_the_equations_says_so(tank, tmp_path):
     outcome = quietly(tank, recordings, "SensorOffset[level]")
     problem = Problem(tank, outcome.cases, None, effects)
     assert outcome.diagnosis.verdict != "found"
+    assert "the model's own tool, export the FMU" in outcome.next_steps[-2]
     assert "put the Modelica library" in outcome.next_steps[-1]
     with pytest.raises(InputError, match=re.escape("no Modelica library package.mo")):
         propose(outcome, problem, Engine(out=tmp_path))

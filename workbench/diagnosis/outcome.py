@@ -280,8 +280,10 @@ class Outcome:
         if not self.system.library.is_file():
             return [
                 *widen,
-                "put the Modelica library of the model beside the system file: effects of its own, "
-                "and laws that --propose infers, act inside of its equations",
+                "add what may be missing in the model's own tool, export the FMU, and diagnose "
+                "again",
+                "put the Modelica library of the model beside the system file, if you have it: "
+                "effects of its own, and laws that --propose infers, act inside of its equations",
             ]
         return [
             "infer a law from these recordings: workbench diagnose ... --propose",

@@ -225,8 +225,8 @@ def meaning_doubt(
     turn = conversion(si, "rad")
     if turn is not None and (rounds := _rounds(turn.factor * values)):
         return (
-            f"its values go round, by one turn back {rounds} times; have the turns counted before "
-            f"the import, or --column '{column} [{unit}]' keeps the jumps"
+            f"its values go round (steps back by one turn: {rounds}); have the turns counted "
+            f"before the import, or --column '{column} [{unit}]' keeps the jumps"
         )
     return ""
 
