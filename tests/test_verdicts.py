@@ -46,6 +46,20 @@ unit = "A"
 noise = "0.02 A"
 scale = "5 A"
 """
+EXCHANGER = """model Exchanger "Water heats water"
+  parameter Real UA(unit="W/K", min=1.0) = 900.0 "Conductance";
+  parameter Real C(unit="J/K", min=1.0) = 9000.0 "Heat capacity of each side";
+  parameter Real cp(unit="J/(kg.K)") = 4180.0 "Specific heat";
+  input Real m(unit="kg/s", start=0.5) "Flow of both sides";
+  input Real warm(unit="K", start=350.0) "Inlet of the hot side";
+  input Real cool(unit="K", start=288.0) "Inlet of the cold side";
+  output Real hot(unit="K", start=335.0, fixed=true, nominal=300.0) "Outlet of the hot side";
+  output Real cold(unit="K", start=303.0, fixed=true, nominal=300.0) "Outlet of the cold side";
+equation
+  C*der(hot) = m*cp*(warm - hot) - UA*(hot - cold);
+  C*der(cold) = m*cp*(cool - cold) + UA*(hot - cold);
+end Exchanger;
+"""
 # kg.m2, N.m/rad, N.m.s/rad of the model of tests/machines/bearings
 JM, JL, STIFFNESS, DAMPING, FRICTION = 2e-3, 1e-2, 20.0, 0.04, 5e-3
 
@@ -310,6 +324,73 @@ def test_causes_that_imitate_an_effect_in_one_place_together_are_no_answer(tmp_p
 def test_a_cause_of_the_catalogue_is_found_beside_parameters_that_imitate_it(tmp_path):
     """A healthy drive lacks nothing; what both bearings do alike is theirs."""
     assert drive(tmp_path / "sound", 100).diagnosis.verdict == "nothing"
+
+
+def exchanger(folder: Path, seed: int, conductance: float, zero: float) -> Outcome:
+    """Diagnose three quarters of an hour of a heat exchanger as an FMU alone.
+
+    Parameters
+    ----------
+    conductance : of its walls [W/K].
+    zero : what the sensor of the cold outlet reads too much [K].
+    """
+    build_text(folder, EXCHANGER)
+    signals = {
+        "inputs.m": ("kg/s", 0.001, 0.7),
+        "inputs.warm": ("K", 0.05, 350.0),
+        "inputs.cool": ("K", 0.05, 290.0),
+        "outputs.hot": ("K", 0.1, 340.0),
+        "outputs.cold": ("K", 0.1, 310.0),
+    }
+    tables = [
+        f'[{name}]\nunit = "{unit}"\nnoise = "{noise} {unit}"\nscale = "{scale} {unit}"\n'
+        for name, (unit, noise, scale) in signals.items()
+    ]
+    head = 'title = "An exchanger"\nsample_time = "2 s"\ncases = "recordings"\n'
+    models = '[models]\nobserver = { fmu = "Exchanger.fmu" }\n'
+    (folder / "system.toml").write_text("".join([head, models, *tables]))
+    rng, time = np.random.default_rng(seed), 2.0 * np.arange(451)
+
+    def course(low, high, period):
+        knots = np.arange(-period, 900.0 + 2.0 * period, period)
+        values = rng.uniform(low, high, knots.size)
+        return lambda t: np.interp(t, knots, values)
+
+    for k in range(3):
+        m, warm, cool = course(0.25, 0.8, 180.0), course(343, 358, 400.0), course(286, 290, 500.0)
+
+        def rates(t, x, m=m, warm=warm, cool=cool):
+            heat = conductance * (x[0] - x[1])
+            hot = (m(t) * 4180.0 * (warm(t) - x[0]) - heat) / 9000.0
+            return hot, (m(t) * 4180.0 * (cool(t) - x[1]) + heat) / 9000.0
+
+        x = solve_ivp(rates, (0.0, 900.0), (335, 303), t_eval=time, rtol=1e-9, max_step=2.0).y
+        columns = {
+            "time [s]": time,
+            "m [kg/s]": m(time) + 0.001 * rng.standard_normal(time.size),
+            "warm [K]": warm(time) + 0.05 * rng.standard_normal(time.size),
+            "cool [K]": cool(time) + 0.05 * rng.standard_normal(time.size),
+            "hot [K]": x[0] + 0.1 * rng.standard_normal(time.size),
+            "cold [K]": x[1] + zero + 0.1 * rng.standard_normal(time.size),
+        }
+        write_case(folder / "recordings" / f"{k}", columns, f"Run {k}", "%.8g")
+    return diagnosed(load_system(str(folder)), folder / "recordings", folder / "out")
+
+
+@pytest.mark.parametrize(
+    ("seed", "conductance", "zero"),
+    [(1, 720.0, 1.5), pytest.param(2, 1050.0, -2.0, marks=pytest.mark.long)],
+)
+def test_two_causes_are_found_of_which_neither_is_significant_alone(
+    tmp_path, seed, conductance, zero
+):
+    """Of slow errors few are independent: two sensors that were right 'explained a part'."""
+    outcome = exchanger(tmp_path, seed, conductance, zero)
+    assert outcome.diagnosis.verdict == "found"
+    sizes = {c.effect.name: next(iter(c.parameters.values())) for c in outcome.diagnosis.causes}
+    assert set(sizes) == {"UA", "SensorOffset[cold]"}
+    assert sizes["UA"].low < conductance - 900.0 < sizes["UA"].high
+    assert sizes["SensorOffset[cold]"].low < zero < sizes["SensorOffset[cold]"].high
 
 
 def test_a_gap_matters_where_a_state_keeps_what_an_input_did_in_it():

@@ -16,6 +16,7 @@ from workbench.diagnosis.inference.search import (
     is_clean,
 )
 from workbench.diagnosis.inference.selection import Selection
+from workbench.diagnosis.inference.sets import Sets
 from workbench.system.units import with_unit
 
 NEAREST = 3  # candidates that are named where none is accepted
@@ -135,18 +136,26 @@ def below_what_matters(model: FittedModel) -> bool:
     return all(abs(sizes[effect.name, effect.label]) < effect.matters for effect in model.active)
 
 
-def single_effect(
+def passed_over(
     fit: Fit, chosen: Selection, fits: Mapping[tuple[str, ...], FittedModel]
 ) -> FittedModel | None:
-    """A single effect that leaves noise alone, where the search did not get.
+    """A single effect that leaves noise alone, or else two, where the search did not get.
 
-    Of what switches, derivatives hold over so little that they say nothing of it.
+    Of what switches, derivatives hold over so little that they say nothing of it. Of two effects
+    that each explain a part, neither may be significant while the other is not there.
     """
+    singles = [model for model in fits.values() if len(model.active) == 1]
+    return _whole(fit, chosen, singles) or _whole(
+        fit, chosen, Sets(chosen.best, chosen.trial).fits(fit, count=2)
+    )
+
+
+def _whole(fit: Fit, chosen: Selection, models: Sequence[FittedModel]) -> FittedModel | None:
+    """The best of fits that leave noise alone and clearly less than what was found."""
     able = [
         model
-        for model in fits.values()
-        if len(model.active) == 1
-        and model is not chosen.best
+        for model in models
+        if model is not chosen.best
         and beyond(chosen.best, model) > fit.decides.needed
         and is_clean(fit, model)
         and chosen.validation.noise_alone(model, fast=chosen.validation.fast(chosen.base, model))

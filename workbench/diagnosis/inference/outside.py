@@ -1,34 +1,28 @@
 """Changes that no effect of the catalogue is, and that explain as much as causes do, or more."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import partial
-from itertools import combinations
-from typing import NamedTuple
 
 import numpy as np
 
-from workbench.arrays import Vector
 from workbench.diagnosis.data.clocks import INPUT_DELAY
 from workbench.diagnosis.effects.candidates import INPUT_LAG
-from workbench.diagnosis.effects.catalogue import Effect, variant
+from workbench.diagnosis.effects.catalogue import Effect
 from workbench.diagnosis.inference.crossvalidation import CrossValidation
 from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.nearest import NEAREST, NearestCandidate, below_what_matters
-from workbench.diagnosis.inference.quadratic import minima_of
-from workbench.diagnosis.inference.score_test import CandidateScore, ScoreTest, score_test
+from workbench.diagnosis.inference.score_test import CandidateScore, score_test
 from workbench.diagnosis.inference.search import (
     FittedModel,
     beyond,
     differentiable,
     examine,
-    fitted,
     is_clean,
     rival_fits,
-    sized,
     starts_of,
-    without,
 )
 from workbench.diagnosis.inference.selection import Selection, anew
+from workbench.diagnosis.inference.sets import Sets
 from workbench.runtime.engine import Reporter
 from workbench.system.parts import Signal
 from workbench.system.units import BAND, with_interval
@@ -36,53 +30,6 @@ from workbench.system.units import BAND, with_interval
 _ONE = ("it is no effect of the catalogue",)  # why such a change is no cause
 _SOME = ("not all of them are effects of the catalogue",)
 _TOGETHER = 2  # changes that are sought together where causes are no answer
-
-
-class _Member(NamedTuple):
-    """An effect or another change that may be one of several."""
-
-    effect: Effect
-    shape: Mapping[str, float]  # to begin a fit with; empty of a cause, which has its own
-    at: int  # of its size among the unknowns
-
-
-class _Sets:
-    """Sets of changes and effects in place of all causes, as derivatives about these have them.
-
-    Parameters
-    ----------
-    best, trial : the causes, and all else about them.
-    changes : at least one of which each set has.
-    """
-
-    def __init__(self, best: FittedModel, trial: ScoreTest, changes: Sequence[Effect]) -> None:
-        keys = [key for key in trial.joint.shared if key not in trial.levels]
-        causes = [_Member(e, {}, keys.index((e.name, e.label))) for e in best.active]
-        others = [
-            _Member(effect, shape, keys.index((variant(effect, shape), effect.size)))
-            for effect, shape in trial.candidates
-        ]
-        self._able = [m for m in (*causes, *others) if not m.effect.order_locked]
-        self._changes = {change.name for change in changes}
-        self._N, g = trial.joint.reduced(keys)
-        removed = np.zeros(len(keys))
-        for cause in causes:
-            removed[cause.at] = -best.point.sizes[keys[cause.at]]
-        self._slope = g + self._N @ removed
-        self._explained = float((g + self._slope) @ removed)  # chi-squared, by the causes
-
-    def likeliest(self, count: int, near: float) -> list[tuple[tuple[_Member, ...], Vector]]:
-        """Sets of so many that explain most, a share of what causes do or more, and their sizes."""
-        sets = [members for members in combinations(self._able, count) if self._allowed(members)]
-        at = np.array([[member.at for member in members] for members in sets], np.intp)
-        sizes, falls = minima_of(self._N, self._slope, at.reshape(-1, count))
-        first = np.argsort(-falls)[:NEAREST]
-        return [(sets[k], sizes[k]) for k in first if falls[k] > near * self._explained]
-
-    def _allowed(self, members: Sequence[_Member]) -> bool:
-        """Whether some of them are no effects, and none stands twice."""
-        names = {member.effect.name for member in members}
-        return len(names) == len(members) and not names.isdisjoint(self._changes)
 
 
 def outside_changes(
@@ -142,36 +89,17 @@ def _several(
         return None
     causes, needed = len(chosen.best.active), fit.decides.needed
     best, trial = examine(fit, chosen.best, [*fit.unknowns.effects.values()], report)
-    sets, fewest = _Sets(best, trial, changes), None
+    sets, fewest = Sets(best, trial, changes), None
     for count in range(1 if causes > 1 else _TOGETHER, fit.decides.most + 1):
         if fewest is None and count > most:
             break
-        begun = fit.together(partial(_begun, fit, best), sets.likeliest(count, fit.decides.near))
-        models = [model for model in begun if model is not None]
+        models = sets.fits(fit, count)
         if fewest is None:
             able = [model for model in models if _explains(fit, chosen, model)]
         elif not (able := [model for model in models if beyond(fewest, model) > needed]):
             break
         fewest = min(able, key=lambda model: model.misfit, default=None)
     return fewest
-
-
-def _begun(
-    fit: Fit, best: FittedModel, item: tuple[Sequence[_Member], Vector]
-) -> FittedModel | None:
-    """Fit a set in place of all causes, begun where derivatives have it; None: no model has it."""
-    members, sizes = item
-    active, point = tuple(member.effect for member in members), best.point
-    for effect in best.active:
-        point = point if effect in active else without(point, effect)
-    for member, size in zip(members, sizes, strict=True):
-        low, high = fit.unknowns.bounds(member.effect, member.effect.size)
-        point = sized(point, member.effect, member.shape, float(np.clip(size, low, high)))
-    start = fit.tried(point)
-    if start is None:
-        return None
-    spread, sought = best.linearised.spread, best.linearised.deviance + fit.decides.form
-    return differentiable(partial(fitted, fit, start, active, spread=spread, sought=sought))
 
 
 def _explains(fit: Fit, chosen: Selection, model: FittedModel) -> bool:

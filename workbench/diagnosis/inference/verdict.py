@@ -31,7 +31,7 @@ from workbench.diagnosis.inference.nearest import (
     NearestCandidate,
     nearest_candidates,
     nearest_fits,
-    single_effect,
+    passed_over,
     undecided,
 )
 from workbench.diagnosis.inference.nuisance import (
@@ -250,14 +250,17 @@ def _judged(
             much = "as much" if len(change.effects) < len(best.active) else "more"
             does = "alone explains" if len(change.effects) == 1 else "explain"
             objections.append(f"{' and '.join(change.effects)} {does} {much}")
-    nearest: tuple[NearestCandidate, ...] = ()
+    fits: dict[tuple[str, ...], FittedModel] = {}
     if verdict == "unexplained" and late is None:
         report("candidates that come nearest")
         fits = {} if outside else nearest_fits(fit, chosen)
-        if not (refused or change or chosen.interrupted):
-            other = _passed_over(fit, catalogue, chosen, fits, report)
-            if other is not None:
-                return _judged(fit, catalogue, other, astray, report)
+    whole = change is not None or verdict in ("nothing", "found")
+    if not (whole or refused or chosen.interrupted):
+        other = _passed_over(fit, catalogue, chosen, fits, report)
+        if other is not None:
+            return _judged(fit, catalogue, other, astray, report)
+    nearest: tuple[NearestCandidate, ...] = ()
+    if verdict == "unexplained" and late is None:
         others = () if outside else nearest_candidates(fit, chosen, fits, objections)
         nearest = (*filter(None, (outside, change)), *others)[:NEAREST]
     if verdict == "nothing" and not chosen.interrupted:
@@ -373,12 +376,12 @@ def _passed_over(
     fits: Mapping[tuple[str, ...], FittedModel],
     report: Reporter,
 ) -> Selection | None:
-    """What recordings need beside a cause where the search did not get, if that leaves less."""
-    if (whole := single_effect(fit, chosen, fits)) is None:
+    """What recordings need beside causes where the search did not get, if that leaves less."""
+    if (whole := passed_over(fit, chosen, fits)) is None:
         return None
-    report(f"with {whole.active[0].name}, where the fits above did not get")
+    report(f"with {' and '.join(whole.names)}, where the fits above did not get")
     other = _selected_with(fit, catalogue, chosen, whole, report)
-    return other if other.best.active and other.best.misfit < chosen.best.misfit else None
+    return other if beyond(chosen.best, other.best) > fit.decides.needed else None
 
 
 def _selected_with(
