@@ -19,12 +19,12 @@ from importlib import import_module
 from pathlib import Path
 
 from workbench.errors import InputError
-from workbench.recordings.formats.cells import by_tag
 from workbench.recordings.formats.contents import Contents, FileChannel, Group, RecordedFile
 from workbench.recordings.formats.json_text import is_json
 from workbench.recordings.formats.json_text import read as read_as_json
 from workbench.recordings.formats.line_protocol import is_line_protocol
 from workbench.recordings.formats.line_protocol import read as read_lines_of_influx
+from workbench.recordings.formats.tables.parts import by_tag
 from workbench.recordings.formats.text import read as read_as_text
 from workbench.runtime.files import read_bytes
 from workbench.runtime.pool import Pool

@@ -9,9 +9,11 @@ import numpy as np
 
 from workbench.errors import InputError
 from workbench.recordings.formats.arrays import by_place, read_groups
-from workbench.recordings.formats.cells import Cells, find_table, read_group
 from workbench.recordings.formats.contents import Contents, Group
 from workbench.recordings.formats.spelling import name_and_unit, spell_unit
+from workbench.recordings.formats.tables.cells import Cells
+from workbench.recordings.formats.tables.groups import read_group
+from workbench.recordings.formats.tables.samples import find_table
 
 _SCALAR = str | int | float | bool | None
 _FEWEST = 3  # rows of a table

@@ -8,8 +8,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from workbench.errors import InputError
-from workbench.recordings.formats.cells import Cells, read_group
 from workbench.recordings.formats.contents import Contents
+from workbench.recordings.formats.tables.cells import Cells
+from workbench.recordings.formats.tables.groups import read_group
 
 _KEY = r"(?:[^,= \\]|\\.)+"
 _FIELD = rf'{_KEY}=(?:"(?:[^"\\]|\\.)*"|[^, "]+)'

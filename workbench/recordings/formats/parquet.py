@@ -8,9 +8,10 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from workbench.recordings.formats.cells import Cells, read_group
 from workbench.recordings.formats.contents import Contents, FileChannel, Group
 from workbench.recordings.formats.spelling import name_and_unit, spell_unit
+from workbench.recordings.formats.tables.cells import Cells
+from workbench.recordings.formats.tables.groups import read_group
 
 _UNITS = (b"unit", b"units", b"Unit", b"Units", b"UNIT")
 _END = b"\xff\xff\xff\xff\0\0\0\0"  # of a stream

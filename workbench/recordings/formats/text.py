@@ -13,18 +13,14 @@ import numpy as np
 
 from workbench.errors import InputError
 from workbench.recordings.csv import is_cut
-from workbench.recordings.formats.cells import (
-    Cells,
-    find_table,
-    find_tables,
-    is_quantity,
-    numbers_of,
-    parts_of_tables,
-    read_group,
-)
 from workbench.recordings.formats.contents import Contents
 from workbench.recordings.formats.numbers import is_missing, is_number
 from workbench.recordings.formats.stamps import is_stamp
+from workbench.recordings.formats.tables.cells import Cells
+from workbench.recordings.formats.tables.groups import numbers_of, read_group
+from workbench.recordings.formats.tables.parts import parts_of_tables
+from workbench.recordings.formats.tables.samples import find_table, find_tables
+from workbench.recordings.formats.tables.units import is_quantity
 
 _SEPARATORS = {";": "semicolons", "\t": "tabs", "|": "bars", ",": "commas", " ": "spaces"}
 _COMMENT = re.compile(r"(?!\"#\")\s*\"?(#+|%+|//+|!+|\*+)\s*")

@@ -15,9 +15,11 @@ from pathlib import Path
 from typing import Any
 
 from workbench.errors import InputError
-from workbench.recordings.formats.cells import find_tables, parts_of_tables, read_group
 from workbench.recordings.formats.contents import Contents, Group
 from workbench.recordings.formats.numbers import is_number
+from workbench.recordings.formats.tables.groups import read_group
+from workbench.recordings.formats.tables.parts import parts_of_tables
+from workbench.recordings.formats.tables.samples import find_tables
 from workbench.runtime.supervision import quiet_panics
 
 _LOOKED = 200  # rows that tell whether a sheet shows percent
