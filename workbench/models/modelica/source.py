@@ -157,7 +157,14 @@ class Cursor:
 
     def identifier(self) -> str:
         """Take a name without dots, which must come next."""
-        if self.token.kind != "name" or self.token.text in _KEYWORDS:
+        if self.token.text in _KEYWORDS:
+            raise InputError(
+                where=self.where,
+                found=f"'{self.token.text}', a reserved word of Modelica",
+                expected="a name",
+                remedy="use another name, or correct the source",
+            )
+        if self.token.kind != "name":
             raise self.refusal("a name")
         return self.advance().text
 
