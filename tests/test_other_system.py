@@ -96,6 +96,17 @@ def test_outputs_of_one_unit_share_a_panel(boiler):
     assert "Temperature of the room TRoom" in titles
 
 
+def test_percent_of_an_absolute_temperature_is_said_in_kelvin_and_of_its_range(result):
+    """An error of 1 K is 0.3 % of 300 K, and much of what a vessel warms up by."""
+    warm = 293.0 + np.linspace(0.0, 14.0, result.case.time.size)  # mean 300 K
+    absolute = replace(result.case, signals={**result.case.signals, "T": warm})
+    note = "T moves by 14 K, far from zero: 1 % of its mean is 3 K, which is 21 % of that"
+    assert replace(result, case=absolute).scale_notes() == [note]
+    assert f"01_heating: {note}." in format_table(result.system, [replace(result, case=absolute)])
+    above = replace(absolute, signals={**absolute.signals, "T": warm - 293.0})
+    assert not replace(result, case=above).scale_notes()
+
+
 def test_table_and_page_speak_of_the_judged_signal(result, tmp_path):
     system = result.system
     table = format_table(system, [result])

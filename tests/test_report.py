@@ -16,7 +16,7 @@ from numpy.testing import assert_allclose
 from workbench.__main__ import main
 from workbench.observers import label
 from workbench.observers.gains import matrix_names
-from workbench.observers.report import standings, usual_error
+from workbench.observers.report import standings, usual_error, warning_lines
 
 from .page_rules import check_page, script
 from .processes import LONGEST, python
@@ -381,3 +381,10 @@ def test_live_window_draws_whole_runs_and_may_be_closed(root):
     assert run.returncode == 0, run.stderr
     expected = [("measured", True), ("open loop", True), ("direct inversion", True)]
     assert run.stdout.strip() == str(expected)
+
+
+def test_a_sentence_that_recordings_share_but_for_its_numbers_is_said_once():
+    doubts = {"run1": ["v1 is up to 3.5e+07 m/s"], "run2": ["v1 is up to 12 m/s"], "run3": []}
+    assert warning_lines(doubts) == ["run1, run2 (figures of run1): v1 is up to 3.5e+07 m/s."]
+    others = {"run1": ["v1 is off", "x[1] is off"], "run2": ["v2 is off", "x[2] is off"]}
+    assert len(warning_lines(others)) == 4

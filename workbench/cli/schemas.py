@@ -279,7 +279,7 @@ def _simulate() -> Schema:
     scores = closed(score) | {"patternProperties": {r"_rms_|_nrmse$": ERROR}}
     case = {
         "title": TEXT,
-        "doubts warnings guesses": TEXTS,
+        "doubts warnings scale guesses": TEXTS,
         "reference": or_null(TEXT),
         "inseparable": listed(closed({"names": TEXTS, "correlation": NUMBER})),
         "contradicted": by_name(NUMBER),

@@ -1,5 +1,6 @@
 """Machine-readable results, and the table on the terminal."""
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -88,6 +89,7 @@ def format_table(system: System, results: Sequence[CaseResult]) -> str:
     when = f" {objective.when}" if objective.when else ""
     limits = ", ".join(filter(None, (below(system), window(system))))
     lines = [f"Error of {objective.signal}, rms / mean{when} ({limits})", *followed(system)]
+    lines += warning_lines({result.case.name: result.scale_notes() for result in results})
     lines += warning_lines({result.case.name: result.warnings() for result in results})
     lines += contradiction_lines({result.case.name: result.contradictions for result in results})
     lines += [header, "-" * len(header)]
@@ -281,6 +283,7 @@ def write_page(
     page.write(summary, path)
 
 
+_NUMBER = re.compile(r"(?<![\w.\[])-?\d+(\.\d+)?(e[+-]?\d+)?(?![\w\]])")  # within a sentence
 _ROWS = 20_000  # of a table that become text at once
 _Z = Numbers("objective z", "mean weighed error over the whole recording; of several, the largest")
 
@@ -373,21 +376,26 @@ def _trust_lines(system: System, summary: Mapping[str, Any]) -> list[str]:
         }
         for name, case in summary["cases"].items()
     }
-    return followed(system) + contradiction_lines(tested)
+    scales = {name: case["scale"] for name, case in summary["cases"].items()}
+    return followed(system) + warning_lines(scales) + contradiction_lines(tested)
 
 
 def warning_lines(warnings: Mapping[str, Sequence[str]]) -> list[str]:
-    """What is said of recordings first, by recording: each sentence once, with where it holds."""
-    cases: dict[str, list[str]] = {}
+    """What is said of recordings first: each sentence once, with where it holds.
+
+    Of sentences that differ in numbers alone, the first stands for all.
+    """
+    cases: dict[str, dict[str, str]] = {}
     for name, texts in warnings.items():
         for text in texts:
-            cases.setdefault(text, []).append(name)
-    return [
-        f"{', '.join(names) if len(names) < len(warnings) else 'All recordings'}: {text}."
-        if len(warnings) > 1
-        else f"{names[0]}: {text}."
-        for text, names in cases.items()
-    ]
+            cases.setdefault(_NUMBER.sub("0", text), {}).setdefault(name, text)
+    lines = []
+    for alike in cases.values():
+        name, text = next(iter(alike.items()))
+        where = ", ".join(alike) if len(alike) < max(len(warnings), 2) else "All recordings"
+        of = f" (figures of {name})" if len({*alike.values()}) > 1 else ""
+        lines.append(f"{where}{of}: {text}.")
+    return lines
 
 
 def _doubts(system: System, summary: Mapping[str, Any], order: Sequence[str]) -> list[Text]:

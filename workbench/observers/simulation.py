@@ -52,12 +52,12 @@ from workbench.observers.trust import (
 )
 from workbench.pages.figures import ESTIMATORS, CaseFigure, Curve, Panel, value_range
 from workbench.pages.views import (
+    amount,
     below,
     called,
     errs_least,
     per_shown,
     percent,
-    rounded,
     shown_unit,
     titled,
     views,
@@ -177,6 +177,26 @@ class CaseResult:
         """What is said first of the recording: guesses, and doubts by the model."""
         return [*self.guesses(), *self.doubts]
 
+    def scale_notes(self) -> list[str]:
+        """What a percent is, where the judged signal stays farther from zero than it moves.
+
+        Errors are over the mean of its size, as are those of Schwarz et al. (2018). Zero of an
+        absolute temperature, pressure or position may lie far from all that the machine does.
+        """
+        measured, name = self.measured(), self.system.objective.signal
+        window = judged_window(self.case, self.system)
+        if measured is None or window.stop - window.start < 2:
+            return []
+        low, high = float(measured[window].min()), float(measured[window].max())
+        mean, span = float(np.mean(np.abs(measured[window]))), high - low
+        if not 0.0 < span < mean:
+            return []
+        unit = self.system.unit(name)
+        return [
+            f"{name} moves by {amount(span, unit)}, far from zero: 1 % of its mean is "
+            f"{amount(0.01 * mean, unit)}, which is {100.0 * 0.01 * mean / span:.2g} % of that"
+        ]
+
     def to_frame(self) -> "pd.DataFrame":
         """All that the figure of the case shows, as a table; see `to_columns`."""
         import pandas as pd  # takes its time, and files are written without it
@@ -217,6 +237,7 @@ class CaseResult:
             "title": self.case.title,
             "doubts": [*self.case.doubts, *self.warnings()],
             "warnings": self.warnings(),
+            "scale": self.scale_notes(),
             "guesses": self.guessed,
             "inseparable": [
                 {"names": list(names), "correlation": round(correlation, 6)}
@@ -248,7 +269,7 @@ class CaseResult:
         table = pd.DataFrame(self.to_dict()["estimators"]).T
         title = f"{self.case.name}: {self.case.title}"
         contradicted = contradiction_lines({self.case.name: self.contradictions})
-        lines = [*followed(self.system), *self.warnings(), *contradicted]
+        lines = [*followed(self.system), *self.scale_notes(), *self.warnings(), *contradicted]
         return "\n".join([title, *lines, table.to_string(na_rep="n/a")])
 
     def plot(self) -> "Figure":
@@ -668,5 +689,5 @@ def _finding(result: CaseResult) -> str:
     )
     return (
         f"{first}: {percent(share)} of the mean {called(system, signal)}, "
-        f"{rounded(rms)} {system.unit(signal)} rms" + (f"; {others}." if others else ".") + trust
+        f"{amount(rms, system.unit(signal))} rms" + (f"; {others}." if others else ".") + trust
     )

@@ -16,7 +16,7 @@ from workbench.models.fmu import ALIKE, FMU
 from workbench.models.hybrid import HybridSimulation
 from workbench.models.instance import NoFunctionError
 from workbench.models.simulation import Drive, Simulation, needs_simulation
-from workbench.pages.views import rounded
+from workbench.pages.views import amount, rounded
 from workbench.recordings.case import Case
 from workbench.system.system import System
 
@@ -157,7 +157,7 @@ def size_doubt(fmu: FMU, system: System, x: Matrix, *, walks: bool = True) -> st
     reach = dict(zip(fmu.states, np.abs(x).max(axis=0, initial=0.0), strict=True))
     unsized = _unsized(fmu, system)
     off = [
-        f"{name} is up to {rounded(reach[name])} {fmu.units.get(name, '')}".rstrip()
+        f"{name} is up to {reach[name]:.3g} {fmu.units.get(name, '')}".rstrip()
         + f", taken for {rounded(size)}"
         for name, size in zip(unsized, fmu.sizes(unsized), strict=True)
         if reach[name] > 64.0 * np.finfo(float).eps  # which is rounding of what is 1
@@ -210,7 +210,7 @@ def own_step_doubt(fmu: FMU, system: System, case: Case) -> str:
         for output, column in zip(outputs, y.T, strict=True)
     ]
     shown = [
-        f"{output.name} by {rounded(off)} {output.unit}"
+        f"{output.name} by {amount(off, output.unit)}"
         for output, off in late
         if off > 0.1 * output.noise_at_scale
     ]

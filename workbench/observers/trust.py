@@ -24,7 +24,7 @@ from workbench.observers.replay import replay
 from workbench.observers.run import Ending, Run
 from workbench.observers.score import judged_window
 from workbench.observers.trajectory import Trajectory
-from workbench.pages.views import rounded
+from workbench.pages.views import amount, rounded
 from workbench.recordings.case import Case
 from workbench.system.system import System
 
@@ -380,8 +380,8 @@ def step_doubt(
             share = min(off / error, 1.0)
             sentence = (
                 f"{' and '.join(coarse)}: one step of first order from sample to sample "
-                f"damps what swings: an open loop with it errs by {off:.3g} {output.unit} rms in "
-                f"{output.name}. Rely on open_loop and Kalman filters, or record more often"
+                f"damps what swings: an open loop with it errs by {amount(off, output.unit)} rms "
+                f"in {output.name}. Rely on open_loop and Kalman filters, or record more often"
             )
     return share, sentence
 

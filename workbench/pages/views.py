@@ -120,6 +120,15 @@ def rounded(value: float) -> str:
     return f"{value:.0f}" if abs(value) >= 10.0 else f"{value:.2g}"
 
 
+def amount(value: float, unit: str) -> str:
+    """A rounded number with its unit, which a plain number has not.
+
+    >>> amount(553.1, "N"), amount(5.8512, "1")
+    ('553 N', '5.9')
+    """
+    return f"{rounded(value)} {unit}".removesuffix(" 1")
+
+
 def percent(share: float) -> str:
     """A share in percent, as tables and figures give it.
 
