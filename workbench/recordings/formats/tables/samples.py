@@ -21,7 +21,6 @@ from workbench.recordings.formats.tables.cells import (
 from workbench.recordings.formats.tables.header import HEADER_ROWS, header, refuse_narrow
 from workbench.recordings.formats.tables.moments import with_whole_stamps
 from workbench.recordings.formats.tables.scaling import (
-    refuse_remarks_within,
     refuse_scales,
     refuse_units_within,
     remarks,
@@ -59,7 +58,6 @@ def find_tables(rows: Sequence[Sequence[str]], lines: Sequence[int], where: str)
         rows, lines = rows[begin:], lines[begin:]
     for own in (*tables, table):
         refuse_units_within(own, rows_at, where)
-        refuse_remarks_within(own, rows_at, where)
     return [*tables, table]
 
 

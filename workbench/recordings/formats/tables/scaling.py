@@ -32,37 +32,37 @@ _ONE, _NOTHING = (
 
 
 def refuse_units_within(table: Cells, rows: Mapping[int, Sequence[str]], where: str) -> None:
-    """Refuse a row of other units among samples, without names above it."""
+    """Refuse a row of other units among samples, and a line that says that their units change.
+
+    Parameters
+    ----------
+    rows : by line, those of the file.
+    """
     samples = set(table.lines)
-    units = [unit for _, unit in table.labels]
-    for line in range(table.lines[0], table.lines[-1]):
-        row = [spell_unit(cell) for cell in rows.get(line, ())]
-        if line in samples or len(row) != len(units) or not are_units(row):
-            continue
-        pairs = [pair for pair in zip(row, units, strict=True) if all(pair)]
-        if others := [f"[{own}] below [{above}]" for own, above in pairs if own != above]:
+    lines = [n for n in range(table.lines[0], table.lines[-1]) if n not in samples and n in rows]
+    names, units = zip(*table.labels, strict=True)
+    for line in lines:
+        row = [spell_unit(cell) for cell in rows[line]]
+        pairs = zip(row, units, strict=True) if len(row) == len(units) and are_units(row) else ()
+        if others := [
+            f"[{own}] below [{above}]" for own, above in pairs if own and above and own != above
+        ]:
             raise InputError(
                 where=f"{where}, line {line}",
                 found=f"a row of other units among samples, {', '.join(others)}",
                 expected="samples in the units that stand above them",
                 remedy="part the file there, and write the names above the units",
             )
-
-
-def refuse_remarks_within(table: Cells, rows: Mapping[int, Sequence[str]], where: str) -> None:
-    """Refuse a line among samples that says that a column is in other units from there on."""
-    samples = set(table.lines)
-    for line in range(table.lines[0], table.lines[-1]):
-        row = rows.get(line, ()) if line not in samples else ()
-        texts = remarks(table, [row]) if row else ()
-        if i := next((i for i, text in enumerate(texts, 1) if text), 0):
-            raise InputError(
-                where=f"{where}, line {line}",
-                found=f"'{texts[i - 1]}' among samples, which says what "
-                f"'{table.labels[i - 1][0]}' is there",
-                expected="samples in the units that stand above them",
-                remedy="part the file there if its units or its range change, or delete the line",
-            )
+    for line in lines:
+        for name, text in zip(names, remarks(table, [rows[line]]), strict=True):
+            if text:
+                raise InputError(
+                    where=f"{where}, line {line}",
+                    found=f"'{text}' among samples, which says what '{name}' is there",
+                    expected="samples in the units that stand above them",
+                    remedy="part the file there if its units or its range change, or delete the "
+                    "line",
+                )
 
 
 def remarks(table: Cells, above: Sequence[Sequence[str]]) -> tuple[str, ...]:

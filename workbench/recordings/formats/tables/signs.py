@@ -28,6 +28,8 @@ def signs_beside(
     ]
     for i, (name, _) in enumerate(labels):
         match = _SIGN_NAME.fullmatch(name)
+        if match is None and numeric[i]:
+            continue  # as nearly all are
         held = {cell.casefold() for cell in columns[i] if cell}
         if match and held and held <= _SIGNS.keys() | _SIGNS_IN_FIGURES.keys():
             own = (match["own"] or match["of"] or "").casefold()
