@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from itertools import combinations
@@ -15,7 +15,7 @@ from workbench.errors import InputError
 from workbench.recordings.channels.names import TIME, NamedChannel, is_time, listed, words
 from workbench.recordings.formats import FileChannel, Group
 from workbench.recordings.formats.spelling import conversion, spell_unit
-from workbench.recordings.formats.stamps import MINUTES, is_said, read_stamps
+from workbench.recordings.formats.stamps import MINUTES, goes_on, is_said, read_stamps, steps_of
 from workbench.system.system import System
 
 # Units of time that recorders leave out, and how far from those of usual recordings steps may be in
@@ -169,7 +169,7 @@ def _read_clock(
             expected="one time between samples",
             remedy="say it, --sample-rate '200 Hz'",
         )
-    back = [c for c in clocks if c.certain and is_time(c.channel) and _goes_back(c.times)]
+    back = [c for c in clocks if c.certain and is_time(c.channel) and not goes_on(c.times)]
     if back:  # segments, between which a stated rate knows no gap
         return _going_on(back[0], group, where)
     if math.isfinite(group.step):
@@ -212,13 +212,13 @@ def _beside_others(clock: Clock, others: Sequence[Clock], where: str) -> Clock:
 
 def _tick(clock: Clock) -> float:
     """What a clock counts by: its shortest step [s]."""
-    steps = np.diff(clock.times[np.isfinite(clock.times)])
+    steps = steps_of(clock.times)
     return float(steps[steps > 0.0].min(initial=math.inf))
 
 
 def _beside_stated(clock: Clock, step: float, where: str) -> Clock:
     """The clock, with what a file states of its steps where that is another one."""
-    steps = np.diff(clock.times[np.isfinite(clock.times)])
+    steps = steps_of(clock.times)
     usual = float(np.median(steps[steps > 0.0]))  # rows of one time have other channels
     ratio = max(usual, step) / min(usual, step)
     if not ratio > _FACTOR:
@@ -375,7 +375,7 @@ def _minutes_or_hours(clock: Clock, channel: FileChannel, system: System) -> Clo
     if not texts or not all(map(_TWO_PARTS.fullmatch, texts)):
         return clock
     other = read_stamps(channel.name, channel.texts, MINUTES)
-    steps = np.diff(clock.times[np.isfinite(clock.times)])
+    steps = steps_of(clock.times)
     usual = float(np.median(steps)) if steps.size else math.nan
     # Sixty times as far apart: the reading that is nearer to usual steps.
     if other is None or not usual / system.sample_time > math.sqrt(60.0):
@@ -515,7 +515,7 @@ def _since(channel: FileChannel, system: System) -> Clock | None:
         clock = Clock(channel.name, channel.values * _DAY, "days of a year", unit="d")
     if clock is None:
         return None
-    steps = np.abs(np.diff(clock.times[np.isfinite(clock.times)]))
+    steps = np.abs(steps_of(clock.times))
     ratio = float(np.median(steps)) / system.sample_time
     return clock if 1.0 / _LIKE < ratio < _LIKE else None
 
@@ -577,7 +577,7 @@ def _unit_reason(unit: str) -> str:
 
 def _likely_units(values: Vector, system: System) -> list[str]:
     """The units in which times step as those of usual recordings."""
-    steps = np.diff(values[np.isfinite(values)])
+    steps = steps_of(values)
     steps = steps[steps != 0.0]
     usual = float(np.median(steps)) if steps.size else 0.0
     scales = {unit: conversion(unit, "s") for unit in _UNSTATED}
@@ -598,29 +598,39 @@ def _goes_on(times: Vector, group: Group) -> bool:
 def _as_even(clock: Clock) -> Clock:
     """The clock with even times, where its own are these in few digits: 0, 0.02, 0.03, 0.05 min.
 
-    Steps are then of two sizes, one digit apart, and all times within half a digit of a line.
+    All times are then within half a digit of a line.
     """
     known = np.flatnonzero(np.isfinite(clock.times))
-    times = clock.times[known]
-    steps = np.round(np.diff(times) / np.median(np.diff(times)), _STEP_DIGITS)
-    sizes, counts = np.unique(steps, return_counts=True)
-    if sizes.size != 2 or counts.min() < max(_FEWEST_STEPS, _OFTEN * steps.size):
+    times, places = clock.times[known], np.arange(known.size)
+    digit = _digit(times)
+    if not digit:
         return clock
-    digit = float(np.ptp(sizes)) * float(np.median(np.diff(times)))
-    places = np.arange(times.size)
-    slope = float(np.polyfit(places, times - times[0], 1)[0])
-    # The roundest step, or rate, that all times allow.
-    for figures in range(1, _STEP_DIGITS):
-        for step in (float(f"{slope:.{figures}g}"), 1.0 / float(f"{1.0 / slope:.{figures}g}")):
-            apart = times - times[0] - step * places
-            # Half a digit around all times; within, the first stays where it is.
-            zeros = float(apart.max()) - 0.5 * digit, float(apart.min()) + 0.5 * digit
-            if zeros[0] <= zeros[1] + _SAME * digit and digit > _COARSE_DIGIT * step:
-                even = clock.times.copy()
-                even[known] = times[0] + min(max(zeros[0], 0.0), zeros[1]) + step * places
-                note = f"times have digits of {digit:.4g} s; taken as even, every {step:.6g} s"
-                return replace(clock, times=even, corrections=(*clock.corrections, note))
+    for step in _round_steps(float(np.polyfit(places, times - times[0], 1)[0])):
+        apart = times - times[0] - step * places
+        # Half a digit around all times; within, the first stays where it is.
+        least, most = float(apart.max()) - 0.5 * digit, float(apart.min()) + 0.5 * digit
+        if least <= most + _SAME * digit and digit > _COARSE_DIGIT * step:
+            even = clock.times.copy()
+            even[known] = times[0] + min(max(least, 0.0), most) + step * places
+            note = f"times have digits of {digit:.4g} s; taken as even, every {step:.6g} s"
+            return replace(clock, times=even, corrections=(*clock.corrections, note))
     return clock
+
+
+def _digit(times: Vector) -> float:
+    """The digit to which times are rounded [s], by which its steps of two sizes differ; or 0."""
+    usual = float(np.median(np.diff(times)))
+    steps = np.round(np.diff(times) / usual, _STEP_DIGITS)
+    sizes, counts = np.unique(steps, return_counts=True)
+    often = counts.min() >= max(_FEWEST_STEPS, _OFTEN * steps.size)
+    return float(np.ptp(sizes)) * usual if sizes.size == 2 and often else 0.0
+
+
+def _round_steps(step: float) -> Iterator[float]:
+    """A step, or a rate, in figures that become more: the roundest is first."""
+    for figures in range(1, _STEP_DIGITS):
+        yield float(f"{step:.{figures}g}")
+        yield 1.0 / float(f"{1.0 / step:.{figures}g}")
 
 
 def _rows_of_one_time(times: Vector, group: Group) -> int:
@@ -657,10 +667,6 @@ def _is_clock(channel: FileChannel, moves: Vector, steps: Vector) -> bool:
     rates = moves[known] / steps[known]
     usual = float(np.median(rates)) if rates.size >= _FEWEST_RATES else 0.0
     return usual != 0.0 and float(np.isclose(rates, usual, rtol=1e-3).mean()) > 0.9
-
-
-def _goes_back(times: Vector) -> bool:
-    return bool((np.diff(times[np.isfinite(times)]) < 0).any())
 
 
 def _holds_values(group: Group, clock: Clock) -> NDArray[np.bool_]:

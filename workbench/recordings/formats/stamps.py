@@ -172,7 +172,12 @@ def _match(text: str) -> re.Match[str] | None:
     text = _spelled(text)
     patterns = (_DAY, _OF_DAY, _OF_HOUR, _COMPACT, _COMPACT_SHORT, _CALLED_FIRST, _DURATION)
     match = next((match for pattern in patterns if (match := pattern.fullmatch(text))), None)
-    return match if match is None or _zone_known(match.groupdict().get("zone")) else None
+    return match if _zone_known(_part(match, "zone")) else None
+
+
+def _part(match: re.Match[str] | None, name: str) -> str:
+    """A part of a time by its name; empty where it has none, or is none."""
+    return match[name] or "" if match and name in match.re.groupindex else ""
 
 
 def _spelled(text: str) -> str:
@@ -195,7 +200,7 @@ def _spelled(text: str) -> str:
     return _ZONE_WITHIN.sub(r"\2 \1", text)
 
 
-def _zone_known(zone: str | None) -> bool:
+def _zone_known(zone: str) -> bool:
     """Whether letters behind a time may be a zone: those of none that is known are capitals."""
     if not zone or zone[-1].isdigit() or zone.upper() in _AHEAD:
         return True
@@ -263,7 +268,8 @@ def _read_statement(how: str) -> tuple[str, str, tzinfo | None]:
 
 def has_day(cells: Sequence[str]) -> bool:
     """Whether a column holds dates, with or without a time of day."""
-    return _first_day(cells) is not None
+    first = next((match for cell in cells if (match := _match(cell.strip()))), None)
+    return first is not None and first.re not in _TIMES_ALONE
 
 
 def has_day_alone(cells: Sequence[str]) -> bool:
@@ -277,27 +283,18 @@ def has_day_alone(cells: Sequence[str]) -> bool:
 
 def has_fraction(cells: Sequence[str]) -> bool:
     """Whether times of a column have parts of a second."""
-    matches = (_match(cell.strip()) for cell in cells)
-    return any(_of_second(match)["f"] for match in matches)
-
-
-def _first_day(cells: Sequence[str]) -> re.Match[str] | None:
-    matches = (_match(cell.strip()) for cell in cells)
-    first = next((match for match in matches if match), None)
-    return None if first is None or first.re in _TIMES_ALONE else first
+    return any(_fraction(_match(cell.strip())) for cell in cells)
 
 
 def _of_day(name: str, texts: Sequence[str], pattern: re.Pattern[str]) -> FileChannel:
     """Times without dates."""
     matches = [pattern.fullmatch(text) for text in texts]
     known = np.array([match is not None for match in matches])
-    whole = np.array([_clock(match) if match else 0 for match in matches])
+    whole = np.array([_clock(match) for match in matches])
     parts, words, doubt = _counted_frames(matches, whole)
     if doubt:
         return _in_doubt(name, texts, doubt)
-    signs = np.array(
-        [-1.0 if match and match.groupdict().get("sign") else 1.0 for match in matches]
-    )
+    signs = np.array([-1.0 if _part(match, "sign") else 1.0 for match in matches])
     times = signs * (whole + parts) - np.array([_offset(match) for match in matches])
     period = 24 * _HOUR
     if pattern in (_OF_HOUR, _OF_MINUTES):
@@ -309,7 +306,7 @@ def _of_day(name: str, texts: Sequence[str], pattern: re.Pattern[str]) -> FileCh
     # A step back by more than half a period is the next day, or the next hour.
     back = np.diff(times[known]) < -period / 2
     times[known] += np.concatenate([[0], np.cumsum(back)]) * period
-    if pattern is _OF_DAY and not any(match and match["zone"] for match in matches):
+    if pattern is _OF_DAY and not any(_part(match, "zone") for match in matches):
         times[known], mended = _mend_changes(times[known], dated=False)
         words += mended
     shown = float(times[known][0]) if signs.min() > 0.0 else math.nan
@@ -321,12 +318,10 @@ def _of_day(name: str, texts: Sequence[str], pattern: re.Pattern[str]) -> FileCh
 
 def _twelve_hours(matches: Sequence[re.Match[str] | None]) -> bool:
     """Whether hours go from 12 to 1, and none says which half of a day it is of."""
-    held = [match.groupdict() for match in matches if match]
-    hours = [int(own["h"]) for own in held if own.get("h")]
-    if any(own.get("half") or own.get("days") for own in held):
+    if any(_part(match, "half") or _part(match, "days") for match in matches):
         return False
-    within = bool(hours) and min(hours) >= 1 and max(hours) <= 12
-    return within and any(a == 12 and b == 1 for a, b in pairwise(hours))
+    hours = [int(hour) for match in matches if (hour := _part(match, "h"))]
+    return set(hours) <= set(range(1, 13)) and (12, 1) in pairwise(hours)
 
 
 def _by_format(
@@ -353,40 +348,53 @@ def _by_format(
 def _by_date(
     name: str, texts: Sequence[str], pattern: re.Pattern[str], order: str, zone: tzinfo | None
 ) -> FileChannel | None:
+    """Times with dates: read in each order that days may have, of which one is chosen."""
     matches = [pattern.fullmatch(text) for text in texts]
     known = np.array([match is not None for match in matches])
-    clocks = np.array([_clock(match) if match else 0 for match in matches])
+    clocks = np.array([_clock(match) for match in matches])
     parts, notes, doubt = _counted_frames(matches, clocks)
     if doubt:
         return _in_doubt(name, texts, doubt)
-    zones = {str(match["zone"]) for match in matches if match and match.groupdict().get("zone")}
-    letters = {own.upper() for own in zones if own.isalpha()}
-    local = len(zones) == 1 and bool(letters & _AMBIGUOUS or letters - _AHEAD.keys())
-    shift = np.array([0.0 if local else _offset(match) for match in matches])
-    if len(zones) == 1 and "/" in (own := next(iter(zones))):
-        zone = _zone(own)
+    shift, named, zoned = _stated_zone(matches)
     readings: dict[str, FileChannel] = {}
-    for reading in _readings(matches) if not order else [order]:
+    for reading in [order] if order else _readings(matches):
         try:
             days = _days(matches, reading)
         except ValueError:  # a 31st of February
             continue
         whole, leap = _with_leap_second(matches, days + clocks, parts)
-        zoned = bool(zones) and not local
-        channel = _channel(name, texts, known, (whole, parts, shift), zone, zoned=zoned)
+        channel = _channel(name, texts, known, (whole, parts, shift), named or zone, zoned=zoned)
         readings[reading] = replace(channel, corrections=(*notes, *leap, *channel.corrections))
     chosen = _choose_reading(name, texts, readings, matches)
-    if chosen is None or not math.isfinite(chosen.start):
-        return chosen
-    first, year = texts[int(np.argmax(known))], _moment(chosen.start).year
-    other = ""
+    return chosen and _with_sure_date(chosen, texts[int(np.argmax(known))])
+
+
+def _stated_zone(matches: Sequence[re.Match[str] | None]) -> tuple[Vector, tzinfo | None, bool]:
+    """Seconds ahead of UTC that cells state, (n,), a zone that all name, and whether any does.
+
+    Letters that mean nothing, or several zones, say only that times are local.
+    """
+    zones = {zone for match in matches if (zone := _part(match, "zone"))}
+    one = next(iter(zones)) if len(zones) == 1 else ""
+    if one.isalpha() and (one.upper() in _AMBIGUOUS or one.upper() not in _AHEAD):
+        return np.zeros(len(matches)), None, False
+    shift = np.array([_offset(match) for match in matches])
+    return shift, _zone(one) if "/" in one else None, bool(zones)
+
+
+def _with_sure_date(channel: FileChannel, first: str) -> FileChannel:
+    """The channel, without its date where that may be of another language or another calendar."""
+    if not math.isfinite(channel.start):
+        return channel
+    year, why = _moment(channel.start).year, ""
     if any(map(_MONTHS_OF_TWO.fullmatch, re.split(r"[\W\d]+", first))):
-        other = "the month is another one in Croatian"
+        why = "the month is another one in Croatian"
     if not _YEARS[0] <= year <= _YEARS[1]:
-        other = f"{year} is a year of another calendar, or of a clock that was not set"
-    note = f"of '{first}' {other}: the date is not taken"
-    corrections = (*chosen.corrections, note)
-    return replace(chosen, start=math.nan, corrections=corrections) if other else chosen
+        why = f"{year} is a year of another calendar, or of a clock that was not set"
+    if not why:
+        return channel
+    note = f"of '{first}' {why}: the date is not taken"
+    return replace(channel, start=math.nan, corrections=(*channel.corrections, note))
 
 
 def _channel(
@@ -428,20 +436,14 @@ def _channel(
 
 def _readings(matches: Sequence[re.Match[str] | None]) -> list[str]:
     """Orders in which days may be written, the usual one for their marks first."""
-    kinds = {
-        (match["mark"], len(match["last"]))
-        for match in matches
-        if match and match.groupdict().get("one")
-    }
-    if not kinds:
+    numbers = [match for match in matches if match and _part(match, "one")]
+    if not numbers:
         return ["ymd"]
-    years = {digits for _, digits in kinds}
-    marks = {mark for mark, _ in kinds}
+    marks = {match["mark"] for match in numbers}
     if marks == {""}:
         return ["ymd", "dmy", "mdy"]
-    if marks == {"."}:
-        return ["dmy"] if years == {4} else ["dmy", "ymd"]
-    return ["dmy", "mdy"] if years == {4} else ["dmy", "mdy", "ymd"]
+    usual = ["dmy"] if marks == {"."} else ["dmy", "mdy"]
+    return usual if all(len(match["last"]) == 4 for match in numbers) else [*usual, "ymd"]
 
 
 def _choose_reading(
@@ -452,38 +454,43 @@ def _choose_reading(
 ) -> FileChannel | None:
     """The reading with which times go on evenly; a doubt where several do and differ."""
     going = {order: channel for order, channel in readings.items() if goes_on(channel.values)}
-    left = going or readings
-    even = {order: channel for order, channel in left.items() if _is_even(channel.values)}
-    # Nobody records on one day of each year, where another reading has days that follow.
-    near = {k: c for k, c in left.items() if _longest(c.values) <= 31 * 24 * _HOUR}
-    far = {k: c for k, c in left.items() if _longest(c.values) > 300 * 24 * _HOUR}
-    left = even or (near if near and len(near) + len(far) == len(left) else left)
+    left = _likely_readings(going or readings)
     if not left:
         return None
-    order, channel = next(iter(left.items()))
-    others = [other for key, other in left.items() if key != order]
+    channel, *others = left.values()
     if not others and (going or not _twelve_hours(matches)):
         return channel
-    if going and all(
-        np.array_equal(channel.values, other.values, equal_nan=True) for other in others
-    ):
-        # The day is not known, the times are; points are German, the day first.
-        points = all(match is None or match["mark"] == "." for match in matches)
-        compact = all(match is None or match["mark"] == "" for match in matches)  # as YYMMDD
-        sure = (points or compact) and _moment(channel.start).year >= 2010
+    alike = (np.array_equal(channel.values, own.values, equal_nan=True) for own in others)
+    if going and all(alike):
+        # The day is not known, the times are; points are German, the day first, and YYMMDD has no
+        # marks.
+        marks = {match["mark"] for match in matches if match}
+        sure = marks in ({"."}, {""}) and _moment(channel.start).year >= 2010
         return channel if sure else replace(channel, start=math.nan)
+    first = next(text for text, match in zip(texts, matches, strict=True) if match)
     words = [
         f"{_moment(c.start):%Y-%m-%d} to {_moment(c.start + np.nanmax(c.values)):%Y-%m-%d} "
         f"({key.upper()}: {ORDERS[key]})"
         for key, c in left.items()
     ]
-    first = next(text for text, match in zip(texts, matches, strict=True) if match)
     doubt = f"dates such as '{first}' that go on in two ways, {' or '.join(words)}"
     if _twelve_hours(matches):
         doubt = f"times such as '{first}', whose hours count to 12 without AM or PM"
     elif not going:
         doubt = f"dates such as '{first}' that go back in each order of day, month and year"
     return _in_doubt(name, texts, doubt)
+
+
+def _likely_readings(readings: dict[str, FileChannel]) -> dict[str, FileChannel]:
+    """Those of some readings whose times are even; else those without years between samples.
+
+    Nobody records on one day of each year, where another reading has days that follow.
+    """
+    longest = {order: steps_of(c.values).max(initial=0.0) for order, c in readings.items()}
+    near = {order: c for order, c in readings.items() if longest[order] <= 31 * 24 * _HOUR}
+    far = {order for order in readings if longest[order] > 300 * 24 * _HOUR}
+    even = {order: c for order, c in readings.items() if _is_even(c.values)}
+    return even or (near if near and len(near) + len(far) == len(readings) else readings)
 
 
 def _in_doubt(name: str, texts: Sequence[str], doubt: str) -> FileChannel:
@@ -495,19 +502,18 @@ def _moment(seconds: float) -> datetime:
     return _START + timedelta(seconds=seconds)
 
 
+def steps_of(times: Vector) -> Vector:
+    """Steps between times; NaN is none."""
+    return np.diff(times[np.isfinite(times)])
+
+
 def goes_on(times: Vector) -> bool:
     """Whether times never go back; NaN where there is none."""
-    steps = np.diff(times[np.isfinite(times)])
-    return bool((steps >= 0.0).all())
-
-
-def _longest(times: Vector) -> float:
-    steps = np.diff(times[np.isfinite(times)])
-    return float(steps.max()) if steps.size else 0.0
+    return bool((steps_of(times) >= 0.0).all())
 
 
 def _is_even(times: Vector) -> bool:
-    steps = np.diff(times[np.isfinite(times)])
+    steps = steps_of(times)
     ahead = steps[steps > 0.0]
     return not ahead.size or bool(ahead.max() <= _EVEN * np.median(ahead))
 
@@ -676,7 +682,7 @@ def _full(year: str) -> int:
 
 def _offset(match: re.Match[str] | None) -> float:
     """Seconds that a cell says that it is ahead of UTC."""
-    zone = (match.groupdict().get("zone") or "") if match else ""
+    zone = _part(match, "zone")
     if not zone or "/" in zone:
         return 0.0
     if not zone[-1].isdigit():
@@ -686,9 +692,9 @@ def _offset(match: re.Match[str] | None) -> float:
     return int(f"{sign}1") * (int(hours) * _HOUR + int(minutes) * 60.0)
 
 
-def _clock(match: re.Match[str]) -> int:
+def _clock(match: re.Match[str] | None) -> int:
     """Whole seconds of the day, or of the hour."""
-    parts = match.groupdict()
+    parts = match.groupdict() if match else {}
     c = "c" if parts.get("ch") else ""
     hour = int(parts.get(f"{c}h") or 0)
     half = parts.get(f"{c}half") or parts.get("early") or parts.get("late")
@@ -707,15 +713,14 @@ def _fractions(
     are none where one ends in 0, as .50 beside .125, and counts none where one begins with 0. Else
     those are taken with which times go on evenly.
     """
-    seconds = [_of_second(match) for match in matches]
-    digits = [own["f"] for own in seconds]
+    digits = [_fraction(match) for match in matches]
     held = [own for own in digits if len(own) > 1]
     parts = np.array([float(f"0.{own or 0}") for own in digits])
     widths = {len(own) for own in digits if own}
     if not widths or not max(widths) <= 3 < 3 * len(widths):
         return parts, [], ""
     counts = np.array([int(own or 0) * 1e-3 for own in digits])
-    if all(own["dot"] == ":" for own in seconds if own["f"]):
+    if all(_part(match, "dot") == ":" for match in matches if _fraction(match)):
         return counts, [], ""
     short = any(own.endswith("0") and len(own) < max(widths) for own in held)
     padded = any(own.startswith("0") for own in held)
@@ -736,10 +741,9 @@ def _fractions(
     return parts, [], f"{doubt} milliseconds without zeros before them"
 
 
-def _of_second(match: re.Match[str] | None) -> dict[str, str]:
-    """Parts of a second, `f`, also before the year, and what stands before them, `dot`."""
-    parts = match.groupdict() if match else {}
-    return {"f": parts.get("f") or parts.get("cf") or "", "dot": parts.get("dot") or ""}
+def _fraction(match: re.Match[str] | None) -> str:
+    """Figures of a part of a second, also before the year."""
+    return _part(match, "f") or _part(match, "cf")
 
 
 def _counted_frames(
@@ -751,10 +755,8 @@ def _counted_frames(
     they may be seconds behind minutes.
     """
     parts, notes, doubt = _fractions(matches, whole)
-    held = [match for match in matches if match and match.groupdict().get("f")]
-    if len(held) < len(matches) or any(
-        m.groupdict().get("dot") != ":" or len(m["f"]) != 2 for m in held
-    ):
+    held = [match for match in matches if match and _part(match, "dot") == ":"]
+    if len(held) < len(matches) or any(len(match["f"]) != 2 for match in held):
         return parts, notes, doubt
     frames = np.array([int(match["f"]) for match in held])
     for rate in [0, *(rate for rate in _FRAMES if rate > frames.max())]:
@@ -774,7 +776,7 @@ def _with_leap_second(
     matches: Sequence[re.Match[str] | None], whole: np.ndarray, parts: Vector
 ) -> tuple[np.ndarray, list[str]]:
     """Whole seconds, (n,), a second later behind a 60th second that the next minute repeats."""
-    leaps = [k for k, match in enumerate(matches) if match and match.groupdict().get("s") == "60"]
+    leaps = [k for k, match in enumerate(matches) if _part(match, "s") == "60"]
     after = leaps[-1] + 1 if leaps else len(matches)
     if after >= whole.size or (whole + parts)[after] > (whole + parts)[after - 1]:
         return whole, []

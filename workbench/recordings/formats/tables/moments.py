@@ -199,7 +199,8 @@ def _with_fraction(columns: Columns, stamp: int | None, i: int) -> Columns | Non
     digits = PARTS_OF_SECOND.get(last)
     if digits is None or (unit and PARTS_OF_SECOND.get(unit.casefold(), 0) != digits):
         return None
-    if not digits and not unit and (stamp is None or not _repeats(columns.cells[stamp])):
+    stamps = columns.cells[stamp] if stamp is not None else []
+    if not digits and not unit and not any(a == b for a, b in pairwise(stamps)):
         return None  # a fraction of something else: stamps tell samples apart without it
     counter = [f"{begin}{word}" for word in ("sec", "secs", "seconds", "s")]
     names = [label[0].casefold() for label in columns.labels]
@@ -211,11 +212,6 @@ def _with_fraction(columns: Columns, stamp: int | None, i: int) -> Columns | Non
     counted = not mostly(columns.cells[at], is_stamp)
     label = (f"time {columns.labels[at][0]} {name}", "s") if counted else None
     return columns.joined((at, i), moments, label)
-
-
-def _repeats(cells: Sequence[str]) -> bool:
-    """Whether cells beside each other are alike."""
-    return any(a == b for a, b in pairwise(cells))
 
 
 def _with_decimals(moments: list[str], parts: list[str], digits: int) -> list[str] | None:
