@@ -338,7 +338,6 @@ def _first_problem(
 ) -> InputError:
     """Name the first cell that `_numbers` stumbles over."""
     ambiguous = "one decimal mark throughout the file, and no thousands separators"
-    rewrite = "export the recording again, without thousands separators"
     mark, number, place = "", "", str(path)  # the first decimal mark, its number and where
     for line, row in enumerate(zip(*cells.values(), strict=True), first_line):
         for name, cell in zip(cells, row, strict=True):
@@ -356,21 +355,15 @@ def _first_problem(
                     expected="a finite number",
                     remedy="correct the field, or remove its line",
                 )
-            if doubtful:
-                return InputError(
-                    where=where,
-                    found=f"'{text}', which is ambiguous",
-                    expected=ambiguous,
-                    remedy=rewrite,
-                )
-            if marks and not mark:
+            if marks and not doubtful and not mark:
                 mark, number, place = marks[0], text, where
-            if marks and marks[0] != mark:
+            if doubtful or (marks and marks[0] != mark):
+                before = "" if doubtful else f" after '{number}' ({place})"
                 return InputError(
                     where=where,
-                    found=f"'{text}' after '{number}' ({place}), which is ambiguous",
+                    found=f"'{text}'{before}, which is ambiguous",
                     expected=ambiguous,
-                    remedy=rewrite,
+                    remedy="export the recording again, without thousands separators",
                 )
     return InputError(
         where=place,

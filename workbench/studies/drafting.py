@@ -28,9 +28,10 @@ from workbench.recordings.channels import (
     propose_recordings,
 )
 from workbench.recordings.channels.clock import usual_step
-from workbench.recordings.channels.matching import COLD, USUAL_UNITS, PlacedChannel, meaning_doubt
+from workbench.recordings.channels.matching import COLD, USUAL_UNITS, meaning_doubt
 from workbench.recordings.channels.names import (
     EXACT,
+    PlacedChannel,
     is_asked,
     is_time,
     likeness_to,
@@ -139,8 +140,7 @@ def _match(
     """Signals, why other inputs and outputs have no channel, and channels that nobody takes."""
     names = signal_names(description)
     places: dict[str, PlacedChannel] = {}
-    for placed in placed_channels(files[:1]):
-        place = PlacedChannel(*placed)
+    for place in placed_channels(files[:1]):
         if not _is_time(place.channel):
             places.setdefault(place.channel.name, place)
     signals: dict[str, DraftSignal] = {}

@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,11 +13,12 @@ from workbench.recordings.channels.names import (
     WITHIN,
     WORDS,
     NamedChannel,
+    PlacedChannel,
     is_asked,
     likeness_to,
     words,
 )
-from workbench.recordings.formats import FileChannel, Group
+from workbench.recordings.formats import FileChannel
 from workbench.recordings.formats.numbers import markers
 from workbench.recordings.formats.spelling import (
     Conversion,
@@ -55,30 +56,14 @@ class Assignment:
     @property
     def values(self) -> Vector:
         """(n,) SI, not finite in gaps."""
-        with np.errstate(over="ignore", invalid="ignore"):  # what no machine reads
-            return self.factor * samples_of(self.channel, self.missing) + self.zero
+        samples = samples_of(self.channel, self.missing)
+        return Conversion(self.factor, self.zero).applied(samples)
 
     @property
     def named(self) -> NamedChannel:
         """As it is stored; what the file says of the unit is left to it."""
         unit = self.unit if self.concluded or self.unit != self.channel.unit else ""
         return NamedChannel(self.label, unit, self.factor < 0.0, self.declared)
-
-
-@dataclass(frozen=True, eq=False)
-class PlacedChannel:
-    """Where a channel stands: file and group, and a name that no other channel has."""
-
-    file: int
-    group: int
-    holder: Group
-    channel: FileChannel
-    label: str
-
-    @property
-    def full(self) -> str:
-        """Name with that of its group, whether or not others have the same."""
-        return f"{self.holder.name}/{self.channel.name}"
 
 
 def samples_of(channel: FileChannel, missing: Sequence[float]) -> Vector:
@@ -231,7 +216,16 @@ def meaning_doubt(
     return ""
 
 
-def remark_doubt(channel: FileChannel, unit: str, column: str) -> str:
+def doubts_of(
+    channel: FileChannel, unit: str, values: Vector, signal: Signal, column: str
+) -> Iterator[str]:
+    """What is open of the size and the meaning of a channel; see `size_doubt`, `meaning_doubt`."""
+    yield size_doubt(values, unit, signal, column)
+    yield _remark_doubt(channel, unit, column)
+    yield meaning_doubt(channel.name, unit, values, signal.names, signal.unit, column)
+
+
+def _remark_doubt(channel: FileChannel, unit: str, column: str) -> str:
     """What a line of the file says of the size of a channel's values; empty: nothing."""
     if not channel.remark:
         return ""
@@ -310,8 +304,7 @@ def _candidate(
         known = "of another dimension" if is_unit(unit) else "that is not known"
         return None, f"'{channel.name}' is in [{unit}], a unit {known}"
     scale, formula = way
-    with np.errstate(over="ignore", invalid="ignore"):  # what no machine reads
-        values = scale.factor * samples + scale.zero
+    values = scale.applied(samples)
     low, high = signal.possible
     if not np.isfinite(values).any():
         return None, f"'{channel.name}' holds no numbers"
@@ -329,12 +322,7 @@ def _candidate(
     elif not likeness:
         confirms = f"--column '{signal.name}={place.label}' confirms it"
         doubt = f"nothing but its unit speaks for it, {confirms}"
-    own_doubts = (
-        marked,
-        size_doubt(values, unit, signal, column),
-        remark_doubt(channel, unit, column),
-        meaning_doubt(channel.name, unit, values, signal.names, signal.unit, column),
-    )
+    own_doubts = (marked, *doubts_of(channel, unit, values, signal, column))
     doubt = "; ".join(filter(None, (doubt, *own_doubts)))
     return Assignment(
         file=place.file,
@@ -474,8 +462,7 @@ def fitting_units(samples: Vector, signal: Signal, system: System) -> list[str]:
         way = conversion_to(unit, signal, system)
         if way is None:
             continue
-        with np.errstate(over="ignore", invalid="ignore"):
-            values = way[0].factor * samples + way[0].zero
+        values = way[0].applied(samples)
         size = float(np.nanmax(np.abs(values), initial=0.0))
         low, high = signal.plausible
         typical = signal.scale / _TYPICAL <= size <= signal.scale * _TYPICAL

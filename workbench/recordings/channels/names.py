@@ -163,10 +163,24 @@ def stored_columns(folder: Path, system: System) -> dict[str, NamedChannel]:
     return read_named(table.table("columns"), system)
 
 
-def placed_channels(
-    files: Sequence[RecordedFile],
-) -> Iterator[tuple[int, int, Group, FileChannel, str]]:
-    """All channels with file and group, counted from 0, and a name that no other channel has.
+@dataclass(frozen=True, eq=False)
+class PlacedChannel:
+    """Where a channel stands, counted from 0, and a name that no other channel has."""
+
+    file: int
+    group: int
+    holder: Group
+    channel: FileChannel
+    label: str
+
+    @property
+    def full(self) -> str:
+        """Name with that of its group, whether or not others have the same."""
+        return f"{self.holder.name}/{self.channel.name}"
+
+
+def placed_channels(files: Sequence[RecordedFile]) -> Iterator[PlacedChannel]:
+    """All channels with their places.
 
     Of namesakes, those of a group alone have its name before theirs; others are counted, `h#2`.
     """
@@ -182,7 +196,7 @@ def placed_channels(
                     label = f"{group.name}/{label}"
                 if own[channel.name] > 1:
                     label = f"{label}#{before[channel.name]}"
-                yield i, j, group, channel, label
+                yield PlacedChannel(i, j, group, channel, label)
 
 
 def usable(
@@ -190,9 +204,9 @@ def usable(
 ) -> dict[str, NamedChannel]:
     """Of stored channels those that some files have, in no other unit than what was confirmed."""
     units: dict[str, str] = {}
-    for _, _, group, channel, label in placed_channels(files):
-        unit = "" if channel.stamp else channel.unit
-        units[channel.name] = units[f"{group.name}/{channel.name}"] = units[label] = unit
+    for place in placed_channels(files):
+        unit = "" if place.channel.stamp else place.channel.unit
+        units |= dict.fromkeys((place.channel.name, place.full, place.label), unit)
     units |= {text.name: "" for file in files for group in file.groups for text in group.left}
     return {
         signal: assignment

@@ -4,27 +4,23 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from workbench.errors import InputError, closest
 from workbench.recordings.channels.clock import Clock, read_clock
 from workbench.recordings.channels.matching import (
     Assignment,
-    PlacedChannel,
     conversion_to,
+    doubts_of,
     fitting_units,
     match,
-    meaning_doubt,
     missing_of,
-    remark_doubt,
     samples_of,
-    size_doubt,
     unit_doubt,
     unit_reason,
 )
 from workbench.recordings.channels.names import (
     TIME,
     NamedChannel,
+    PlacedChannel,
     likeness_to,
     listed,
     placed_channels,
@@ -102,7 +98,7 @@ def propose(
         If a named channel is missing or is named twice, or its unit does not fit; or a group that
         holds a signal has no time.
     """
-    places = [PlacedChannel(*placed) for placed in placed_channels(files)]
+    places = list(placed_channels(files))
     where = ", ".join(str(file.path) for file in files)
     texts = [channel for file in files for group in file.groups for channel in group.left]
     _refuse_texts(given, texts, places, where)
@@ -190,9 +186,7 @@ def _find(
     candidates = [place for place in places if place.channel.name == name]
     candidates = candidates or [place for place in places if name in (place.label, place.full)]
     candidates = candidates or [p for p in places if p.channel.name.casefold() == name.casefold()]
-    candidates = candidates or [
-        place for place in places if place.channel.about == name
-    ]  # its number
+    candidates = candidates or [p for p in places if p.channel.about == name]  # its number
     if signal == TIME and candidates:
         return candidates[0]
     if len(candidates) != 1:
@@ -229,14 +223,9 @@ def _as_named(
         raise _no_unit_of(signal, place, unit, stated_by_user=bool(channel.unit), where=where)
     turn = -1.0 if channel.reversed else 1.0
     scale, formula = way
-    with np.errstate(over="ignore", invalid="ignore"):  # what no machine reads
-        values = scale.factor * samples + scale.zero
     doubts = [marked]
     if not channel.unit:
-        doubts.append(size_doubt(values, unit, signal, column))
-        doubts.append(remark_doubt(place.channel, unit, column))
-        called = signal.names, signal.unit
-        doubts.append(meaning_doubt(place.channel.name, unit, values, *called, column))
+        doubts += doubts_of(place.channel, unit, scale.applied(samples), signal, column)
     doubt = unit_doubt(signal.name, place.label, unit) if concluded else ""
     return Assignment(
         file=place.file,

@@ -124,12 +124,7 @@ def read_recorded_file(path: Path) -> RecordedFile:
     """Read a file of a recorder."""
     raw = read_bytes(path, "correct the path")
     if not raw:
-        raise InputError(
-            where=str(path),
-            found="an empty file",
-            expected="a recording",
-            remedy="export it again, with its samples",
-        )
+        raise _without_samples(path, "an empty file")
     sha256 = hashlib.sha256(raw).hexdigest()
     packed = raw.startswith(b"\x1f\x8b")
     if packed:
@@ -137,14 +132,18 @@ def read_recorded_file(path: Path) -> RecordedFile:
     words, groups, notes, doubts = _reader(path, raw)(path, raw)
     groups = [own for group in groups for own in by_tag(group)]
     if not any(group.channels for group in groups):
-        raise InputError(
-            where=str(path),
-            found=f"{words} without a channel of numbers",
-            expected="a recording",
-            remedy="export it again, with its samples",
-        )
+        raise _without_samples(path, f"{words} without a channel of numbers")
     return RecordedFile(
         path, words + ", gzip" * packed, tuple(groups), tuple(notes), sha256, doubts
+    )
+
+
+def _without_samples(path: Path, found: str) -> InputError:
+    return InputError(
+        where=str(path),
+        found=found,
+        expected="a recording",
+        remedy="export it again, with its samples",
     )
 
 

@@ -220,11 +220,9 @@ def _value(item: h5py.Dataset, file: h5py.File) -> Any:
     if matlab_class == "char":
         return "".join(map(chr, np.ravel(np.asarray(value).T, order="F").astype(int)))
     if isinstance(value, np.ndarray) and value.dtype.kind in "SO":
-        return [
-            v.decode("utf-8", "replace") if isinstance(v, bytes) else str(v) for v in value.flat
-        ]
+        return list(map(_text, value.flat))
     if isinstance(value, bytes):
-        return value.decode("utf-8", "replace")
+        return _text(value)
     if not isinstance(value, np.ndarray) or value.dtype.kind not in "fiub":
         return None
     # MATLAB counts columns first.

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -220,7 +221,7 @@ def _table(rows: Sequence[Sequence[Any]], units: Mapping[str, Any], where: str) 
         return find_table(cells, range(1, len(cells) + 1), where)
     stated = [units.get(name) or units.get(name_and_unit(name)[0]) for name in names]
     spelled = [spell_unit(unit) if isinstance(unit, str) else "" for unit in stated]
-    return Cells(body, list(range(1, len(body) + 1)), (), tuple(names), tuple(spelled))
+    return replace(Cells.named(names, body), units=tuple(spelled))
 
 
 def _cell(value: Any) -> str:

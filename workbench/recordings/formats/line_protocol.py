@@ -5,6 +5,7 @@ Source: InfluxData, Line protocol reference (documentation of InfluxDB OSS v2).
 
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 from workbench.errors import InputError
@@ -58,7 +59,7 @@ def read(path: Path, raw: bytes) -> Contents:
     for name, records in series.items():
         names = list(dict.fromkeys(key for _, record in records for key in record))
         rows = [[record.get(key, "") for key in names] for _, record in records]
-        cells = Cells(rows, [number for number, _ in records], (), tuple(names), ("",) * len(names))
+        cells = replace(Cells.named(names, rows), lines=[number for number, _ in records])
         group, _, own = read_group(cells, name, str(path))
         groups.append(group)
         notes += own

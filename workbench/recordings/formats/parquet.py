@@ -56,9 +56,7 @@ def read(path: Path, raw: bytes) -> Contents:
     left: tuple[FileChannel, ...] = ()
     if texts:  # dates, times, or numbers as people write them
         rows = list(map(list, zip(*texts.values(), strict=True)))
-        lines = list(range(1, len(rows) + 1))
-        cells = Cells(rows, lines, (), tuple(texts), ("",) * len(texts))
-        written, _, own = read_group(cells, "", str(path))
+        written, _, own = read_group(Cells.named(texts, rows), "", str(path))
         channels = [*written.channels, *channels]
         left, notes = written.left, [*notes, *own]
     return Contents(called, [Group("", tuple(channels), left=left)], notes, doubts)

@@ -4,6 +4,9 @@ import math
 import re
 from dataclasses import dataclass
 
+import numpy as np
+
+from workbench.arrays import Vector
 from workbench.errors import InputError
 from workbench.system.units import check_unit, si_factor
 
@@ -39,20 +42,8 @@ _ANY_CASE = {
     unit.casefold(): unit
     for unit in (
         *("kPa", "hPa", "bar", "kW", "kWh", "kV", "Hz", "kHz", "kg", "kgf", "km", "sec", "hrs"),
-        *(
-            "l/min",
-            "l/h",
-            "l/s",
-            "m3/h",
-            "m3/hr",
-            "m3/s",
-            "m3/min",
-            "kg/h",
-            "kg/hr",
-            "kg/s",
-            "kg/min",
-            "ltr",
-        ),
+        *("l/min", "l/h", "l/s", "m3/h", "m3/hr", "m3/s", "m3/min"),
+        *("kg/h", "kg/hr", "kg/s", "kg/min", "ltr"),
     )
 }
 # Units that mean the same in capitals: PSI, MPH.
@@ -97,6 +88,11 @@ class Conversion:
 
     factor: float
     zero: float = 0.0
+
+    def applied(self, values: Vector) -> Vector:
+        """Values in SI, (n,), of those of a file; what no machine reads may be infinite."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            return self.factor * values + self.zero
 
 
 def spell_unit(text: str) -> str:

@@ -15,8 +15,7 @@ from workbench.errors import InputError
 from workbench.recordings.csv import is_cut
 from workbench.recordings.formats.contents import Contents
 from workbench.recordings.formats.numbers import is_missing, is_number
-from workbench.recordings.formats.stamps import is_stamp
-from workbench.recordings.formats.tables.cells import Cells
+from workbench.recordings.formats.tables.cells import Cells, is_sample
 from workbench.recordings.formats.tables.groups import numbers_of, read_group
 from workbench.recordings.formats.tables.parts import parts_of_tables
 from workbench.recordings.formats.tables.samples import find_table, find_tables
@@ -154,9 +153,7 @@ def _decode(path: Path, raw: bytes) -> tuple[str, str]:
 
 def _separator(path: Path, lines: Sequence[str]) -> str:
     """The separator with which most cells in the middle of the file are numbers or times."""
-    middle = [line for line in lines if line.strip() and not _COMMENT.match(line)]
-    begin = max(0, (len(middle) - _SAMPLED) // 2)
-    middle_lines = middle[begin : begin + _SAMPLED]
+    middle_lines = _middle(_without_comments(lines))
     scores: dict[str, float] = {}
     for mark in _SEPARATORS:
         if mark == " ":
@@ -174,10 +171,7 @@ def _separator(path: Path, lines: Sequence[str]) -> str:
             continue
         width = max(set(widths), key=widths.count)
         cells = [cell for row in rows for cell in row]
-        good = sum(
-            is_missing(cell) or is_number(cell) or is_stamp(cell) or is_quantity(cell)
-            for cell in cells
-        )
+        good = sum(is_missing(cell) or is_sample(cell) or is_quantity(cell) for cell in cells)
         even = widths.count(width) / len(widths)
         if width > 1:
             scores[mark] = good / len(cells) * even
@@ -190,6 +184,17 @@ def _separator(path: Path, lines: Sequence[str]) -> str:
         )
     # Of equals the first: a semicolon separates for certain, a comma may be a decimal mark.
     return max(scores, key=lambda mark: scores[mark])
+
+
+def _without_comments(lines: Sequence[str]) -> list[str]:
+    """Lines that hold something, and begin with no mark of comments."""
+    return [line for line in lines if line.strip() and not _COMMENT.match(line)]
+
+
+def _middle(lines: Sequence[str]) -> Sequence[str]:
+    """Lines from the middle, which tell how all are laid out."""
+    begin = max(0, (len(lines) - _SAMPLED) // 2)
+    return lines[begin : begin + _SAMPLED]
 
 
 def _rows(lines: Sequence[str], separator: str) -> tuple[list[list[str]], list[int], int]:
@@ -253,7 +258,7 @@ def _filled(rows: list[list[str]]) -> tuple[list[list[str]], int]:
 
 def _are_numbers(row: Sequence[str]) -> bool:
     """Whether a row begins with a number or a time, as most of its cells are."""
-    kinds = [is_number(cell) or is_stamp(cell.strip()) for cell in row]
+    kinds = list(map(is_sample, row))
     return kinds[0] and 2 * sum(kinds) >= len(kinds)
 
 
@@ -274,13 +279,12 @@ def _edges(lines: Sequence[str]) -> list[int]:
 
     Columns are parted by places that are blank in all lines of samples.
     """
-    middle = [line for line in lines if line.strip() and not _COMMENT.match(line)]
-    begin = max(0, (len(middle) - _SAMPLED) // 2)
-    numeric_lines = [line for line in middle[begin : begin + _SAMPLED] if _is_numeric(line)]
+    bare = _without_comments(lines)
+    numeric_lines = list(filter(_is_numeric, _middle(bare)))
     widths = [len(line.split()) for line in numeric_lines]
     if not widths or widths.count(max(set(widths), key=widths.count)) >= _UNEVEN * len(widths):
         return []
-    length = max(map(len, middle))
+    length = max(map(len, bare))
     filled = np.zeros(length + 2, dtype=bool)
     for line in numeric_lines:
         for place, character in enumerate(line, 1):
@@ -293,7 +297,7 @@ def _edges(lines: Sequence[str]) -> list[int]:
 def _is_numeric(line: str) -> bool:
     """Whether most of what stands in a line are numbers or times."""
     cells = line.split()
-    return 2 * sum(is_number(cell) or is_stamp(cell) for cell in cells) > len(cells)
+    return 2 * sum(map(is_sample, cells)) > len(cells)
 
 
 def _preamble_beside(rows: Sequence[Sequence[str]]) -> tuple[int, int] | None:

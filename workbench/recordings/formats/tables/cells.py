@@ -1,7 +1,7 @@
 """A table of cells, and what a cell, a row or a column of it is."""
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 from workbench.recordings.formats.numbers import is_missing, is_number
@@ -37,6 +37,12 @@ class Cells:
     about: tuple[str, ...] = ()
     # the line above samples that says of each column that its values are not as named
     remarks: tuple[str, ...] = ()
+
+    @classmethod
+    def named(cls, names: Iterable[str], rows: list[list[str]]) -> "Cells":
+        """Rows below their names, which may hold units, and nothing else."""
+        own = tuple(names)
+        return cls(rows, list(range(1, len(rows) + 1)), (), own, ("",) * len(own))
 
     @property
     def labels(self) -> list[Label]:
