@@ -145,6 +145,28 @@ def test_intervals_hold_the_truth_and_nothing_speaks_against_a_right_model(syste
         assert 0.4 < recording.error(recording.fitted) < 1.5
 
 
+def test_values_that_leave_noise_alone_need_no_search_of_the_ranges(cases, tmp_path):
+    """From a negative heat capacity, block and fit run away: no sign that there are better ones.
+
+    Once an evolution was begun, of which each simulation failed slowly: 10 min in place of 10 s.
+    """
+    build_text(tmp_path, machine_file("heated_block/Block.mo").replace(", min=1.0, max=1000.0", ""))
+    (tmp_path / "system.toml").write_text(SYSTEM)
+    anywhere = wb.FittedParameter("C", (-1000.0, 1000.0), (), by_recording=None)
+    settings = wb.FitSettings(seed=2, profiles=False)
+    outcome = wb.fit(
+        wb.load_system(tmp_path),
+        cases,
+        [anywhere, "G"],
+        settings=settings,
+        workers=1,
+        report=lambda line: None,
+    )
+    assert max(outcome.costs) > 100.0 * min(outcome.costs)
+    assert not outcome.evolved
+    assert outcome.reliable, outcome.doubts
+
+
 def test_a_product_that_alone_is_told_is_named_with_its_direction(system, cases):
     given = wb.FittedParameter(name="C", range=(99.0, 101.0), prior=(C, 1.0), by_recording=None)
     outcome = fitted(system, cases[:1], "a", "b", given)

@@ -49,9 +49,16 @@ _ROUNDING = 1e-4
 _MOVES = 10.0  # deviations of a sample, by which a fit may move a start that it shows
 _SHARE = 0.1  # of the leading part of a direction, from which on another one belongs to it
 _CHEAP = 60.0  # [s] that profiles may take before a covariance has to do
+_LED = (
+    "say in [points.design] of the system file at which inputs the machine works, and in its "
+    "'held' where states are held there. Then run 'workbench diagnose': outputs lead its "
+    "simulations, and it sizes wrong parameters"
+)
 _FREE = FittedParameter(name="", range=(-np.inf, np.inf), prior=(), by_recording=None)
 _UNBOUNDED = 1e100  # deviations, whose squares can still be added up
 _MUCH = 4.0  # deviations of chi-squared; chance leaves more once in 30 000 fits
+# Times e, by which a state that grows by itself makes its rounding as large as it was.
+_LOST = -float(np.log(np.finfo(float).eps))
 _FAILED = 1e4  # deviations, of all samples of a recording that cannot be simulated
 
 
@@ -102,6 +109,19 @@ class _Run(NamedTuple):
     starts: Mapping[str, ShownStart]  # of states that outputs show, at the first sample
     doubt: str  # of the model along it, see `check_along`
     outputs: tuple[str, ...]  # (l,) names
+    growth: float = 0.0  # 1/s, largest at the first sample, of a state by itself
+
+    @property
+    def lost(self) -> str:
+        """Why a simulation from inputs alone tells nothing of its end; empty: it may."""
+        lasts = float(self.case.time[-1] - self.case.time[0])
+        if not self.growth * lasts > _LOST:
+            return ""
+        return (
+            f"the model is unstable where {self.case.name} begins: a state grows e-fold in "
+            f"{1.0 / self.growth:.2g} s by itself, and is simulated from inputs alone for "
+            f"{lasts:.3g} s"
+        )
 
     @property
     def begin(self) -> dict[str, float]:
@@ -144,22 +164,34 @@ def fit(
         problem = _Problem(pool, runs[: len(cases)], unknowns, settings.loss, progress)
         problem.residuals(problem.start)
         if problem.failure:
-            raise InputError(
-                where=str(description.path),
-                found=f"no simulation with the model's own values: {problem.failure}",
-                expected="a model that runs along the recordings",
-                remedy="run 'workbench simulate --estimator open_loop' on them first",
-            )
+            found = f"no simulation with the model's own values: {problem.failure}"
+            first = "run 'workbench simulate --estimator open_loop' on them first"
+            raise _failed(description, problem, found, first)
         # The first of each worker compiles.
         problem.seconds = min(problem.time_residuals() for _ in range(workers + 1))
         search, interrupted = _Search(problem, settings, engine.report, jumps=jumps), False
         try:
             search.run()
+            if not np.isfinite(search.costs).any():
+                found = f"no fit from any start: {search.failure}"
+                first = "give narrower ranges, --range, or fit fewer parameters"
+                raise _failed(description, problem, found, first)
         except KeyboardInterrupt:
             interrupted = True
             pool.finish()
         outcome = _Judgement(problem, search, settings, engine.report).outcome(interrupted)
         return outcome if interrupted else _with_held_out(outcome, problem, runs[len(cases) :])
+
+
+def _failed(description: Description, problem: "_Problem", found: str, remedy: str) -> InputError:
+    """What to raise where a model cannot be simulated along the recordings."""
+    unstable = next((run.lost for run in problem.runs if run.lost), "")
+    return InputError(
+        where=str(description.path),
+        found=f"{found}; {unstable}" if unstable else found,
+        expected="a model that runs along the recordings from inputs alone",
+        remedy=_LED if unstable else remedy,
+    )
 
 
 @contextmanager
@@ -239,7 +271,20 @@ def _run(case: Case, system: System, fmu: FMU, moved: Sequence[str]) -> _Run:
     names = tuple(output.name for output in system.outputs)
     run = _Run(case, drive, y, sigma, counted, given, starts, doubt, names)
     fmu.start(run.begin, {**given, **held})
-    return run._replace(starts={**shown_states(fmu, system, u[0], first, starts), **starts})
+    run = run._replace(starts={**shown_states(fmu, system, u[0], first, starts), **starts})
+    return run._replace(growth=_growth(fmu, run.begin, {**given, **held}))
+
+
+def _growth(fmu: FMU, begin: Mapping[str, float], held: Mapping[str, float]) -> float:
+    """How fast a state grows by itself at the start [1/s]; 0 where none does, or nobody knows."""
+    if fmu.interface != MODEL_EXCHANGE:
+        return 0.0
+    try:
+        fmu.start(begin, held)
+        rates = np.linalg.eigvals(fmu.state_jacobian())
+    except (FMUError, np.linalg.LinAlgError):
+        return 0.0
+    return float(rates.real.max(initial=0.0))
 
 
 def _unknowns(
@@ -504,7 +549,7 @@ class _Search:
         self._jumps = jumps
         self.costs: list[float] = []
         self.converged = False
-        self.evolved = ""
+        self.evolved, self.failure = "", ""
 
     def run(self) -> None:
         """Search; the problem keeps the best."""
@@ -522,7 +567,9 @@ class _Search:
             self._fit(x)
             error = np.sqrt(2.0 * self.costs[-1] / max(problem.residuals_at_best.size, 1))
             steps.step(f"start {number + 1}: residuals {error:.4g} times the noise")
-        if not self.agree() and settings.generations:
+        # What is unstable stays so elsewhere, and each of many simulations fails slowly.
+        hopeless = not np.isfinite(self.costs).any() and any(run.lost for run in problem.runs)
+        if settings.generations and not (hopeless or self.agree() or self.leaves_noise()):
             self._evolve(low, high)
 
     def _fit(self, x: Vector) -> None:
@@ -531,6 +578,7 @@ class _Search:
             result = self._local(x)
         except FMUError as error:  # a model that bears no step from here
             self._report(str(error))
+            self.failure = self.failure or str(error)
             self.costs.append(np.inf)
             return
         self.costs.append(float(result.cost))
@@ -556,6 +604,16 @@ class _Search:
     def agree(self) -> bool:
         """Whether all starts reached sums of squares that chance does not part."""
         return max(self.costs) < min(self.costs) + 0.5 * _CHANCE
+
+    def leaves_noise(self) -> bool:
+        """Whether the best values leave nothing but noise, so that no others leave much less."""
+        problem = self._problem
+        size = problem.residuals_at_best.size
+        if not 2.0 * problem.least - size <= _MUCH * np.sqrt(2.0 * size):
+            return False
+        simulated = problem.outputs(problem.best)
+        fits = map(recording_fit, problem.runs, simulated, simulated)
+        return not any(text for fit in fits for text in residual_doubts(fit))
 
     def _box(self) -> tuple[Vector, Vector]:
         """Where starts are drawn: the range, or around the model's own value."""
@@ -621,7 +679,7 @@ class _Judgement:
             doubts.append("the fit has not converged")
         if interrupted:
             doubts.append("interrupted: these are the best values so far, without intervals")
-        elif not search.agree():
+        elif not (search.agree() or search.leaves_noise()):
             reached = sum(2.0 * (cost - problem.least) < _CHANCE for cost in search.costs)
             if reached < 2:
                 doubts.append(
@@ -629,6 +687,8 @@ class _Judgement:
                     "better ones"
                 )
         contradictions = [text for fit in recordings for text in residual_doubts(fit)]
+        lost = [run.lost for run in problem.runs if run.lost]
+        doubts += [f"{lost[0]}. To do: {_LED}"] if lost and contradictions else []
         values, correlation = self._values(), np.eye(problem.best.size)
         directions: list[Direction] = []
         if not interrupted:
