@@ -14,7 +14,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from workbench.__main__ import main
-from workbench.observers import label
+from workbench.observers import label, trajectory
 from workbench.observers.gains import matrix_names
 from workbench.observers.report import standings, usual_error, warning_lines
 
@@ -388,3 +388,10 @@ def test_a_sentence_that_recordings_share_but_for_its_numbers_is_said_once():
     assert warning_lines(doubts) == ["run1, run2 (figures of run1): v1 is up to 3.5e+07 m/s."]
     others = {"run1": ["v1 is off", "x[1] is off"], "run2": ["v2 is off", "x[2] is off"]}
     assert len(warning_lines(others)) == 4
+
+
+def test_a_doubt_along_recordings_is_said_once_though_its_numbers_differ(monkeypatch):
+    doubts = iter(["v is up to 12 m/s", "", "v is up to 15 m/s", "w is up to 12 m/s"])
+    monkeypatch.setattr(trajectory, "check_along", lambda *_, **__: next(doubts))
+    said = trajectory.doubts_along(None, None, [None] * 4)
+    assert said == "v is up to 12 m/s; w is up to 12 m/s"

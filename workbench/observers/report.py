@@ -1,6 +1,5 @@
 """Machine-readable results, and the table on the terminal."""
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -38,6 +37,7 @@ from workbench.pages.views import (
     capital,
     errs_least,
     inverse,
+    numberless,
     percent,
     rounded,
     window,
@@ -283,7 +283,6 @@ def write_page(
     page.write(summary, path)
 
 
-_NUMBER = re.compile(r"(?<![\w.\[])-?\d+(\.\d+)?(e[+-]?\d+)?(?![\w\]])")  # within a sentence
 _ROWS = 20_000  # of a table that become text at once
 _Z = Numbers("objective z", "mean weighed error over the whole recording; of several, the largest")
 
@@ -388,7 +387,7 @@ def warning_lines(warnings: Mapping[str, Sequence[str]]) -> list[str]:
     cases: dict[str, dict[str, str]] = {}
     for name, texts in warnings.items():
         for text in texts:
-            cases.setdefault(_NUMBER.sub("0", text), {}).setdefault(name, text)
+            cases.setdefault(numberless(text), {}).setdefault(name, text)
     lines = []
     for alike in cases.values():
         name, text = next(iter(alike.items()))

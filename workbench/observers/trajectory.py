@@ -16,7 +16,7 @@ from workbench.models.fmu import ALIKE, FMU
 from workbench.models.hybrid import HybridSimulation
 from workbench.models.instance import NoFunctionError
 from workbench.models.simulation import Drive, Simulation, needs_simulation
-from workbench.pages.views import amount, rounded
+from workbench.pages.views import amount, numberless, rounded
 from workbench.recordings.case import Case
 from workbench.system.system import System
 
@@ -131,9 +131,15 @@ def _elsewhere(fmu: FMU, parameters: Sequence[str]) -> dict[str, float]:
 def doubts_along(
     fmu: FMU, system: System, cases: Sequence[Case], *, moved: Sequence[str] = ()
 ) -> str:
-    """Check a model along recordings, see `check_along`; what is said of it, each once."""
-    doubts = dict.fromkeys(check_along(fmu, system, case, moved=moved) for case in cases)
-    return "; ".join(filter(None, doubts))
+    """Check a model along recordings, see `check_along`; what is said of it, each once.
+
+    Of doubts that differ in numbers alone, the first stands for all.
+    """
+    doubts: dict[str, str] = {}
+    for case in cases:
+        doubt = check_along(fmu, system, case, moved=moved)
+        doubts.setdefault(numberless(doubt), doubt)
+    return "; ".join(filter(None, doubts.values()))
 
 
 def _unsized(fmu: FMU, system: System) -> list[str]:

@@ -1,11 +1,13 @@
 """What the panels of a figure show, and how signals are written for people."""
 
+import re
 from collections.abc import Sequence
 
 from workbench.system.parts import Threshold, View
 from workbench.system.system import System
 from workbench.system.units import si_factor
 
+_NUMBER = re.compile(r"(?<![\w.\[])-?\d+(\.\d+)?(e[+-]?\d+)?(?![\w\]])")  # within a sentence
 _JUDGED_HEIGHT = 1.8  # the judged signal has room for several curves on top of each other
 
 
@@ -118,6 +120,15 @@ def rounded(value: float) -> str:
     ('553', '0.042')
     """
     return f"{value:.0f}" if abs(value) >= 10.0 else f"{value:.2g}"
+
+
+def numberless(text: str) -> str:
+    """A sentence whose numbers are zero, to find those that differ in them alone.
+
+    >>> numberless("x[1] is up to 3.5e+07 m/s"), numberless("v2 is 12")
+    ('x[1] is up to 0 m/s', 'v2 is 0')
+    """
+    return _NUMBER.sub("0", text)
 
 
 def amount(value: float, unit: str) -> str:
