@@ -17,8 +17,8 @@ from numpy.testing import assert_allclose
 
 from workbench.__main__ import main
 from workbench.diagnosis import Residuals
+from workbench.diagnosis.figures import FAST, lasting, lasting_blocks, recording_figure
 from workbench.diagnosis.inference.residuals import Balance
-from workbench.diagnosis.outcome import FAST, lasting, lasting_blocks, recording_figure
 from workbench.diagnosis.report import write_diagnosis_page
 from workbench.machines.wheelset.rig import CONSTANT_PADS, plant
 from workbench.pages.figures import CaseFigure

@@ -12,13 +12,7 @@ from urllib.parse import quote
 import numpy as np
 from markupsafe import Markup
 
-from workbench.diagnosis.outcome import (
-    EXTENDED,
-    NOMINAL,
-    duration,
-    estimate_figure,
-    lasting_blocks,
-)
+from workbench.diagnosis.figures import EXTENDED, NOMINAL, estimate_figure, lasting_blocks
 from workbench.observers import label
 from workbench.observers.simulation import CaseResult
 from workbench.pages.answer import recordings, unit_suffix
@@ -45,7 +39,7 @@ from workbench.pages.parts import (
     term,
     zoomable,
 )
-from workbench.pages.views import called, capital, named, per_shown, shown_unit
+from workbench.pages.views import called, capital, duration, named, per_shown, shown_unit
 from workbench.system.system import System
 from workbench.system.units import si_factor
 

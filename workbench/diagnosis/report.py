@@ -7,16 +7,15 @@ from pathlib import Path
 from typing import Any
 
 from workbench.diagnosis import Outcome, Residuals
-from workbench.diagnosis.inference.best_estimate import bands, best_estimate
-from workbench.diagnosis.outcome import (
+from workbench.diagnosis.figures import (
     at_blocks,
     draw_confusability,
     draw_dependences,
     draw_gain,
     lasting,
     lasting_blocks,
-    recording_figures,
 )
+from workbench.diagnosis.inference.best_estimate import bands, best_estimate
 from workbench.diagnosis.page import write_diagnosis_page
 from workbench.observers.report import write_estimates, write_numbers
 from workbench.pages.answer import Answer, Measure, percentage, with_answer
@@ -42,7 +41,7 @@ def write_diagnosis(
     pictures : whether figures of the page are written as files, too; those of an earlier
         diagnosis in the folder go.
     """
-    figures = recording_figures(outcome)
+    figures = outcome.figures()
     best = best_estimate(outcome, figures[0].name)
     content = {
         **outcome.to_dict(),
@@ -83,7 +82,7 @@ def _drawings(
 def relate_diagnosis(outcome: Outcome, out: Path, related: Mapping[str, str]) -> None:
     """Write the page of a diagnosis in `out` anew, with links; see `write_diagnosis_page`."""
     summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
-    figures = recording_figures(outcome)
+    figures = outcome.figures()
     best = best_estimate(outcome, figures[0].name)
     write_diagnosis_page(outcome.system, summary, figures, best, out, related)
 

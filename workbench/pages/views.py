@@ -165,3 +165,12 @@ def errs_least(errors: Sequence[tuple[float, str]]) -> str:
     if len(names) == 1:
         return f"The {names[0]} errs least"
     return f"The {', the '.join(names[:-1])} and the {names[-1]} tie"
+
+
+def duration(seconds: float) -> str:
+    """A time for people.
+
+    >>> duration(0.05), duration(1.0), duration(300.0)
+    ('50 ms', '1 s', '300 s')
+    """
+    return f"{1e3 * seconds:g} ms" if seconds < 0.5 else f"{seconds:g} s"

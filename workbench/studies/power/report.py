@@ -9,7 +9,7 @@ import numpy as np
 
 from workbench.arrays import Matrix
 from workbench.diagnosis import Effect
-from workbench.diagnosis.outcome import draw_heat
+from workbench.diagnosis.figures import draw_heat
 from workbench.pages.answer import Answer, Measure, share_measure, share_with_interval, with_answer
 from workbench.pages.figures import LIGHT, in_style, save_figure, styled
 from workbench.pages.parts import (
