@@ -485,6 +485,13 @@ def test_what_is_no_undecided_diagnosis_is_refused(summary, message, tmp_path, c
     assert message in capsys.readouterr().err
 
 
+def test_an_fmu_alone_is_refused_before_its_owner_writes_what_may_be_varied(block, undecided):
+    """The remedy was a table [next], then an option that the command has not."""
+    alone = replace(block, library=block.library.parent / "none.mo", experiments=None)
+    with pytest.raises(InputError, match=r"an FMU alone, without none\.mo.*the diagnosis says"):
+        next_stop(alone, undecided.rivals, ALONE)
+
+
 def test_a_system_that_does_not_say_what_may_be_varied_is_refused(block, undecided):
     silent = replace(block, experiments=None)
     with pytest.raises(InputError, match=r"no table \[next\]"):

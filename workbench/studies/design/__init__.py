@@ -14,8 +14,8 @@ from workbench.diagnosis import build_everything, catalogue, choose
 from workbench.diagnosis.data.samples import channels
 from workbench.diagnosis.effects.extension import variables
 from workbench.diagnosis.inference.rivals import Rivals
+from workbench.diagnosis.problem import library_of
 from workbench.errors import InputError
-from workbench.models.modelica import read_library
 from workbench.runtime.engine import Engine
 from workbench.runtime.pool import Pool
 from workbench.studies.design.candidates import (
@@ -113,7 +113,15 @@ def _open(
     system: System, rivals: Rivals, engine: Engine
 ) -> Iterator[tuple[Experiments, Pool[ExperimentPredictor]]]:
     """What the system allows, and workers with its model."""
-    experiments = system.experiments
+    experiments, library = system.experiments, library_of(system)
+    if library is None:
+        raise InputError(
+            where=str(system.source),
+            found=f"an FMU alone, without {system.library.name}",
+            expected="the Modelica library of the model, in which candidates are simulated",
+            remedy="put it beside the system file, and name the class of the model in [models]. "
+            "Without it, the diagnosis says beside each effect what would discriminate it",
+        )
     if experiments is None:
         raise InputError(
             where=str(system.source),
@@ -121,7 +129,6 @@ def _open(
             expected="what may be varied in the next recording",
             remedy="write it, see docs/next-stop.md",
         )
-    library = read_library(system.library)
     effects = {effect.name: effect for effect in choose(rivals.effects, catalogue(system, library))}
     for model in rivals.models:
         for effect, parameter in model.sizes:
