@@ -134,6 +134,15 @@ def test_what_is_wrong_is_named_with_its_size(tank, tmp_path, truth, effect, siz
     assert (outcome.extension is None) == (effect != "A")  # a sensor is no matter of the model
 
 
+def test_an_extended_model_says_which_wrong_sensors_it_does_not_hold(tank, tmp_path):
+    """With the recordings as they are, another tool would not reach the errors of the fit."""
+    outcome = diagnosed(tank, tmp_path, seed=2, area=0.55, zero=0.15)
+    effects = {cause.effect.name for cause in outcome.diagnosis.causes}
+    assert effects == {"A", "SensorOffset[level]"}
+    assert outcome.without == ["SensorOffset[level]"]
+    assert "Extended.fmu\n  without SensorOffset[level], as sensors" in outcome.summary()
+
+
 @pytest.mark.parametrize(
     ("truth", "form", "size"),
     [({"seed": 2, "late": 3.0}, "Delay", "delay"), ({"seed": 3, "lag": 6.0}, "Lag", "lag")],

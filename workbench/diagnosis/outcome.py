@@ -338,6 +338,12 @@ class Outcome:
         strongest = max(self.dependences, key=lambda dependence: dependence.after)
         return f"; it goes with {strongest.influence}" if strongest.after > 0.0 else ""
 
+    @property
+    def without(self) -> list[str]:
+        """Effects that were found and are not in the extended model: of sensors and clocks."""
+        effects = [cause.effect for cause in self.diagnosis.causes]
+        return [effect.name for effect in effects if effect.sensor or effect.late]
+
     def summary(self) -> str:
         """The verdict, its causes and what they rest on, for people."""
         lines = [self.sentence, *(f"doubt: {warning}" for warning in self.warnings)]
@@ -360,6 +366,11 @@ class Outcome:
         if self.extension is not None:
             part = " (a part of what is missing)" * (self.diagnosis.verdict == "partly explained")
             lines += ["", f"extended model{part}: {', '.join(map(str, self.extension.files))}"]
+            if self.without:
+                lines.append(
+                    f"  without {', '.join(self.without)}, as sensors and clocks are no part of a "
+                    "model: correct recordings by it before you compare them with that model"
+                )
         aside = sum(counts[FAULTY] + counts[MISSING] for counts in self.set_aside.values())
         if aside:
             lines.append(f"{aside} samples were missing or wrong, and are excluded")
