@@ -42,7 +42,7 @@ def header(above: Sequence[Sequence[str]], width: int) -> tuple[list[str], list[
         and not conversion(units[0], "s")
     ):
         units = ["", *units]  # between spaces, dates and times have none
-    return names if units else _with_slashes(names), units
+    return names, units
 
 
 def refuse_narrow(
@@ -206,7 +206,7 @@ def _whole_names(rows: Sequence[list[str]]) -> list[str]:
     return [" ".join(filter(None, pair)) for pair in zip(over, names, strict=True)]
 
 
-def _with_slashes(names: list[str]) -> list[str]:
+def with_slashes(names: list[str]) -> list[str]:
     """Names with units in brackets, where most are written as quotients: t/s, U/V, Ewe/V."""
     matches = [_QUOTIENT.fullmatch(name) for name in names]
     units = [match["unit"] if match and is_unit(match["unit"]) else "" for match in matches]

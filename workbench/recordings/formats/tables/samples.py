@@ -18,7 +18,12 @@ from workbench.recordings.formats.tables.cells import (
     is_time_alone,
     trim,
 )
-from workbench.recordings.formats.tables.header import HEADER_ROWS, header, refuse_narrow
+from workbench.recordings.formats.tables.header import (
+    HEADER_ROWS,
+    header,
+    refuse_narrow,
+    with_slashes,
+)
 from workbench.recordings.formats.tables.moments import with_whole_stamps
 from workbench.recordings.formats.tables.scaling import (
     refuse_scales,
@@ -136,6 +141,7 @@ def find_table(rows: Sequence[Sequence[str]], lines: Sequence[int], where: str) 
         refuse_narrow(names, units, body, f"{where}, above line {lines[first]}")
     else:
         names = [f"column {i + 1}" for i in range(width)]
+    names = names if units else with_slashes(names)
     # Recorders of portable kind name channels CH1 above samples, and say further up what they are.
     listed = {row[0].strip(): row[1].strip() for row in above if len(row) > 2}
     table = Cells(
