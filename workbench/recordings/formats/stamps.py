@@ -573,54 +573,68 @@ def _mend_changes_by(by: int, times: Vector, *, dated: bool) -> tuple[Vector, tu
     A step back by them is the end of summer time; a step that is too long by them is its begin
     where some zone changes its clock just there.
     """
-    called = "hour" if by == _HOUR else "half-hour"
-    an = "an" if by == _HOUR else "a"
     steps = np.diff(times)
     ahead = steps[steps > 0.0]
     usual = float(np.median(ahead)) if ahead.size else 0.0
     if not 0.0 < usual <= 12 * _HOUR:
         return times, ()
-    twice = steps + by
-    back = np.flatnonzero((steps <= 0.0) & (twice > 0.0) & (twice <= _EVEN * usual))
-    if usual > by:  # a step that is too short by them is one ahead
-        back = np.flatnonzero(np.abs(twice - usual) <= 0.1 * by)
-    long = np.flatnonzero(np.abs(steps - by - usual) <= 0.1 * min(usual, by))
-    words = []
-    if dated:
-        near = np.flatnonzero((steps > by) & (steps < by + _EVEN * usual))
-        begins = [k for k in near if _changes(times[k], times[k + 1], by)]
-        words = [
-            f"{an} {called} may be missing after {_moment(times[k]):%Y-%m-%d %H:%M:%S}, where "
-            "summer time begins in some zones; say the zone, such as [Europe/Berlin], or [UTC]"
-            for k in begins
-            if k not in long
-        ]
-        back = back[[_changes(times[k], times[k + 1], -by) for k in back]] if back.size else back
-        long = np.array([k for k in begins if k in long], dtype=np.int64)
-    else:
-        of_day = times % (24 * _HOUR)
-        back = back[(of_day[back] <= 4 * _HOUR) & (of_day[back] >= _HOUR)][:1]
-        back = back[np.abs(twice[back] - usual) <= 0.1 * usual]
-        night = (of_day[long] <= 3 * _HOUR) & (of_day[long + 1] >= 2 * _HOUR)
-        words = [
-            f"{an} {called} is missing after {_moment(times[k]):%H:%M:%S}: a gap, or summer time "
-            "begins, which only a date tells; times after it are as they are written"
-            for k in long[night]
-            if usual <= by
-        ]
-        long = long[:0]
+    find, form = (_dated_changes, "%Y-%m-%d %H:%M:%S") if dated else (_night_changes, "%H:%M:%S")
+    ends, begins, doubted = find(times, usual, by)
+    named = "an hour" if by == _HOUR else "a half-hour"
+    words = [f"{named} {doubt}" for doubt in doubted]
+    called = named.partition(" ")[2]
     shift = np.zeros(times.size)
-    shift[back + 1] += by
-    shift[long + 1] -= by
-    for k in sorted([*back.tolist(), *long.tolist()]):
-        at = f"{_moment(times[k]):%Y-%m-%d %H:%M:%S}" if dated else f"{_moment(times[k]):%H:%M:%S}"
-        if k in back:
-            words.append(
-                f"the {called} after {at} comes twice: summer time ends, later times go on"
-            )
-        else:
-            words.append(f"the {called} after {at} is missing: summer time begins, no gap is left")
+    for k in sorted([*ends, *begins]):
+        at = f"{_moment(times[k]):{form}}"
+        shift[k + 1] = by if k in ends else -by
+        words.append(
+            f"the {called} after {at} comes twice: summer time ends, later times go on"
+            if k in ends
+            else f"the {called} after {at} is missing: summer time begins, no gap is left"
+        )
     return times + np.cumsum(shift), tuple(words)
+
+
+def _steps_off(steps: Vector, usual: float, by: int) -> tuple[np.ndarray, np.ndarray]:
+    """Places of steps that are too short, and of those that are too long, by so many seconds."""
+    twice = steps + by
+    back = (steps <= 0.0) & (twice > 0.0) & (twice <= _EVEN * usual)
+    if usual > by:  # a step that is too short by them is one ahead
+        back = np.abs(twice - usual) <= 0.1 * by
+    long = np.abs(steps - by - usual) <= 0.1 * min(usual, by)
+    return np.flatnonzero(back), np.flatnonzero(long)
+
+
+def _dated_changes(times: Vector, usual: float, by: int) -> tuple[list[int], list[int], list[str]]:
+    """Where summer time ends and begins in some zone, and where it may begin, in words."""
+    steps = np.diff(times)
+    back, long = _steps_off(steps, usual, by)
+    near = np.flatnonzero((steps > by) & (steps < by + _EVEN * usual))
+    begins = [k for k in near.tolist() if _changes(times[k], times[k + 1], by)]
+    words = [
+        f"may be missing after {_moment(times[k]):%Y-%m-%d %H:%M:%S}, where summer time begins in "
+        "some zones; say the zone, such as [Europe/Berlin], or [UTC]"
+        for k in begins
+        if k not in long
+    ]
+    ends = [k for k in back.tolist() if _changes(times[k], times[k + 1], -by)]
+    return ends, [k for k in begins if k in long], words
+
+
+def _night_changes(times: Vector, usual: float, by: int) -> tuple[list[int], list[int], list[str]]:
+    """The same of times of day: summer time ends once in a night; that it begins a date tells."""
+    steps, of_day = np.diff(times), times % (24 * _HOUR)
+    back, long = _steps_off(steps, usual, by)
+    ends = back[(of_day[back] <= 4 * _HOUR) & (of_day[back] >= _HOUR)][:1]
+    ends = ends[np.abs(steps[ends] + by - usual) <= 0.1 * usual]
+    night = (of_day[long] <= 3 * _HOUR) & (of_day[long + 1] >= 2 * _HOUR)
+    words = [
+        f"is missing after {_moment(times[k]):%H:%M:%S}: a gap, or summer time begins, which only "
+        "a date tells; times after it are as they are written"
+        for k in long[night]
+        if usual <= by
+    ]
+    return ends.tolist(), [], words
 
 
 def _changes(before: float, after: float, by: int) -> bool:
