@@ -167,6 +167,66 @@ def test_values_that_leave_noise_alone_need_no_search_of_the_ranges(cases, tmp_p
     assert outcome.reliable, outcome.doubts
 
 
+STORES = """model Stores "Two stores that one output adds up"
+  parameter Real R(min=0.0) = 0.2;
+  input Real i;
+  output Real y;
+  Real a(start=0.0, fixed=true, nominal=1.0);
+  Real b(start=1.0, fixed=true, nominal=1.0);
+equation
+  der(a) = i - a/20.0;
+  der(b) = -b/200.0;
+  y = a + b + R*i;
+end Stores;
+"""
+
+
+def stored(folder: Path, name: str, begin: float, R: float) -> None:
+    """A recording of the stores by the closed form of each step; `b` begins elsewhere."""
+    rng, time = np.random.default_rng(int(name)), 2.0 * np.arange(100)
+    i, fades, a = np.repeat(rng.uniform(-0.1, 0.1, 10), 10), np.exp(-0.1), 0.0
+    y = []
+    for now, at in zip(i, time, strict=True):
+        y.append(a + begin * np.exp(-at / 200.0) + R * now)
+        a = a * fades + 20.0 * now * (1.0 - fades)
+    y = np.array(y) + rng.normal(0.0, 0.01, time.size)
+    write_case(folder / "cases" / name, {"time [s]": time, "i [1]": i, "y [1]": y}, name, "%.8g")
+
+
+def test_a_start_that_differs_by_recording_is_named_and_its_table_helps(tmp_path):
+    """A cell that is not full at the start made resistance and capacity wrong, without a hint."""
+    build_text(tmp_path, STORES)
+    text = (
+        'title = "Stores"\nsample_time = "2 s"\n[models]\nobserver = { fmu = "Stores.fmu" }\n'
+        '[inputs]\ni = { unit = "1", noise = 0.0, scale = 0.1, held = true }\n'
+        '[outputs]\ny = { unit = "1", noise = 0.01, scale = 2.0 }\n[fit.R]\n'
+    )
+    (tmp_path / "system.toml").write_text(text)
+    for number, begin in enumerate((0.7, 1.0, 1.4)):
+        stored(tmp_path, str(number), begin, R=0.3)
+
+    def outcome(names: str) -> wb.FitOutcome:
+        system = wb.load_system(tmp_path)
+        cases = wb.read_cases(tmp_path / "cases", system)
+        return fitted(system, [case for case in cases if case.name in names])
+
+    first = outcome("012")
+    assert re.match(r"another start of b in each recording would explain 100%", first.doubts[0])
+    assert "write a table [fit.b]" in first.doubts[0]
+    (tmp_path / "system.toml").write_text(text + "[fit.b]\n")
+    second = outcome("012")
+    assert second.reliable, second.doubts
+    assert (second["R"].low or 1.0) < 0.3 < (second["R"].high or 0.0)
+    # With right starts and a wrong form, no start is named.
+    for number in (3, 4, 5):
+        stored(tmp_path, str(number), 1.0, R=0.3)
+    wrong = text.replace('"Stores.fmu" }\n', '"Stores.fmu" }\n[parameters]\nR = 0.2\n')
+    (tmp_path / "system.toml").write_text(wrong.replace("[fit.R]", "[fit.a]"))
+    third = outcome("345")
+    assert not third.reliable
+    assert not any("another start" in doubt for doubt in third.doubts)
+
+
 def test_a_product_that_alone_is_told_is_named_with_its_direction(system, cases):
     given = wb.FittedParameter(name="C", range=(99.0, 101.0), prior=(C, 1.0), by_recording=None)
     outcome = fitted(system, cases[:1], "a", "b", given)
@@ -288,6 +348,17 @@ def test_the_command_writes_what_other_tools_read(folder, tmp_path):
     assert starts["a"] == "1.0"
     assert any("parameters.ssv" in note for note in summary["notes"])  # compiled-in defaults
     assert "Fitted values" in (tmp_path / "index.html").read_text()
+
+
+@pytest.mark.parametrize(("parameters", "status"), [(["C"], 1), (["C", "G"], 0)])
+def test_a_wrong_model_leads_to_a_diagnosis(parameters, status, folder, tmp_path, capsys):
+    """The loss stays wrong by a quarter if the heat capacity alone is fitted."""
+    named = [word for name in parameters for word in ("--parameter", name)]
+    command = ["fit", str(folder / "cases" / "day1"), "--system", str(folder), *named]
+    command += ["--starts", "1", "--intervals", "covariance", "--workers", "1"]
+    assert main([*command, "--out", str(tmp_path)]) == status
+    advised = f"next: workbench diagnose --system {folder}, on the same recordings"
+    assert (advised in capsys.readouterr().out) == bool(status)
 
 
 def test_a_fitted_fmu_differs_in_start_values_alone(folder, tmp_path):

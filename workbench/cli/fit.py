@@ -132,6 +132,11 @@ def run(options: argparse.Namespace, output: Output) -> CommandResult:
     for note in notes:
         warn(note)
     output.result(f"to read: {page}; parameters.ssv, parameters.toml and the FMU beside it")
+    if outcome.is_contradicted and not outcome.interrupted:
+        output.result(
+            f"next: workbench diagnose --system {options.system}, on the same recordings: it seeks "
+            "what the model lacks"
+        )
     units = {"seconds": "s", **{value.label: value.unit for value in outcome.values}}
     status = 130 if outcome.interrupted else 0 if outcome.reliable else 1
     return CommandResult(read_result(options.out / "summary.json"), units, status, page)

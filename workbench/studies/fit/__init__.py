@@ -23,6 +23,7 @@ from workbench.models.fmu import FMU
 from workbench.models.simulation import Drive, Simulation
 from workbench.observers.operating import ShownStart, shown_states, start_spreads
 from workbench.observers.trajectory import check_along
+from workbench.observers.trust import MOSTLY
 from workbench.recordings.case import Case
 from workbench.runtime.engine import Engine, ProgressReporter, StepReporter
 from workbench.runtime.pool import Pool
@@ -110,6 +111,7 @@ class _Run(NamedTuple):
     doubt: str  # of the model along it, see `check_along`
     outputs: tuple[str, ...]  # (l,) names
     growth: float = 0.0  # 1/s, largest at the first sample, of a state by itself
+    hidden: tuple[str, ...] = ()  # states that no output shows at the first sample
 
     @property
     def lost(self) -> str:
@@ -272,7 +274,9 @@ def _run(case: Case, system: System, fmu: FMU, moved: Sequence[str]) -> _Run:
     run = _Run(case, drive, y, sigma, counted, given, starts, doubt, names)
     fmu.start(run.begin, {**given, **held})
     run = run._replace(starts={**shown_states(fmu, system, u[0], first, starts), **starts})
-    return run._replace(growth=_growth(fmu, run.begin, {**given, **held}))
+    hidden = tuple(name for name in fmu.states if name not in run.starts)
+    growth = _growth(fmu, run.begin, {**given, **held})
+    return run._replace(growth=growth, hidden=hidden if fmu.interface == MODEL_EXCHANGE else ())
 
 
 def _growth(fmu: FMU, begin: Mapping[str, float], held: Mapping[str, float]) -> float:
@@ -689,6 +693,7 @@ class _Judgement:
         contradictions = [text for fit in recordings for text in residual_doubts(fit)]
         lost = [run.lost for run in problem.runs if run.lost]
         doubts += [f"{lost[0]}. To do: {_LED}"] if lost and contradictions else []
+        doubts += filter(None, [self._other_starts()] if contradictions and not interrupted else [])
         values, correlation = self._values(), np.eye(problem.best.size)
         directions: list[Direction] = []
         if not interrupted:
@@ -717,6 +722,49 @@ class _Judgement:
             evolved=search.evolved,
             loss=self._settings.loss,
             interrupted=interrupted,
+        )
+
+    def _other_starts(self) -> str:
+        """Say which state that no output shows may begin elsewhere, by recording; or nothing.
+
+        Where a Gauss-Newton step of its starts and of all unknowns removes most of what remains.
+        """
+        problem, best = self._problem, self._problem.best
+        names = [n for n in problem.runs[0].hidden if n not in {u.name for u in problem.unknowns}]
+        try:
+            own = problem.jacobian(best)
+            tasks = [
+                problem.pool.submit(_slopes, run.drive, problem.values(best, number), names, {})
+                for number, run in enumerate(problem.runs)
+            ]
+            slopes = [
+                (task.result()[0] / run.sigma[:, :, None])[run.counted]
+                for run, task in zip(problem.runs, tasks, strict=True)
+            ]
+        except (FMUError, InputError):
+            return ""
+        r, shares = problem.residuals_at_best, dict[str, float]()
+        above = float(r @ r) - r.size
+        for k, name in enumerate(names):
+            starts = np.zeros((r.size, len(slopes)))
+            first = 0
+            for number, columns in enumerate(slopes):
+                starts[first : first + len(columns), number] = columns[:, k]
+                first += len(columns)
+            jacobian = np.hstack([own, starts])
+            norms = np.linalg.norm(jacobian, axis=0)
+            if not np.isfinite(norms).all() or not above > 0.0:
+                continue
+            scaled = jacobian / np.where(norms > 0.0, norms, 1.0)
+            left = r - scaled @ np.linalg.lstsq(scaled, r, rcond=_ROUNDING)[0]
+            shares[name] = min((float(r @ r) - float(left @ left)) / above, 1.0)
+        name = max(shares, key=lambda name: shares[name], default="")
+        if not name or not shares[name] > MOSTLY:
+            return ""
+        return (
+            f"another start of {name} in each recording would explain {shares[name]:.0%} of what "
+            f"remains. If that start may differ from the model, write a table "
+            f"[fit.{name}] in the system file, and fit again"
         )
 
     def _values(self) -> list[FittedValue]:

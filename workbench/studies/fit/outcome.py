@@ -160,6 +160,11 @@ class FitOutcome:
         """Whether the values may be relied on."""
         return not self.doubts
 
+    @property
+    def is_contradicted(self) -> bool:
+        """Whether residuals of a recording that was fitted contradict the model."""
+        return any(any(residual_doubts(fit)) for fit in self.recordings if not fit.held_out)
+
     def __getitem__(self, label: str) -> FittedValue:
         """A value by its label."""
         return next(value for value in self.values if value.label == label)
