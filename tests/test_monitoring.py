@@ -152,6 +152,20 @@ def test_a_quantity_alone_that_jumps_is_told_once_and_stays():
     assert abs(level - change.before[0] - 6.0) < 3.0 * np.hypot(known, change.before[1])
 
 
+def test_the_sentence_of_a_quantity_without_a_label_says_its_name_once():
+    def jumps(values: Matrix) -> None:
+        values[20:, 8] += 6.0
+
+    tracks = Machine(5, 60).watched(jumps)[-1:]
+    result: Any = SimpleNamespace(tracks=tracks, names=[f"day{k}" for k in range(60)])
+    result._size = lambda track: "+6"
+    (sentence,) = wb.MonitoringResult.sentences.fget(result)  # type: ignore[attr-defined]
+    assert sentence.startswith("b: +6 since day")
+    result.tracks = [replace(tracks[0], label="of the belt")]
+    (sentence,) = wb.MonitoringResult.sentences.fget(result)  # type: ignore[attr-defined]
+    assert sentence.startswith("of the belt (b): +6 since day")
+
+
 def test_what_is_common_to_all_is_told_of_their_mean_alone():
     def fall(values: Matrix) -> None:
         values[20:, :8] -= 9.0

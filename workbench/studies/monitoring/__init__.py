@@ -68,7 +68,8 @@ def monitor(
             where=str(system.source),
             found="no estimated quantity that can be watched",
             expected="quantities in [estimated] that no condition sets",
-            remedy="name some parameters of the model there, with corrections",
+            remedy="name some parameters of the model there, each with its 'correction'. That is "
+            "an input of the model, 0 by default, which is added to the parameter",
         )
     with open_model(system, OBSERVER) as model:
         identity = {

@@ -69,8 +69,10 @@ class MonitoringResult:
                 first, last = track.changes[0], track.changes[-1]
                 alarms = len(track.changes)
                 until = f", {alarms} alarms until {self.names[last.raised]}" * (alarms > 1)
+                name = _quantity_name(track)
+                called = name if track.label == name else f"{track.label} ({name})"
                 sentences.append(
-                    f"{track.label} ({_quantity_name(track)}): {self._size(track)} since "
+                    f"{called}: {self._size(track)} since "
                     f"{self.names[first.last]}; reported at {self.names[first.raised]}{until}"
                 )
         return sentences
@@ -81,7 +83,7 @@ class MonitoringResult:
         lines = [f"{count} recordings, {self.names[0]} to {self.names[-1]}: "]
         lines[0] += "; ".join(
             [
-                f"{len(self.changes) or 'no'} alarms",
+                f"{len(self.changes) or 'no'} alarm{'s' * (len(self.changes) != 1)}",
                 *([f"{len(self.refused)} not used"] if self.refused else []),
                 *([f"{len(self.again)} there twice"] if self.again else []),
             ]
