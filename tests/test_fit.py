@@ -4,6 +4,7 @@ import json
 import re
 import zipfile
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -18,6 +19,7 @@ from workbench.models.description import read_description
 from workbench.models.fmu import FMU
 from workbench.models.simulation import Drive, Simulation
 from workbench.recordings.case import Case
+from workbench.studies.fit import resolve_parameters
 from workbench.studies.fit.report import write_fmu
 from workbench.system.system import System
 
@@ -314,6 +316,15 @@ def test_ctrl_c_keeps_the_best_values(system, cases):
 def test_a_name_that_cannot_be_fitted_is_refused(system, cases):
     with pytest.raises(InputError, match="expected names or patterns"):
         fitted(system, cases[:1], "K")
+
+
+def test_a_whole_number_is_refused_with_another_way(system):
+    """Teeth of a gear: it was called no parameter, and its owner was to correct the name."""
+    read = read_description(next(iter(system.models.values())).path)
+    variables = [replace(v, type="Integer") if v.name == "idle" else v for v in read.variables]
+    entries = replace(read, variables=tuple(variables))
+    with pytest.raises(InputError, match=r"'idle', which is a whole number.*in \[parameters\]"):
+        resolve_parameters(system, entries, ["idle"])
 
 
 def test_a_table_of_no_parameter_is_refused(folder):

@@ -219,6 +219,22 @@ def resolve_parameters(
     for entry in parameters or system.fitted:
         pattern = entry if isinstance(entry, str) else entry.name
         names = [pattern] if pattern in known else fnmatch.filter(known, pattern)
+        variable = description.by_name.get(pattern)
+        if not names and variable is not None and variable.causality == "parameter":
+            raise InputError(
+                where="parameters to fit",
+                found=f"'{pattern}', which is "
+                + (
+                    "calculated by the model"
+                    if variable.scalar
+                    else "an array, or an element of one"
+                    if variable.floats
+                    else f"a whole number or no number ({variable.type})"
+                ),
+                expected="a parameter that is a single real number and can be set, or a state",
+                remedy=f"set other values of '{pattern}' in [parameters] of the system file, "
+                "fit with each, and compare what remains",
+            )
         if not names:
             raise unknown_name(
                 pattern,
