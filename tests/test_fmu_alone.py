@@ -814,6 +814,48 @@ def test_what_a_sensor_lacks_is_taken_from_no_run_that_was_led_astray(tmp_path, 
     assert_allclose(straight, free, atol=1e-9)
 
 
+def test_a_run_at_the_edge_of_what_the_model_can_do_ends_no_diagnosis(tmp_path):
+    """A valve lets nothing through below a tenth of its lift, where a sensor's gain takes it."""
+    build_text(
+        tmp_path,
+        """model Valve
+  parameter Real A(unit="m2") = 0.5 "Area of the tank";
+  parameter Real most(unit="m3/s") = 4e-3 "Flow through the open valve";
+  input Real lift(unit="1", start=0.5, min=0.1, max=1.0) "Lift of the valve";
+  input Real drawn(unit="m3/s") "Flow that is drawn";
+  output Real h(unit="m", start=1.0, fixed=true, nominal=1.0) "Level";
+equation
+  A*der(h) = most*sqrt(lift - 0.099999) - drawn;
+end Valve;
+""",
+    )
+    (tmp_path / "system.toml").write_text("""title = "A valve"
+sample_time = "1 s"
+models.observer = { fmu = "Valve.fmu" }
+inputs.lift = { unit = "1", noise = "1e-4 1", scale = "1 1", held = true }
+inputs.drawn = { unit = "m3/s", noise = "0 m3/s", scale = "4e-3 m3/s", held = true }
+outputs.h = { unit = "m", noise = "2 mm", scale = "1 m" }
+""")
+    rng = np.random.default_rng(2)
+    for number in range(3):
+        time = np.arange(0.0, 300.0)
+        opened = np.repeat(rng.choice([0.1, 0.3, 0.6, 1.0], 10), 30)
+        through = 3.6e-3 * np.sqrt(opened - 0.099999)
+        drawn = np.repeat(rng.uniform(0.5, 1.5, 5), 60) * through.mean()
+        level = 1.0 + np.append(0.0, np.cumsum(through - drawn)[:-1]) / 0.5
+        columns = {
+            "time [s]": time,
+            "lift [1]": opened,
+            "drawn [m3/s]": drawn,
+            "h [m]": level + 0.002 * rng.standard_normal(time.size),
+        }
+        write_case(tmp_path / "recordings" / f"{number}", columns, "Valve", "%.9g")
+    outcome = quietly(load_system(tmp_path), tmp_path / "recordings")
+    (cause,) = outcome.diagnosis.causes
+    assert cause.effect.name == "most"
+    assert cause.parameters["change"].low < -4e-4 < cause.parameters["change"].high
+
+
 @pytest.fixture(scope="module")
 def kettle(tmp_path_factory) -> Path:
     """Folder of an FMU whose states are temperatures, with its system file."""

@@ -90,7 +90,7 @@ def _settle(
         - fmu.defaults[quantity.name]
         for quantity in system.estimated
     ]
-    u = np.array([*(point.inputs.get(name, 0.0) for name in names), *offsets])
+    u = np.array([*(point.inputs.get(name, fmu.defaults[name]) for name in names), *offsets])
     fmu.set(fmu.variables([*names, *system.corrections]), u)
     x = fmu.get_states()
     rests = np.ones(x.size, bool)

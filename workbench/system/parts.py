@@ -606,7 +606,10 @@ class OperatingPoint:
     """Where a model is linearised: inputs given, some states held, all others at rest."""
 
     inputs: Mapping[str, float] = key(
-        "of the model; others are zero", unit=_units("inputs"), keys=names_of("inputs"), absent={}
+        "of the model; others are as the model starts them",
+        unit=_units("inputs"),
+        keys=names_of("inputs"),
+        absent={},
     )
     held: Mapping[str, Expression] = key(
         "formulas of states, in parameters of the model; all others are at rest",

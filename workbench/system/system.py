@@ -238,7 +238,7 @@ class System:
         "where observers are designed",
         name="points.design",
         absent=AT_REST,
-        otherwise="at rest without inputs",
+        otherwise="at rest, at the start values of the inputs",
     )
     tested: OperatingPoint = key(
         "where observability is tested", name="points.tested", absent="{design}"

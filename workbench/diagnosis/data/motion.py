@@ -21,7 +21,7 @@ from workbench.errors import FMUError, InputError
 from workbench.models.fmu import FMU
 from workbench.models.simulation import needs_simulation
 from workbench.observers.layout import rolling_ratio
-from workbench.observers.operating import corrected_states, linearised
+from workbench.observers.operating import DesignPointError, corrected_states, linearised
 from workbench.system.registry import open_file
 from workbench.system.system import System
 
@@ -94,7 +94,20 @@ class Lead:
 
 
 def motion(fmu: FMU, system: System) -> Motion:
-    """Linearise a model at the design point; the FMU is started anew."""
+    """Linearise a model at the design point; the FMU is started anew.
+
+    Raises
+    ------
+    DesignPointError
+        If the model cannot be evaluated or differentiated there.
+    """
+    try:
+        return _motion(fmu, system)
+    except FMUError as error:
+        raise DesignPointError.at(fmu, system, str(error)) from None
+
+
+def _motion(fmu: FMU, system: System) -> Motion:
     system = replace(system, outputs=(*system.outputs, *system.intermittent), intermittent=())
     states = corrected_states(fmu, system)
     model = linearised(fmu, system).of(states)

@@ -37,8 +37,8 @@ def outside_changes(
 ) -> NearestCandidate | None:
     """Changes that no effect is, see `Fit.changes`, alone or beside effects.
 
-    They are fewer than the causes and explain as much; or they explain significantly more, and
-    leave noise alone: one in place of one cause or none, two where causes are no answer.
+    They are fewer than the causes and explain as much; or they are as many, two where causes are no
+    answer, explain significantly more, and leave noise alone.
 
     Parameters
     ----------
@@ -47,12 +47,9 @@ def outside_changes(
     changes = fit.changes()
     if not changes:
         return None
-    other, model = fit.beside(changes), None
-    if len(chosen.best.active) < 2:
-        model = _single(other, chosen, changes, report)
-    if model is None:
-        most = max(len(chosen.best.active) - 1, 0 if explained else _TOGETHER)
-        model = _several(other, chosen, changes, most, report)
+    other, causes = fit.beside(changes), len(chosen.best.active)
+    most = max(causes, 0 if explained else _TOGETHER)
+    model = _fewest(other, chosen, changes, most, report)
     if model is None:
         return None
     validation = CrossValidation(other)
@@ -63,20 +60,7 @@ def outside_changes(
     return NearestCandidate(model.names, removed, reasons, change=text)
 
 
-def _single(
-    fit: Fit, chosen: Selection, changes: Sequence[Effect], report: Reporter
-) -> FittedModel | None:
-    """One change in place of one cause or none."""
-    about, trial = examine(fit, chosen.base, changes, report)
-    scores: dict[str, CandidateScore] = {}
-    for score in sorted(trial.scores(), key=lambda score: -score.gain):
-        scores.setdefault(score.effect.name, score)
-    tried = [starts_of([score]) for score in list(scores.values())[:NEAREST] if score.size]
-    models = rival_fits(fit, about, tried) if tried else []
-    return next((model for model in models if _explains(fit, chosen, model)), None)
-
-
-def _several(
+def _fewest(
     fit: Fit, chosen: Selection, changes: Sequence[Effect], most: int, report: Reporter
 ) -> FittedModel | None:
     """Changes, or changes and effects, in place of all causes: as few as explain what more do.
@@ -85,21 +69,34 @@ def _several(
     ----------
     most : of them, unless more explain significantly more.
     """
-    if most < 1:
-        return None
-    causes, needed = len(chosen.best.active), fit.decides.needed
+    causes, fewest = len(chosen.best.active), None
+    if causes < 2:
+        models = _singles(fit, chosen, changes, report)
+        fewest = next((model for model in models if _explains(fit, chosen, model)), None)
     best, trial = examine(fit, chosen.best, [*fit.unknowns.effects.values()], report)
-    sets, fewest = Sets(best, trial, changes), None
-    for count in range(1 if causes > 1 else _TOGETHER, fit.decides.most + 1):
+    sets = Sets(best, trial, changes)
+    for count in range(1 if causes > 1 else 2, fit.decides.most + 1):
         if fewest is None and count > most:
             break
         models = sets.fits(fit, count)
         if fewest is None:
             able = [model for model in models if _explains(fit, chosen, model)]
-        elif not (able := [model for model in models if beyond(fewest, model) > needed]):
+        elif not (able := [m for m in models if beyond(fewest, m) > fit.decides.needed]):
             break
         fewest = min(able, key=lambda model: model.misfit, default=None)
     return fewest
+
+
+def _singles(
+    fit: Fit, chosen: Selection, changes: Sequence[Effect], report: Reporter
+) -> list[FittedModel]:
+    """Single changes in place of one cause or none, which some laws' forms and starts need."""
+    about, trial = examine(fit, chosen.base, changes, report)
+    scores: dict[str, CandidateScore] = {}
+    for score in sorted(trial.scores(), key=lambda score: -score.gain):
+        scores.setdefault(score.effect.name, score)
+    tried = [starts_of([score]) for score in list(scores.values())[:NEAREST] if score.size]
+    return rival_fits(fit, about, tried) if tried else []
 
 
 def _explains(fit: Fit, chosen: Selection, model: FittedModel) -> bool:

@@ -475,8 +475,9 @@ def pruned(
             clear = size / max(own, 1e-300) / fit.decides.significant
             material = _material(effect, size, own * _noise_share(best), sure=sure)
             needs = beyond(less[effect], best) / fit.decides.needed
-            # Where something is missing for sure, its immaterial twins are no other answer.
-            if sure and alone:
+            # Where something is missing for sure, its immaterial twins are no other answer; beside
+            # others that holds where all together leave noise alone.
+            if sure and (alone or is_clean(fit, best)):
                 clear = max(clear, needs)
             # No sheet says what matters of a term: what errors need does, too; of a clock alone,
             # too, from the least time on.

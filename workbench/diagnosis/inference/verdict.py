@@ -239,26 +239,27 @@ def _judged(
         ]
         verdict, doubts = _by_intervals(fit, chosen, gain, verdict, causes)
         objections += doubts
+    fits: dict[tuple[str, ...], FittedModel] = {}
+    if verdict == "unexplained" and late is None:
+        report("candidates that come nearest")
+        fits = {} if outside else nearest_fits(fit, chosen)
+    refused = refused or chosen.interrupted
+    if verdict in ("partly explained", "unexplained") and not refused:
+        other = _passed_over(fit, catalogue, chosen, fits, report)
+        if other is not None:
+            return _judged(fit, catalogue, other, astray, report)
     change = None
-    if verdict != "nothing" and not (refused or chosen.interrupted):
+    if verdict != "nothing" and not refused:
         report("changes that no effect is")
         change = outside_changes(fit, chosen, report, explained=verdict != "unexplained")
         change = change or otherwise_held(fit, chosen)
     if change is not None:
+        fits = fits or nearest_fits(fit, chosen)
         verdict = "unexplained"
         if best.active:
             much = "as much" if len(change.effects) < len(best.active) else "more"
             does = "alone explains" if len(change.effects) == 1 else "explain"
             objections.append(f"{' and '.join(change.effects)} {does} {much}")
-    fits: dict[tuple[str, ...], FittedModel] = {}
-    if verdict == "unexplained" and late is None:
-        report("candidates that come nearest")
-        fits = {} if outside else nearest_fits(fit, chosen)
-    whole = change is not None or verdict in ("nothing", "found")
-    if not (whole or refused or chosen.interrupted):
-        other = _passed_over(fit, catalogue, chosen, fits, report)
-        if other is not None:
-            return _judged(fit, catalogue, other, astray, report)
     nearest: tuple[NearestCandidate, ...] = ()
     if verdict == "unexplained" and late is None:
         others = () if outside else nearest_candidates(fit, chosen, fits, objections)

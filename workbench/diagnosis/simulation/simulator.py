@@ -336,14 +336,15 @@ class Simulator:
                 columns.append((whole - errors({**known, name: 0.0})) / size)
                 continue
             timed = name not in self._typical or (sensor is not None and sensor.parameter == LAG)
+            cut = sensor is not None and sensor.parameter in (LOSS, RECTIFIED)
             step = sample if timed else _DIFFERENCE * self._typical[name]
-            if sensor is None and name not in self._clocks:
+            if not (timed or cut):
                 step, moved = self._stepped(number, known, name, at, step, simulated)
                 columns.append((read(moved, {**known, name: at + step}) - now) / step)
                 continue
             later = {**known, name: at + step}
             before = read(simulated, values, values, later) if name in self._clocks else now
-            if sensor is not None and sensor.parameter in (LOSS, RECTIFIED) and not at:
+            if cut and not at:
                 before = errors({**known, name: _CUT})  # nothing leads either run
             columns.append((errors(later, values, later) - before) / step)
         return np.column_stack(columns)
