@@ -78,6 +78,21 @@ equation
   der(p) = r - q/V*p;
 end Reactor;
 """
+VESSEL = """model Vessel "A vessel of gas between two valves"
+  parameter Real V(unit="m3", min=1e-4) = 0.05 "Volume";
+  parameter Real A(unit="m2", min=0.0) = 4e-6 "Area of the filling valve";
+  parameter Real B(unit="m2", min=0.0) = 3e-6 "Area of the emptying valve";
+  parameter Real T(unit="K", min=100) = 293.0 "Temperature";
+  input Real a(unit="1", start=0.5) "Opening of the filling valve";
+  input Real b(unit="1", start=0.5) "Opening of the emptying valve";
+  input Real ps(unit="Pa", start=7e5) "Supply";
+  output Real p(unit="Pa", start=3e5, fixed=true, nominal=3e5) "Pressure";
+  output Real q(unit="kg/s", nominal=1e-3) "Flow from the supply";
+equation
+  q = A*a*sqrt(2*ps/(287*T)*(ps - p));
+  V*der(p) = 287*T*(q - B*b*sqrt(2*p/(287*T)*(p - 1e5)));
+end Vessel;
+"""
 # kg.m2, N.m/rad, N.m.s/rad of the model of tests/machines/bearings
 JM, JL, STIFFNESS, DAMPING, FRICTION = 2e-3, 1e-2, 20.0, 0.04, 5e-3
 
@@ -473,6 +488,55 @@ def test_a_cause_is_needed_though_its_twin_is_too_small_to_matter(tmp_path):
     assert zero.effect.name == "SensorOffset[p]"
     assert zero.parameters["offset"].low < 20.0 < zero.parameters["offset"].high
     assert outcome.diagnosis.noise_alone
+
+
+def test_fewer_causes_are_found_where_they_explain_as_much(tmp_path):
+    """Of a valve 5 % and a vessel 8 % too small a flow sensor, another valve and a vessel came."""
+    build_text(tmp_path, VESSEL)
+    signals = {
+        "inputs.a": ("1", 0, 1),
+        "inputs.b": ("1", 0, 1),
+        "inputs.ps": ("Pa", 0, 7e5),
+        "outputs.p": ("Pa", 500, 5e5),
+        "outputs.q": ("kg/s", 2e-5, 3e-3),
+    }
+    text = declared("Vessel", signals).replace("2 s", "0.1 s")
+    (tmp_path / "system.toml").write_text(text.replace("[inputs.ps]", "[inputs.ps]\nheld = true"))
+    rng, time, A, V, RT = np.random.default_rng(106), 0.1 * np.arange(600), 4.2e-6, 0.054, 287 * 293
+
+    def flow(area, high, low):
+        return area * np.sqrt(2.0 * high / RT * (high - low))
+
+    for k in range(3):
+        a, b = (np.interp(time, np.arange(0, 61, 6), rng.uniform(0.2, 1, 11)) for _ in range(2))
+        ps = np.repeat(rng.uniform(6.5e5, 7.5e5, 6), 100)
+        p = [3e5]
+        for first in range(0, 600, 100):
+
+            def rate(t, x, a=a, b=b, ps=ps[first]):
+                filled = flow(A * np.interp(t, time, a), ps, x)
+                return RT / V * (filled - flow(3e-6 * np.interp(t, time, b), x, 1e5))
+
+            at = time[first : first + 101]
+            run = solve_ivp(rate, (at[0], at[-1]), p[-1:], t_eval=at[1:], rtol=1e-8, max_step=0.1)
+            p = [*p, *run.y[0]]
+        columns = {
+            "time [s]": time,
+            "a [1]": a,
+            "b [1]": b,
+            "ps [Pa]": ps,
+            "p [Pa]": np.array(p) + 500.0 * rng.standard_normal(time.size),
+            "q [kg/s]": flow(A * a, ps, np.array(p)) + 2e-5 * rng.standard_normal(time.size),
+        }
+        write_case(tmp_path / "recordings" / f"{k}", columns, f"Run {k}", "%.9g")
+    outcome = diagnosed(load_system(str(tmp_path)), tmp_path / "recordings", tmp_path / "out")
+    sizes = {c.effect.name: next(iter(c.parameters.values())) for c in outcome.diagnosis.causes}
+    (valve,) = sizes.keys() - {"V"}
+    assert valve in ("A", "SensorGain[a]")  # the same motion
+    wide, least = (0.2e-6, 0.1e-6) if valve == "A" else (-0.05 / 1.05, -0.1)
+    assert sizes[valve].low < wide < sizes[valve].high
+    assert abs(sizes[valve].high - sizes[valve].low) < abs(least)
+    assert sizes["V"].low < 4e-3 < sizes["V"].high < 5e-3
 
 
 def test_a_gap_matters_where_a_state_keeps_what_an_input_did_in_it():

@@ -150,6 +150,23 @@ def passed_over(
     )
 
 
+def fewer_causes(fit: Fit, chosen: Selection) -> FittedModel | None:
+    """As few effects as explain what more causes do, to which one after another did not lead.
+
+    A valve and a vessel that both are larger are a sensor, another valve and a vessel that err.
+    """
+    sets = Sets(chosen.best, chosen.trial)
+    for count in range(1, len(chosen.best.active)):
+        able = [
+            model
+            for model in sets.fits(fit, count)
+            if beyond(model, chosen.best) < fit.decides.form and not below_what_matters(model)
+        ]
+        if able:
+            return min(able, key=lambda model: model.misfit)
+    return None
+
+
 def _whole(fit: Fit, chosen: Selection, models: Sequence[FittedModel]) -> FittedModel | None:
     """The best of fits that leave noise alone and clearly less than what was found."""
     able = [

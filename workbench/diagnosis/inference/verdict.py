@@ -29,6 +29,7 @@ from workbench.diagnosis.inference.fit import Fit
 from workbench.diagnosis.inference.nearest import (
     NEAREST,
     NearestCandidate,
+    fewer_causes,
     nearest_candidates,
     nearest_fits,
     passed_over,
@@ -223,6 +224,10 @@ def _judged(
     if not (astray or outside):
         chosen, late = _with_clocks(fit, catalogue, chosen, report)
     refused = bool(astray or outside or late)
+    if not (refused or chosen.interrupted):
+        other = _fewer(fit, catalogue, chosen, report)
+        if other is not None:
+            return _judged(fit, catalogue, other, astray, report)
     verdict: Verdict = "unexplained" if refused else _verdict(fit, chosen)
     base, best = chosen.base, chosen.best
     gain, objections, noise_alone = None, list[str](), True
@@ -368,6 +373,17 @@ def _by_intervals(
     if verdict == "partly explained" and len(causes) > 1 and (bent := at_bounds(causes)):
         return "unexplained", [*unsure, *bent]
     return verdict, unsure
+
+
+def _fewer(
+    fit: Fit, catalogue: Sequence[Effect], chosen: Selection, report: Reporter
+) -> Selection | None:
+    """What recordings need where fewer effects explain as much as the causes."""
+    if (fewer := fewer_causes(fit, chosen)) is None:
+        return None
+    report(f"with {' and '.join(fewer.names)} in place of more causes")
+    other = _selected_with(fit, catalogue, chosen, fewer, report)
+    return other if len(other.best.active) < len(chosen.best.active) else None
 
 
 def _passed_over(
