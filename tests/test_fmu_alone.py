@@ -22,6 +22,7 @@ from workbench.diagnosis import Outcome, Problem, catalogue, choose, problem_of
 from workbench.diagnosis.data.clocks import held_otherwise
 from workbench.diagnosis.effects.candidates import rate_terms
 from workbench.diagnosis.laws import propose
+from workbench.diagnosis.report import write_diagnosis
 from workbench.diagnosis.run import with_effects
 from workbench.diagnosis.simulation.prediction import Predictor
 from workbench.diagnosis.simulation.residual_model import ModelSource, ResidualModel
@@ -29,6 +30,7 @@ from workbench.errors import InputError
 from workbench.models.added import write_extended
 from workbench.models.fmu import FMU
 from workbench.models.native import instance
+from workbench.pages.provenance import run_of
 from workbench.runtime.engine import Engine, silent
 from workbench.studies.power.own_model import own_model
 from workbench.system.registry import load_system, model_path
@@ -140,7 +142,10 @@ def test_an_extended_model_says_which_wrong_sensors_it_does_not_hold(tank, tmp_p
     effects = {cause.effect.name for cause in outcome.diagnosis.causes}
     assert effects == {"A", "SensorOffset[level]"}
     assert outcome.without == ["SensorOffset[level]"]
-    assert "Extended.fmu\n  without SensorOffset[level], as sensors" in outcome.summary()
+    said = "without SensorOffset[level]: sensors and clocks are no part of a model"
+    assert f"Extended.fmu\n  {said}" in outcome.summary()
+    page = write_diagnosis(outcome, {"run": run_of("diagnose", tank, {})}, tmp_path / "out")
+    assert f"W{said[1:]}" in page.read_text()
 
 
 @pytest.mark.parametrize(
@@ -312,6 +317,7 @@ def test_what_needs_the_equations_says_so(tank, tmp_path):
     outcome = quietly(tank, recordings, "SensorOffset[level]")
     problem = Problem(tank, outcome.cases, None, effects)
     assert outcome.diagnosis.verdict != "found"
+    assert "workbench fit ... --parameter NAME" in outcome.next_steps[-3]
     assert "the model's own tool, export the FMU" in outcome.next_steps[-2]
     assert "put the Modelica library" in outcome.next_steps[-1]
     with pytest.raises(InputError, match=re.escape("no Modelica library package.mo")):

@@ -352,7 +352,12 @@ def _diagnose() -> Schema:
         "shape_units": by_name(TEXT),
     }
     step = {"before": NUMBER, "rivals": listed(closed({"effect": TEXT, "misfit": NUMBER}))}
-    model = {"partial": FLAG, "modelica fmu": or_null(TEXT), "difference_from_fit": ERROR}
+    model = {
+        "partial": FLAG,
+        "modelica fmu": or_null(TEXT),
+        "difference_from_fit": ERROR,
+        "without": TEXTS,
+    }
     certainty = {
         "unknowns": TEXTS,
         "correlations": MATRIX,

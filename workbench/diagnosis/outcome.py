@@ -44,6 +44,11 @@ _MEASURE = (
     "alone"
 )
 
+NOT_OF_A_MODEL = (  # why an extended model has no wrong sensors, and what follows
+    "sensors and clocks are no part of a model. Correct recordings by them before you compare "
+    "these with the extended model"
+)
+
 
 @dataclass(frozen=True)
 class Extension:
@@ -277,6 +282,8 @@ class Outcome:
         if not self.system.library.is_file():
             return [
                 *widen,
+                "fit parameters that may be wrong, several at once: workbench fit ... --parameter "
+                "NAME",
                 "add what may be missing in the model's own tool, export the FMU, and diagnose "
                 "again",
                 "put the Modelica library of the model beside the system file, if you have it: "
@@ -367,10 +374,7 @@ class Outcome:
             part = " (a part of what is missing)" * (self.diagnosis.verdict == "partly explained")
             lines += ["", f"extended model{part}: {', '.join(map(str, self.extension.files))}"]
             if self.without:
-                lines.append(
-                    f"  without {', '.join(self.without)}, as sensors and clocks are no part of a "
-                    "model: correct recordings by it before you compare them with that model"
-                )
+                lines.append(f"  without {', '.join(self.without)}: {NOT_OF_A_MODEL}")
         aside = sum(counts[FAULTY] + counts[MISSING] for counts in self.set_aside.values())
         if aside:
             lines.append(f"{aside} samples were missing or wrong, and are excluded")
@@ -446,7 +450,7 @@ class Outcome:
             "doubts": {case.name: list(case.doubts) for case in self.cases if case.doubts},
             "causes": [_cause(cause) for cause in diagnosis.causes],
             "gain": None if diagnosis.gain is None else self._gain(diagnosis.gain),
-            "model": _model(self.extension, partial=diagnosis.verdict == "partly explained"),
+            "model": self._model(),
             "partial": list(diagnosis.partial),
             "noise_alone": diagnosis.noise_alone,
             "nearest": [asdict(candidate) for candidate in diagnosis.nearest],
@@ -542,6 +546,16 @@ class Outcome:
         return f"<p>{escape(self.sentence)}</p>" + (
             table.to_html(index=False) if len(table) else ""
         )
+
+    def _model(self) -> dict[str, Any]:
+        extension = self.extension
+        return {
+            "partial": self.diagnosis.verdict == "partly explained",
+            "modelica": str(extension.modelica) if extension and extension.modelica else None,
+            "fmu": None if extension is None else str(extension.fmu),
+            "difference_from_fit": None if extension is None else extension.difference,
+            "without": [] if extension is None else self.without,
+        }
 
     def _gain(self, gain: Gain) -> dict[str, Any]:
         compare = self.system.comparison
@@ -652,15 +666,6 @@ def _cause(cause: Cause) -> dict[str, Any]:
         "confusable_with": list(cause.confusable_with),
         "explained": cause.explained,
         "separation": cause.effect.separation,
-    }
-
-
-def _model(extension: Extension | None, *, partial: bool) -> dict[str, Any]:
-    return {
-        "partial": partial,
-        "modelica": str(extension.modelica) if extension and extension.modelica else None,
-        "fmu": None if extension is None else str(extension.fmu),
-        "difference_from_fit": None if extension is None else extension.difference,
     }
 
 

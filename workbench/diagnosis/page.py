@@ -13,6 +13,7 @@ import numpy as np
 from markupsafe import Markup
 
 from workbench.diagnosis.figures import EXTENDED, NOMINAL, estimate_figure, lasting_blocks
+from workbench.diagnosis.outcome import NOT_OF_A_MODEL
 from workbench.observers import label
 from workbench.observers.simulation import CaseResult
 from workbench.pages.answer import recordings, unit_suffix
@@ -84,7 +85,7 @@ def write_diagnosis_page(
     if estimate is not None:
         title = f"The best estimate of {summary['smoothed']['recording']}"
         parts.append(Part("estimate", title, _estimate(system, summary["smoothed"], estimate)))
-    if summary["model"]["modelica"] is not None:
+    if summary["model"]["fmu"] is not None:
         parts.append(Part("model", "The extended model", _model(summary["model"], folder)))
     parts.append(
         Part("baseline", "Nuisance parameters, tolerances, excluded samples", _baseline(summary))
@@ -650,18 +651,27 @@ def _with_band(estimate: Mapping[str, Any], factor: float) -> Cell:
 
 
 def _model(model: Mapping[str, Any], folder: Path) -> list[Block]:
-    # What is written into the folder is linked from there.
-    source, fmu = (Path(model[key]).relative_to(folder).as_posix() for key in ("modelica", "fmu"))
+    links = []
+    for key, kind in (("modelica", "Modelica source"), ("fmu", "FMU")):
+        if model[key] is not None:  # what is written into the folder is linked from there
+            path = Path(model[key]).relative_to(folder).as_posix()
+            links.append(Markup('{} <a href="{}">{}</a>').format(kind, quote(path), path))
     part = "It explains a part of what is missing. " * model["partial"]
-    text = Markup(part) + Markup(
-        'Modelica source <a href="{}">{}</a> and FMU <a href="{}">{}</a>, beside this page. '
-        "Compiled, it predicts as the fit does: the largest difference on these recordings is "
-        "{:.1e} standard deviations of the noise."
-    ).format(quote(source), source, quote(fmu), fmu, model["difference_from_fit"])
+    text = Markup("{}{}, beside this page. {} predicts as the fit does: the largest difference on ")
+    text = text.format(
+        part, Markup(" and ").join(links), "It" if len(links) < 2 else "Compiled, it"
+    )
+    text += Markup("these recordings is {:.1e} standard deviations of the noise.").format(
+        model["difference_from_fit"]
+    )
+    blocks: list[Block] = [text]
+    if model["without"]:
+        blocks.append(f"Without {', '.join(model['without'])}: {NOT_OF_A_MODEL}.")
+    if model["modelica"] is not None:
+        blocks.append(Source(Path(model["modelica"]).read_text(), "Modelica source"))
     again = f"workbench diagnose NEW_RECORDINGS --model {model['fmu']} --out results/next"
     return [
-        text,
-        Source(Path(model["modelica"]).read_text(), "Modelica source"),
+        *blocks,
         "Next, to see on new recordings whether anything is still missing:",
         Source(again),
     ]
