@@ -376,6 +376,15 @@ def test_slow_channels_have_empty_cells_between_their_samples(tmp_path):
     assert [int(np.isfinite(c.values).sum()) for c in group.channels] == [24, 24, 12]
 
 
+def test_an_empty_column_without_a_name_is_none_beside_days_and_times(tmp_path):
+    """As days and times become one, it was called by the name beside it."""
+    rows = [f"2024-03-05;10:00:{k:02d};;4.{k:02d}" for k in range(60)]
+    file = read_recorded_file(table(tmp_path / "a.csv", ["Date;Time;;inflow [l/s]", *rows]))
+    assert [channel.name for channel in file.groups[0].channels] == ["Date Time", "inflow"]
+    assert not file.groups[0].left
+    assert not file.notes
+
+
 @pytest.mark.parametrize(
     ("head", "clocks"),
     [
@@ -389,10 +398,12 @@ def test_slow_channels_have_empty_cells_between_their_samples(tmp_path):
         ),
     ],
 )
-def test_columns_with_times_of_their_own_keep_them(tmp_path, head, clocks):
+@pytest.mark.parametrize("between", [";", ", "])
+def test_columns_with_times_of_their_own_keep_them(tmp_path, head, clocks, between):
     """All had the times of the first; a column at half the rate was twice as fast."""
     rows = [f"{k};4.{k:02d};" + (f"{2 * k};{900 + 2 * k}.5" if k < 30 else ";") for k in range(60)]
-    groups = read_recorded_file(table(tmp_path / "a.csv", [*head, *rows])).groups
+    lines = [line.replace(";", between) for line in [*head, *rows]]
+    groups = read_recorded_file(table(tmp_path / "a.csv", lines)).groups
     assert [group.channels[0].name for group in groups] == clocks
     assert [group.channels[1].unit for group in groups] == ["l/s", "mm"]
     assert_allclose(groups[1].channels[0].values, np.arange(0.0, 60.0, 2.0))

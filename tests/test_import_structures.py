@@ -362,6 +362,16 @@ def test_counts_of_hdf5_are_scaled_as_is_usual_or_told(tmp_path, tank, stated, m
         assert np.isnan(proposed.assigned["h"].values[3])
 
 
+def test_units_of_hdf5_may_be_in_the_encoding_of_windows(tmp_path):
+    """A degree sign that is no UTF-8 made a whole file unreadable."""
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["time"], file["T"] = TIME, LEVEL
+        file["time"].attrs["units"] = "s"
+        file["T"].attrs["units"] = np.bytes_("°C".encode("cp1252"))
+    units = {c.name: c.unit for c in read_recorded_file(tmp_path / "a.h5").groups[0].channels}
+    assert units == {"time": "s", "T": "degC"}
+
+
 def test_hdf5_is_read_with_what_its_attributes_say(tmp_path):
     """A table with names, rows of a compound, a rate, times since a date; no object of MATLAB."""
     with h5py.File(tmp_path / "a.h5", "w") as file:

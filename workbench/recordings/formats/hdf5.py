@@ -82,7 +82,13 @@ def _bytes(value: Any) -> bytes:
 
 
 def _text(value: Any) -> str:
-    return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
+    """A text; in the encoding of Western Windows where its bytes are no UTF-8, as of °C."""
+    if not isinstance(value, bytes):
+        return str(value)
+    try:
+        return value.decode()
+    except UnicodeDecodeError:
+        return value.decode("cp1252", "replace")
 
 
 _CLASS = "MATLAB_class"
@@ -128,7 +134,7 @@ def _attributes(item: Any, keys: Collection[str]) -> dict[str, Any]:
     statements: dict[str, Any] = {}
     for key, value in item.attrs.items():
         if key.lower() in keys:
-            statements[key] = value.decode() if isinstance(value, bytes) else value
+            statements[key] = _text(value) if isinstance(value, bytes) else value
             if np.size(value) == 1 and not isinstance(statements[key], str):
                 statements[key] = np.ravel(value)[0]
     return statements
@@ -153,12 +159,10 @@ def _entries(items: Mapping[str, Any], file: h5py.File) -> dict[str, Any]:
         for key in (*_NAMES, *_UNITS):
             labels = item.attrs.get(key)
             if isinstance(labels, np.ndarray | list) and len(labels) > 1:
-                texts = [text.decode() if isinstance(text, bytes) else str(text) for text in labels]
-                members[f"{name}_{key}"] = texts
+                members[f"{name}_{key}"] = list(map(_text, labels))
         unit = next((text for key, text in item.attrs.items() if key.lower() in _UNITS), None)
         if unit is not None and np.size(unit) == 1:
-            text = np.ravel(unit)[0]
-            members[f"{name}_unit"] = text.decode() if isinstance(text, bytes) else str(text)
+            members[f"{name}_unit"] = _text(np.ravel(unit)[0])
     return members
 
 
@@ -202,8 +206,7 @@ def _refers(item: Any) -> bool:
 
 def _class_of(item: Any) -> str:
     """What MATLAB says that an entry is; empty where it says nothing."""
-    matlab_class = item.attrs.get(_CLASS, b"")
-    return matlab_class.decode() if isinstance(matlab_class, bytes) else str(matlab_class)
+    return _text(item.attrs.get(_CLASS, b""))
 
 
 def _value(item: h5py.Dataset, file: h5py.File) -> Any:
@@ -240,6 +243,6 @@ def read_netcdf(path: Path, raw: bytes) -> Contents:
             native = np.asarray(values).astype(values.dtype.newbyteorder("="))
             content[name] = scaled(native, stated)
             if unit := stated.get("units"):
-                content[f"{name}_unit"] = unit.decode("utf-8", "replace")
+                content[f"{name}_unit"] = _text(unit)
     groups, notes = read_groups(content)
     return Contents("NetCDF", groups, notes)

@@ -82,6 +82,7 @@ def read_group(
         else:
             held = ", ".join(sorted({*columns[i]} - {""}))
             remarks[labels[k][0]] = f"'{labels[i][0]}' beside it with {held}"
+    unnamed = {f"column {i}" for i, name in enumerate(table.names, 1) if not name.strip()}
     stamps: list[FileChannel] = []
     numbers: dict[int, list[str]] = {}
     factors: dict[int, Vector] = {}  # by row, of columns with several units
@@ -95,7 +96,7 @@ def read_group(
         elif (within := numbers_within(cells, labels[i][1])) is not None:
             bare, (unit, factors[i]) = within
             numbers[i], labels[i] = all_plain(bare), (labels[i][0], unit)
-        elif any(cells) or table.names[i].strip():
+        elif any(cells) or labels[i][0] not in unnamed:
             texts[i] = cells
     for k, i in units_beside(labels, numbers, texts).items():
         rows = list(zip(numbers[k], texts.pop(i), strict=True))

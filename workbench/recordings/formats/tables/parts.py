@@ -62,7 +62,7 @@ def _by_tag(table: Cells, at: Mapping[str, int]) -> list[tuple[str, Cells]]:
 def _by_clock(table: Cells) -> list[tuple[str, Cells]]:
     """A table for each column of times, with the columns behind it; none where these are alike."""
     labels = table.labels
-    columns = list(zip(*table.rows, strict=True))
+    columns = table.columns
     at = [i for i, cells in enumerate(columns) if is_clock(labels[i], cells)]
     if len(at) < 2:
         return []
@@ -75,7 +75,7 @@ def _by_clock(table: Cells) -> list[tuple[str, Cells]]:
     # Or each column ends where its times do, and these elsewhere than others.
     lengths = [{_length(columns[i]) for i in range(a, b) if any(columns[i])} for a, b in blocks]
     apart = max(map(len, lengths)) == 1 and len(set().union(*lengths)) > 1
-    same = len({columns[a] for a in at}) == 1
+    same = len({tuple(columns[a]) for a in at}) == 1
     if not all(behind) or same or not (apart or len(alike) == 1):
         return []
     tables = []
