@@ -211,6 +211,25 @@ def _concluded(fit: Fit, catalogue: Sequence[Effect], report: Reporter) -> Diagn
     return _judged(fit, catalogue, chosen, astray, report)
 
 
+@dataclass(frozen=True)
+class _Answer:
+    """What the causes of a selection answer, by recordings that were fitted and that were not."""
+
+    verdict: Verdict
+    gain: Gain | None  # None without causes, or where another verdict is sure before
+    causes: Sequence[Cause]
+    objections: Sequence[str]  # what is held against the causes
+    noise_alone: bool  # see `Diagnosis`
+
+    def outdone_by(self, change: NearestCandidate, best: FittedModel) -> "_Answer":
+        """The answer where changes explain as much as the causes do, and not all are effects."""
+        much = "as much" if len(change.effects) < len(best.active) else "more"
+        does = "alone explains" if len(change.effects) == 1 else "explain"
+        outdone = f"{' and '.join(change.effects)} {does} {much}"
+        objections = [*self.objections, *([outdone] if best.active else [])]
+        return replace(self, verdict="unexplained", objections=objections)
+
+
 def _judged(
     fit: Fit,
     catalogue: Sequence[Effect],
@@ -218,76 +237,96 @@ def _judged(
     astray: Sequence[int],
     report: Reporter,
 ) -> Diagnosis:
-    """What the outcome of a search amounts to; begun again from a cause that it passed over."""
+    """What the outcome of a search amounts to; begun again from causes that it passed over."""
     chosen, outside = _within_bounds(fit, catalogue, chosen, report)
     late = None
     if not (astray or outside):
         chosen, late = _with_clocks(fit, catalogue, chosen, report)
     refused = bool(astray or outside or late)
-    if not (refused or chosen.interrupted):
-        other = _fewer(fit, catalogue, chosen, report)
-        if other is not None:
-            return _judged(fit, catalogue, other, astray, report)
-    verdict: Verdict = "unexplained" if refused else _verdict(fit, chosen)
-    base, best = chosen.base, chosen.best
-    gain, objections, noise_alone = None, list[str](), True
-    if best.active and not (outside or late):
+    ended = refused or chosen.interrupted
+    other = None if ended else _fewer(fit, catalogue, chosen, report)
+    if other is not None:
+        return _judged(fit, catalogue, other, astray, report)
+    answer = _Answer("unexplained" if refused else _verdict(fit, chosen), None, (), (), True)
+    if chosen.best.active and not (outside or late):
         report("held-out recordings")
-        gain = _gain(fit, chosen)
-        verdict, objections = _on_held_out(fit, chosen, gain, verdict, astray)
-    causes: list[Cause] = []
-    if gain is not None and verdict in ("found", "partly explained"):
-        noise_alone = chosen.validation.noise_alone(best, fast=gain.fast)
-        causes = [
-            cause_of(fit, chosen, effect, noise_alone=noise_alone, whole=verdict == "found")
-            for effect in strongest_first(fit, chosen, catalogue)
-        ]
-        verdict, doubts = _by_intervals(fit, chosen, gain, verdict, causes)
-        objections += doubts
+        answer = _answered(fit, catalogue, chosen, astray, answer.verdict)
     fits: dict[tuple[str, ...], FittedModel] = {}
-    if verdict == "unexplained" and late is None:
+    if answer.verdict == "unexplained" and late is None:
         report("candidates that come nearest")
         fits = {} if outside else nearest_fits(fit, chosen)
-    refused = refused or chosen.interrupted
-    if verdict in ("partly explained", "unexplained") and not refused:
+    if answer.verdict in ("partly explained", "unexplained") and not ended:
         other = _passed_over(fit, catalogue, chosen, fits, report)
-        if other is not None:
-            return _judged(fit, catalogue, other, astray, report)
+    if other is not None:
+        return _judged(fit, catalogue, other, astray, report)
     change = None
-    if verdict != "nothing" and not refused:
+    if answer.verdict != "nothing" and not ended:
         report("changes that no effect is")
-        change = outside_changes(fit, chosen, report, explained=verdict != "unexplained")
+        explained = answer.verdict != "unexplained"
+        change = outside_changes(fit, chosen, report, explained=explained)
         change = change or otherwise_held(fit, chosen)
     if change is not None:
         fits = fits or nearest_fits(fit, chosen)
-        verdict = "unexplained"
-        if best.active:
-            much = "as much" if len(change.effects) < len(best.active) else "more"
-            does = "alone explains" if len(change.effects) == 1 else "explain"
-            objections.append(f"{' and '.join(change.effects)} {does} {much}")
+        answer = answer.outdone_by(change, chosen.best)
     nearest: tuple[NearestCandidate, ...] = ()
-    if verdict == "unexplained" and late is None:
-        others = () if outside else nearest_candidates(fit, chosen, fits, objections)
+    if answer.verdict == "unexplained" and late is None:
+        others = () if outside else nearest_candidates(fit, chosen, fits, answer.objections)
         nearest = (*filter(None, (outside, change)), *others)[:NEAREST]
-    if verdict == "nothing" and not chosen.interrupted:
+    if answer.verdict == "nothing" and not chosen.interrupted:
         nearest = undecided(fit, chosen)
-    answered = bool(causes) and verdict != "unexplained"
+    return _diagnosis(fit, catalogue, chosen, answer, nearest, late)
+
+
+def _answered(
+    fit: Fit,
+    catalogue: Sequence[Effect],
+    chosen: Selection,
+    astray: Sequence[int],
+    verdict: Verdict,
+) -> _Answer:
+    """What causes answer, beside a verdict by the recordings that they were fitted to."""
+    gain = _gain(fit, chosen)
+    verdict, objections = _on_held_out(fit, chosen, gain, verdict, astray)
+    if verdict not in ("found", "partly explained"):
+        return _Answer(verdict, gain, (), objections, noise_alone=True)
+    noise_alone = chosen.validation.noise_alone(chosen.best, fast=gain.fast)
+    causes = [
+        cause_of(fit, chosen, effect, noise_alone=noise_alone, whole=verdict == "found")
+        for effect in strongest_first(fit, chosen, catalogue)
+    ]
+    verdict, doubts = _by_intervals(fit, chosen, gain, verdict, causes)
+    return _Answer(verdict, gain, causes, [*objections, *doubts], noise_alone)
+
+
+def _diagnosis(
+    fit: Fit,
+    catalogue: Sequence[Effect],
+    chosen: Selection,
+    answer: _Answer,
+    nearest: tuple[NearestCandidate, ...],
+    late: LateSignals | None,
+) -> Diagnosis:
+    """The answer with all that shows it, and what these recordings cannot show."""
+    best, verdict = chosen.best, answer.verdict
+    answered = bool(answer.causes) and verdict != "unexplained"
     twins = [model for fits in chosen.twins.values() for model in fits.values()]
-    remains = not noise_alone or (verdict == "unexplained" and late is None)
-    remains = remains and change is None
+    changed = any(candidate.change for candidate in nearest)
+    remains = not answer.noise_alone or (verdict == "unexplained" and late is None)
     part_of = verdict == "partly explained" or best.names in [near.effects for near in nearest]
     hidden = hidden_effects(fit, chosen.trial, catalogue)
     return Diagnosis(
         verdict=verdict,
         interrupted=chosen.interrupted,
-        causes=tuple(causes) if answered else (),
-        gain=gain if answered else None,
+        causes=tuple(answer.causes) if answered else (),
+        gain=answer.gain if answered else None,
         partial=best.names if part_of else (),
         nearest=nearest,
-        noise_alone=noise_alone,
-        differing=what_differs(fit, best, chosen.trial.joint) if remains else None,
+        noise_alone=answer.noise_alone,
+        differing=(
+            what_differs(fit, best, chosen.trial.joint) if remains and not changed else None
+        ),
         late=late,
-        base=base,
+        base=chosen.base,
         best=best,
         rivals=(best, *twins) if answered else (),
         steps=chosen.steps,
