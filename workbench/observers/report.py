@@ -89,9 +89,9 @@ def format_table(system: System, results: Sequence[CaseResult]) -> str:
     when = f" {objective.when}" if objective.when else ""
     limits = ", ".join(filter(None, (below(system), window(system))))
     lines = [f"Error of {objective.signal}, rms / mean{when} ({limits})", *followed(system)]
-    lines += warning_lines({result.case.name: result.scale_notes() for result in results})
     lines += warning_lines({result.case.name: result.warnings() for result in results})
     lines += contradiction_lines({result.case.name: result.contradictions for result in results})
+    lines += warning_lines({result.case.name: result.scale_notes() for result in results})
     lines += [header, "-" * len(header)]
     for result in results:
         cells = [_percent(result.scores[name].nrmse) for name in names]
@@ -376,7 +376,7 @@ def _trust_lines(system: System, summary: Mapping[str, Any]) -> list[str]:
         for name, case in summary["cases"].items()
     }
     scales = {name: case["scale"] for name, case in summary["cases"].items()}
-    return followed(system) + warning_lines(scales) + contradiction_lines(tested)
+    return followed(system) + contradiction_lines(tested) + warning_lines(scales)
 
 
 def warning_lines(warnings: Mapping[str, Sequence[str]]) -> list[str]:

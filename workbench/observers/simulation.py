@@ -269,7 +269,7 @@ class CaseResult:
         table = pd.DataFrame(self.to_dict()["estimators"]).T
         title = f"{self.case.name}: {self.case.title}"
         contradicted = contradiction_lines({self.case.name: self.contradictions})
-        lines = [*followed(self.system), *self.scale_notes(), *self.warnings(), *contradicted]
+        lines = [*followed(self.system), *self.warnings(), *contradicted, *self.scale_notes()]
         return "\n".join([title, *lines, table.to_string(na_rep="n/a")])
 
     def plot(self) -> "Figure":

@@ -297,7 +297,7 @@ def _run(case: Case, system: System, fmu: FMU, moved: Sequence[str]) -> _Run:
 
 def _growth(fmu: FMU, begin: Mapping[str, float], held: Mapping[str, float]) -> float:
     """How fast a state grows by itself at the start [1/s]; 0 where none does, or nobody knows."""
-    if fmu.interface != MODEL_EXCHANGE:
+    if fmu.interface != MODEL_EXCHANGE or not all(map(fmu.is_real, fmu.states)):
         return 0.0
     try:
         fmu.start(begin, held)
