@@ -375,7 +375,7 @@ def _trust_lines(system: System, summary: Mapping[str, Any]) -> list[str]:
         }
         for name, case in summary["cases"].items()
     }
-    scales = {name: case["scale"] for name, case in summary["cases"].items()}
+    scales = {name: case.get("scale", ()) for name, case in summary["cases"].items()}
     return followed(system) + contradiction_lines(tested) + warning_lines(scales)
 
 

@@ -75,7 +75,7 @@ def _fewest(
         fewest = next((model for model in models if _explains(fit, chosen, model)), None)
     best, trial = examine(fit, chosen.best, [*fit.unknowns.effects.values()], report)
     sets = Sets(best, trial, changes)
-    for count in range(1 if causes > 1 else 2, fit.decides.most + 1):
+    for count in range(1 if causes > 1 else 2, max(most, _TOGETHER) + 1):
         if fewest is None and count > most:
             break
         models = sets.fits(fit, count)
