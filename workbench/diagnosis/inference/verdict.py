@@ -437,7 +437,10 @@ def _passed_over(
         return None
     report(f"with {' and '.join(whole.names)}, where the fits above did not get")
     other = _selected_with(fit, catalogue, chosen, whole, report)
-    return other if beyond(chosen.best, other.best) > fit.decides.needed else None
+    # Else a cause that only stands for another beyond its bound would be taken up again and again.
+    within, outside = _within_bounds(fit, catalogue, other, report)
+    more = beyond(chosen.best, within.best) > fit.decides.needed
+    return within if more and outside is None else None
 
 
 def _selected_with(
